@@ -1,0 +1,1 @@
+//! The Axisbridge gateway.

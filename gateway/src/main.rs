@@ -1,0 +1,3 @@
+//! The `axisbridge` command.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! EtherNet/IP, CIP and CIP Motion: wire formats, target and controller roles.

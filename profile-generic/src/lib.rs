@@ -1,0 +1,1 @@
+//! The generic power drive system interface of IEC 61800-7-1.

@@ -1,0 +1,1 @@
+//! SERCOS III: telegrams, phases, service channel, master and slave roles.
