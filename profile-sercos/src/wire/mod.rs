@@ -1,0 +1,8 @@
+//! The bytes of SERCOS III: one file per telegram or telegram part.
+//!
+//! Each file has a plain `Repr` (or word type) with `parse`, `buffer_len` and `emit`. `parse(emit(x)) == x`
+//! for every value, and parsing never panics and never allocates, whatever the bytes are.
+
+pub mod error;
+
+pub use error::Error;
