@@ -1,1 +1,10 @@
 //! Shared helpers of the whole-system tests.
+//!
+//! The tests themselves stand in `tests/`, one file a subject. What needs a foreign peer (tshark, root
+//! for network namespaces) goes through [`peer`]: on a user's machine a missing peer is a visible skip,
+//! in CI (`CI=true`) it is a failure.
+
+pub mod namespace;
+pub mod peer;
+pub mod process;
+pub mod tshark;

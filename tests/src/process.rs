@@ -1,0 +1,87 @@
+//! Child processes of a test: ended by their own id, never left behind.
+
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// The `axisbridge` binary of this build: built by the same cargo run, beside the test binary.
+///
+/// # Panics
+/// When it was not built.
+#[must_use]
+pub fn axisbridge() -> PathBuf {
+    let mut directory = std::env::current_exe().expect("the test knows its own path");
+    directory.pop();
+    if directory.ends_with("deps") {
+        directory.pop();
+    }
+    let binary = directory.join("axisbridge");
+    if !binary.exists() {
+        // `cargo test -p axisbridge-tests` alone does not build the binary of another package.
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "-p", "axisbridge", "--bin", "axisbridge"]);
+        if directory.ends_with("release") {
+            build.arg("--release");
+        }
+        assert!(build.status().is_ok_and(|status| status.success()), "cannot build the axisbridge binary");
+    }
+    assert!(binary.exists(), "the axisbridge binary is not at {}", binary.display());
+    binary
+}
+
+/// A child process that is ended when the test ends, however it ends.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    name: &'static str,
+}
+
+impl Running {
+    /// Starts `command`; `name` stands in messages.
+    ///
+    /// # Panics
+    /// When the command cannot be started.
+    #[must_use]
+    pub fn start(name: &'static str, command: &mut Command) -> Self {
+        let child = command.spawn().unwrap_or_else(|error| panic!("cannot start {name}: {error}"));
+        Self { child, name }
+    }
+
+    /// Its exit status if it has ended.
+    pub fn ended(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().expect("a child can be waited for")
+    }
+
+    /// Waits until it ends, at most `limit`.
+    ///
+    /// # Panics
+    /// When it is still running then.
+    pub fn wait(&mut self, limit: Duration) -> ExitStatus {
+        let end = Instant::now() + limit;
+        loop {
+            if let Some(status) = self.ended() {
+                return status;
+            }
+            assert!(Instant::now() < end, "{} did not end within {limit:?}", self.name);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Asks it to end (SIGTERM), as a service manager does, and waits.
+    ///
+    /// # Panics
+    /// When it does not end within `limit`.
+    pub fn terminate(&mut self, limit: Duration) -> ExitStatus {
+        if self.ended().is_none() {
+            let _ = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status();
+        }
+        self.wait(limit)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
