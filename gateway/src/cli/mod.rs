@@ -1,0 +1,160 @@
+//! The command line: a contract, since scripts depend on it.
+//!
+//! Data goes to standard output, errors and progress to standard error. Exit status 0 is good, 1 findings or failure, 2 usage.
+
+mod decode;
+mod demo;
+mod progress;
+mod run;
+mod simulate;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Motion protocol gateway: to a controller it is CIP Motion drives; behind it, it masters the real ones.
+#[derive(Debug, Parser)]
+#[command(name = "axisbridge", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the whole chain in one process: controller, gateway and two simulated SERCOS III drives.
+    Demo(DemoArguments),
+    /// Run the gateway box.
+    Run(RunArguments),
+    /// Print the frames of a capture file as an indented tree.
+    Decode(DecodeArguments),
+    /// Run the other side of a protocol as a process of its own.
+    #[command(subcommand)]
+    Simulate(Simulate),
+}
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+struct DemoArguments {
+    /// How long the axes move, in seconds (1 to 3600).
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: u32,
+    /// Print the result as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Address on which the gateway's EtherNet/IP side listens (TCP and UDP 44818, UDP 2222).
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.2")]
+    listen: std::net::Ipv4Addr,
+    /// Where to write the recording of both sides.
+    #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
+    capture: PathBuf,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+struct RunArguments {
+    /// The configuration of the box (TOML).
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Record both sides into this file (pcapng).
+    #[arg(long, value_name = "FILE")]
+    capture: Option<PathBuf>,
+}
+
+/// Arguments of `decode`.
+#[derive(Debug, Args)]
+struct DecodeArguments {
+    /// A pcap or pcapng file.
+    file: PathBuf,
+    /// First frame to print, counted from 1.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    from: u64,
+    /// Print at most this many frames.
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    /// Print frames of this side only.
+    #[arg(long, value_enum)]
+    only: Option<Side>,
+}
+
+/// Which protocol `decode` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Side {
+    /// SERCOS III.
+    Sercos,
+    /// EtherNet/IP, CIP and CIP Motion.
+    Cip,
+}
+
+#[derive(Debug, Subcommand)]
+enum Simulate {
+    /// A line of simulated SERCOS III drives on a network interface.
+    SercosDrive(SercosDriveArguments),
+    /// A CIP Motion controller that configures, enables and moves the axes of a device.
+    Controller(ControllerArguments),
+}
+
+/// Arguments of `simulate sercos-drive`.
+#[derive(Debug, Args)]
+struct SercosDriveArguments {
+    /// The network interface, such as eth1.
+    #[arg(long, value_name = "IF")]
+    interface: String,
+    /// How many drives hang on the line.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
+    slaves: u16,
+    /// SERCOS address of the first drive; the others count up from it.
+    #[arg(long, value_name = "ADDRESS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
+    address: u16,
+    /// End by itself after this many seconds.
+    #[arg(long, value_name = "N")]
+    seconds: Option<u64>,
+}
+
+/// Arguments of `simulate controller`.
+#[derive(Debug, Args)]
+struct ControllerArguments {
+    /// The device's address.
+    #[arg(long, value_name = "ADDR")]
+    target: std::net::Ipv4Addr,
+    /// This controller's own address; the class 1 data arrive there on UDP 2222.
+    #[arg(long, value_name = "ADDR", default_value = "0.0.0.0")]
+    bind: std::net::Ipv4Addr,
+    /// How many axes the device has.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
+    axes: u8,
+    /// Controller update period (the connection's RPI) in microseconds.
+    #[arg(long, value_name = "US", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(250..=1_000_000))]
+    update_period_us: u32,
+    /// How long the axes move, in seconds.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: u32,
+    /// Print the result as one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads the arguments, runs the command, and says what the process's exit status is.
+#[must_use]
+pub fn main() -> ExitCode {
+    // clap itself ends with status 2 on a usage error, and 0 after help.
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Decode(arguments) => decode::run(&arguments),
+        Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
+        Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// An error as the person at the terminal reads it.
+type CliError = Box<dyn std::error::Error + Send + Sync>;
