@@ -1,0 +1,3 @@
+//! The device role: the explicit side ([`adapter`]) and the motion device behind it.
+
+pub mod motion_link;

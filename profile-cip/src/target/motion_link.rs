@@ -1,0 +1,201 @@
+//! What passes between the explicit side ([`super::adapter`]) and the motion device.
+//!
+//! The two run on different threads: the adapter beside the TCP sessions, the motion device in the cycle.
+//! These values cross in bounded queues, so they own fixed storage and never touch the heap.
+//!
+//! ```text
+//! Adapter --MotionRequest--> motion device        Adapter <--MotionReply-- motion device
+//! ```
+//!
+//! Every request carries a [`Token`] and is answered exactly once with a reply of the same token. Besides
+//! that the device reports on its own when the open connection has timed out.
+
+use arrayvec::ArrayVec;
+use core::fmt;
+use core::net::{Ipv4Addr, SocketAddrV4};
+
+/// Most bytes of service data in a handed-on explicit request or its reply: what an unconnected message holds.
+pub const EXPLICIT_DATA_MAX: usize = 504;
+
+/// Most 16-bit words of extended status the device may add to a reply.
+pub const EXTENDED_STATUS_MAX: usize = 4;
+
+/// Names one request until its reply; never used twice by one adapter run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Token(pub u64);
+
+/// What identifies a connection at its originator: the triad of every Forward_Open and Forward_Close.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ConnectionTriad {
+    /// Connection serial number, chosen by the originator.
+    pub connection_serial: u16,
+    /// Vendor ID of the originator.
+    pub originator_vendor: u16,
+    /// Serial number of the originator.
+    pub originator_serial: u32,
+}
+
+impl fmt::Display for ConnectionTriad {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "connection {:#06x} of vendor {:#06x} serial {:#010x}",
+            self.connection_serial, self.originator_vendor, self.originator_serial
+        )
+    }
+}
+
+/// What the adapter asks of the motion device.
+#[expect(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MotionRequest {
+    /// Take up the motion I/O connection; answered with [`MotionReply::Opened`].
+    Open(OpenParameters),
+    /// Give the motion I/O connection up at the controller's wish (Forward_Close, Volume 9 clause 5-2.6:
+    /// faults are cleared and the axes initialise); answered with [`MotionReply::Closed`].
+    Close(CloseParameters),
+    /// Run an explicit service of the Motion Device Axis Object; answered with [`MotionReply::Explicit`].
+    Explicit(ExplicitRequest),
+}
+
+impl MotionRequest {
+    /// The token its reply has to carry.
+    pub const fn token(&self) -> Token {
+        match self {
+            Self::Open(open) => open.token,
+            Self::Close(close) => close.token,
+            Self::Explicit(explicit) => explicit.token,
+        }
+    }
+}
+
+/// The motion I/O connection as the Forward_Open asked for it; every value has been checked and accepted.
+///
+/// O->T is the controller-to-device direction, T->O the device-to-controller direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OpenParameters {
+    /// Names this request.
+    pub token: Token,
+    /// The connection's triad.
+    pub triad: ConnectionTriad,
+    /// Connection ID in the controller-to-device datagrams; chosen by this device, unique in its run.
+    pub o_to_t_id: u32,
+    /// Connection ID to put into the device-to-controller datagrams; chosen by the controller.
+    pub t_to_o_id: u32,
+    /// Address controller-to-device datagrams come from; others are not of this connection.
+    pub originator: Ipv4Addr,
+    /// Where device-to-controller datagrams go (point to point).
+    pub t_to_o_destination: SocketAddrV4,
+    /// Requested packet interval of both directions in microseconds, which is the Controller Update Period
+    /// (Volume 9 clause 7-1.1: the actual interval equals the requested one).
+    pub rpi_us: u32,
+    /// Silence in the controller-to-device direction that ends the connection, in microseconds: the interval
+    /// times the time-out multiplier.
+    pub timeout_us: u64,
+    /// Largest controller-to-device connection data in bytes, the 2-byte sequence count included.
+    pub o_to_t_size: u16,
+    /// Largest device-to-controller connection data in bytes, the 2-byte sequence count included.
+    pub t_to_o_size: u16,
+    /// Whether controller-to-device data may be shorter than `o_to_t_size`.
+    pub o_to_t_variable: bool,
+    /// Whether device-to-controller data may be shorter than `t_to_o_size`.
+    pub t_to_o_variable: bool,
+    /// Format revision of the connection data (the I/O connection point of the path).
+    pub format_revision: u8,
+}
+
+/// Which connection ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CloseParameters {
+    /// Names this request.
+    pub token: Token,
+    /// The connection's triad.
+    pub triad: ConnectionTriad,
+    /// The controller-to-device connection ID given at [`OpenParameters::o_to_t_id`].
+    pub o_to_t_id: u32,
+}
+
+/// The object and attribute an explicit request is aimed at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ObjectPath {
+    /// Class code; 0x42 for the Motion Device Axis Object.
+    pub class: u16,
+    /// Instance number; 0 is the class itself.
+    pub instance: u32,
+    /// Attribute number where the path names one.
+    pub attribute: Option<u16>,
+    /// Member (array element) where the path names one.
+    pub member: Option<u32>,
+    /// Connection point where the path names one.
+    pub connection_point: Option<u16>,
+}
+
+/// An explicit service request to the Motion Device Axis Object.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExplicitRequest {
+    /// Names this request.
+    pub token: Token,
+    /// Service code, 0..=0x7F.
+    pub service: u8,
+    /// What it is aimed at.
+    pub path: ObjectPath,
+    /// The service data behind the path.
+    pub data: ArrayVec<u8, EXPLICIT_DATA_MAX>,
+}
+
+/// What the motion device tells the adapter.
+#[expect(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MotionReply {
+    /// Answer to [`MotionRequest::Open`].
+    Opened {
+        /// Token of the request.
+        token: Token,
+        /// Success, or why the device cannot take the connection now.
+        outcome: Result<(), OpenRefusal>,
+    },
+    /// Answer to [`MotionRequest::Close`]; also given when the device no longer had that connection.
+    Closed {
+        /// Token of the request.
+        token: Token,
+    },
+    /// Answer to [`MotionRequest::Explicit`].
+    Explicit(ExplicitReply),
+    /// The connection ended without a Forward_Close: the controller was silent for too long. The connection is
+    /// free for the next owner from here on.
+    ConnectionLost {
+        /// Which connection.
+        o_to_t_id: u32,
+        /// Silence since the last controller-to-device datagram in microseconds.
+        silent_us: u64,
+    },
+}
+
+/// Why the device refuses a connection that the adapter had accepted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OpenRefusal {
+    /// General status for the Forward_Open reply, not zero.
+    pub general_status: u8,
+    /// First extended status word.
+    pub extended_status: u16,
+}
+
+/// The answer to an explicit request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExplicitReply {
+    /// Token of the request.
+    pub token: Token,
+    /// General status; zero is success.
+    pub general_status: u8,
+    /// Extended status words, usually none.
+    pub extended_status: ArrayVec<u16, EXTENDED_STATUS_MAX>,
+    /// Reply data of the service.
+    pub data: ArrayVec<u8, EXPLICIT_DATA_MAX>,
+}
+
+impl ExplicitReply {
+    /// A reply without data: success (0) or a refusal.
+    pub fn status(token: Token, general_status: u8) -> Self {
+        Self { token, general_status, extended_status: ArrayVec::new(), data: ArrayVec::new() }
+    }
+}
