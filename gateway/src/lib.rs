@@ -1,1 +1,3 @@
 //! The Axisbridge gateway.
+
+pub mod sys;

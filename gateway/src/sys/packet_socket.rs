@@ -1,0 +1,486 @@
+//! Whole Ethernet frames of one EtherType on one interface (`AF_PACKET`).
+//!
+//! The south bus of a SERCOS box: frames leave past the queueing discipline and arrive with the kernel's time stamp;
+//! frames sent by this host are not seen. Sending and receiving never wait and never allocate.
+#![allow(unsafe_code)]
+
+use std::ffi::CString;
+use std::io;
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
+use std::time::Duration;
+
+use thiserror::Error;
+
+use super::clock::KernelTime;
+use super::receive::{PlainAddress, enable_time_stamps, receive, set_option};
+
+/// EtherType of SERCOS III.
+pub const ETHER_TYPE_SERCOS: u16 = 0x88CD;
+
+/// Longest name of an interface on Linux, without the closing zero.
+const NAME_LEN_MAX: usize = libc::IFNAMSIZ - 1;
+
+/// Frames of our own that one [`PacketSocket::recv`] passes over before it gives the caller its time back.
+const OUTGOING_SKIPPED_MAX: usize = 32;
+
+/// Room for received frames in the kernel: 64 cycles of eight frames of the longest kind.
+const RECEIVE_BUFFER_LEN: i32 = 1 << 20;
+
+/// Why a packet socket could not be opened.
+#[derive(Debug, Error)]
+pub enum OpenError {
+    /// No interface has this name.
+    #[error("there is no network interface `{name}`")]
+    NoSuchInterface {
+        /// The name asked for.
+        name: String,
+    },
+    /// The name cannot be one of an interface.
+    #[error("`{name}` cannot be the name of a network interface (1 to 15 bytes, no zero)")]
+    BadName {
+        /// The name asked for.
+        name: String,
+    },
+    /// The process may not open packet sockets.
+    #[error(
+        "not allowed to send raw frames on `{name}`: the process needs CAP_NET_RAW (run as root, or `setcap cap_net_raw+ep` on the program)"
+    )]
+    NotPermitted {
+        /// The name asked for.
+        name: String,
+    },
+    /// The interface is there and switched off.
+    #[error("the network interface `{name}` is down (`ip link set {name} up`)")]
+    InterfaceDown {
+        /// The name asked for.
+        name: String,
+    },
+    /// The interface does not carry Ethernet frames.
+    #[error("the network interface `{name}` is not Ethernet (hardware type {hardware_type})")]
+    NotEthernet {
+        /// The name asked for.
+        name: String,
+        /// Linux's `ARPHRD_` number.
+        hardware_type: u16,
+    },
+    /// The system refused for another reason.
+    #[error("cannot open `{name}`: {step}: {source}")]
+    System {
+        /// The name asked for.
+        name: String,
+        /// The system call that failed.
+        step: &'static str,
+        /// Its error.
+        source: io::Error,
+    },
+}
+
+/// Why a frame was not sent or nothing can be received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum LinkError {
+    /// The interface has been switched off (`ENETDOWN`).
+    #[error("the network interface is down")]
+    Down,
+    /// The interface has been removed (`ENXIO`, `ENODEV`).
+    #[error("the network interface is gone")]
+    Gone,
+    /// The transmit queue is full or the link has no carrier (`ENOBUFS`, `EAGAIN`).
+    #[error("the transmit queue is full or there is no carrier")]
+    Full,
+    /// The frame is longer than the interface takes (`EMSGSIZE`), or shorter than an Ethernet header (`EINVAL`).
+    #[error("the frame's length does not suit the interface")]
+    Length,
+    /// Another error of the system.
+    #[error("system error {0}")]
+    System(i32),
+}
+
+impl LinkError {
+    fn from_io(error: &io::Error) -> Self {
+        match error.raw_os_error().unwrap_or(libc::EIO) {
+            libc::ENETDOWN => Self::Down,
+            libc::ENXIO | libc::ENODEV => Self::Gone,
+            libc::ENOBUFS | libc::EAGAIN => Self::Full,
+            libc::EMSGSIZE | libc::EINVAL => Self::Length,
+            other => Self::System(other),
+        }
+    }
+}
+
+/// State of an interface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkState {
+    /// Switched on, with carrier.
+    Up,
+    /// Switched on; no cable, or the other end is off.
+    NoCarrier,
+    /// Switched off.
+    Down,
+    /// No longer there.
+    Gone,
+}
+
+/// A received frame; its bytes are in the caller's buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Received {
+    /// Bytes of the frame, from the destination address on, without frame check sequence.
+    pub len: usize,
+    /// When the kernel took it from the interface, where it says so.
+    pub at: Option<KernelTime>,
+}
+
+/// An open packet socket.
+#[derive(Debug)]
+pub struct PacketSocket {
+    socket: OwnedFd,
+    name: String,
+    index: i32,
+    mac: [u8; 6],
+    time_stamps: bool,
+}
+
+impl PacketSocket {
+    /// Opens the interface `name` for frames of `ether_type`, promiscuous and without waiting.
+    ///
+    /// # Errors
+    /// [`OpenError`], one kind for each thing a person can put right.
+    pub fn open(name: &str, ether_type: u16) -> Result<Self, OpenError> {
+        let owned = || name.to_owned();
+        let system =
+            |step: &'static str, source: io::Error| OpenError::System { name: owned(), step, source };
+        let c_name = CString::new(name).map_err(|_| OpenError::BadName { name: owned() })?;
+        if name.is_empty() || name.len() > NAME_LEN_MAX {
+            return Err(OpenError::BadName { name: owned() });
+        }
+        // SAFETY: `c_name` ends in a zero and outlives the call.
+        let index = unsafe { libc::if_nametoindex(c_name.as_ptr()) };
+        let index = i32::try_from(index).unwrap_or(0);
+        if index == 0 {
+            return Err(OpenError::NoSuchInterface { name: owned() });
+        }
+
+        // Protocol 0 receives nothing: no frame of another interface can slip in before the bind below.
+        // SAFETY: socket() takes integers only.
+        let descriptor = unsafe {
+            libc::socket(libc::AF_PACKET, libc::SOCK_RAW | libc::SOCK_NONBLOCK | libc::SOCK_CLOEXEC, 0)
+        };
+        if descriptor < 0 {
+            let error = io::Error::last_os_error();
+            return Err(match error.kind() {
+                io::ErrorKind::PermissionDenied => OpenError::NotPermitted { name: owned() },
+                _ => system("socket", error),
+            });
+        }
+        // SAFETY: the descriptor has just been made and belongs to nobody else.
+        let socket = unsafe { OwnedFd::from_raw_fd(descriptor) };
+
+        match link_state(socket.as_fd(), index, name) {
+            LinkState::Up | LinkState::NoCarrier => {}
+            LinkState::Down => return Err(OpenError::InterfaceDown { name: owned() }),
+            LinkState::Gone => return Err(OpenError::NoSuchInterface { name: owned() }),
+        }
+        let (hardware_type, mac) =
+            hardware_address(socket.as_fd(), name).map_err(|error| system("SIOCGIFHWADDR", error))?;
+        if hardware_type != libc::ARPHRD_ETHER {
+            return Err(OpenError::NotEthernet { name: owned(), hardware_type });
+        }
+
+        set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_QDISC_BYPASS, &1_i32)
+            .map_err(|error| system("PACKET_QDISC_BYPASS", error))?;
+        // Older kernels do not know this one; `recv` looks at the packet type in any case.
+        let _ = set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_IGNORE_OUTGOING, &1_i32);
+        // A smaller buffer than asked for is still a working one.
+        let _ = set_option(socket.as_fd(), libc::SOL_SOCKET, libc::SO_RCVBUF, &RECEIVE_BUFFER_LEN);
+        let membership = libc::packet_mreq {
+            mr_ifindex: index,
+            mr_type: u16::try_from(libc::PACKET_MR_PROMISC).unwrap_or(1),
+            mr_alen: 0,
+            mr_address: [0; 8],
+        };
+        set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_ADD_MEMBERSHIP, &membership)
+            .map_err(|error| system("PACKET_ADD_MEMBERSHIP", error))?;
+        let time_stamps = enable_time_stamps(socket.as_fd());
+
+        let mut address = libc::sockaddr_ll::zeroed();
+        address.sll_family = libc::sa_family_t::try_from(libc::AF_PACKET).unwrap_or(0);
+        address.sll_protocol = ether_type.to_be();
+        address.sll_ifindex = index;
+        let length = libc::socklen_t::try_from(size_of::<libc::sockaddr_ll>()).unwrap_or(0);
+        // SAFETY: `address` is a valid `sockaddr_ll` of the length given and outlives the call.
+        let bound = unsafe { libc::bind(socket.as_raw_fd(), (&raw const address).cast(), length) };
+        if bound != 0 {
+            return Err(system("bind", io::Error::last_os_error()));
+        }
+        Ok(Self { socket, name: owned(), index, mac, time_stamps })
+    }
+
+    /// Name of the interface.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The interface's Ethernet address.
+    #[must_use]
+    pub const fn mac(&self) -> [u8; 6] {
+        self.mac
+    }
+
+    /// Whether received frames carry the kernel's time stamp.
+    #[must_use]
+    pub const fn has_time_stamps(&self) -> bool {
+        self.time_stamps
+    }
+
+    /// State of the interface now.
+    #[must_use]
+    pub fn link_state(&self) -> LinkState {
+        link_state(self.socket.as_fd(), self.index, &self.name)
+    }
+
+    /// Sends one whole frame, from the destination address on, at once or not at all.
+    ///
+    /// # Errors
+    /// [`LinkError`]: the frame has not left.
+    pub fn send(&self, frame: &[u8]) -> Result<(), LinkError> {
+        // SAFETY: `frame` is readable for its length through the call.
+        let sent = unsafe {
+            libc::send(
+                self.socket.as_raw_fd(),
+                frame.as_ptr().cast(),
+                frame.len(),
+                libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL,
+            )
+        };
+        if sent < 0 { Err(LinkError::from_io(&io::Error::last_os_error())) } else { Ok(()) }
+    }
+
+    /// Receives one frame into `buffer` without waiting; `Ok(None)` when there is none.
+    ///
+    /// A frame longer than `buffer` is cut to it.
+    ///
+    /// # Errors
+    /// [`LinkError`]: once when the interface has gone down; receiving may be tried again.
+    pub fn recv(&self, buffer: &mut [u8]) -> Result<Option<Received>, LinkError> {
+        let mut from = libc::sockaddr_ll::zeroed();
+        for _ in 0..OUTGOING_SKIPPED_MAX {
+            let message = receive(self.socket.as_fd(), buffer, &mut from)
+                .map_err(|error| LinkError::from_io(&error))?;
+            let Some(message) = message else { return Ok(None) };
+            if from.sll_pkttype == libc::PACKET_OUTGOING {
+                continue;
+            }
+            return Ok(Some(Received { len: message.len, at: message.at }));
+        }
+        Ok(None)
+    }
+
+    /// Waits until a frame can be received or `timeout` is over; `true` when one can.
+    ///
+    /// For threads that are not the cycle's.
+    ///
+    /// # Errors
+    /// What `poll` refuses.
+    pub fn wait(&self, timeout: Duration) -> io::Result<bool> {
+        let mut entry = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+        let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
+        // SAFETY: `entry` is one valid, writable `pollfd` that outlives the call.
+        let ready = unsafe { libc::poll(&raw mut entry, 1, milliseconds) };
+        if ready < 0 {
+            let error = io::Error::last_os_error();
+            return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
+        }
+        Ok(ready > 0)
+    }
+
+    /// Frames the kernel dropped since the last call because they were not fetched in time.
+    #[must_use]
+    pub fn take_dropped(&self) -> u32 {
+        let mut statistics = libc::tpacket_stats { tp_packets: 0, tp_drops: 0 };
+        let mut length = libc::socklen_t::try_from(size_of::<libc::tpacket_stats>()).unwrap_or(0);
+        // SAFETY: `statistics` is writable for `length` bytes and both outlive the call.
+        let result = unsafe {
+            libc::getsockopt(
+                self.socket.as_raw_fd(),
+                libc::SOL_PACKET,
+                libc::PACKET_STATISTICS,
+                (&raw mut statistics).cast(),
+                &raw mut length,
+            )
+        };
+        if result == 0 { statistics.tp_drops } else { 0 }
+    }
+}
+
+impl AsFd for PacketSocket {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+/// `struct ifreq` of Linux, as far as it is used here: `SIOCGIFFLAGS` and `SIOCGIFHWADDR` fill at most 16 bytes after
+/// the name; the kernel copies 40 bytes in and out.
+#[repr(C, align(8))]
+struct InterfaceRequest {
+    name: [u8; libc::IFNAMSIZ],
+    value: [u8; 24],
+}
+
+const SIOCGIFFLAGS: libc::c_ulong = 0x8913;
+const SIOCGIFHWADDR: libc::c_ulong = 0x8927;
+
+impl InterfaceRequest {
+    fn ask(socket: BorrowedFd<'_>, name: &str, question: libc::c_ulong) -> io::Result<[u8; 24]> {
+        let mut request = Self { name: [0; libc::IFNAMSIZ], value: [0; 24] };
+        for (slot, byte) in request.name[..NAME_LEN_MAX].iter_mut().zip(name.bytes()) {
+            *slot = byte;
+        }
+        // SAFETY: both questions read and write a `struct ifreq`, which `request` is, alive through the call.
+        let result = unsafe { libc::ioctl(socket.as_raw_fd(), question as _, &raw mut request) };
+        if result < 0 { Err(io::Error::last_os_error()) } else { Ok(request.value) }
+    }
+}
+
+fn link_state(socket: BorrowedFd<'_>, index: i32, name: &str) -> LinkState {
+    let Ok(value) = InterfaceRequest::ask(socket, name, SIOCGIFFLAGS) else { return LinkState::Gone };
+    // The name may have passed to another interface since.
+    let same = CString::new(name).is_ok_and(|c_name| {
+        // SAFETY: `c_name` ends in a zero and outlives the call.
+        i32::try_from(unsafe { libc::if_nametoindex(c_name.as_ptr()) }) == Ok(index)
+    });
+    let flags = i32::from(u16::from_ne_bytes([value[0], value[1]]));
+    if !same {
+        LinkState::Gone
+    } else if flags & libc::IFF_UP == 0 {
+        LinkState::Down
+    } else if flags & libc::IFF_RUNNING == 0 {
+        LinkState::NoCarrier
+    } else {
+        LinkState::Up
+    }
+}
+
+fn hardware_address(socket: BorrowedFd<'_>, name: &str) -> io::Result<(u16, [u8; 6])> {
+    let value = InterfaceRequest::ask(socket, name, SIOCGIFHWADDR)?;
+    let hardware_type = u16::from_ne_bytes([value[0], value[1]]);
+    let mut mac = [0; 6];
+    mac.copy_from_slice(&value[2..8]);
+    Ok((hardware_type, mac))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sys::clock::realtime_now;
+    use crate::sys::namespace::{in_namespace, ip};
+
+    fn frame(ether_type: u16, payload: u8) -> [u8; 60] {
+        let mut frame = [payload; 60];
+        frame[..6].fill(0xFF);
+        frame[6..12].copy_from_slice(&[2, 0, 0, 0, 0, 1]);
+        frame[12..14].copy_from_slice(&ether_type.to_be_bytes());
+        frame
+    }
+
+    fn veth() {
+        ip("link add south0 address 02:00:00:00:00:0a type veth peer name south1");
+        ip("link set south0 up");
+        ip("link set south1 up");
+    }
+
+    #[test]
+    fn frames_cross_a_cable_with_time_stamps_and_without_our_own() {
+        in_namespace("frames_cross_a_cable", || {
+            veth();
+            let a = PacketSocket::open("south0", ETHER_TYPE_SERCOS).unwrap();
+            let b = PacketSocket::open("south1", ETHER_TYPE_SERCOS).unwrap();
+            assert_eq!(a.mac(), [2, 0, 0, 0, 0, 0x0A]);
+            assert_eq!(a.name(), "south0");
+            assert_eq!(a.link_state(), LinkState::Up);
+
+            let before = realtime_now();
+            a.send(&frame(0x0800, 1)).unwrap();
+            a.send(&frame(ETHER_TYPE_SERCOS, 2)).unwrap();
+            a.send(&frame(ETHER_TYPE_SERCOS, 3)).unwrap();
+
+            let mut buffer = [0xA5; 1518];
+            for payload in [2, 3] {
+                assert!(b.wait(Duration::from_secs(5)).unwrap());
+                let received = b.recv(&mut buffer).unwrap().unwrap();
+                assert_eq!(buffer[..received.len], frame(ETHER_TYPE_SERCOS, payload));
+                if b.has_time_stamps() {
+                    let at = received.at.unwrap();
+                    assert!(before <= at && at <= realtime_now(), "{before:?} {at:?}");
+                }
+            }
+            assert_eq!(b.recv(&mut buffer).unwrap(), None);
+            assert_eq!(a.recv(&mut buffer).unwrap(), None, "the sender sees its own frames");
+            assert!(!a.wait(Duration::from_millis(1)).unwrap());
+            assert_eq!(b.take_dropped(), 0);
+        });
+    }
+
+    #[test]
+    fn an_interface_that_goes_down_is_reported_and_comes_back() {
+        in_namespace("an_interface_that_goes_down", || {
+            veth();
+            let a = PacketSocket::open("south0", ETHER_TYPE_SERCOS).unwrap();
+            let b = PacketSocket::open("south1", ETHER_TYPE_SERCOS).unwrap();
+            let mut buffer = [0; 1518];
+
+            ip("link set south1 down");
+            assert_eq!(a.link_state(), LinkState::NoCarrier);
+            assert_eq!(a.send(&frame(ETHER_TYPE_SERCOS, 1)), Err(LinkError::Full));
+
+            ip("link set south0 down");
+            assert_eq!(a.link_state(), LinkState::Down);
+            assert_eq!(a.send(&frame(ETHER_TYPE_SERCOS, 1)), Err(LinkError::Down));
+            assert_eq!(a.recv(&mut buffer), Err(LinkError::Down));
+            assert_eq!(a.recv(&mut buffer), Ok(None), "the error is reported once");
+            assert!(matches!(
+                PacketSocket::open("south0", ETHER_TYPE_SERCOS),
+                Err(OpenError::InterfaceDown { name }) if name == "south0"
+            ));
+
+            ip("link set south0 up");
+            ip("link set south1 up");
+            assert_eq!(b.recv(&mut buffer), Err(LinkError::Down));
+            a.send(&frame(ETHER_TYPE_SERCOS, 7)).unwrap();
+            assert!(b.wait(Duration::from_secs(5)).unwrap());
+            assert_eq!(b.recv(&mut buffer).unwrap().unwrap().len, 60);
+
+            ip("link del south0");
+            assert_eq!(a.link_state(), LinkState::Gone);
+            assert_eq!(a.send(&frame(ETHER_TYPE_SERCOS, 1)), Err(LinkError::Gone));
+        });
+    }
+
+    #[test]
+    fn lengths_the_interface_does_not_take_are_refused() {
+        in_namespace("lengths_the_interface_does_not_take", || {
+            veth();
+            let a = PacketSocket::open("south0", ETHER_TYPE_SERCOS).unwrap();
+            let mut long = [0; 1600];
+            long[..60].copy_from_slice(&frame(ETHER_TYPE_SERCOS, 1));
+            assert_eq!(a.send(&long), Err(LinkError::Length));
+            assert_eq!(a.send(&long[..10]), Err(LinkError::Length));
+            a.send(&long[..1514]).unwrap();
+        });
+    }
+
+    #[test]
+    fn what_cannot_be_opened_says_why() {
+        let text = |name: &str| PacketSocket::open(name, ETHER_TYPE_SERCOS).unwrap_err().to_string();
+        assert_eq!(text("axb-none"), "there is no network interface `axb-none`");
+        assert!(text("a-name-longer-than-fifteen").contains("cannot be the name of a network interface"));
+        assert!(text("").contains("cannot be the name of a network interface"));
+        assert!(text("a\0b").contains("cannot be the name of a network interface"));
+        in_namespace("what_cannot_be_opened", || {
+            ip("link set lo up");
+            assert!(matches!(
+                PacketSocket::open("lo", ETHER_TYPE_SERCOS),
+                Err(OpenError::NotEthernet { hardware_type: libc::ARPHRD_LOOPBACK, .. })
+            ));
+        });
+    }
+}

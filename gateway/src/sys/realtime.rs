@@ -1,0 +1,260 @@
+//! Asking the kernel for real-time treatment of the calling thread.
+//!
+//! Every measure may be refused: by missing privilege, by a control group without real-time budget
+//! (`CONFIG_RT_GROUP_SCHED`), by a processor that does not exist. The box then runs on without it, so a refusal is
+//! data in a [`Report`], to be shown, and never an error.
+#![allow(unsafe_code)]
+
+use std::fmt;
+use std::io;
+
+use arrayvec::ArrayVec;
+
+/// The highest priority of `SCHED_FIFO` on Linux; the lowest is 1.
+pub const PRIORITY_MAX: u8 = 99;
+
+/// Without real-time scheduling a wake-up may be put off by this much less than the kernel's usual 50 us.
+const TIMER_SLACK_NS: libc::c_ulong = 1;
+
+/// What to ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Request {
+    /// `SCHED_FIFO` priority, 1 to [`PRIORITY_MAX`]; `None` leaves the scheduling class alone.
+    pub priority: Option<u8>,
+    /// The processor to stay on, from 0; `None` lets the kernel choose.
+    pub cpu: Option<u16>,
+    /// Keep all memory of the process resident, so that the cycle never waits for a page.
+    pub lock_memory: bool,
+}
+
+/// One thing asked of the kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Wake-ups without the usual slack (asked always: it needs no privilege).
+    TimerSlack,
+    /// `SCHED_FIFO` with this priority.
+    Scheduler {
+        /// 1 to 99.
+        priority: u8,
+    },
+    /// Staying on one processor.
+    Affinity {
+        /// Its number from 0.
+        cpu: u16,
+    },
+    /// Memory locked, including what is allocated later.
+    LockMemory,
+    /// Memory locked as far as it is allocated now: the process has a limit on locked memory, and locking what comes
+    /// later would make allocations fail once the limit is reached.
+    LockPresentMemory,
+}
+
+impl fmt::Display for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TimerSlack => f.write_str("timer slack 1 ns"),
+            Self::Scheduler { priority } => write!(f, "SCHED_FIFO priority {priority}"),
+            Self::Affinity { cpu } => write!(f, "processor {cpu}"),
+            Self::LockMemory => f.write_str("memory locked"),
+            Self::LockPresentMemory => f.write_str("memory locked as allocated now"),
+        }
+    }
+}
+
+/// A measure and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outcome {
+    /// What was asked.
+    pub measure: Measure,
+    /// `Err` with the kernel's error number when it refused.
+    pub result: Result<(), i32>,
+}
+
+impl Outcome {
+    /// What the person at the machine can do about a refusal.
+    #[must_use]
+    pub fn hint(&self) -> Option<&'static str> {
+        let error = self.result.err()?;
+        Some(match (self.measure, error) {
+            (Measure::Scheduler { .. }, libc::EPERM) => {
+                "needs CAP_SYS_NICE or LimitRTPRIO=, and a control group with real-time budget"
+            }
+            (Measure::Scheduler { .. }, libc::EINVAL) => "priority must be 1 to 99",
+            (Measure::Affinity { .. }, libc::EINVAL) => "no such processor is allowed to this process",
+            (Measure::LockMemory | Measure::LockPresentMemory, libc::EPERM | libc::ENOMEM | libc::EAGAIN) => {
+                "needs CAP_IPC_LOCK or a higher LimitMEMLOCK="
+            }
+            _ => "the kernel refused",
+        })
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.result {
+            Ok(()) => write!(f, "{}: granted", self.measure),
+            Err(number) => {
+                let error = io::Error::from_raw_os_error(number);
+                let hint = self.hint().unwrap_or("the kernel refused");
+                write!(f, "{}: refused ({error}): {hint}", self.measure)
+            }
+        }
+    }
+}
+
+/// What the kernel granted and refused.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Report {
+    outcomes: ArrayVec<Outcome, 4>,
+}
+
+impl Report {
+    /// Every measure that was asked for, in order.
+    #[must_use]
+    pub fn outcomes(&self) -> &[Outcome] {
+        &self.outcomes
+    }
+
+    /// The refused ones.
+    pub fn refused(&self) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().filter(|outcome| outcome.result.is_err())
+    }
+
+    /// Whether everything was granted.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.refused().next().is_none()
+    }
+
+    fn record(&mut self, measure: Measure, result: libc::c_int) {
+        let result = if result == 0 {
+            Ok(())
+        } else {
+            Err(io::Error::last_os_error().raw_os_error().unwrap_or(libc::EINVAL))
+        };
+        self.outcomes.push(Outcome { measure, result });
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, outcome) in self.outcomes.iter().enumerate() {
+            if index > 0 {
+                f.write_str("; ")?;
+            }
+            write!(f, "{outcome}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Asks for real-time treatment of the calling thread (and, for memory, of the process).
+#[must_use]
+pub fn apply(request: &Request) -> Report {
+    let mut report = Report::default();
+    // SAFETY: PR_SET_TIMERSLACK takes an integer and touches no memory.
+    let result = unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, TIMER_SLACK_NS) };
+    report.record(Measure::TimerSlack, result);
+
+    if request.lock_memory {
+        let (measure, flags) = if may_lock_without_limit() {
+            (Measure::LockMemory, libc::MCL_CURRENT | libc::MCL_FUTURE)
+        } else {
+            (Measure::LockPresentMemory, libc::MCL_CURRENT)
+        };
+        // SAFETY: mlockall takes flags and changes no contents of memory.
+        let result = unsafe { libc::mlockall(flags) };
+        report.record(measure, result);
+    }
+    if let Some(cpu) = request.cpu {
+        let result = set_affinity(cpu);
+        report.record(Measure::Affinity { cpu }, result);
+    }
+    if let Some(priority) = request.priority {
+        let parameters = libc::sched_param { sched_priority: i32::from(priority) };
+        // SAFETY: `parameters` outlives the call; thread 0 is the calling one.
+        let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
+        report.record(Measure::Scheduler { priority }, result);
+    }
+    report
+}
+
+fn set_affinity(cpu: u16) -> libc::c_int {
+    // SAFETY: `cpu_set_t` is an array of integers, for which all zeroes is a value (the empty set).
+    let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
+    let cpu = usize::from(cpu);
+    if cpu < size_of::<libc::cpu_set_t>() * 8 {
+        // SAFETY: `cpu` is below the number of bits of the set, checked above.
+        unsafe { libc::CPU_SET(cpu, &mut set) };
+    }
+    // SAFETY: `set` is valid for the size given; thread 0 is the calling one. An empty set is refused with EINVAL.
+    unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) }
+}
+
+fn may_lock_without_limit() -> bool {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: `limit` is a valid, writable `rlimit` that outlives the call.
+    let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) } == 0;
+    // SAFETY: geteuid has no preconditions and cannot fail.
+    let root = unsafe { libc::geteuid() } == 0;
+    root || (known && limit.rlim_cur == libc::RLIM_INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn on_own_thread(request: Request) -> Report {
+        // Scheduling is per thread: a thread of its own keeps the test runner's ones as they are.
+        std::thread::spawn(move || apply(&request)).join().unwrap()
+    }
+
+    #[test]
+    fn staying_on_the_first_allowed_processor_is_granted() {
+        let report = on_own_thread(Request { cpu: Some(0), ..Request::default() });
+        let affinity = report.outcomes()[1];
+        assert_eq!(affinity.measure, Measure::Affinity { cpu: 0 });
+        if affinity.result.is_err() {
+            println!("SKIPPED: processor 0 is not allowed to this process: {affinity}");
+            return;
+        }
+        assert_eq!(report.to_string(), "timer slack 1 ns: granted; processor 0: granted");
+    }
+
+    #[test]
+    fn refusals_are_reported_with_a_reason_and_do_not_stop_the_rest() {
+        let request = Request { cpu: Some(u16::MAX), priority: Some(100), lock_memory: false };
+        let report = on_own_thread(request);
+        assert!(!report.is_complete());
+        let refused: Vec<_> = report.refused().map(|outcome| (outcome.measure, outcome.result)).collect();
+        assert_eq!(
+            refused,
+            [
+                (Measure::Affinity { cpu: u16::MAX }, Err(libc::EINVAL)),
+                (Measure::Scheduler { priority: 100 }, Err(libc::EINVAL)),
+            ]
+        );
+        assert_eq!(
+            report.outcomes()[2].to_string(),
+            "SCHED_FIFO priority 100: refused (Invalid argument (os error 22)): priority must be 1 to 99"
+        );
+    }
+
+    #[test]
+    fn fifo_scheduling_is_granted_or_the_refusal_says_what_is_needed() {
+        let scheduler = std::thread::spawn(|| {
+            let report = apply(&Request { priority: Some(10), ..Request::default() });
+            // SAFETY: sched_getscheduler takes a thread number, 0 being the calling one.
+            (report.outcomes()[1], unsafe { libc::sched_getscheduler(0) })
+        });
+        let (outcome, policy) = scheduler.join().unwrap();
+        match outcome.result {
+            Ok(()) => assert_eq!(policy, libc::SCHED_FIFO),
+            Err(number) => {
+                assert_eq!(number, libc::EPERM);
+                assert!(outcome.to_string().contains("CAP_SYS_NICE"), "{outcome}");
+                println!("SKIPPED: {outcome}");
+            }
+        }
+    }
+}

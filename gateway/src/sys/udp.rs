@@ -1,0 +1,212 @@
+//! The UDP socket of class-1 I/O: never waits, marks what it sends as urgent, and knows when each datagram came.
+//!
+//! EtherNet/IP's implicit messages go from and to port 2222 at both ends. Two ends on one host work when each binds an
+//! address of its own, which is why the address is always given and `SO_REUSEADDR` is set.
+#![allow(unsafe_code)]
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::os::fd::{AsFd, BorrowedFd};
+
+use socket2::{Domain, Protocol, SockAddr, Socket, Type};
+use thiserror::Error;
+
+use super::clock::KernelTime;
+use super::receive::{PlainAddress, enable_time_stamps, receive};
+
+/// UDP port of EtherNet/IP implicit messages.
+pub const PORT_IO: u16 = 2222;
+
+/// Differentiated services code point of CIP Motion data: the QoS object's default for urgent priority.
+pub const DSCP_URGENT: u8 = 55;
+
+/// Room for received datagrams in the kernel: more than a second of 1 ms updates of two connections.
+const RECEIVE_BUFFER_LEN: usize = 1 << 20;
+
+/// Why the socket could not be opened.
+#[derive(Debug, Error)]
+pub enum BindError {
+    /// No interface of this host has the address.
+    #[error("no network interface of this host has the address {}", address.ip())]
+    NoSuchAddress {
+        /// The address asked for.
+        address: SocketAddrV4,
+    },
+    /// Another program has the port.
+    #[error("UDP {address} is taken by another program")]
+    InUse {
+        /// The address asked for.
+        address: SocketAddrV4,
+    },
+    /// The system refused for another reason.
+    #[error("cannot open UDP {address}: {step}: {source}")]
+    System {
+        /// The address asked for.
+        address: SocketAddrV4,
+        /// What was being done.
+        step: &'static str,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+/// A received datagram; its bytes are in the caller's buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Datagram {
+    /// Bytes written to the buffer.
+    pub len: usize,
+    /// Whether the datagram was longer than the buffer: then it must not be used.
+    pub truncated: bool,
+    /// Who sent it.
+    pub from: SocketAddrV4,
+    /// When the kernel took it from the network, where it says so.
+    pub at: Option<KernelTime>,
+}
+
+/// An open socket.
+#[derive(Debug)]
+pub struct IoSocket {
+    socket: Socket,
+    local: SocketAddrV4,
+    time_stamps: bool,
+}
+
+impl IoSocket {
+    /// Binds `address` (port 0 takes any free one) and marks what is sent with `dscp`, 0 to 63.
+    ///
+    /// # Errors
+    /// [`BindError`], one kind for each thing a person can put right.
+    pub fn bind(address: SocketAddrV4, dscp: u8) -> Result<Self, BindError> {
+        let system =
+            |step: &'static str| move |source: io::Error| BindError::System { address, step, source };
+        let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP)).map_err(system("socket"))?;
+        socket.set_nonblocking(true).map_err(system("O_NONBLOCK"))?;
+        socket.set_reuse_address(true).map_err(system("SO_REUSEADDR"))?;
+        // The code point is the upper six bits of the octet once called type of service.
+        socket.set_tos_v4(u32::from(dscp & 0x3F) << 2).map_err(system("IP_TOS"))?;
+        // A smaller buffer than asked for is still a working one.
+        let _ = socket.set_recv_buffer_size(RECEIVE_BUFFER_LEN);
+        let time_stamps = enable_time_stamps(socket.as_fd());
+        socket.bind(&SockAddr::from(address)).map_err(|source| match source.kind() {
+            io::ErrorKind::AddrNotAvailable => BindError::NoSuchAddress { address },
+            io::ErrorKind::AddrInUse => BindError::InUse { address },
+            _ => BindError::System { address, step: "bind", source },
+        })?;
+        let local = socket
+            .local_addr()
+            .map_err(system("getsockname"))?
+            .as_socket_ipv4()
+            .unwrap_or(SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0));
+        Ok(Self { socket, local, time_stamps })
+    }
+
+    /// The address it is bound to.
+    #[must_use]
+    pub const fn local_address(&self) -> SocketAddrV4 {
+        self.local
+    }
+
+    /// Whether received datagrams carry the kernel's time stamp.
+    #[must_use]
+    pub const fn has_time_stamps(&self) -> bool {
+        self.time_stamps
+    }
+
+    /// Sends one datagram at once or not at all.
+    ///
+    /// # Errors
+    /// What the system says; [`io::ErrorKind::WouldBlock`] when the transmit queue is full.
+    pub fn send_to(&self, data: &[u8], to: SocketAddrV4) -> io::Result<()> {
+        let sent = self.socket.send_to(data, &SockAddr::from(SocketAddr::V4(to)))?;
+        if sent == data.len() { Ok(()) } else { Err(io::ErrorKind::WriteZero.into()) }
+    }
+
+    /// Receives one datagram into `buffer` without waiting; `Ok(None)` when there is none.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn recv(&self, buffer: &mut [u8]) -> io::Result<Option<Datagram>> {
+        let mut from = libc::sockaddr_in::zeroed();
+        let Some(message) = receive(self.socket.as_fd(), buffer, &mut from)? else { return Ok(None) };
+        let ip = Ipv4Addr::from(u32::from_be(from.sin_addr.s_addr));
+        let from = SocketAddrV4::new(ip, u16::from_be(from.sin_port));
+        Ok(Some(Datagram { len: message.len, truncated: message.truncated, from, at: message.at }))
+    }
+}
+
+impl AsFd for IoSocket {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+    use crate::sys::clock::realtime_now;
+
+    fn any(ip: [u8; 4]) -> IoSocket {
+        IoSocket::bind(SocketAddrV4::new(Ipv4Addr::from(ip), 0), DSCP_URGENT).unwrap()
+    }
+
+    fn wait(socket: &IoSocket, buffer: &mut [u8]) -> Datagram {
+        let deadline = Instant::now() + Duration::from_secs(5);
+        loop {
+            if let Some(datagram) = socket.recv(buffer).unwrap() {
+                return datagram;
+            }
+            assert!(Instant::now() < deadline, "nothing came");
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+
+    #[test]
+    fn a_datagram_crosses_with_sender_and_time_stamp() {
+        let (a, b) = (any([127, 0, 0, 1]), any([127, 0, 0, 2]));
+        assert_eq!(*b.local_address().ip(), Ipv4Addr::new(127, 0, 0, 2));
+        let mut buffer = [0xA5; 64];
+        assert_eq!(b.recv(&mut buffer).unwrap(), None);
+
+        let before = realtime_now();
+        a.send_to(&[1, 2, 3], b.local_address()).unwrap();
+        let datagram = wait(&b, &mut buffer);
+        assert_eq!((datagram.len, datagram.truncated, datagram.from), (3, false, a.local_address()));
+        assert_eq!(buffer[..4], [1, 2, 3, 0xA5]);
+        if b.has_time_stamps() {
+            let at = datagram.at.unwrap();
+            assert!(before <= at && at <= realtime_now(), "{before:?} {at:?}");
+        }
+    }
+
+    #[test]
+    fn a_datagram_longer_than_the_buffer_is_marked() {
+        let (a, b) = (any([127, 0, 0, 1]), any([127, 0, 0, 1]));
+        a.send_to(&[7; 100], b.local_address()).unwrap();
+        let datagram = wait(&b, &mut [0; 60]);
+        assert_eq!((datagram.len, datagram.truncated), (60, true));
+    }
+
+    #[test]
+    fn data_are_marked_with_the_code_point() {
+        let socket = any([127, 0, 0, 1]);
+        assert_eq!(socket.socket.tos_v4().unwrap(), 55 << 2);
+    }
+
+    #[test]
+    fn one_port_may_be_bound_on_two_addresses() {
+        let a = any([127, 0, 0, 1]);
+        let port = a.local_address().port();
+        let b = IoSocket::bind(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 2), port), 0).unwrap();
+        a.send_to(&[9], b.local_address()).unwrap();
+        assert_eq!(wait(&b, &mut [0; 8]).from, a.local_address());
+    }
+
+    #[test]
+    fn what_cannot_be_bound_says_why() {
+        let foreign = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 1), 0);
+        let error = IoSocket::bind(foreign, 0).unwrap_err();
+        assert_eq!(error.to_string(), "no network interface of this host has the address 192.0.2.1");
+    }
+}
