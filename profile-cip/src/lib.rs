@@ -11,5 +11,6 @@
 //! Names are the terms of the CIP documents. Multi-byte values are little-endian on the wire unless a
 //! layout table says otherwise.
 
+pub mod controller;
 pub mod target;
 pub mod wire;

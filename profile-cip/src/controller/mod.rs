@@ -1,0 +1,3 @@
+//! The controller role of CIP Motion.
+
+pub mod trajectory;
