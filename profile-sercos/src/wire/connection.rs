@@ -1,0 +1,335 @@
+//! Words of the cyclic connections.
+//!
+//! * [`ConnectionControl`], C-CON: the first two bytes of a connection's data in MDT or AT.
+//! * [`ConnectionSetup`], S-0-1050.x.1.
+//! * [`TelegramAssignment`], S-0-1050.x.3: in which telegram, at which offset the data is.
+//! * [`TelegramOffset`], S-0-1009, 1011, 1013, 1014: the same for device words and service channels, where MDT
+//!   or AT follows from the IDN.
+
+use core::fmt;
+
+use bitflags::bitflags;
+
+use super::Error;
+
+/// Length of C-CON in bytes.
+pub const CONNECTION_CONTROL_LEN: usize = 2;
+
+/// Largest offset that an assignment can name (11 bits).
+pub const OFFSET_MAX: u16 = 0x7FF;
+
+/// Telegrams of one kind in a cycle: MDT0..3, AT0..3.
+pub const TELEGRAMS: u8 = 4;
+
+const COUNTER_SHIFT: u16 = 12;
+
+bitflags! {
+    /// Connection control, C-CON. Bits without a name are kept.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub struct ConnectionControl: u16 {
+        /// The producer is ready; before that the data means nothing.
+        const READY = 1 << 0;
+        /// Toggles with every new value.
+        const NEW_DATA = 1 << 1;
+        /// The data field is delayed.
+        const DELAY = 1 << 2;
+        /// Flow control: the producer has stopped.
+        const STOPPED = 1 << 4;
+        /// Real-time bit 1.
+        const REAL_TIME_1 = 1 << 6;
+        /// Real-time bit 2.
+        const REAL_TIME_2 = 1 << 7;
+        /// Counter, see [`ConnectionControl::counter`].
+        const COUNTER = 0xF000;
+        /// Reserved bits, transmitted as 0.
+        const RESERVED = 0x0F28;
+    }
+}
+
+impl ConnectionControl {
+    /// Counts every production, 0..=15 with wrap. A producer that does not count sends 0 for ever.
+    #[must_use]
+    pub const fn counter(self) -> u8 {
+        (self.bits() >> COUNTER_SHIFT).to_le_bytes()[0]
+    }
+
+    /// The word which follows this one when the producer has written a new value: toggled, counted, ready.
+    #[must_use]
+    pub const fn produced(self) -> ConnectionControl {
+        let counter = self.bits().wrapping_add(1 << COUNTER_SHIFT) & ConnectionControl::COUNTER.bits();
+        let rest = self.bits() & !ConnectionControl::COUNTER.bits();
+        ConnectionControl::from_bits_retain(
+            (rest ^ ConnectionControl::NEW_DATA.bits()) | ConnectionControl::READY.bits() | counter,
+        )
+    }
+}
+
+impl fmt::Display for ConnectionControl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}{} toggle {} counter {}",
+            if self.contains(ConnectionControl::READY) { "ready" } else { "not ready" },
+            if self.contains(ConnectionControl::STOPPED) { ", stopped," } else { "" },
+            u8::from(self.contains(ConnectionControl::NEW_DATA)),
+            self.counter()
+        )
+    }
+}
+
+/// What a connection's data field is made of, bits 5..4 of S-0-1050.x.1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum ConfigurationType {
+    /// The IDNs of the list S-0-1050.x.6.
+    IdnList = 0,
+    /// A container.
+    Container = 1,
+    /// What the function specific profile says; drives: telegram type S-0-0015.
+    Profile = 2,
+    /// Reserved.
+    Reserved = 3,
+}
+
+/// How a connection is timed, bits 1..0 of S-0-1050.x.1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum ConnectionTiming {
+    /// Synchronous to the communication clock.
+    ClockSynchronous = 0,
+    /// Asynchronous with watchdog.
+    AsynchronousWatchdog = 1,
+    /// Asynchronous without watchdog.
+    Asynchronous = 2,
+    /// Cyclic, not synchronized.
+    Cyclic = 3,
+}
+
+bitflags! {
+    /// Connection setup, S-0-1050.x.1. Bits without a name are kept.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub struct ConnectionSetup: u16 {
+        /// The connection is used.
+        const ACTIVE = 1 << 15;
+        /// The slave produces (AT); 0: the slave consumes.
+        const PRODUCER = 1 << 14;
+        /// Configuration type, see [`ConnectionSetup::configuration`].
+        const CONFIGURATION = 3 << 4;
+        /// Timing, see [`ConnectionSetup::timing`].
+        const TIMING = 3;
+        /// Bits without a public meaning.
+        const RESERVED = 0x3FCC;
+    }
+}
+
+impl ConnectionSetup {
+    /// The setup of an active, clock synchronous connection of an IDN list.
+    #[must_use]
+    pub const fn synchronous(producer: bool) -> ConnectionSetup {
+        if producer {
+            ConnectionSetup::ACTIVE.union(ConnectionSetup::PRODUCER)
+        } else {
+            ConnectionSetup::ACTIVE
+        }
+    }
+
+    /// What the data field is made of.
+    #[must_use]
+    pub const fn configuration(self) -> ConfigurationType {
+        match self.bits() >> 4 & 3 {
+            0 => ConfigurationType::IdnList,
+            1 => ConfigurationType::Container,
+            2 => ConfigurationType::Profile,
+            _ => ConfigurationType::Reserved,
+        }
+    }
+
+    /// The same with another configuration type.
+    #[must_use]
+    pub const fn with_configuration(self, configuration: ConfigurationType) -> ConnectionSetup {
+        ConnectionSetup::from_bits_retain(self.bits() & !(3 << 4) | (configuration as u16) << 4)
+    }
+
+    /// How the connection is timed.
+    #[must_use]
+    pub const fn timing(self) -> ConnectionTiming {
+        match self.bits() & 3 {
+            0 => ConnectionTiming::ClockSynchronous,
+            1 => ConnectionTiming::AsynchronousWatchdog,
+            2 => ConnectionTiming::Asynchronous,
+            _ => ConnectionTiming::Cyclic,
+        }
+    }
+
+    /// The same with another timing.
+    #[must_use]
+    pub const fn with_timing(self, timing: ConnectionTiming) -> ConnectionSetup {
+        ConnectionSetup::from_bits_retain(self.bits() & !3 | timing as u16)
+    }
+}
+
+/// Telegram assignment of a connection, S-0-1050.x.3: bits 13..12 telegram number, bit 11 MDT, bits 10..0
+/// offset in bytes from the end of the SERCOS header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct TelegramAssignment {
+    /// In the MDT (true) or in the AT.
+    pub mdt: bool,
+    /// Telegram number, 0..=3.
+    pub telegram: u8,
+    /// Offset in bytes, 0..=2047.
+    pub offset: u16,
+}
+
+impl TelegramAssignment {
+    /// Takes the word apart; bits 15..14 are reserved and ignored.
+    #[must_use]
+    pub const fn from_word(word: u16) -> TelegramAssignment {
+        TelegramAssignment {
+            mdt: word & 1 << 11 != 0,
+            telegram: (word >> 12).to_le_bytes()[0] & 3,
+            offset: word & OFFSET_MAX,
+        }
+    }
+
+    /// The word; fails when telegram number or offset do not fit.
+    pub const fn to_word(self) -> Result<u16, Error> {
+        match (TelegramOffset { telegram: self.telegram, offset: self.offset }).to_word() {
+            Ok(word) if self.mdt => Ok(word | 1 << 11),
+            other => other,
+        }
+    }
+}
+
+impl fmt::Display for TelegramAssignment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{} offset {}", if self.mdt { "MDT" } else { "AT" }, self.telegram, self.offset)
+    }
+}
+
+/// Place of a device word or service channel, S-0-1009, 1011, 1013, 1014: bits 15..12 telegram number, bits
+/// 11..0 offset in bytes, of which 10..0 are used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct TelegramOffset {
+    /// Telegram number, 0..=3.
+    pub telegram: u8,
+    /// Offset in bytes from the end of the SERCOS header, 0..=2047.
+    pub offset: u16,
+}
+
+impl TelegramOffset {
+    /// Takes the word apart; fails when it names a telegram above 3 or an offset above 2047.
+    pub const fn from_word(word: u16) -> Result<TelegramOffset, Error> {
+        let place = TelegramOffset { telegram: (word >> 12).to_le_bytes()[0], offset: word & 0xFFF };
+        match place.to_word() {
+            Ok(_) => Ok(place),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The word; fails when telegram number or offset do not fit.
+    pub const fn to_word(self) -> Result<u16, Error> {
+        if self.telegram >= TELEGRAMS {
+            let (value, max) = (self.telegram as u32, TELEGRAMS as u32 - 1);
+            return Err(Error::OutOfRange { what: "telegram number", value, max });
+        }
+        if self.offset > OFFSET_MAX {
+            let (value, max) = (self.offset as u32, OFFSET_MAX as u32);
+            return Err(Error::OutOfRange { what: "telegram offset", value, max });
+        }
+        Ok((self.telegram as u16) << 12 | self.offset)
+    }
+}
+
+impl fmt::Display for TelegramOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "telegram {} offset {}", self.telegram, self.offset)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn producer_words_of_the_recording() {
+        // Startup recording, frames 5229 to 5245: 0x1003, 0x2001, 0x3003, 0x4001, 0x5003.
+        let mut word = ConnectionControl::empty();
+        let mut words = Vec::new();
+        for _ in 0..17 {
+            word = word.produced();
+            words.push(word.bits());
+        }
+        assert_eq!(words[..5], [0x1003, 0x2001, 0x3003, 0x4001, 0x5003]);
+        // The counter wraps after 15 and carries into nothing.
+        assert_eq!(words[14..], [0xF003, 0x0001, 0x1003]);
+        let rest = ConnectionControl::REAL_TIME_1 | ConnectionControl::DELAY;
+        assert_eq!(rest.produced().bits(), 0x1047);
+        assert_eq!(ConnectionControl::from_bits_retain(0x5003).to_string(), "ready toggle 1 counter 5");
+    }
+
+    #[test]
+    fn setup_words() {
+        // Startup recording, frames 2665 and 2721.
+        assert_eq!(ConnectionSetup::synchronous(false).bits(), 0x8000);
+        assert_eq!(ConnectionSetup::synchronous(true).bits(), 0xC000);
+        let word = ConnectionSetup::synchronous(true)
+            .with_configuration(ConfigurationType::Profile)
+            .with_timing(ConnectionTiming::Cyclic);
+        assert_eq!(word.bits(), 0xC023);
+        for bits in 0..=u16::MAX {
+            let word = ConnectionSetup::from_bits_retain(bits);
+            let again = word.with_configuration(word.configuration()).with_timing(word.timing());
+            assert_eq!(again.bits(), bits);
+        }
+    }
+
+    #[test]
+    fn assignment_words() {
+        // Startup recording: frame 3657 low word 0x081E, frame 3713 low word 0x0018.
+        let vectors = [
+            (0x081E, TelegramAssignment { mdt: true, telegram: 0, offset: 30 }, "MDT0 offset 30"),
+            (0x0018, TelegramAssignment { mdt: false, telegram: 0, offset: 24 }, "AT0 offset 24"),
+            (0x3FFF, TelegramAssignment { mdt: true, telegram: 3, offset: 2047 }, "MDT3 offset 2047"),
+        ];
+        for (word, value, text) in vectors {
+            assert_eq!(TelegramAssignment::from_word(word), value);
+            assert_eq!(value.to_word(), Ok(word));
+            assert_eq!(value.to_string(), text);
+        }
+        assert_eq!(
+            TelegramAssignment { mdt: true, telegram: 4, offset: 0 }.to_word(),
+            Err(Error::OutOfRange { what: "telegram number", value: 4, max: 3 })
+        );
+        assert_eq!(
+            TelegramAssignment { mdt: false, telegram: 0, offset: 2048 }.to_word(),
+            Err(Error::OutOfRange { what: "telegram offset", value: 2048, max: 2047 })
+        );
+    }
+
+    #[test]
+    fn offset_words() {
+        // Startup recording, frame 3257: C-DEV of slave 1 at 26 of MDT0.
+        assert_eq!(TelegramOffset::from_word(0x001A), Ok(TelegramOffset { telegram: 0, offset: 26 }));
+        assert_eq!(TelegramOffset { telegram: 2, offset: 8 }.to_word(), Ok(0x2008));
+        assert_eq!(
+            TelegramOffset::from_word(0x4000),
+            Err(Error::OutOfRange { what: "telegram number", value: 4, max: 3 })
+        );
+        assert_eq!(
+            TelegramOffset::from_word(0x0800),
+            Err(Error::OutOfRange { what: "telegram offset", value: 2048, max: 2047 })
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+        #[test]
+        fn words_round_trip(word: u16) {
+            prop_assert_eq!(TelegramAssignment::from_word(word).to_word(), Ok(word & 0x3FFF));
+            if let Ok(place) = TelegramOffset::from_word(word) {
+                prop_assert_eq!(place.to_word(), Ok(word));
+            }
+        }
+    }
+}
