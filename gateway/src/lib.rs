@@ -1,3 +1,4 @@
 //! The Axisbridge gateway.
 
+pub mod capture;
 pub mod sys;

@@ -1,0 +1,362 @@
+//! Records what the box sends and receives, without the cycle thread ever waiting for a disk.
+//!
+//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one writer thread. Pushing copies the bytes and
+//! returns; when the queue is full the record is dropped and counted. The writer thread takes the oldest
+//! record of all taps, dresses socket payloads up as frames ([`super::synth`]) and writes the file, up to a limit of bytes.
+
+use std::fs::File;
+use std::io;
+use std::net::SocketAddrV4;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::synth::{DATAGRAM_LEN_MAX, SEGMENT_LEN_MAX, Synthesizer};
+use super::writer::Writer;
+use super::{FRAME_LEN_MAX, Side};
+use crate::sys::clock::KernelTime;
+
+/// Bytes after which a recording is full, unless told otherwise.
+pub const FILE_LEN_MAX_DEFAULT: u64 = 4 << 30;
+
+/// How long the writer thread sleeps when it has nothing to do.
+const IDLE: Duration = Duration::from_millis(2);
+
+/// What is recorded, and how.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The file; overwritten if there.
+    pub path: PathBuf,
+    /// Description of the north interface in the file, such as its IP address.
+    pub north: String,
+    /// Description of the south interface in the file, such as the name of the network interface.
+    pub south: String,
+    /// Records each tap can hold until the writer thread takes them; each takes about 1.5 KiB.
+    pub depth: usize,
+    /// Bytes of the file at which recording ends; what comes after counts as dropped.
+    pub file_len_max: u64,
+}
+
+impl Settings {
+    /// A recording to `path` with the usual limits.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            north: "EtherNet/IP".to_owned(),
+            south: "south bus".to_owned(),
+            depth: 1024,
+            file_len_max: FILE_LEN_MAX_DEFAULT,
+        }
+    }
+}
+
+/// What became of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Frames in the file.
+    pub frames: u64,
+    /// Records lost: a tap's queue was full, the payload did not fit a frame, or the file was full.
+    pub dropped: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Frame(Side),
+    Datagram { from: SocketAddrV4, to: SocketAddrV4, tos: u8 },
+    Opened { client: SocketAddrV4, server: SocketAddrV4 },
+    Stream { from: SocketAddrV4, to: SocketAddrV4 },
+    Closed { from: SocketAddrV4, to: SocketAddrV4 },
+}
+
+impl Kind {
+    const fn side(self) -> Side {
+        match self {
+            Self::Frame(side) => side,
+            _ => Side::North,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Record {
+    at: KernelTime,
+    kind: Kind,
+    len: u16,
+    data: [u8; FRAME_LEN_MAX],
+}
+
+/// One place where traffic is seen.
+#[derive(Debug)]
+pub struct Tap {
+    queue: Producer<Record>,
+    dropped: Arc<[AtomicU64; 2]>,
+}
+
+impl Tap {
+    /// A whole Ethernet frame, cut to [`FRAME_LEN_MAX`].
+    pub fn frame(&mut self, at: KernelTime, side: Side, frame: &[u8]) {
+        self.push(at, Kind::Frame(side), frame.get(..FRAME_LEN_MAX).unwrap_or(frame));
+    }
+
+    /// The payload of a UDP datagram with its type-of-service octet.
+    pub fn datagram(
+        &mut self,
+        at: KernelTime,
+        from: SocketAddrV4,
+        to: SocketAddrV4,
+        tos: u8,
+        payload: &[u8],
+    ) {
+        let kind = Kind::Datagram { from, to, tos };
+        if payload.len() > DATAGRAM_LEN_MAX {
+            self.drop_one(kind);
+        } else {
+            self.push(at, kind, payload);
+        }
+    }
+
+    /// A TCP connection was made.
+    pub fn opened(&mut self, at: KernelTime, client: SocketAddrV4, server: SocketAddrV4) {
+        self.push(at, Kind::Opened { client, server }, &[]);
+    }
+
+    /// Bytes that went through a TCP connection.
+    pub fn stream(&mut self, at: KernelTime, from: SocketAddrV4, to: SocketAddrV4, bytes: &[u8]) {
+        for part in bytes.chunks(SEGMENT_LEN_MAX) {
+            self.push(at, Kind::Stream { from, to }, part);
+        }
+    }
+
+    /// `from` closed its TCP connection to `to`.
+    pub fn closed(&mut self, at: KernelTime, from: SocketAddrV4, to: SocketAddrV4) {
+        self.push(at, Kind::Closed { from, to }, &[]);
+    }
+
+    fn push(&mut self, at: KernelTime, kind: Kind, bytes: &[u8]) {
+        let mut record =
+            Record { at, kind, len: u16::try_from(bytes.len()).unwrap_or(0), data: [0; FRAME_LEN_MAX] };
+        record.data[..bytes.len()].copy_from_slice(bytes);
+        if self.queue.push(record).is_err() {
+            self.drop_one(kind);
+        }
+    }
+
+    fn drop_one(&self, kind: Kind) {
+        count(&self.dropped, kind.side());
+    }
+}
+
+fn count(counters: &[AtomicU64; 2], side: Side) {
+    let index = usize::from(side == Side::South);
+    counters[index].fetch_add(1, Ordering::Relaxed);
+}
+
+/// A recording that is running.
+#[derive(Debug)]
+pub struct Recorder {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<io::Result<Summary>>,
+}
+
+impl Recorder {
+    /// Creates the file and starts the writer thread with `taps` taps, in the order in which they are returned.
+    ///
+    /// # Errors
+    /// The file cannot be created, or the thread not started.
+    pub fn start(settings: Settings, taps: usize) -> io::Result<(Self, Vec<Tap>)> {
+        let file = File::create(&settings.path)?;
+        let writer = Writer::new(file, &settings.north, &settings.south)?;
+        let dropped = Arc::new([AtomicU64::new(0), AtomicU64::new(0)]);
+        let mut queues = Vec::with_capacity(taps);
+        let mut ends = Vec::with_capacity(taps);
+        for _ in 0..taps {
+            let (producer, consumer) = RingBuffer::new(settings.depth);
+            ends.push(Tap { queue: producer, dropped: Arc::clone(&dropped) });
+            queues.push(consumer);
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let task = Task {
+            queues,
+            dropped,
+            writer,
+            synth: Synthesizer::new(),
+            written: [0; 2],
+            failed: None,
+            limit: settings.file_len_max,
+        };
+        let flag = Arc::clone(&stop);
+        let thread =
+            std::thread::Builder::new().name("recorder".to_owned()).spawn(move || task.run(&flag))?;
+        Ok((Self { stop, thread }, ends))
+    }
+
+    /// Writes what the taps hold, closes the file and says what is in it. Records pushed later are lost.
+    ///
+    /// # Errors
+    /// Writing failed, now or at some time before; the file has what came before that.
+    pub fn finish(self) -> io::Result<Summary> {
+        self.stop.store(true, Ordering::Release);
+        self.thread.join().unwrap_or_else(|_| Err(io::Error::other("the recorder thread panicked")))
+    }
+}
+
+/// The writer thread.
+struct Task {
+    queues: Vec<Consumer<Record>>,
+    dropped: Arc<[AtomicU64; 2]>,
+    writer: Writer<File>,
+    synth: Synthesizer,
+    written: [u64; 2],
+    failed: Option<io::Error>,
+    limit: u64,
+}
+
+impl Task {
+    fn run(mut self, stop: &AtomicBool) -> io::Result<Summary> {
+        let mut last = KernelTime(0);
+        loop {
+            // Read before draining: what was pushed before the request to stop is still written.
+            let stopping = stop.load(Ordering::Acquire);
+            // Bounded by what the queues hold, so that a flood cannot keep the thread from stopping.
+            let waiting: usize = self.queues.iter().map(Consumer::slots).sum();
+            for _ in 0..waiting {
+                let Some(record) = self.oldest() else { break };
+                last = last.max(record.at);
+                self.write(&record);
+            }
+            if stopping {
+                break;
+            }
+            if waiting == 0 {
+                std::thread::sleep(IDLE);
+            }
+        }
+        let dropped = [&self.dropped[0], &self.dropped[1]].map(|counter| counter.load(Ordering::Relaxed));
+        if let Some(error) = self.failed {
+            return Err(error);
+        }
+        for (index, side) in Side::ALL.into_iter().enumerate() {
+            self.writer.statistics(side, last, self.written[index] + dropped[index], dropped[index])?;
+        }
+        self.writer.finish()?;
+        Ok(Summary { frames: self.written.iter().sum(), dropped: dropped.iter().sum() })
+    }
+
+    /// Takes the record with the smallest time at the head of any queue.
+    fn oldest(&mut self) -> Option<Record> {
+        let heads = self.queues.iter().enumerate();
+        let times = heads.filter_map(|(index, queue)| Some((queue.peek().ok()?.at, index)));
+        let (_, index) = times.min()?;
+        self.queues[index].pop().ok()
+    }
+
+    fn write(&mut self, record: &Record) {
+        let side = record.kind.side();
+        if self.failed.is_some() || self.writer.bytes_written() >= self.limit {
+            count(&self.dropped, side);
+            return;
+        }
+        let data = &record.data[..usize::from(record.len)];
+        let Self { writer, synth, written, failed, .. } = self;
+        let index = usize::from(side == Side::South);
+        let mut emit = |frame: &[u8]| match writer.frame(side, record.at, frame, None) {
+            Ok(()) => written[index] += 1,
+            Err(error) => *failed = Some(error),
+        };
+        match record.kind {
+            Kind::Frame(_) => emit(data),
+            Kind::Datagram { from, to, tos } => {
+                if synth.udp(from, to, tos, data, &mut emit).is_err() {
+                    count(&self.dropped, side);
+                }
+            }
+            Kind::Opened { client, server } => synth.tcp_open(client, server, &mut emit),
+            Kind::Stream { from, to } => synth.tcp_data(from, to, data, &mut emit),
+            Kind::Closed { from, to } => synth.tcp_close(from, to, &mut emit),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use super::*;
+    use crate::capture::reader::Reader;
+
+    const CLIENT: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 1), 50_000);
+    const SERVER: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 2), 44_818);
+
+    fn path(name: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("axisbridge-recorder-{}-{name}.pcapng", std::process::id()))
+    }
+
+    /// Interface, time and length of every frame of a file, which is then removed.
+    fn frames(path: &Path) -> Vec<(u32, u64, usize)> {
+        let mut reader = Reader::open(path).unwrap();
+        let mut frames = Vec::new();
+        while let Some(frame) = reader.next_frame().unwrap() {
+            frames.push((frame.interface, frame.at.unwrap().0, frame.data.len()));
+        }
+        std::fs::remove_file(path).unwrap();
+        frames
+    }
+
+    #[test]
+    fn taps_are_merged_by_time_and_payloads_become_frames() {
+        let path = path("merge");
+        let settings = Settings::new(&path);
+        let (recorder, mut taps) = Recorder::start(settings, 2).unwrap();
+        // Held back by the lock-step of this thread: the writer may take either tap first, so push the later first
+        // only where it is of the same tap.
+        let [cycle, supervisor] = &mut taps[..] else { panic!() };
+        supervisor.opened(KernelTime(10), CLIENT, SERVER);
+        supervisor.stream(KernelTime(20), CLIENT, SERVER, &[1; 1461]);
+        std::thread::sleep(Duration::from_millis(50));
+        cycle.frame(KernelTime(30), Side::South, &[2; 60]);
+        cycle.datagram(KernelTime(40), SERVER, CLIENT, 0, &[3; 10]);
+        std::thread::sleep(Duration::from_millis(50));
+        supervisor.closed(KernelTime(50), SERVER, CLIENT);
+        assert_eq!(recorder.finish().unwrap(), Summary { frames: 10, dropped: 0 });
+        assert_eq!(
+            frames(&path),
+            [
+                (0, 10, 54),
+                (0, 10, 54),
+                (0, 10, 54),
+                (0, 20, 1514),
+                (0, 20, 55),
+                (1, 30, 60),
+                (0, 40, 52),
+                (0, 50, 54),
+                (0, 50, 54),
+                (0, 50, 54)
+            ]
+        );
+    }
+
+    #[test]
+    fn a_full_queue_drops_and_counts_and_never_waits() {
+        let path = path("full");
+        let settings = Settings { depth: 4, file_len_max: 0, ..Settings::new(&path) };
+        let (recorder, mut taps) = Recorder::start(settings, 1).unwrap();
+        for number in 0..1000 {
+            taps[0].frame(KernelTime(number), Side::South, &[0; 60]);
+        }
+        taps[0].datagram(KernelTime(2000), SERVER, CLIENT, 0, &[0; 1473]);
+        // The file takes nothing, so that everything is dropped: in the queue, by its length or by the limit.
+        assert_eq!(recorder.finish().unwrap(), Summary { frames: 0, dropped: 1001 });
+        assert!(frames(&path).is_empty());
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_made_is_an_error_at_the_start() {
+        let error = Recorder::start(Settings::new(Path::new("/nonexistent/file.pcapng")), 1).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+    }
+}
