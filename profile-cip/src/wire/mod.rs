@@ -3,10 +3,22 @@
 //! Each file has a plain value with `parse`, `buffer_len` and `emit`. `parse(emit(x)) == x` for every value,
 //! and parsing never panics and never allocates, whatever the bytes are.
 
+#[cfg(test)]
+mod check;
+pub mod class1;
+pub mod cpf;
+pub mod encapsulation;
+pub mod epath;
 pub mod error;
+pub mod message_router;
 pub mod reader;
+pub mod register_session;
+pub mod sockaddr;
+pub mod status;
+pub mod triad;
 pub mod writer;
 
 pub use error::Error;
 pub use reader::Reader;
+pub use triad::ConnectionTriad;
 pub use writer::Writer;

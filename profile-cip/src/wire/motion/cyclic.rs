@@ -18,10 +18,12 @@ use super::codes::{
     ActualDataSet, AxisControl, CommandDataSet, CommandTarget, ControlMode, ControlStatus, FeedbackMode,
     StatusDataSet,
 };
+use super::value::{ReadValue, WriteValue, invalid};
 use crate::wire::{Error, Reader, Writer};
 
 /// Octets of the block without values.
 pub const HEADER_LEN: usize = 8;
+const BLOCK: &str = "cyclic command block";
 const COMMAND_SET_AT: usize = 4;
 const COMMAND_CONTROL_AT: usize = 7;
 const POSITION_TYPE_SHIFT: u8 = 2;
@@ -113,31 +115,31 @@ impl CommandValues {
             position: if !has(CommandDataSet::POSITION) {
                 None
             } else if position_is_integer {
-                Some(CommandPosition::Integer(reader.i32()?))
+                Some(CommandPosition::Integer(reader.i32(BLOCK)?))
             } else {
-                Some(CommandPosition::Float(reader.f64()?))
+                Some(CommandPosition::Float(reader.f64(BLOCK)?))
             },
-            velocity: has(CommandDataSet::VELOCITY).then(|| reader.f32()).transpose()?,
-            acceleration: has(CommandDataSet::ACCELERATION).then(|| reader.f32()).transpose()?,
-            torque: has(CommandDataSet::TORQUE).then(|| reader.f32()).transpose()?,
-            unwind_count: has(CommandDataSet::UNWIND_COUNT).then(|| reader.i32()).transpose()?,
+            velocity: has(CommandDataSet::VELOCITY).then(|| reader.f32(BLOCK)).transpose()?,
+            acceleration: has(CommandDataSet::ACCELERATION).then(|| reader.f32(BLOCK)).transpose()?,
+            torque: has(CommandDataSet::TORQUE).then(|| reader.f32(BLOCK)).transpose()?,
+            unwind_count: has(CommandDataSet::UNWIND_COUNT).then(|| reader.i32(BLOCK)).transpose()?,
             position_displacement: has(CommandDataSet::POSITION_DISPLACEMENT)
-                .then(|| reader.i32())
+                .then(|| reader.i32(BLOCK))
                 .transpose()?,
         })
     }
 
     pub(super) fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         match self.position {
-            Some(CommandPosition::Float(p)) => writer.f64(p)?,
-            Some(CommandPosition::Integer(p)) => writer.i32(p)?,
+            Some(CommandPosition::Float(p)) => writer.f64(BLOCK, p)?,
+            Some(CommandPosition::Integer(p)) => writer.i32(BLOCK, p)?,
             None => {}
         }
         for value in [self.velocity, self.acceleration, self.torque].into_iter().flatten() {
-            writer.f32(value)?;
+            writer.f32(BLOCK, value)?;
         }
         for value in [self.unwind_count, self.position_displacement].into_iter().flatten() {
-            writer.i32(value)?;
+            writer.i32(BLOCK, value)?;
         }
         Ok(())
     }
@@ -193,32 +195,32 @@ pub struct CommandBlock {
 }
 
 impl CommandBlock {
-    /// Reads a block; `reader` must hold exactly the block.
+    /// Reads a block; `block` must hold exactly the block.
     ///
     /// # Errors
     /// The octets are too few or too many for the data set, or the data set or the position type hold reserved
     /// codes, whose size is unknown.
-    pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
-        let start = reader.offset();
-        let control_mode = ControlMode(reader.u8()?);
-        let feedback_mode = FeedbackMode(reader.u8()?);
-        let axis_control = AxisControl(reader.u8()?);
-        let control_status = ControlStatus::from_bits_retain(reader.u8()?);
-        let set = CommandDataSet::from_bits_retain(reader.u8()?);
-        let actual_data_set = ActualDataSet::from_bits_retain(reader.u8()?);
-        let status_data_set = StatusDataSet::from_bits_retain(reader.u8()?);
-        let command_control = reader.u8()?;
+    pub fn parse(block: &[u8]) -> Result<Self, Error> {
+        let reader = &mut Reader::new(block);
+        let control_mode = ControlMode(reader.u8(BLOCK)?);
+        let feedback_mode = FeedbackMode(reader.u8(BLOCK)?);
+        let axis_control = AxisControl(reader.u8(BLOCK)?);
+        let control_status = ControlStatus::from_bits_retain(reader.u8(BLOCK)?);
+        let set = CommandDataSet::from_bits_retain(reader.u8(BLOCK)?);
+        let actual_data_set = ActualDataSet::from_bits_retain(reader.u8(BLOCK)?);
+        let status_data_set = StatusDataSet::from_bits_retain(reader.u8(BLOCK)?);
+        let command_control = reader.u8(BLOCK)?;
         if set.reserved() != 0 {
-            let at = start + COMMAND_SET_AT;
-            return Err(Error::value("command data set without reserved bits", u64::from(set.bits()), at));
+            let known = set.bits() & !set.reserved();
+            return Err(invalid("command data set", COMMAND_SET_AT, set.bits(), known));
         }
         let position_type = command_control >> POSITION_TYPE_SHIFT;
         if position_type > 1 {
-            let at = start + COMMAND_CONTROL_AT;
-            return Err(Error::value("command position type LREAL or DINT", u64::from(command_control), at));
+            let known = command_control & 0b111;
+            return Err(invalid("command control", COMMAND_CONTROL_AT, command_control, known));
         }
         let values = CommandValues::parse(reader, set, position_type == 1)?;
-        reader.finish("command values")?;
+        reader.finish(BLOCK)?;
         Ok(Self {
             control_mode,
             feedback_mode,
@@ -242,15 +244,15 @@ impl CommandBlock {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u8(self.control_mode.0)?;
-        writer.u8(self.feedback_mode.0)?;
-        writer.u8(self.axis_control.0)?;
-        writer.u8(self.control_status.bits())?;
-        writer.u8(self.values.data_set().bits())?;
-        writer.u8(self.actual_data_set.bits())?;
-        writer.u8(self.status_data_set.bits())?;
+        writer.u8(BLOCK, self.control_mode.0)?;
+        writer.u8(BLOCK, self.feedback_mode.0)?;
+        writer.u8(BLOCK, self.axis_control.0)?;
+        writer.u8(BLOCK, self.control_status.bits())?;
+        writer.u8(BLOCK, self.values.data_set().bits())?;
+        writer.u8(BLOCK, self.actual_data_set.bits())?;
+        writer.u8(BLOCK, self.status_data_set.bits())?;
         let integer = matches!(self.values.position, Some(CommandPosition::Integer(_)));
-        writer.u8((u8::from(integer) << POSITION_TYPE_SHIFT) | (self.target.0 & 0b11))?;
+        writer.u8(BLOCK, (u8::from(integer) << POSITION_TYPE_SHIFT) | (self.target.0 & 0b11))?;
         self.values.emit(writer)
     }
 }

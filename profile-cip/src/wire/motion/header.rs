@@ -20,12 +20,12 @@
 use core::fmt;
 
 use super::codes::{ConnectionFormat, NodeAlarm, NodeControl, NodeFault, NodeStatus, TimeDataSet};
+use super::value::{ReadValue, WriteValue, invalid};
 use crate::wire::{Error, Reader, Writer};
 
 mod field {
     pub const FORMAT: usize = 0;
     pub const REVISION: usize = FORMAT + 1;
-    pub const INSTANCE_COUNT: usize = 4;
     pub const TIME_DATA_SET: usize = 7;
     pub const FIXED_END: usize = 8;
 }
@@ -34,8 +34,8 @@ mod field {
 pub const FORMAT_REVISION: u8 = 2;
 /// Octets of a header without time data.
 pub const HEADER_LEN: usize = field::FIXED_END;
-/// Octet at which the instance count stands.
-pub(super) const INSTANCE_COUNT_AT: usize = field::INSTANCE_COUNT;
+const HEADER: &str = "connection header";
+const TIME_DATA: &str = "time data";
 
 /// Header of a C-to-D connection update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,21 +104,21 @@ const REQUESTS: TimeDataSet = TimeDataSet::UPDATE_DIAGNOSTICS.union(TimeDataSet:
 
 /// Reads the time data set; a reserved bit could stand for data of unknown size, so it is refused.
 fn parse_time_data_set(reader: &mut Reader<'_>) -> Result<TimeDataSet, Error> {
-    let set = TimeDataSet::from_bits_retain(reader.u8()?);
+    let set = TimeDataSet::from_bits_retain(reader.u8(HEADER)?);
     if set.reserved() == 0 {
         Ok(set)
     } else {
-        Err(Error::value("time data set without reserved bits", u64::from(set.bits()), field::TIME_DATA_SET))
+        Err(invalid("time data set", field::TIME_DATA_SET, set.bits(), set.bits() & !set.reserved()))
     }
 }
 
 fn expect_format(reader: &mut Reader<'_>, format: ConnectionFormat) -> Result<(), Error> {
-    let (got, revision) = (reader.u8()?, reader.u8()?);
-    if got != format.0 {
-        return Err(Error::value("connection format of this direction", u64::from(got), field::FORMAT));
+    let (found, revision) = (reader.u8(HEADER)?, reader.u8(HEADER)?);
+    if found != format.0 {
+        return Err(invalid("connection format", field::FORMAT, found, format.0));
     }
     if revision != FORMAT_REVISION {
-        return Err(Error::value("format revision 2", u64::from(revision), field::REVISION));
+        return Err(invalid("format revision", field::REVISION, revision, FORMAT_REVISION));
     }
     Ok(())
 }
@@ -130,19 +130,19 @@ impl CommandHeader {
     /// The octets are too few, or format, revision or time data set are not those of this edition.
     pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
         expect_format(reader, ConnectionFormat::VARIABLE_COMMAND)?;
-        let update_id = reader.u8()?;
-        let node_control = NodeControl::from_bits_retain(reader.u8()?);
-        let instance_count = reader.u8()?;
-        reader.u8()?;
-        let last_received_id = reader.u8()?;
+        let update_id = reader.u8(HEADER)?;
+        let node_control = NodeControl::from_bits_retain(reader.u8(HEADER)?);
+        let instance_count = reader.u8(HEADER)?;
+        reader.u8(HEADER)?;
+        let last_received_id = reader.u8(HEADER)?;
         let set = parse_time_data_set(reader)?;
         Ok(Self {
             update_id,
             node_control,
             instance_count,
             last_received_id,
-            time_stamp: set.contains(TimeDataSet::TIME_STAMP).then(|| reader.u64()).transpose()?,
-            time_offset: set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64()).transpose()?,
+            time_stamp: set.contains(TimeDataSet::TIME_STAMP).then(|| reader.u64(TIME_DATA)).transpose()?,
+            time_offset: set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64(TIME_DATA)).transpose()?,
             diagnostics: set & REQUESTS,
         })
     }
@@ -167,16 +167,16 @@ impl CommandHeader {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u8(ConnectionFormat::VARIABLE_COMMAND.0)?;
-        writer.u8(FORMAT_REVISION)?;
-        writer.u8(self.update_id)?;
-        writer.u8(self.node_control.bits())?;
-        writer.u8(self.instance_count)?;
-        writer.u8(0)?;
-        writer.u8(self.last_received_id)?;
-        writer.u8(self.time_data_set().bits())?;
-        self.time_stamp.map_or(Ok(()), |t| writer.u64(t))?;
-        self.time_offset.map_or(Ok(()), |t| writer.i64(t))
+        writer.u8(HEADER, ConnectionFormat::VARIABLE_COMMAND.0)?;
+        writer.u8(HEADER, FORMAT_REVISION)?;
+        writer.u8(HEADER, self.update_id)?;
+        writer.u8(HEADER, self.node_control.bits())?;
+        writer.u8(HEADER, self.instance_count)?;
+        writer.u8(HEADER, 0)?;
+        writer.u8(HEADER, self.last_received_id)?;
+        writer.u8(HEADER, self.time_data_set().bits())?;
+        self.time_stamp.map_or(Ok(()), |t| writer.u64(TIME_DATA, t))?;
+        self.time_offset.map_or(Ok(()), |t| writer.i64(TIME_DATA, t))
     }
 }
 
@@ -187,23 +187,23 @@ impl ActualHeader {
     /// The octets are too few, or format, revision or time data set are not those of this edition.
     pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
         expect_format(reader, ConnectionFormat::VARIABLE_ACTUAL)?;
-        let update_id = reader.u8()?;
-        let node_status = NodeStatus::from_bits_retain(reader.u8()?);
-        let instance_count = reader.u8()?;
-        let fault_alarm = reader.u8()?;
-        let last_received_id = reader.u8()?;
+        let update_id = reader.u8(HEADER)?;
+        let node_status = NodeStatus::from_bits_retain(reader.u8(HEADER)?);
+        let instance_count = reader.u8(HEADER)?;
+        let fault_alarm = reader.u8(HEADER)?;
+        let last_received_id = reader.u8(HEADER)?;
         let set = parse_time_data_set(reader)?;
-        let time_stamp = set.contains(TimeDataSet::TIME_STAMP).then(|| reader.u64()).transpose()?;
-        let time_offset = set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64()).transpose()?;
+        let time_stamp = set.contains(TimeDataSet::TIME_STAMP).then(|| reader.u64(TIME_DATA)).transpose()?;
+        let time_offset = set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64(TIME_DATA)).transpose()?;
         let update_diagnostics = if set.contains(TimeDataSet::UPDATE_DIAGNOSTICS) {
-            let (lost_updates, late_updates) = (reader.u8()?, reader.u8()?);
-            reader.u16()?;
+            let (lost_updates, late_updates) = (reader.u8(TIME_DATA)?, reader.u8(TIME_DATA)?);
+            reader.u16(TIME_DATA)?;
             Some(UpdateDiagnostics { lost_updates, late_updates })
         } else {
             None
         };
         let time_diagnostics = if set.contains(TimeDataSet::TIME_DIAGNOSTICS) {
-            Some(TimeDiagnostics { received_at: reader.u64()?, transmitted_at: reader.u64()? })
+            Some(TimeDiagnostics { received_at: reader.u64(TIME_DATA)?, transmitted_at: reader.u64(TIME_DATA)? })
         } else {
             None
         };
@@ -247,24 +247,24 @@ impl ActualHeader {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u8(ConnectionFormat::VARIABLE_ACTUAL.0)?;
-        writer.u8(FORMAT_REVISION)?;
-        writer.u8(self.update_id)?;
-        writer.u8(self.node_status.bits())?;
-        writer.u8(self.instance_count)?;
-        writer.u8((self.node_fault.0 << 4) | (self.node_alarm.0 & 0x0F))?;
-        writer.u8(self.last_received_id)?;
-        writer.u8(self.time_data_set().bits())?;
-        self.time_stamp.map_or(Ok(()), |t| writer.u64(t))?;
-        self.time_offset.map_or(Ok(()), |t| writer.i64(t))?;
+        writer.u8(HEADER, ConnectionFormat::VARIABLE_ACTUAL.0)?;
+        writer.u8(HEADER, FORMAT_REVISION)?;
+        writer.u8(HEADER, self.update_id)?;
+        writer.u8(HEADER, self.node_status.bits())?;
+        writer.u8(HEADER, self.instance_count)?;
+        writer.u8(HEADER, (self.node_fault.0 << 4) | (self.node_alarm.0 & 0x0F))?;
+        writer.u8(HEADER, self.last_received_id)?;
+        writer.u8(HEADER, self.time_data_set().bits())?;
+        self.time_stamp.map_or(Ok(()), |t| writer.u64(TIME_DATA, t))?;
+        self.time_offset.map_or(Ok(()), |t| writer.i64(TIME_DATA, t))?;
         if let Some(d) = self.update_diagnostics {
-            writer.u8(d.lost_updates)?;
-            writer.u8(d.late_updates)?;
-            writer.u16(0)?;
+            writer.u8(TIME_DATA, d.lost_updates)?;
+            writer.u8(TIME_DATA, d.late_updates)?;
+            writer.u16(TIME_DATA, 0)?;
         }
         if let Some(d) = self.time_diagnostics {
-            writer.u64(d.received_at)?;
-            writer.u64(d.transmitted_at)?;
+            writer.u64(TIME_DATA, d.received_at)?;
+            writer.u64(TIME_DATA, d.transmitted_at)?;
         }
         Ok(())
     }
