@@ -1,1 +1,15 @@
 //! The generic power drive system interface of IEC 61800-7-1.
+
+pub mod capture;
+pub mod cast;
+pub mod code;
+pub mod fault;
+pub mod image;
+pub mod inhibit;
+pub mod mode;
+pub mod program;
+pub mod quantity;
+pub mod ratio;
+pub mod scaling;
+pub mod state;
+pub mod time;

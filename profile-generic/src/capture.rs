@@ -1,0 +1,132 @@
+//! Event capture: the position at which something happened (an optional application function).
+
+use crate::code::named_enum;
+use crate::quantity::Position;
+use crate::time::SystemTime;
+
+named_enum! {
+    /// What triggers a capture.
+    pub enum CaptureSource {
+        /// The first registration (probe) input.
+        Registration1 = "registration_1",
+        /// The second registration (probe) input.
+        Registration2 = "registration_2",
+        /// The marker (index pulse) of the feedback device.
+        Marker = "marker",
+        /// The home switch input.
+        HomeSwitch = "home_switch",
+        /// The first marker after the home switch.
+        HomeSwitchMarker = "home_switch_marker",
+        /// The actual position passes the watch position.
+        WatchPosition = "watch_position",
+    }
+}
+
+named_enum! {
+    /// Which edge triggers: of the input, or the direction in which a watch position is passed.
+    #[derive(Default)]
+    pub enum CaptureEdge {
+        /// The input goes active; the watch position is passed forward.
+        #[default]
+        Positive = "positive",
+        /// The input goes inactive; the watch position is passed backward.
+        Negative = "negative",
+    }
+}
+
+/// A stretch of positions in which a trigger counts; both ends belong to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CaptureWindow {
+    /// The lower end.
+    pub from: Position,
+    /// The upper end.
+    pub to: Position,
+}
+
+impl CaptureWindow {
+    /// Whether the position lies within the window.
+    pub fn contains(self, position: Position) -> bool {
+        self.from <= position && position <= self.to
+    }
+}
+
+/// Arms or disarms a capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CaptureRequest {
+    /// Chosen by the requester, returned with the result.
+    pub id: u8,
+    /// Whether to arm or to disarm.
+    pub arm: bool,
+    /// What triggers.
+    pub source: CaptureSource,
+    /// Which edge triggers.
+    pub edge: CaptureEdge,
+    /// Whether the capture arms itself again after a trigger.
+    pub auto_rearm: bool,
+    /// Where a trigger counts; everywhere when `None`.
+    pub window: Option<CaptureWindow>,
+    /// The watch position; used with [`CaptureSource::WatchPosition`] only.
+    pub watch_position: Position,
+}
+
+impl CaptureRequest {
+    /// Arms a single capture without a window.
+    pub const fn arm(id: u8, source: CaptureSource, edge: CaptureEdge) -> Self {
+        Self { id, arm: true, source, edge, auto_rearm: false, window: None, watch_position: Position::ZERO }
+    }
+
+    /// Disarms a capture.
+    pub const fn disarm(id: u8, source: CaptureSource, edge: CaptureEdge) -> Self {
+        Self { id, arm: false, source, edge, auto_rearm: false, window: None, watch_position: Position::ZERO }
+    }
+}
+
+/// How a capture request ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CaptureStatus {
+    /// The trigger came.
+    Captured,
+    /// The capture was disarmed before a trigger came.
+    Disarmed,
+    /// The drive cannot capture this source or edge.
+    NotSupported,
+    /// The drive uses its capture unit for something else.
+    Busy,
+}
+
+/// What a capture brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CaptureResult {
+    /// The identifier of the request.
+    pub id: u8,
+    /// What triggered.
+    pub source: CaptureSource,
+    /// Which edge triggered.
+    pub edge: CaptureEdge,
+    /// How it ended; position and time are meaningful for [`CaptureStatus::Captured`] only.
+    pub status: CaptureStatus,
+    /// The position at the trigger.
+    pub position: Position,
+    /// The system time of the trigger.
+    pub at: SystemTime,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ends_belong_to_the_window() {
+        let window = CaptureWindow { from: Position(-5), to: Position(5) };
+        let inside = [-6, -5, 0, 5, 6].map(|position| window.contains(Position(position)));
+        assert_eq!(inside, [false, true, true, true, false]);
+    }
+
+    #[test]
+    fn sources_and_edges_have_names_that_lead_back() {
+        for source in CaptureSource::ALL {
+            assert_eq!(CaptureSource::parse(source.name()), Some(*source));
+        }
+        assert_eq!(CaptureEdge::parse("negative"), Some(CaptureEdge::Negative));
+    }
+}

@@ -1,0 +1,526 @@
+//! The process image of one axis: set-points going to the drive, actual values coming from it.
+//!
+//! Both images are `Copy` values of fixed size. A set-point or actual value counts only when its bit in `present`
+//! is set, so that a profile that does not deliver a value cannot be mistaken for one that delivers zero.
+
+use crate::code::named_enum;
+use crate::fault::Fault;
+use crate::inhibit::Inhibits;
+use crate::mode::{InterpolationSource, OperatingMode};
+use crate::quantity::{Acceleration, Current, Position, Quantity, Temperature, Torque, Velocity, Voltage};
+use crate::state::{DriveState, Report, Request};
+use crate::time::SystemTime;
+use bitflags::bitflags;
+
+named_enum! {
+    /// One value of the process image, as the mapping tables name it.
+    pub enum Signal {
+        /// Set-point of the position.
+        PositionCommand = "position_command",
+        /// Set-point of the velocity.
+        VelocityCommand = "velocity_command",
+        /// Set-point of the acceleration.
+        AccelerationCommand = "acceleration_command",
+        /// Set-point of the torque or force.
+        TorqueCommand = "torque_command",
+        /// Added to the position set-point.
+        PositionOffset = "position_offset",
+        /// Added to the output of the position loop: trim and feed-forward of the velocity.
+        VelocityOffset = "velocity_offset",
+        /// Added to the output of the velocity loop: trim and feed-forward of the acceleration.
+        AccelerationOffset = "acceleration_offset",
+        /// Added to the torque set-point: trim and feed-forward of the torque.
+        TorqueOffset = "torque_offset",
+        /// Digital outputs the controller sets, bit 0 first.
+        DigitalOutputs = "digital_outputs",
+        /// Actual position.
+        PositionActual = "position_actual",
+        /// Actual velocity.
+        VelocityActual = "velocity_actual",
+        /// Actual acceleration.
+        AccelerationActual = "acceleration_actual",
+        /// Actual torque or force.
+        TorqueActual = "torque_actual",
+        /// Actual motor current.
+        CurrentActual = "current_actual",
+        /// Voltage of the DC bus.
+        BusVoltage = "bus_voltage",
+        /// Temperature of the motor.
+        Temperature = "temperature",
+        /// Position set-point less actual position, as the drive's loop sees it.
+        FollowingError = "following_error",
+        /// Digital inputs of the drive, bit 0 first.
+        DigitalInputs = "digital_inputs",
+    }
+}
+
+impl Signal {
+    /// What the signal measures.
+    pub const fn quantity(self) -> Quantity {
+        match self {
+            Self::PositionCommand | Self::PositionOffset | Self::PositionActual | Self::FollowingError => {
+                Quantity::Position
+            }
+            Self::VelocityCommand | Self::VelocityOffset | Self::VelocityActual => Quantity::Velocity,
+            Self::AccelerationCommand | Self::AccelerationOffset | Self::AccelerationActual => {
+                Quantity::Acceleration
+            }
+            Self::TorqueCommand | Self::TorqueOffset | Self::TorqueActual => Quantity::Torque,
+            Self::CurrentActual => Quantity::Current,
+            Self::BusVoltage => Quantity::Voltage,
+            Self::Temperature => Quantity::Temperature,
+            Self::DigitalInputs | Self::DigitalOutputs => Quantity::None,
+        }
+    }
+
+    /// Whether the signal belongs to the [`AxisCommand`]; otherwise it belongs to the [`AxisFeedback`].
+    pub const fn is_command(self) -> bool {
+        matches!(
+            self,
+            Self::PositionCommand
+                | Self::VelocityCommand
+                | Self::AccelerationCommand
+                | Self::TorqueCommand
+                | Self::PositionOffset
+                | Self::VelocityOffset
+                | Self::AccelerationOffset
+                | Self::TorqueOffset
+                | Self::DigitalOutputs
+        )
+    }
+}
+
+/// Reading and writing a process image by signal; what the compiled programs work on.
+pub trait SignalImage {
+    /// Whether the signal belongs to this image.
+    fn owns(signal: Signal) -> bool;
+
+    /// The value of the signal, or `None` when it is not present in this image.
+    fn get(&self, signal: Signal) -> Option<i64>;
+
+    /// Sets the value and marks it present. Returns whether the signal belongs to this image and holds the value.
+    fn set(&mut self, signal: Signal, value: i64) -> bool;
+}
+
+bitflags! {
+    /// Which set-points of an [`AxisCommand`] are valid.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub struct CommandSet: u16 {
+        /// [`AxisCommand::position`].
+        const POSITION = 1 << 0;
+        /// [`AxisCommand::velocity`].
+        const VELOCITY = 1 << 1;
+        /// [`AxisCommand::acceleration`].
+        const ACCELERATION = 1 << 2;
+        /// [`AxisCommand::torque`].
+        const TORQUE = 1 << 3;
+        /// [`AxisCommand::position_offset`].
+        const POSITION_OFFSET = 1 << 4;
+        /// [`AxisCommand::velocity_offset`].
+        const VELOCITY_OFFSET = 1 << 5;
+        /// [`AxisCommand::acceleration_offset`].
+        const ACCELERATION_OFFSET = 1 << 6;
+        /// [`AxisCommand::torque_offset`].
+        const TORQUE_OFFSET = 1 << 7;
+        /// [`AxisCommand::digital_outputs`].
+        const DIGITAL_OUTPUTS = 1 << 8;
+    }
+}
+
+bitflags! {
+    /// Which actual values of an [`AxisFeedback`] are valid.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub struct FeedbackSet: u16 {
+        /// [`AxisFeedback::position`].
+        const POSITION = 1 << 0;
+        /// [`AxisFeedback::velocity`].
+        const VELOCITY = 1 << 1;
+        /// [`AxisFeedback::acceleration`].
+        const ACCELERATION = 1 << 2;
+        /// [`AxisFeedback::torque`].
+        const TORQUE = 1 << 3;
+        /// [`AxisFeedback::current`].
+        const CURRENT = 1 << 4;
+        /// [`AxisFeedback::bus_voltage`].
+        const BUS_VOLTAGE = 1 << 5;
+        /// [`AxisFeedback::temperature`].
+        const TEMPERATURE = 1 << 6;
+        /// [`AxisFeedback::following_error`].
+        const FOLLOWING_ERROR = 1 << 7;
+        /// [`AxisFeedback::digital_inputs`].
+        const DIGITAL_INPUTS = 1 << 8;
+    }
+}
+
+bitflags! {
+    /// Status of the drive, one bit each (IEC 61800-7-202, 3.1.44).
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub struct StatusBits: u32 {
+        /// The drive could be enabled.
+        const READY = 1 << 0;
+        /// The power stage has its supply.
+        const POWER = 1 << 1;
+        /// The power stage is on: there is torque.
+        const ENABLED = 1 << 2;
+        /// The drive follows the set-points of the controller.
+        const TRACKING = 1 << 3;
+        /// The actual position is within the window around the set-point.
+        const IN_POSITION = 1 << 4;
+        /// The actual velocity is within the window around the set-point.
+        const AT_VELOCITY = 1 << 5;
+        /// The axis stands.
+        const STANDSTILL = 1 << 6;
+        /// The position set-point is held at a limit.
+        const POSITION_LIMIT = 1 << 7;
+        /// The velocity set-point is held at a limit.
+        const VELOCITY_LIMIT = 1 << 8;
+        /// The acceleration set-point is held at a limit.
+        const ACCELERATION_LIMIT = 1 << 9;
+        /// The torque is held at a limit.
+        const TORQUE_LIMIT = 1 << 10;
+        /// The current is held at a limit.
+        const CURRENT_LIMIT = 1 << 11;
+        /// A homing procedure has ended well.
+        const HOMED = 1 << 12;
+        /// The position refers to the machine's zero point.
+        const REFERENCED = 1 << 13;
+        /// The axis is halted by request, with torque.
+        const HALT = 1 << 14;
+        /// A warning is present.
+        const WARNING = 1 << 15;
+        /// A fault is latched.
+        const FAULT = 1 << 16;
+        /// The shutdown is latched.
+        const SHUTDOWN = 1 << 17;
+        /// The brake is released.
+        const BRAKE_RELEASED = 1 << 18;
+        /// A safety function is active.
+        const SAFETY_ACTIVE = 1 << 19;
+        /// A set-point or actual value was clamped on its way.
+        const SATURATED = 1 << 20;
+
+        // Bits above are kept when they come from a newer table.
+        const _ = !0;
+    }
+}
+
+impl StatusBits {
+    /// Every named status bit with its name in snake case.
+    pub const NAMED: &'static [(Self, &'static str)] = &[
+        (Self::READY, "ready"),
+        (Self::POWER, "power"),
+        (Self::ENABLED, "enabled"),
+        (Self::TRACKING, "tracking"),
+        (Self::IN_POSITION, "in_position"),
+        (Self::AT_VELOCITY, "at_velocity"),
+        (Self::STANDSTILL, "standstill"),
+        (Self::POSITION_LIMIT, "position_limit"),
+        (Self::VELOCITY_LIMIT, "velocity_limit"),
+        (Self::ACCELERATION_LIMIT, "acceleration_limit"),
+        (Self::TORQUE_LIMIT, "torque_limit"),
+        (Self::CURRENT_LIMIT, "current_limit"),
+        (Self::HOMED, "homed"),
+        (Self::REFERENCED, "referenced"),
+        (Self::HALT, "halt"),
+        (Self::WARNING, "warning"),
+        (Self::FAULT, "fault"),
+        (Self::SHUTDOWN, "shutdown"),
+        (Self::BRAKE_RELEASED, "brake_released"),
+        (Self::SAFETY_ACTIVE, "safety_active"),
+        (Self::SATURATED, "saturated"),
+    ];
+
+    /// The single bit with this exact name.
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::NAMED.iter().find(|(_, known)| *known == name).map(|(bit, _)| *bit)
+    }
+}
+
+/// What the controller wants of one axis in this cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisCommand {
+    /// What the drive shall follow.
+    pub mode: OperatingMode,
+    /// Who generates the profile.
+    pub interpolation: InterpolationSource,
+    /// Position set-point.
+    pub position: Position,
+    /// Velocity set-point.
+    pub velocity: Velocity,
+    /// Acceleration set-point.
+    pub acceleration: Acceleration,
+    /// Torque or force set-point.
+    pub torque: Torque,
+    /// Added to the position set-point.
+    pub position_offset: Position,
+    /// Added to the velocity set-point: trim and feed-forward.
+    pub velocity_offset: Velocity,
+    /// Added to the acceleration set-point: trim and feed-forward.
+    pub acceleration_offset: Acceleration,
+    /// Added to the torque set-point: trim and feed-forward.
+    pub torque_offset: Torque,
+    /// Digital outputs, bit 0 first.
+    pub digital_outputs: u32,
+    /// Which of the values above are valid.
+    pub present: CommandSet,
+    /// When the set-points shall be reached; as soon as possible when `None`.
+    pub target_time: Option<SystemTime>,
+    /// A request to the state machine, if there is one.
+    pub request: Option<Request>,
+    /// Changes with every fresh command; the same number twice means the command is old.
+    pub sequence: u32,
+}
+
+impl AxisCommand {
+    /// The value of a command signal, or `None` when it is absent or belongs to the feedback.
+    pub fn get(&self, signal: Signal) -> Option<i64> {
+        let (bit, value) = match signal {
+            Signal::PositionCommand => (CommandSet::POSITION, self.position.0),
+            Signal::VelocityCommand => (CommandSet::VELOCITY, self.velocity.0),
+            Signal::AccelerationCommand => (CommandSet::ACCELERATION, self.acceleration.0),
+            Signal::TorqueCommand => (CommandSet::TORQUE, self.torque.0),
+            Signal::PositionOffset => (CommandSet::POSITION_OFFSET, self.position_offset.0),
+            Signal::VelocityOffset => (CommandSet::VELOCITY_OFFSET, self.velocity_offset.0),
+            Signal::AccelerationOffset => (CommandSet::ACCELERATION_OFFSET, self.acceleration_offset.0),
+            Signal::TorqueOffset => (CommandSet::TORQUE_OFFSET, self.torque_offset.0),
+            Signal::DigitalOutputs => (CommandSet::DIGITAL_OUTPUTS, i64::from(self.digital_outputs)),
+            _ => return None,
+        };
+        self.present.contains(bit).then_some(value)
+    }
+
+    /// Sets a command signal and marks it present. Returns `false`, and changes nothing, when the signal belongs to
+    /// the feedback or the value does not fit (digital outputs are 32 bits).
+    pub fn set(&mut self, signal: Signal, value: i64) -> bool {
+        let bit = match signal {
+            Signal::PositionCommand => {
+                self.position = Position(value);
+                CommandSet::POSITION
+            }
+            Signal::VelocityCommand => {
+                self.velocity = Velocity(value);
+                CommandSet::VELOCITY
+            }
+            Signal::AccelerationCommand => {
+                self.acceleration = Acceleration(value);
+                CommandSet::ACCELERATION
+            }
+            Signal::TorqueCommand => {
+                self.torque = Torque(value);
+                CommandSet::TORQUE
+            }
+            Signal::PositionOffset => {
+                self.position_offset = Position(value);
+                CommandSet::POSITION_OFFSET
+            }
+            Signal::VelocityOffset => {
+                self.velocity_offset = Velocity(value);
+                CommandSet::VELOCITY_OFFSET
+            }
+            Signal::AccelerationOffset => {
+                self.acceleration_offset = Acceleration(value);
+                CommandSet::ACCELERATION_OFFSET
+            }
+            Signal::TorqueOffset => {
+                self.torque_offset = Torque(value);
+                CommandSet::TORQUE_OFFSET
+            }
+            Signal::DigitalOutputs => {
+                let Ok(bits) = u32::try_from(value) else { return false };
+                self.digital_outputs = bits;
+                CommandSet::DIGITAL_OUTPUTS
+            }
+            _ => return false,
+        };
+        self.present |= bit;
+        true
+    }
+}
+
+impl SignalImage for AxisCommand {
+    fn owns(signal: Signal) -> bool {
+        signal.is_command()
+    }
+
+    fn get(&self, signal: Signal) -> Option<i64> {
+        AxisCommand::get(self, signal)
+    }
+
+    fn set(&mut self, signal: Signal, value: i64) -> bool {
+        AxisCommand::set(self, signal, value)
+    }
+}
+
+/// What is known of one axis in this cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisFeedback {
+    /// The state of the generic state machine.
+    pub state: DriveState,
+    /// What the drive itself last reported.
+    pub report: Report,
+    /// What the drive follows.
+    pub mode: OperatingMode,
+    /// Actual position.
+    pub position: Position,
+    /// Actual velocity.
+    pub velocity: Velocity,
+    /// Actual acceleration.
+    pub acceleration: Acceleration,
+    /// Actual torque or force.
+    pub torque: Torque,
+    /// Actual motor current.
+    pub current: Current,
+    /// Voltage of the DC bus.
+    pub bus_voltage: Voltage,
+    /// Temperature of the motor.
+    pub temperature: Temperature,
+    /// Position set-point less actual position.
+    pub following_error: Position,
+    /// Digital inputs, bit 0 first.
+    pub digital_inputs: u32,
+    /// Which of the values above are valid.
+    pub present: FeedbackSet,
+    /// Status bits.
+    pub status: StatusBits,
+    /// What keeps the axis from starting.
+    pub inhibits: Inhibits,
+    /// The latched fault, if there is one.
+    pub fault: Option<Fault>,
+    /// Whether this cycle brought new data from the drive.
+    pub fresh: bool,
+    /// Cycles since the last new data; 0 when fresh.
+    pub age_cycles: u32,
+    /// When the actual values were taken.
+    pub at: SystemTime,
+}
+
+impl AxisFeedback {
+    /// The value of a feedback signal, or `None` when it is absent or belongs to the command.
+    pub fn get(&self, signal: Signal) -> Option<i64> {
+        let (bit, value) = match signal {
+            Signal::PositionActual => (FeedbackSet::POSITION, self.position.0),
+            Signal::VelocityActual => (FeedbackSet::VELOCITY, self.velocity.0),
+            Signal::AccelerationActual => (FeedbackSet::ACCELERATION, self.acceleration.0),
+            Signal::TorqueActual => (FeedbackSet::TORQUE, self.torque.0),
+            Signal::CurrentActual => (FeedbackSet::CURRENT, self.current.0),
+            Signal::BusVoltage => (FeedbackSet::BUS_VOLTAGE, self.bus_voltage.0),
+            Signal::Temperature => (FeedbackSet::TEMPERATURE, self.temperature.0),
+            Signal::FollowingError => (FeedbackSet::FOLLOWING_ERROR, self.following_error.0),
+            Signal::DigitalInputs => (FeedbackSet::DIGITAL_INPUTS, i64::from(self.digital_inputs)),
+            _ => return None,
+        };
+        self.present.contains(bit).then_some(value)
+    }
+
+    /// Sets a feedback signal and marks it present. Returns `false`, and changes nothing, when the signal belongs
+    /// to the command or the value does not fit (digital inputs are 32 bits).
+    pub fn set(&mut self, signal: Signal, value: i64) -> bool {
+        let bit = match signal {
+            Signal::PositionActual => {
+                self.position = Position(value);
+                FeedbackSet::POSITION
+            }
+            Signal::VelocityActual => {
+                self.velocity = Velocity(value);
+                FeedbackSet::VELOCITY
+            }
+            Signal::AccelerationActual => {
+                self.acceleration = Acceleration(value);
+                FeedbackSet::ACCELERATION
+            }
+            Signal::TorqueActual => {
+                self.torque = Torque(value);
+                FeedbackSet::TORQUE
+            }
+            Signal::CurrentActual => {
+                self.current = Current(value);
+                FeedbackSet::CURRENT
+            }
+            Signal::BusVoltage => {
+                self.bus_voltage = Voltage(value);
+                FeedbackSet::BUS_VOLTAGE
+            }
+            Signal::Temperature => {
+                self.temperature = Temperature(value);
+                FeedbackSet::TEMPERATURE
+            }
+            Signal::FollowingError => {
+                self.following_error = Position(value);
+                FeedbackSet::FOLLOWING_ERROR
+            }
+            Signal::DigitalInputs => {
+                let Ok(bits) = u32::try_from(value) else { return false };
+                self.digital_inputs = bits;
+                FeedbackSet::DIGITAL_INPUTS
+            }
+            _ => return false,
+        };
+        self.present |= bit;
+        true
+    }
+}
+
+impl SignalImage for AxisFeedback {
+    fn owns(signal: Signal) -> bool {
+        !signal.is_command()
+    }
+
+    fn get(&self, signal: Signal) -> Option<i64> {
+        AxisFeedback::get(self, signal)
+    }
+
+    fn set(&mut self, signal: Signal, value: i64) -> bool {
+        AxisFeedback::set(self, signal, value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_signal_belongs_to_exactly_one_image_and_reads_back() {
+        for (signal, value) in Signal::ALL.iter().copied().zip(1_000..) {
+            assert_eq!(Signal::parse(signal.name()), Some(signal));
+            let (mut command, mut feedback) = (AxisCommand::default(), AxisFeedback::default());
+            assert_eq!(
+                (command.get(signal), feedback.get(signal)),
+                (None, None),
+                "{signal} present in an empty image"
+            );
+            assert_eq!(command.set(signal, value), signal.is_command(), "{signal}");
+            assert_eq!(feedback.set(signal, value), !signal.is_command(), "{signal}");
+            assert_eq!(command.get(signal), signal.is_command().then_some(value), "{signal}");
+            assert_eq!(feedback.get(signal), (!signal.is_command()).then_some(value), "{signal}");
+            for other in Signal::ALL.iter().copied().filter(|other| *other != signal) {
+                assert_eq!(
+                    (command.get(other), feedback.get(other)),
+                    (None, None),
+                    "{signal} leaks into {other}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn inputs_and_outputs_refuse_more_than_32_bits() {
+        let mut command = AxisCommand::default();
+        assert!(!command.set(Signal::DigitalOutputs, 1 << 32));
+        assert!(!command.set(Signal::DigitalOutputs, -1));
+        assert_eq!(command, AxisCommand::default());
+        assert!(command.set(Signal::DigitalOutputs, 0xFFFF_FFFF));
+        assert_eq!(command.get(Signal::DigitalOutputs), Some(0xFFFF_FFFF));
+    }
+
+    #[test]
+    fn status_names_lead_back_and_cover_single_bits_once() {
+        let mut seen = StatusBits::empty();
+        for (bit, name) in StatusBits::NAMED {
+            assert_eq!(bit.bits().count_ones(), 1, "{name}");
+            assert_eq!(StatusBits::parse(name), Some(*bit));
+            assert!(!seen.intersects(*bit), "{name} twice");
+            seen |= *bit;
+        }
+        assert_eq!(seen.bits(), (1 << StatusBits::NAMED.len()) - 1);
+    }
+}
