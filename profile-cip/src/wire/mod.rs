@@ -11,6 +11,7 @@ pub mod encapsulation;
 pub mod epath;
 pub mod error;
 pub mod message_router;
+pub mod motion;
 pub mod reader;
 pub mod register_session;
 pub mod sockaddr;

@@ -15,10 +15,11 @@
 use core::fmt;
 
 use super::codes::{
-    ActualDataSet, AlarmType, AxisControl, AxisIoStatus, AxisStateCode, AxisStatus, ClearingEvent, ControlMode,
-    FaultType, FeedbackMode, StatusDataSet,
+    ActualDataSet, AlarmType, AxisControl, AxisIoStatus, AxisStateCode, AxisStatus, ClearingEvent,
+    ControlMode, FaultType, FeedbackMode, StatusDataSet,
 };
 use super::value::{ReadValue, WriteValue, invalid};
+use crate::wire::status::GeneralStatus;
 use crate::wire::{Error, Reader, Writer};
 
 /// Octets of the block without values.
@@ -142,7 +143,8 @@ impl ActualValues {
     /// Octets of the values.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.data_set().iter().count() * 4 + 4 * usize::from(matches!(self.position, Some(ActualPosition::Lint(_))))
+        self.data_set().iter().count() * 4
+            + 4 * usize::from(matches!(self.position, Some(ActualPosition::Lint(_))))
     }
 
     /// Whether there is no value at all.
@@ -341,7 +343,11 @@ impl fmt::Display for FaultRecord {
         if self.fault_type == FaultType::CLEARED {
             write!(f, "{}: {}", self.fault_type, ClearingEvent(self.code))?;
         } else {
-            write!(f, "{} {}, sub code {}, action 0x{:02X}", self.fault_type, self.code, self.sub_code, self.action)?;
+            write!(
+                f,
+                "{} {}, sub code {}, action 0x{:02X}",
+                self.fault_type, self.code, self.sub_code, self.action
+            )?;
         }
         write!(f, ", at {} ns", self.time_stamp)
     }
@@ -366,8 +372,7 @@ impl fmt::Display for ActualValues {
             Some(ActualPosition::Lint(p)) => writeln!(f, "    Actual Position: {p} (LINT)")?,
             None => {}
         }
-        let reals =
-            [("Actual Velocity", self.velocity), ("Actual Acceleration", self.acceleration)];
+        let reals = [("Actual Velocity", self.velocity), ("Actual Acceleration", self.acceleration)];
         for (name, value) in reals {
             if let Some(value) = value {
                 writeln!(f, "    {name}: {value}")?;
@@ -391,7 +396,7 @@ impl fmt::Display for ActualBlock {
         writeln!(f, "    Axis State: {}", self.axis_state)?;
         writeln!(f, "    Control Mode: {}", self.control_mode)?;
         writeln!(f, "    Feedback Mode: {}", self.feedback_mode)?;
-        writeln!(f, "    Axis Response: {}, status 0x{:02X}", self.axis_response, self.response_status)?;
+        writeln!(f, "    Axis Response: {}, {}", self.axis_response, GeneralStatus(self.response_status))?;
         writeln!(f, "    Actual Data Set: {}", self.actual.data_set())?;
         writeln!(f, "    Status Data Set: {}", self.status.data_set())?;
         self.actual.fmt(f)?;

@@ -88,9 +88,9 @@ impl AttributeSelector {
     /// Octets of the value without padding; `None` if the product does not fit.
     #[must_use]
     pub fn value_len(&self) -> Option<usize> {
-        self.ranges().iter().try_fold(usize::from(self.element_size), |len, range| {
-            len.checked_mul(usize::from(range.count))
-        })
+        self.ranges()
+            .iter()
+            .try_fold(usize::from(self.element_size), |len, range| len.checked_mul(usize::from(range.count)))
     }
 
     /// Octets of the head.
@@ -99,7 +99,12 @@ impl AttributeSelector {
         4 + 4 * self.ranges().len()
     }
 
-    fn parse_after_id(reader: &mut Reader<'_>, id: u16, dimension: u8, element_size: u8) -> Result<Self, Error> {
+    fn parse_after_id(
+        reader: &mut Reader<'_>,
+        id: u16,
+        dimension: u8,
+        element_size: u8,
+    ) -> Result<Self, Error> {
         let mut selector = Self::scalar(id, element_size);
         if usize::from(dimension) > MAX_DIMENSIONS {
             let max = u32::try_from(MAX_DIMENSIONS).unwrap_or(u32::MAX);

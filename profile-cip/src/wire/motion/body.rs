@@ -9,6 +9,7 @@ use super::test_service::{
     HookupTestData, InertiaTestData, MotorTestData, RunHookupTest, RunInertiaTest, RunMotorTest,
 };
 use crate::wire::Error;
+use crate::wire::status::GeneralStatus;
 
 /// Writes the lines of one body; what does not decode is printed as octets with the reason.
 pub(super) fn write_body(
@@ -50,7 +51,9 @@ fn write_known(f: &mut fmt::Formatter<'_>, service: MotionService, response: boo
             for item in wire!(GetResponse::new(data)) {
                 match wire!(item) {
                     GetItem::Value(selector, value) => writeln!(f, "      {selector} = {value:02X?}")?,
-                    GetItem::Error(id, status) => writeln!(f, "      attribute {id}: status 0x{status:02X}")?,
+                    GetItem::Error(id, status) => {
+                        writeln!(f, "      attribute {id}: {}", GeneralStatus(status))?
+                    }
                 }
             }
         }
@@ -63,7 +66,13 @@ fn write_known(f: &mut fmt::Formatter<'_>, service: MotionService, response: boo
         (MotionService::SET_AXIS_ATTRIBUTES_LIST, true) => {
             for item in wire!(SetResponse::new(data)) {
                 let item = wire!(item);
-                writeln!(f, "      attribute {}: status 0x{:02X}, index {}", item.id, item.status, item.index)?;
+                writeln!(
+                    f,
+                    "      attribute {}: {}, index {}",
+                    item.id,
+                    GeneralStatus(item.status),
+                    item.index
+                )?;
             }
         }
         (MotionService::SET_CYCLIC_WRITE_LIST | MotionService::SET_CYCLIC_READ_LIST, false) => {
@@ -75,12 +84,14 @@ fn write_known(f: &mut fmt::Formatter<'_>, service: MotionService, response: boo
             let list = wire!(IdStatusList::parse(data));
             writeln!(f, "      block ID {}", list.block_id)?;
             for item in list.iter() {
-                writeln!(f, "      attribute {}: status 0x{:02X}", item.id, item.status)?;
+                writeln!(f, "      attribute {}: {}", item.id, GeneralStatus(item.status))?;
             }
         }
         (MotionService::GROUP_SYNC, false) => writeln!(f, "      grand master clock {data:02X?}")?,
         (MotionService::GROUP_SYNC, true) => writeln!(f, "      {}", SyncStatus(data[0]))?,
-        (MotionService::RUN_MOTOR_TEST, false) => writeln!(f, "      {:?}", wire!(RunMotorTest::parse(data)))?,
+        (MotionService::RUN_MOTOR_TEST, false) => {
+            writeln!(f, "      {:?}", wire!(RunMotorTest::parse(data)))?
+        }
         (MotionService::GET_MOTOR_TEST_DATA, true) => {
             writeln!(f, "      {:?}", wire!(MotorTestData::parse(data)))?;
         }
@@ -90,7 +101,9 @@ fn write_known(f: &mut fmt::Formatter<'_>, service: MotionService, response: boo
         (MotionService::GET_INERTIA_TEST_DATA, true) => {
             writeln!(f, "      {:?}", wire!(InertiaTestData::parse(data)))?;
         }
-        (MotionService::RUN_HOOKUP_TEST, false) => writeln!(f, "      {:?}", wire!(RunHookupTest::parse(data)))?,
+        (MotionService::RUN_HOOKUP_TEST, false) => {
+            writeln!(f, "      {:?}", wire!(RunHookupTest::parse(data)))?
+        }
         (MotionService::GET_HOOKUP_TEST_DATA, true) => {
             writeln!(f, "      {:?}", wire!(HookupTestData::parse(data)))?;
         }

@@ -5,8 +5,8 @@ use core::fmt;
 use profile_generic::open_code;
 
 pub use super::flags::{
-    ActualDataSet, AxisIoStatus, AxisStatus, CommandDataSet, ControlStatus, EventChecking, NodeControl, NodeStatus,
-    StatusDataSet, TimeDataSet,
+    ActualDataSet, AxisIoStatus, AxisStatus, CommandDataSet, ControlStatus, EventChecking, NodeControl,
+    NodeStatus, StatusDataSet, TimeDataSet,
 };
 
 open_code! {

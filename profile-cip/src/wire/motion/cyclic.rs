@@ -162,8 +162,10 @@ impl fmt::Display for CommandValues {
                 writeln!(f, "    {name}: {value}")?;
             }
         }
-        let counts =
-            [("Unwind Cycle Count", self.unwind_count), ("Position Displacement", self.position_displacement)];
+        let counts = [
+            ("Unwind Cycle Count", self.unwind_count),
+            ("Position Displacement", self.position_displacement),
+        ];
         for (name, value) in counts {
             if let Some(value) = value {
                 writeln!(f, "    {name}: {value}")?;

@@ -282,9 +282,7 @@ impl fmt::Display for CommandEvents {
                     writeln!(f, "      Reg {name} Window: {} to {}", w.min, w.max)?;
                 }
             }
-            for (name, value) in
-                [("Threshold", e.home_torque_threshold), ("Time", e.home_torque_time)]
-            {
+            for (name, value) in [("Threshold", e.home_torque_threshold), ("Time", e.home_torque_time)] {
                 if let Some(value) = value {
                     writeln!(f, "      Home Torque {name}: {value}")?;
                 }

@@ -29,6 +29,7 @@ use super::codes::{
 use super::cyclic::{CommandPosition, CommandValues};
 use super::header::FORMAT_REVISION;
 use super::value::invalid;
+use crate::wire::status::GeneralStatus;
 use crate::wire::{Error, Reader, Writer};
 
 /// Octets of either update.
@@ -219,7 +220,7 @@ impl fmt::Display for FixedActual {
         writeln!(f, "    Axis State: {}", self.axis_state)?;
         writeln!(f, "    Control Mode: {}", self.control_mode)?;
         writeln!(f, "    Feedback Mode: {}", self.feedback_mode)?;
-        writeln!(f, "    Axis Response: {}, status 0x{:02X}", self.axis_response, self.response_status)?;
+        writeln!(f, "    Axis Response: {}, {}", self.axis_response, GeneralStatus(self.response_status))?;
         self.actual.fmt(f)
     }
 }

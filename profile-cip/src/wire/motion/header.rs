@@ -194,7 +194,8 @@ impl ActualHeader {
         let last_received_id = reader.u8(HEADER)?;
         let set = parse_time_data_set(reader)?;
         let time_stamp = set.contains(TimeDataSet::TIME_STAMP).then(|| reader.u64(TIME_DATA)).transpose()?;
-        let time_offset = set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64(TIME_DATA)).transpose()?;
+        let time_offset =
+            set.contains(TimeDataSet::TIME_OFFSET).then(|| reader.i64(TIME_DATA)).transpose()?;
         let update_diagnostics = if set.contains(TimeDataSet::UPDATE_DIAGNOSTICS) {
             let (lost_updates, late_updates) = (reader.u8(TIME_DATA)?, reader.u8(TIME_DATA)?);
             reader.u16(TIME_DATA)?;
@@ -203,7 +204,10 @@ impl ActualHeader {
             None
         };
         let time_diagnostics = if set.contains(TimeDataSet::TIME_DIAGNOSTICS) {
-            Some(TimeDiagnostics { received_at: reader.u64(TIME_DATA)?, transmitted_at: reader.u64(TIME_DATA)? })
+            Some(TimeDiagnostics {
+                received_at: reader.u64(TIME_DATA)?,
+                transmitted_at: reader.u64(TIME_DATA)?,
+            })
         } else {
             None
         };
@@ -270,7 +274,12 @@ impl ActualHeader {
     }
 }
 
-fn write_times(f: &mut fmt::Formatter<'_>, who: &str, stamp: Option<u64>, offset: Option<i64>) -> fmt::Result {
+fn write_times(
+    f: &mut fmt::Formatter<'_>,
+    who: &str,
+    stamp: Option<u64>,
+    offset: Option<i64>,
+) -> fmt::Result {
     if let Some(t) = stamp {
         writeln!(f, "  {who} Time Stamp: {t} ns")?;
     }

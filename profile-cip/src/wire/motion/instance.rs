@@ -119,7 +119,8 @@ impl Sizes {
         };
         let (instance, cyclic) = (words(self.total())?, words(self.cyclic + self.read_write)?);
         let (main, read_write) = (words(self.cyclic)?, words(self.read_write)?);
-        let header = [number, 0, instance, cyclic, main, read_write, words(self.event)?, words(self.service)?];
+        let header =
+            [number, 0, instance, cyclic, main, read_write, words(self.event)?, words(self.service)?];
         writer.slice(HEADER, &header)
     }
 }

@@ -30,3 +30,6 @@ pub use frame::{ActualFrame, ActualInstance, ActualWriter, CommandFrame, Command
 pub use header::{ActualHeader, CommandHeader, FORMAT_REVISION, TimeDiagnostics, UpdateDiagnostics};
 pub use read_write::{ReadBlock, WriteBlock};
 pub use service::{ServiceRequest, ServiceResponse};
+
+#[cfg(test)]
+mod tests;

@@ -13,6 +13,7 @@
 
 use core::fmt;
 
+use crate::wire::status::GeneralStatus;
 use crate::wire::{Error, Reader, Writer};
 
 /// Octets of either block without values.
@@ -105,22 +106,27 @@ impl<'a> ReadBlock<'a> {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.slice(READ, &[self.write_block_id, self.write_status, self.read_block_id, self.read_status])?;
+        writer
+            .slice(READ, &[self.write_block_id, self.write_status, self.read_block_id, self.read_status])?;
         emit_data(writer, READ, self.data)
     }
 }
 
 impl fmt::Display for WriteBlock<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "    Cyclic Write Block {}, asks for Cyclic Read Block {}", self.write_block_id, self.read_block_id)?;
+        writeln!(
+            f,
+            "    Cyclic Write Block {}, asks for Cyclic Read Block {}",
+            self.write_block_id, self.read_block_id
+        )?;
         writeln!(f, "      data {:02X?}", self.data)
     }
 }
 
 impl fmt::Display for ReadBlock<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "    Cyclic Write Block {}: status 0x{:02X}", self.write_block_id, self.write_status)?;
-        writeln!(f, "    Cyclic Read Block {}: status 0x{:02X}", self.read_block_id, self.read_status)?;
+        writeln!(f, "    Cyclic Write Block {}: {}", self.write_block_id, GeneralStatus(self.write_status))?;
+        writeln!(f, "    Cyclic Read Block {}: {}", self.read_block_id, GeneralStatus(self.read_status))?;
         writeln!(f, "      data {:02X?}", self.data)
     }
 }

@@ -15,6 +15,7 @@ use core::fmt;
 
 use super::body::write_body;
 use super::codes::MotionService;
+use crate::wire::status::GeneralStatus;
 use crate::wire::{Error, Reader, Writer};
 
 /// Octets of either block without data.
@@ -116,8 +117,11 @@ impl fmt::Display for ServiceResponse<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "    Service Response {}: {}, general status 0x{:02X}, extended status 0x{:02X}",
-            self.transaction_id, self.service, self.general_status, self.extended_status
+            "    Service Response {}: {}, {}, extended status 0x{:02X}",
+            self.transaction_id,
+            self.service,
+            GeneralStatus(self.general_status),
+            self.extended_status
         )?;
         write_body(f, self.service, true, self.data)
     }

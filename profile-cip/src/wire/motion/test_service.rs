@@ -213,10 +213,17 @@ impl HookupTestData {
     /// The octets are too few.
     pub fn parse(body: &[u8]) -> Result<Self, Error> {
         let reader = &mut Reader::new(body);
-        let [status, feedback_1_direction, feedback_2_direction, commutation_polarity] = reader.array(BODY)?;
+        let [status, feedback_1_direction, feedback_2_direction, commutation_polarity] =
+            reader.array(BODY)?;
         let commutation_offset = reader.f32(BODY)?;
         let status = TestStatus(status);
-        Ok(Self { status, feedback_1_direction, feedback_2_direction, commutation_polarity, commutation_offset })
+        Ok(Self {
+            status,
+            feedback_1_direction,
+            feedback_2_direction,
+            commutation_polarity,
+            commutation_offset,
+        })
     }
 
     /// Writes a response body.
