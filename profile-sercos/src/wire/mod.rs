@@ -5,13 +5,37 @@
 
 pub mod attribute;
 pub mod connection;
+pub mod cp0;
+pub mod cp12;
+pub mod cyclic;
 pub mod data_status;
+pub mod device_control;
+pub mod device_status;
 pub mod drive_words;
 pub mod error;
+pub mod extended;
+pub mod header;
+pub mod hot_plug;
 pub mod idn;
+pub mod layout;
 pub mod procedure;
 pub mod scp;
+pub mod slot;
 pub mod svc;
 pub mod svc_error;
+pub mod telegram;
 
 pub use error::Error;
+
+/// Writes names in brackets, separated by commas; nothing if there are none.
+pub(crate) fn display_bits(
+    f: &mut core::fmt::Formatter<'_>,
+    names: impl Iterator<Item = &'static str>,
+) -> core::fmt::Result {
+    let mut open = false;
+    for name in names {
+        write!(f, "{}{name}", if open { ", " } else { " (" })?;
+        open = true;
+    }
+    if open { f.write_str(")") } else { Ok(()) }
+}
