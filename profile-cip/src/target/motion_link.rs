@@ -11,8 +11,9 @@
 //! that the device reports on its own when the open connection has timed out.
 
 use arrayvec::ArrayVec;
-use core::fmt;
 use core::net::{Ipv4Addr, SocketAddrV4};
+
+pub use crate::wire::ConnectionTriad;
 
 /// Most bytes of service data in a handed-on explicit request or its reply: what an unconnected message holds.
 pub const EXPLICIT_DATA_MAX: usize = 504;
@@ -23,27 +24,6 @@ pub const EXTENDED_STATUS_MAX: usize = 4;
 /// Names one request until its reply; never used twice by one adapter run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Token(pub u64);
-
-/// What identifies a connection at its originator: the triad of every Forward_Open and Forward_Close.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ConnectionTriad {
-    /// Connection serial number, chosen by the originator.
-    pub connection_serial: u16,
-    /// Vendor ID of the originator.
-    pub originator_vendor: u16,
-    /// Serial number of the originator.
-    pub originator_serial: u32,
-}
-
-impl fmt::Display for ConnectionTriad {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "connection {:#06x} of vendor {:#06x} serial {:#010x}",
-            self.connection_serial, self.originator_vendor, self.originator_serial
-        )
-    }
-}
 
 /// What the adapter asks of the motion device.
 #[expect(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]

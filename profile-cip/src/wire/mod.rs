@@ -5,18 +5,26 @@
 
 #[cfg(test)]
 mod check;
+pub mod attributes;
 pub mod class1;
 pub mod cpf;
 pub mod encapsulation;
 pub mod epath;
 pub mod error;
+pub mod forward_close;
+pub mod forward_open;
+pub mod list_identity;
+pub mod list_services;
 pub mod message_router;
 pub mod motion;
+pub mod multiple_service;
+pub mod network_parameters;
 pub mod reader;
 pub mod register_session;
 pub mod sockaddr;
 pub mod status;
 pub mod triad;
+pub mod unconnected_send;
 pub mod writer;
 
 pub use error::Error;
