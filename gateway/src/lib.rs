@@ -1,4 +1,5 @@
 //! The Axisbridge gateway.
 
 pub mod capture;
+pub mod config;
 pub mod sys;

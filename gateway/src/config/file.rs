@@ -1,0 +1,219 @@
+//! The file as it is written. Every key that is not listed here is an error.
+//!
+//! Times are strings with a unit: `"2 ms"`, `"31.25 us"`, `"31250 ns"`, `"1 s"`. Names are 1 to 32 letters, digits, `-`
+//! and `_`. Positions count in axis units: revolutions or millimetres.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The whole file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    /// The box itself.
+    #[serde(rename = "box")]
+    pub the_box: BoxTable,
+    /// Time. Default: the host's clock.
+    pub time: Option<TimeTable>,
+    /// Logging. Default: level `info`.
+    pub log: Option<LogTable>,
+    /// The Modbus TCP server. Default: none.
+    pub modbus: Option<ModbusTable>,
+    /// Mapping tables. Default: the built-in ones.
+    pub mappings: Option<MappingsTable>,
+    /// The CIP Motion devices seen by controllers, at least one.
+    pub device: Vec<Spanned<DeviceTable>>,
+    /// The axes, at least one, at most 16.
+    pub axis: Vec<Spanned<AxisTable>>,
+    /// The bus behind.
+    pub south: SouthTable,
+}
+
+/// `[box]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxTable {
+    /// Name of the box in logs, recordings and the status block.
+    pub name: Spanned<String>,
+}
+
+/// `[time]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeTable {
+    /// Where system time comes from. Default: `"host"`, the host's clock (TAI where the kernel knows the offset from UTC).
+    pub source: Option<Spanned<String>>,
+}
+
+/// `[log]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogTable {
+    /// `"error"`, `"warn"`, `"info"`, `"debug"` or `"trace"`. Default: `"info"`.
+    pub level: Option<Spanned<String>>,
+}
+
+/// `[modbus]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModbusTable {
+    /// Address and port, such as `"0.0.0.0:502"`.
+    pub listen: Spanned<String>,
+    /// Clients served at once, 1 to 64. Default: 8.
+    pub clients_max: Option<Spanned<i64>>,
+}
+
+/// `[mappings]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MappingsTable {
+    /// A folder of dictionaries and mapping tables used in place of the built-in ones; counts from the folder of this file.
+    pub dir: Spanned<String>,
+}
+
+/// `[[device]]`: a CIP Motion device.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceTable {
+    /// Name, unique among devices.
+    pub name: Spanned<String>,
+    /// An IPv4 address of this host, one for each device; TCP and UDP 44818 and UDP 2222 are used on it.
+    pub listen: Spanned<String>,
+    /// Names of its axes.
+    pub axes: Spanned<Vec<Spanned<String>>>,
+    /// What it calls itself.
+    pub identity: IdentityTable,
+    /// Drive Power Structure Class ID (class attribute 34); controllers may ask for it when they connect. Default: 0, each axis has
+    /// its own.
+    pub power_structure_class_id: Option<Spanned<i64>>,
+    /// The controller update periods (RPI) it accepts.
+    pub update_period: Option<UpdatePeriodTable>,
+}
+
+/// `identity` of a `[[device]]`; the device type is always 37, CIP Motion Drive.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IdentityTable {
+    /// Vendor number given by ODVA, 1 to 65535.
+    pub vendor_id: Spanned<i64>,
+    /// The vendor's number of the product, 1 to 65535.
+    pub product_code: Spanned<i64>,
+    /// Major and minor revision, such as `"1.1"` (1 to 127, 1 to 255). Default: `"1.1"`.
+    pub revision: Option<Spanned<String>>,
+    /// Number of the piece, 1 to 4294967295, unique among the vendor's pieces.
+    pub serial_number: Spanned<i64>,
+    /// Printable ASCII, 1 to 32 characters. Default: `"Axisbridge"`.
+    pub product_name: Option<Spanned<String>>,
+}
+
+/// `update_period` of a `[[device]]`; both from `250 us` to `100 ms`, in whole microseconds.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UpdatePeriodTable {
+    /// Shortest, at least the bus cycle. Default: `"1 ms"`, or the bus cycle where that is longer.
+    pub min: Option<Spanned<String>>,
+    /// Longest. Default: `"32 ms"`.
+    pub max: Option<Spanned<String>>,
+}
+
+/// `[[axis]]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisTable {
+    /// Name, unique among axes.
+    pub name: Spanned<String>,
+    /// Instance of the Motion Device Axis Object, 1 to 255, unique in its device.
+    pub instance: Spanned<i64>,
+    /// Name of the drive behind it; each drive serves one axis.
+    pub drive: Spanned<String>,
+    /// `"revolution"` for a rotary axis, `"millimetre"` for a linear one.
+    pub unit: Spanned<String>,
+    /// Position counts of the controller in one unit, 1 to 2147483647. Default: 1000000.
+    pub motion_resolution: Option<Spanned<i64>>,
+    /// For an axis without ends: position counts after which it is at its start again, 1 to 2147483647. Default: an axis with ends.
+    pub unwind_counts: Option<Spanned<i64>>,
+    /// Drive Power Structure Axis ID (attribute 725). Default: 0.
+    pub power_structure_axis_id: Option<Spanned<i64>>,
+    /// Limits held by the box. Default: those of the drive alone.
+    pub limits: Option<LimitsTable>,
+    /// What the axis does when commands stay away: `"disable-and-coast"`, `"current-decel-and-disable"`,
+    /// `"ramped-decel-and-disable"`, `"current-decel-and-hold"` or `"ramped-decel-and-hold"`. Default:
+    /// `"ramped-decel-and-disable"`.
+    pub on_command_loss: Option<Spanned<String>>,
+}
+
+/// `limits` of an `[[axis]]`; each is left to the drive where it is not given.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsTable {
+    /// Lowest position command, in axis units; only for an axis with ends, and together with `position_max`.
+    pub position_min: Option<Spanned<f64>>,
+    /// Highest position command, in axis units.
+    pub position_max: Option<Spanned<f64>>,
+    /// Highest speed in either direction, in axis units per second.
+    pub velocity: Option<Spanned<f64>>,
+    /// Highest acceleration and deceleration, in axis units per second squared.
+    pub acceleration: Option<Spanned<f64>>,
+    /// Highest torque or force in either direction, in percent of the motor's rating.
+    pub torque_percent: Option<Spanned<f64>>,
+    /// Largest distance of actual from commanded position, in axis units.
+    pub following_error: Option<Spanned<f64>>,
+}
+
+/// `[south]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SouthTable {
+    /// The SERCOS III bus.
+    pub sercos: SercosTable,
+}
+
+/// `[south.sercos]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosTable {
+    /// Network interface of the bus, such as `"enp3s0"`, or `"in-process"` for simulated drives.
+    pub interface: Spanned<String>,
+    /// Communication cycle: `31.25 us`, `62.5 us`, `125 us`, `250 us`, or a multiple of `250 us` up to `65 ms`.
+    pub cycle_time: Spanned<String>,
+    /// Ethernet address the master sends from, such as `"02:00:00:00:00:01"`. Default: the interface's own.
+    pub master_mac: Option<Spanned<String>>,
+    /// How far the start of a cycle may lie off its time, `1 us` to a quarter of the cycle; declared to the slaves. Default: `"50 us"`,
+    /// or a quarter of the cycle where that is shorter.
+    pub jitter: Option<Spanned<String>>,
+    /// Cycles for which topology and addresses must stay the same in phase 0, 1 to 1000. Default: 100.
+    pub cp0_stable_cycles: Option<Spanned<i64>>,
+    /// Cycles in a row that may be lost in phases 3 and 4 before a slave or the master gives up, 1 to 65535. Default: 5.
+    pub allowed_losses: Option<Spanned<i64>>,
+    /// What to ask of the kernel for the cycle thread; refusals are reported and do not stop the box.
+    pub realtime: Option<RealtimeTable>,
+    /// The drives, at least one.
+    pub drive: Vec<Spanned<DriveTable>>,
+}
+
+/// `[south.sercos.realtime]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RealtimeTable {
+    /// `SCHED_FIFO` priority, 1 to 99; 0 for no real-time scheduling. Default: 80.
+    pub priority: Option<Spanned<i64>>,
+    /// Processor to stay on, from 0. Default: any.
+    pub cpu: Option<Spanned<i64>>,
+    /// Keep the memory of the process resident. Default: true.
+    pub lock_memory: Option<bool>,
+}
+
+/// `[[south.sercos.drive]]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveTable {
+    /// Name, unique among drives.
+    pub name: Spanned<String>,
+    /// SERCOS address, 1 to 511, unique.
+    pub address: Spanned<i64>,
+    /// How the contents of its connections are agreed: `"idn-list"` (S-0-1050.x.6), or `"standard-1"` to `"standard-6"` for a
+    /// telegram of the drive profile (S-0-0015). Default: `"idn-list"`.
+    pub telegram: Option<Spanned<String>>,
+    /// Mapping overlays for this drive, applied in this order. Default: none.
+    pub overlays: Option<Vec<Spanned<String>>>,
+}

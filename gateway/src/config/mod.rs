@@ -1,0 +1,322 @@
+//! The configuration file of the box: TOML in, a checked [`Config`] out.
+//!
+//! [`file`] is the file as it is written: every key, what it means, its default. [`check`] turns it into the types
+//! below, in which every reference is an index and every value is in range, or into a [`ConfigError`] that shows each
+//! fault at its line.
+
+mod check;
+mod diagnostic;
+mod duration;
+pub mod file;
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
+use profile_generic::time::DurationNs;
+
+pub use diagnostic::{ConfigError, Diagnostic};
+
+use crate::sys::realtime;
+
+/// Axes of one box: what its status block, its recorder and its cycle have room for.
+pub const AXES_MAX: usize = 16;
+
+/// Devices of one box: each axis could have one of its own.
+pub const DEVICES_MAX: usize = AXES_MAX;
+
+/// Bytes of a configuration file; a real one has a few thousand.
+pub const FILE_LEN_MAX: u64 = 1 << 20;
+
+/// A checked configuration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Config {
+    /// Name of the box, for people.
+    pub name: String,
+    /// Where system time comes from.
+    pub time: TimeSource,
+    /// What is logged.
+    pub log_level: LogLevel,
+    /// The Modbus TCP server; `None` for none.
+    pub modbus: Option<Modbus>,
+    /// A folder of mapping tables in place of the built-in ones.
+    pub mappings_dir: Option<PathBuf>,
+    /// The CIP Motion devices seen by controllers.
+    pub devices: Vec<Device>,
+    /// All axes, in the order of the file.
+    pub axes: Vec<Axis>,
+    /// The SERCOS III bus behind.
+    pub sercos: Sercos,
+}
+
+impl Config {
+    /// Reads and checks a file. Paths in it count from the file's own folder.
+    ///
+    /// # Errors
+    /// [`ConfigError`]: the file cannot be read, or what is wrong in it, each fault shown at its place.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let name = path.display().to_string();
+        let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
+        let length = std::fs::metadata(path).map_err(unreadable)?.len();
+        if length > FILE_LEN_MAX {
+            return Err(ConfigError::TooLong { path: path.to_owned(), length });
+        }
+        let source = std::fs::read_to_string(path).map_err(unreadable)?;
+        let mut config = Self::parse(&source, &name)?;
+        if let (Some(dir), Some(folder)) = (&mut config.mappings_dir, path.parent()) {
+            *dir = folder.join(&*dir);
+        }
+        Ok(config)
+    }
+
+    /// Checks the text of a file; `name` is shown in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] with every fault found.
+    pub fn parse(source: &str, name: &str) -> Result<Self, ConfigError> {
+        let file: file::File = toml::from_str(source).map_err(|error| {
+            ConfigError::invalid(source, name, vec![diagnostic::Problem::from_toml(&error)])
+        })?;
+        check::check(&file).map_err(|problems| ConfigError::invalid(source, name, problems))
+    }
+
+    /// The axes of a device, with their number in [`Config::axes`].
+    pub fn axes_of(&self, device: usize) -> impl Iterator<Item = (usize, &Axis)> {
+        self.axes.iter().enumerate().filter(move |(_, axis)| axis.device == device)
+    }
+}
+
+/// Where system time comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeSource {
+    /// The host's clock: TAI where the kernel knows the offset, else UTC.
+    Host,
+}
+
+/// How much is logged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LogLevel {
+    /// Only what stops the box.
+    Error,
+    /// And what an operator should know.
+    Warn,
+    /// And what happens in normal operation.
+    Info,
+    /// And what helps to find a fault.
+    Debug,
+    /// And every step.
+    Trace,
+}
+
+impl LogLevel {
+    /// The level's name in the file and in filters.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warn => "warn",
+            Self::Info => "info",
+            Self::Debug => "debug",
+            Self::Trace => "trace",
+        }
+    }
+}
+
+/// The Modbus TCP server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Modbus {
+    /// Where it listens.
+    pub listen: SocketAddr,
+    /// Clients served at once.
+    pub clients_max: u8,
+}
+
+/// A CIP Motion device as controllers see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Device {
+    /// Name, unique among devices.
+    pub name: String,
+    /// Its IP address, for TCP and UDP 44818 and UDP 2222.
+    pub listen: Ipv4Addr,
+    /// The Identity object.
+    pub identity: Identity,
+    /// Motion Device Axis Object, class attribute 34; 0 when each axis has its own.
+    pub power_structure_class_id: u32,
+    /// Shortest controller update period accepted.
+    pub update_period_min: DurationNs,
+    /// Longest controller update period accepted.
+    pub update_period_max: DurationNs,
+}
+
+/// The Identity object of a device; its device type is always CIP Motion Drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// Vendor number given by ODVA.
+    pub vendor_id: u16,
+    /// The vendor's number of the product.
+    pub product_code: u16,
+    /// Major revision, 1 to 127.
+    pub revision_major: u8,
+    /// Minor revision, 1 to 255.
+    pub revision_minor: u8,
+    /// Number of the piece.
+    pub serial_number: u32,
+    /// Printable ASCII, at most 32 characters.
+    pub product_name: String,
+}
+
+/// Whether an axis turns or slides, and with it the unit of its quantities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisKind {
+    /// Revolutions.
+    Rotary,
+    /// Millimetres.
+    Linear,
+}
+
+/// An axis: one instance of the Motion Device Axis Object in front, one drive behind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Axis {
+    /// Name, unique among axes.
+    pub name: String,
+    /// Instance number, unique in its device, from 1.
+    pub instance: u8,
+    /// Index in [`Config::devices`].
+    pub device: usize,
+    /// Index in [`Sercos::drives`]; no two axes share one.
+    pub drive: usize,
+    /// Rotary or linear.
+    pub kind: AxisKind,
+    /// Position counts of the controller for one axis unit.
+    pub motion_resolution: u32,
+    /// Position counts after which the axis is at its start again; `None` for an axis with ends.
+    pub unwind_counts: Option<u32>,
+    /// Motion Device Axis Object, attribute 725; 0 when the device's class attribute says it.
+    pub power_structure_axis_id: u32,
+    /// What the axis may do, beside what its drive allows.
+    pub limits: Limits,
+    /// What happens when commands stay away.
+    pub on_command_loss: StoppingAction,
+}
+
+/// Limits of an axis that the box holds; `None` leaves them to the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Limits {
+    /// Lowest position command.
+    pub position_min: Option<Position>,
+    /// Highest position command.
+    pub position_max: Option<Position>,
+    /// Highest speed, either direction.
+    pub velocity: Option<Velocity>,
+    /// Highest acceleration, either direction.
+    pub acceleration: Option<Acceleration>,
+    /// Highest torque or force, either direction.
+    pub torque: Option<Torque>,
+    /// Largest distance of actual from commanded position.
+    pub following_error: Option<Position>,
+}
+
+/// How an axis stops (Motion Device Axis Object, attribute 610).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StoppingAction {
+    /// Torque off at once; the axis coasts (IEC 60204-1 category 0).
+    DisableAndCoast,
+    /// As fast as torque allows, then torque off (category 1).
+    CurrentDecelAndDisable,
+    /// On the ramp, then torque off (category 1).
+    RampedDecelAndDisable,
+    /// As fast as torque allows, then hold (category 2).
+    CurrentDecelAndHold,
+    /// On the ramp, then hold (category 2).
+    RampedDecelAndHold,
+}
+
+impl StoppingAction {
+    /// All of them, in the order of their codes.
+    pub const ALL: [Self; 5] = [
+        Self::DisableAndCoast,
+        Self::CurrentDecelAndDisable,
+        Self::RampedDecelAndDisable,
+        Self::CurrentDecelAndHold,
+        Self::RampedDecelAndHold,
+    ];
+
+    /// The code of the attribute.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::DisableAndCoast => 0,
+            Self::CurrentDecelAndDisable => 1,
+            Self::RampedDecelAndDisable => 2,
+            Self::CurrentDecelAndHold => 3,
+            Self::RampedDecelAndHold => 4,
+        }
+    }
+
+    /// The name in the file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DisableAndCoast => "disable-and-coast",
+            Self::CurrentDecelAndDisable => "current-decel-and-disable",
+            Self::RampedDecelAndDisable => "ramped-decel-and-disable",
+            Self::CurrentDecelAndHold => "current-decel-and-hold",
+            Self::RampedDecelAndHold => "ramped-decel-and-hold",
+        }
+    }
+}
+
+/// How the bus is reached.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Link {
+    /// Simulated drives inside this process.
+    InProcess,
+    /// A network interface of the host.
+    Interface(String),
+}
+
+/// The SERCOS III bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sercos {
+    /// How it is reached.
+    pub link: Link,
+    /// Communication cycle in phases 3 and 4 (S-0-1002).
+    pub cycle_time: DurationNs,
+    /// The master's Ethernet address; `None` takes the interface's.
+    pub master_mac: Option<[u8; 6]>,
+    /// How far the start of a cycle may lie off its time, declared to the slaves (S-0-1023).
+    pub jitter: DurationNs,
+    /// Cycles for which topology and addresses must stay the same in phase 0.
+    pub cp0_stable_cycles: u16,
+    /// Cycles in a row that may be lost before a slave or the master gives up (S-0-1003).
+    pub allowed_losses: u16,
+    /// What to ask of the kernel for the cycle thread.
+    pub realtime: realtime::Request,
+    /// The drives on it.
+    pub drives: Vec<Drive>,
+}
+
+/// A drive on the bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Drive {
+    /// Name, unique among drives.
+    pub name: String,
+    /// SERCOS address, 1 to 511, unique.
+    pub address: u16,
+    /// How the contents of its connections are agreed.
+    pub telegram: Telegram,
+    /// Mapping overlays for this drive, in the order in which they apply.
+    pub overlays: Vec<String>,
+}
+
+/// How the contents of a connection are agreed (S-0-1050.x.1, bits 5 and 4).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Telegram {
+    /// By lists of IDNs, from the mapping tables (S-0-1050.x.6).
+    IdnList,
+    /// One of the drive profile's standard telegrams, 1 to 6 (S-0-0015).
+    Standard(u8),
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,323 @@
+use std::path::Path;
+
+use super::*;
+
+/// A small configuration without faults; the cases below break it in one place.
+const GOOD: &str = r#"[box]
+name = "press"
+
+[[device]]
+name = "front"
+listen = "192.0.2.10"
+axes = ["x", "y"]
+[device.identity]
+vendor_id = 1
+product_code = 2
+serial_number = 3
+
+[[axis]]
+name = "x"
+instance = 1
+drive = "a"
+unit = "revolution"
+
+[[axis]]
+name = "y"
+instance = 2
+drive = "b"
+unit = "millimetre"
+limits = { position_min = -1.5, position_max = 2.0 }
+
+[south.sercos]
+interface = "in-process"
+cycle_time = "2 ms"
+
+[[south.sercos.drive]]
+name = "a"
+address = 1
+
+[[south.sercos.drive]]
+name = "b"
+address = 2
+"#;
+
+fn good() -> Config {
+    Config::parse(GOOD, "box.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The errors of [`GOOD`] with `old` replaced by `new` at its first place.
+fn broken(old: &str, new: &str) -> String {
+    assert!(GOOD.contains(old), "{old}");
+    match Config::parse(&GOOD.replacen(old, new, 1), "box.toml") {
+        Ok(config) => panic!("accepted: {config:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn defaults_are_those_of_the_documentation() {
+    let config = good();
+    assert_eq!(config.name, "press");
+    assert_eq!((config.time, config.log_level, config.modbus), (TimeSource::Host, LogLevel::Info, None));
+    assert_eq!(config.mappings_dir, None);
+    let device = &config.devices[0];
+    assert_eq!(
+        (device.update_period_min, device.update_period_max),
+        (DurationNs(2_000_000), DurationNs(32_000_000))
+    );
+    assert_eq!(device.power_structure_class_id, 0);
+    assert_eq!(
+        device.identity,
+        Identity {
+            vendor_id: 1,
+            product_code: 2,
+            revision_major: 1,
+            revision_minor: 1,
+            serial_number: 3,
+            product_name: "Axisbridge".to_owned(),
+        }
+    );
+    assert_eq!(
+        config.axes[0],
+        Axis {
+            name: "x".to_owned(),
+            instance: 1,
+            device: 0,
+            drive: 0,
+            kind: AxisKind::Rotary,
+            motion_resolution: 1_000_000,
+            unwind_counts: None,
+            power_structure_axis_id: 0,
+            limits: Limits::default(),
+            on_command_loss: StoppingAction::RampedDecelAndDisable,
+        }
+    );
+    assert_eq!(config.axes[1].kind, AxisKind::Linear);
+    assert_eq!(config.axes[1].limits.position_min, Some(Position(-1_500_000_000)));
+    assert_eq!(config.axes[1].limits.position_max, Some(Position(2_000_000_000)));
+    assert_eq!(
+        config.sercos,
+        Sercos {
+            link: Link::InProcess,
+            cycle_time: DurationNs(2_000_000),
+            master_mac: None,
+            jitter: DurationNs(50_000),
+            cp0_stable_cycles: 100,
+            allowed_losses: 5,
+            realtime: realtime::Request { priority: Some(80), cpu: None, lock_memory: true },
+            drives: vec![
+                Drive { name: "a".to_owned(), address: 1, telegram: Telegram::IdnList, overlays: vec![] },
+                Drive { name: "b".to_owned(), address: 2, telegram: Telegram::IdnList, overlays: vec![] },
+            ],
+        }
+    );
+    assert_eq!(
+        config.axes_of(0).map(|(index, axis)| (index, axis.instance)).collect::<Vec<_>>(),
+        [(0, 1), (1, 2)]
+    );
+}
+
+#[test]
+fn values_given_are_taken() {
+    let text = GOOD
+        .replace("[[device]]", "[time]\nsource = \"host\"\n[log]\nlevel = \"debug\"\n[modbus]\nlisten = \"[::1]:502\"\nclients_max = 3\n[mappings]\ndir = \"maps\"\n[[device]]")
+        .replace("serial_number = 3", "serial_number = 0xFFFF_FFFF\nrevision = \"127.255\"\nproduct_name = \"P\"")
+        .replace("axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\"]\npower_structure_class_id = 7\nupdate_period = { min = \"4 ms\", max = \"4 ms\" }")
+        .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
+        .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\ncp0_stable_cycles = 1\nallowed_losses = 65535\nrealtime = { priority = 0, cpu = 3, lock_memory = false }")
+        .replace("in-process", "enp3s0")
+        .replace("address = 2", "address = 511\ntelegram = \"standard-5\"\noverlays = [\"first\", \"second\"]");
+    let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(config.log_level, LogLevel::Debug);
+    assert_eq!(config.modbus, Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3 }));
+    assert_eq!(config.mappings_dir.as_deref(), Some(Path::new("maps")));
+    let device = &config.devices[0];
+    assert_eq!(device.listen, Ipv4Addr::new(192, 0, 2, 10));
+    assert_eq!(device.power_structure_class_id, 7);
+    assert_eq!(
+        (device.update_period_min, device.update_period_max),
+        (DurationNs(4_000_000), DurationNs(4_000_000))
+    );
+    assert_eq!((device.identity.revision_major, device.identity.revision_minor), (127, 255));
+    assert_eq!((device.identity.serial_number, device.identity.product_name.as_str()), (u32::MAX, "P"));
+    let axis = &config.axes[0];
+    assert_eq!(
+        (axis.motion_resolution, axis.unwind_counts, axis.power_structure_axis_id),
+        (4096, Some(8192), 9)
+    );
+    assert_eq!(axis.on_command_loss, StoppingAction::DisableAndCoast);
+    assert_eq!(
+        axis.limits,
+        Limits {
+            position_min: None,
+            position_max: None,
+            velocity: Some(Velocity(12_500_000_000)),
+            acceleration: Some(Acceleration(100_000_000_000)),
+            torque: Some(Torque(1_505_000)),
+            following_error: Some(Position(100_000_000)),
+        }
+    );
+    let sercos = &config.sercos;
+    assert_eq!(sercos.link, Link::Interface("enp3s0".to_owned()));
+    assert_eq!((sercos.cycle_time, sercos.jitter), (DurationNs(62_500), DurationNs(15_625)));
+    assert_eq!(sercos.master_mac, Some([2, 0, 0, 0, 0, 0xAF]));
+    assert_eq!((sercos.cp0_stable_cycles, sercos.allowed_losses), (1, 65_535));
+    assert_eq!(sercos.realtime, realtime::Request { priority: None, cpu: Some(3), lock_memory: false });
+    assert_eq!((sercos.drives[1].address, sercos.drives[1].telegram), (511, Telegram::Standard(5)));
+    assert_eq!(sercos.drives[1].overlays, ["first", "second"]);
+}
+
+#[test]
+fn cycle_times_are_those_of_the_standard() {
+    let accepts =
+        |time: &str| Config::parse(&GOOD.replacen("\"2 ms\"", &format!("\"{time}\""), 1), "box.toml").is_ok();
+    for time in ["31.25 us", "62500 ns", "125 us", "250 us", "500 us", "0.75 ms", "1 ms", "65 ms"] {
+        assert!(accepts(time), "{time}");
+    }
+    for time in ["0 ms", "31 us", "93.75 us", "187.5 us", "300 us", "65.25 ms", "1 s", "1100 us"] {
+        assert!(!accepts(time), "{time}");
+    }
+}
+
+/// Each case: what it shows, what is replaced, by what.
+const BROKEN: &[(&str, &str, &str)] = &[
+    ("syntax", "name = \"press\"", "name = press"),
+    ("unclosed_string", "name = \"press\"", "name = \"press"),
+    ("unknown_key", "instance = 1", "instanze = 1"),
+    ("unknown_table", "[box]", "[boxes]\n[box]"),
+    ("missing_key", "drive = \"a\"\n", ""),
+    ("missing_table", "[box]\nname = \"press\"\n", ""),
+    ("wrong_type", "instance = 1", "instance = \"one\""),
+    ("duplicate_key", "instance = 1", "instance = 1\ninstance = 2"),
+    ("duplicate_sercos_address", "address = 2", "address = 1"),
+    ("sercos_address_out_of_range", "address = 2", "address = 512"),
+    ("cycle_time_off_the_steps", "\"2 ms\"", "\"1.1 ms\""),
+    ("time_without_unit", "\"2 ms\"", "\"2\""),
+    ("axis_without_its_drive", "drive = \"a\"", "drive = \"c\""),
+    ("drive_of_two_axes", "drive = \"b\"", "drive = \"a\""),
+    ("axis_name_twice", "name = \"y\"", "name = \"x\""),
+    ("axis_of_no_device", "axes = [\"x\", \"y\"]", "axes = [\"x\"]"),
+    ("axis_listed_twice", "axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\", \"x\"]"),
+    ("unknown_axis_in_device", "axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\", \"z\"]"),
+    ("device_without_axes", "axes = [\"x\", \"y\"]", "axes = []"),
+    ("instance_twice", "instance = 2", "instance = 1"),
+    ("instance_zero", "instance = 2", "instance = 0"),
+    (
+        "update_period_below_cycle",
+        "[device.identity]",
+        "update_period = { min = \"1 ms\" }\n[device.identity]",
+    ),
+    (
+        "update_period_reversed",
+        "[device.identity]",
+        "update_period = { min = \"8 ms\", max = \"4 ms\" }\n[device.identity]",
+    ),
+    (
+        "update_period_out_of_range",
+        "[device.identity]",
+        "update_period = { max = \"1 s\" }\n[device.identity]",
+    ),
+    ("listen_with_port", "\"192.0.2.10\"", "\"192.0.2.10:44818\""),
+    ("listen_unspecified", "\"192.0.2.10\"", "\"0.0.0.0\""),
+    ("modbus_without_port", "[[device]]", "[modbus]\nlisten = \"0.0.0.0\"\n[[device]]"),
+    ("revision", "product_code = 2", "product_code = 2\nrevision = \"0.1\""),
+    ("product_name_not_ascii", "product_code = 2", "product_code = 2\nproduct_name = \"Brücke\""),
+    ("unit", "\"revolution\"", "\"degree\""),
+    ("stopping_action", "unit = \"revolution\"", "unit = \"revolution\"\non_command_loss = \"stop\""),
+    ("limits_reversed", "position_max = 2.0", "position_max = -2.0"),
+    ("limit_alone", "position_min = -1.5, ", ""),
+    ("limits_of_endless_axis", "limits = {", "unwind_counts = 5000\nlimits = {"),
+    ("limit_not_positive", "position_min = -1.5, position_max = 2.0", "velocity = 0.0"),
+    ("limit_too_large", "position_min = -1.5, position_max = 2.0", "velocity = 1e10"),
+    ("interface_name", "\"in-process\"", "\"a name with blanks\""),
+    (
+        "mac_of_a_group",
+        "[[south.sercos.drive]]",
+        "master_mac = \"01:00:5e:00:00:01\"\n[[south.sercos.drive]]",
+    ),
+    ("jitter", "[[south.sercos.drive]]", "jitter = \"1 ms\"\n[[south.sercos.drive]]"),
+    ("priority", "[[south.sercos.drive]]", "realtime = { priority = 100 }\n[[south.sercos.drive]]"),
+    ("telegram", "address = 2", "address = 2\ntelegram = \"standard-7\""),
+    ("log_level", "[[device]]", "[log]\nlevel = \"loud\"\n[[device]]"),
+    ("time_source", "[[device]]", "[time]\nsource = \"gps\"\n[[device]]"),
+    ("name_with_blank", "name = \"b\"", "name = \"b b\""),
+];
+
+#[test]
+fn faults_are_shown_at_their_place() {
+    let mut text = String::new();
+    for (case, old, new) in BROKEN {
+        text += &format!("== {case}\n{}\n\n", broken(old, new));
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn every_fault_of_a_file_is_reported_in_its_order() {
+    let text = GOOD
+        .replace("instance = 1", "instance = 300")
+        .replace("address = 2", "address = 0")
+        .replace("2 ms", "7 us");
+    let error = Config::parse(&text, "box.toml").unwrap_err();
+    let places: Vec<_> =
+        error.diagnostics().iter().map(|found| (found.line, found.column, found.title.as_str())).collect();
+    assert_eq!(
+        places,
+        [
+            (15, 12, "the instance is 300"),
+            (28, 14, "7 us is not a SERCOS III cycle time"),
+            (36, 11, "the SERCOS address is 0")
+        ]
+    );
+}
+
+#[test]
+fn too_many_axes_and_devices_are_refused() {
+    let mut text = GOOD.to_owned();
+    let mut list = "\"x\", \"y\"".to_owned();
+    for number in 3..=17 {
+        list += &format!(", \"n{number}\"");
+        text += &format!("[[south.sercos.drive]]\nname = \"d{number}\"\naddress = {number}\n");
+        text += &format!(
+            "[[axis]]\nname = \"n{number}\"\ninstance = {number}\ndrive = \"d{number}\"\nunit = \"revolution\"\n"
+        );
+    }
+    let text = text.replace("axes = [\"x\", \"y\"]", &format!("axes = [{list}]"));
+    let error = Config::parse(&text, "box.toml").unwrap_err();
+    let titles: Vec<_> = error.diagnostics().iter().map(|found| found.title.as_str()).collect();
+    assert_eq!(titles, ["too many axes: 17"]);
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let error = Config::load(Path::new("/nonexistent/box.toml")).unwrap_err();
+    assert!(
+        error.to_string().starts_with("cannot read the configuration /nonexistent/box.toml: No such file")
+    );
+    assert!(error.diagnostics().is_empty());
+}
+
+#[test]
+fn every_example_loads() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+    let mut loaded = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            Config::load(&path).unwrap_or_else(|error| panic!("{error}"));
+            loaded += 1;
+        }
+    }
+    assert!(loaded >= 2, "{loaded} examples in {}", folder.display());
+}
+
+#[test]
+fn the_mappings_folder_counts_from_the_file() {
+    let folder = std::env::temp_dir().join(format!("axisbridge-config-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("box.toml");
+    std::fs::write(&path, GOOD.replace("[[device]]", "[mappings]\ndir = \"maps\"\n[[device]]")).unwrap();
+    let config = Config::load(&path).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!(config.mappings_dir, Some(folder.join("maps")));
+}
