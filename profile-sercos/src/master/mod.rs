@@ -1,1 +1,3 @@
 //! The master role.
+
+pub mod svc;

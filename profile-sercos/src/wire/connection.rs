@@ -2,30 +2,21 @@
 //!
 //! * [`ConnectionControl`], C-CON: the first two bytes of a connection's data in MDT or AT.
 //! * [`ConnectionSetup`], S-0-1050.x.1.
-//! * [`TelegramAssignment`], S-0-1050.x.3: in which telegram, at which offset the data is.
-//! * [`TelegramOffset`], S-0-1009, 1011, 1013, 1014: the same for device words and service channels, where MDT
-//!   or AT follows from the IDN.
+//!
+//! Where a connection is in the telegrams, S-0-1050.x.3, is [`super::layout::Offset`].
 
 use core::fmt;
 
 use bitflags::bitflags;
 
-use super::Error;
-
 /// Length of C-CON in bytes.
 pub const CONNECTION_CONTROL_LEN: usize = 2;
-
-/// Largest offset that an assignment can name (11 bits).
-pub const OFFSET_MAX: u16 = 0x7FF;
-
-/// Telegrams of one kind in a cycle: MDT0..3, AT0..3.
-pub const TELEGRAMS: u8 = 4;
 
 const COUNTER_SHIFT: u16 = 12;
 
 bitflags! {
     /// Connection control, C-CON. Bits without a name are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ConnectionControl: u16 {
         /// The producer is ready; before that the data means nothing.
         const READY = 1 << 0;
@@ -107,7 +98,7 @@ pub enum ConnectionTiming {
 
 bitflags! {
     /// Connection setup, S-0-1050.x.1. Bits without a name are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ConnectionSetup: u16 {
         /// The connection is used.
         const ACTIVE = 1 << 15;
@@ -168,88 +159,9 @@ impl ConnectionSetup {
     }
 }
 
-/// Telegram assignment of a connection, S-0-1050.x.3: bits 13..12 telegram number, bit 11 MDT, bits 10..0
-/// offset in bytes from the end of the SERCOS header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct TelegramAssignment {
-    /// In the MDT (true) or in the AT.
-    pub mdt: bool,
-    /// Telegram number, 0..=3.
-    pub telegram: u8,
-    /// Offset in bytes, 0..=2047.
-    pub offset: u16,
-}
-
-impl TelegramAssignment {
-    /// Takes the word apart; bits 15..14 are reserved and ignored.
-    #[must_use]
-    pub const fn from_word(word: u16) -> TelegramAssignment {
-        TelegramAssignment {
-            mdt: word & 1 << 11 != 0,
-            telegram: (word >> 12).to_le_bytes()[0] & 3,
-            offset: word & OFFSET_MAX,
-        }
-    }
-
-    /// The word; fails when telegram number or offset do not fit.
-    pub const fn to_word(self) -> Result<u16, Error> {
-        match (TelegramOffset { telegram: self.telegram, offset: self.offset }).to_word() {
-            Ok(word) if self.mdt => Ok(word | 1 << 11),
-            other => other,
-        }
-    }
-}
-
-impl fmt::Display for TelegramAssignment {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{} offset {}", if self.mdt { "MDT" } else { "AT" }, self.telegram, self.offset)
-    }
-}
-
-/// Place of a device word or service channel, S-0-1009, 1011, 1013, 1014: bits 15..12 telegram number, bits
-/// 11..0 offset in bytes, of which 10..0 are used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct TelegramOffset {
-    /// Telegram number, 0..=3.
-    pub telegram: u8,
-    /// Offset in bytes from the end of the SERCOS header, 0..=2047.
-    pub offset: u16,
-}
-
-impl TelegramOffset {
-    /// Takes the word apart; fails when it names a telegram above 3 or an offset above 2047.
-    pub const fn from_word(word: u16) -> Result<TelegramOffset, Error> {
-        let place = TelegramOffset { telegram: (word >> 12).to_le_bytes()[0], offset: word & 0xFFF };
-        match place.to_word() {
-            Ok(_) => Ok(place),
-            Err(error) => Err(error),
-        }
-    }
-
-    /// The word; fails when telegram number or offset do not fit.
-    pub const fn to_word(self) -> Result<u16, Error> {
-        if self.telegram >= TELEGRAMS {
-            let (value, max) = (self.telegram as u32, TELEGRAMS as u32 - 1);
-            return Err(Error::OutOfRange { what: "telegram number", value, max });
-        }
-        if self.offset > OFFSET_MAX {
-            let (value, max) = (self.offset as u32, OFFSET_MAX as u32);
-            return Err(Error::OutOfRange { what: "telegram offset", value, max });
-        }
-        Ok((self.telegram as u16) << 12 | self.offset)
-    }
-}
-
-impl fmt::Display for TelegramOffset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "telegram {} offset {}", self.telegram, self.offset)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     #[test]
     fn producer_words_of_the_recording() {
@@ -281,55 +193,6 @@ mod tests {
             let word = ConnectionSetup::from_bits_retain(bits);
             let again = word.with_configuration(word.configuration()).with_timing(word.timing());
             assert_eq!(again.bits(), bits);
-        }
-    }
-
-    #[test]
-    fn assignment_words() {
-        // Startup recording: frame 3657 low word 0x081E, frame 3713 low word 0x0018.
-        let vectors = [
-            (0x081E, TelegramAssignment { mdt: true, telegram: 0, offset: 30 }, "MDT0 offset 30"),
-            (0x0018, TelegramAssignment { mdt: false, telegram: 0, offset: 24 }, "AT0 offset 24"),
-            (0x3FFF, TelegramAssignment { mdt: true, telegram: 3, offset: 2047 }, "MDT3 offset 2047"),
-        ];
-        for (word, value, text) in vectors {
-            assert_eq!(TelegramAssignment::from_word(word), value);
-            assert_eq!(value.to_word(), Ok(word));
-            assert_eq!(value.to_string(), text);
-        }
-        assert_eq!(
-            TelegramAssignment { mdt: true, telegram: 4, offset: 0 }.to_word(),
-            Err(Error::OutOfRange { what: "telegram number", value: 4, max: 3 })
-        );
-        assert_eq!(
-            TelegramAssignment { mdt: false, telegram: 0, offset: 2048 }.to_word(),
-            Err(Error::OutOfRange { what: "telegram offset", value: 2048, max: 2047 })
-        );
-    }
-
-    #[test]
-    fn offset_words() {
-        // Startup recording, frame 3257: C-DEV of slave 1 at 26 of MDT0.
-        assert_eq!(TelegramOffset::from_word(0x001A), Ok(TelegramOffset { telegram: 0, offset: 26 }));
-        assert_eq!(TelegramOffset { telegram: 2, offset: 8 }.to_word(), Ok(0x2008));
-        assert_eq!(
-            TelegramOffset::from_word(0x4000),
-            Err(Error::OutOfRange { what: "telegram number", value: 4, max: 3 })
-        );
-        assert_eq!(
-            TelegramOffset::from_word(0x0800),
-            Err(Error::OutOfRange { what: "telegram offset", value: 2048, max: 2047 })
-        );
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(256))]
-        #[test]
-        fn words_round_trip(word: u16) {
-            prop_assert_eq!(TelegramAssignment::from_word(word).to_word(), Ok(word & 0x3FFF));
-            if let Ok(place) = TelegramOffset::from_word(word) {
-                prop_assert_eq!(place.to_word(), Ok(word));
-            }
         }
     }
 }

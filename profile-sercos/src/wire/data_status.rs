@@ -9,7 +9,7 @@ use bitflags::bitflags;
 
 bitflags! {
     /// The data status word. Reserved bits are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DataStatus: u16 {
         /// Procedure command: set in the slave.
         const SET = 1 << 0;

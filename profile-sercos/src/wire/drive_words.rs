@@ -24,7 +24,7 @@ const READY_SHIFT: u16 = 14;
 
 bitflags! {
     /// Drive control word, S-0-0134. Bits without a name are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DriveControl: u16 {
         /// Drive on; 1 to 0 brakes as well as possible and then removes the torque.
         const ON = 1 << 15;
@@ -84,7 +84,7 @@ impl fmt::Display for ReadyState {
 
 bitflags! {
     /// Drive status word, S-0-0135. Bits without a name are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DriveStatus: u16 {
         /// Ready state, see [`DriveStatus::ready`].
         const READY = 3 << READY_SHIFT;

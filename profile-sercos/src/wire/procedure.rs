@@ -7,7 +7,7 @@ use bitflags::bitflags;
 
 bitflags! {
     /// Procedure command control word. Reserved bits are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ProcedureControl: u16 {
         /// Set the command; 0 cancels it.
         const SET = 1 << 0;

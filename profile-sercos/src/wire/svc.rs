@@ -103,7 +103,7 @@ impl fmt::Display for Element {
 }
 
 /// SVC control word (C-SVC). Bits 15..6 are kept as they came; masters send 0.
-#[derive(Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct SvcControl(pub u16);
 
 impl SvcControl {
@@ -169,7 +169,7 @@ impl fmt::Debug for SvcControl {
 
 bitflags! {
     /// SVC status word (S-SVC). Reserved bits are kept.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct SvcStatus: u16 {
         /// Handshake bit of the slave; equals MHS when the step has been taken over.
         const AHS = 1 << 0;
@@ -185,7 +185,7 @@ bitflags! {
 }
 
 /// Six bytes of the service channel in the MDT.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct MdtSvc {
     /// Control word.
     pub control: SvcControl,
@@ -222,7 +222,7 @@ impl fmt::Display for MdtSvc {
 }
 
 /// Six bytes of the service channel in the AT.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct AtSvc {
     /// Status word.
     pub status: SvcStatus,
@@ -277,7 +277,7 @@ impl fmt::Display for AtSvc {
 }
 
 /// The first four bytes of a list or text: lengths in bytes, this head not counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct ListHead {
     /// Bytes which the list has now.
     pub current: u16,

@@ -1,0 +1,292 @@
+//! The service channel client of one slave.
+//!
+//! One step goes out per cycle: the master toggles MHS, the slave answers with AHS equal to MHS and without BUSY.
+//! A step without that handshake for some cycles, or a slave that is busy for too long, ends the request.
+//! Requests wait in a fixed number of places; a place is taken until its outcome has been fetched, so no
+//! outcome is ever lost.
+
+pub mod request;
+mod transfer;
+
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use self::request::{Priority, SvcFailure, SvcOutcome, SvcReply, SvcRequest};
+use self::transfer::{Flow, Transfer};
+use crate::wire::svc::{AtSvc, Element, MdtSvc, SvcControl, SvcStatus};
+use crate::wire::svc_error::SvcError;
+
+/// Requests of the application which one slave holds, waiting or answered and not fetched.
+pub const REQUESTS_MAX: usize = 16;
+
+/// Place of the master's own requests.
+const OWN: usize = REQUESTS_MAX;
+
+/// Times which a slave has for its answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SvcLimits {
+    /// Cycles until the handshake bit has followed, 1..=65535; 10 by default.
+    pub handshake_cycles: u16,
+    /// Time for which a slave may be busy with one step; 1000 ms by default.
+    pub busy_timeout: DurationNs,
+    /// Time from the start of a procedure command to its end; 10 s by default.
+    pub command_timeout: DurationNs,
+}
+
+impl Default for SvcLimits {
+    fn default() -> SvcLimits {
+        SvcLimits {
+            handshake_cycles: 10,
+            busy_timeout: DurationNs::from_millis(1000),
+            command_timeout: DurationNs::from_secs(10),
+        }
+    }
+}
+
+#[derive(Debug)]
+enum Place {
+    Free,
+    Waiting,
+    Active,
+    Finished(Result<SvcReply, SvcFailure>),
+}
+
+#[derive(Debug)]
+struct Slot {
+    place: Place,
+    serial: u64,
+    request: SvcRequest,
+}
+
+impl Slot {
+    fn empty() -> Slot {
+        let request = SvcRequest::new(crate::wire::idn::Idn(0), request::SvcOperation::Status);
+        Slot { place: Place::Free, serial: 0, request }
+    }
+}
+
+/// What a slave's answer in this cycle says about the step on the wire.
+enum Answer {
+    /// The slave is through: its info, or an error code.
+    Through(Result<u32, SvcError>),
+    Busy,
+    Missing,
+}
+
+/// The service channel client of one slave.
+#[derive(Debug)]
+pub(crate) struct ServiceChannel {
+    limits: SvcLimits,
+    sent: MdtSvc,
+    /// Whether steps may be started: only in CP2 to CP4, not while the phase is switched.
+    open: bool,
+    /// The request on the wire, with whether its first step has gone out.
+    active: Option<(usize, Transfer, bool)>,
+    missing_cycles: u16,
+    busy_since: Option<MonotonicTime>,
+    slots: [Slot; REQUESTS_MAX + 1],
+    serial: u64,
+}
+
+impl ServiceChannel {
+    pub fn new(limits: SvcLimits) -> ServiceChannel {
+        ServiceChannel {
+            limits,
+            sent: MdtSvc::default(),
+            open: false,
+            active: None,
+            missing_cycles: 0,
+            busy_since: None,
+            slots: core::array::from_fn(|_| Slot::empty()),
+            serial: 0,
+        }
+    }
+
+    /// The six bytes for the next MDT.
+    pub fn outgoing(&self) -> MdtSvc {
+        self.sent
+    }
+
+    /// The handshake bit on the wire.
+    pub fn mhs(&self) -> bool {
+        self.sent.control.mhs()
+    }
+
+    /// Sets the word to the given handshake bit and nothing else: the start of CP1 (0) and the end of it (1),
+    /// and the start of later phases, where the bit goes on as it was.
+    pub fn rest(&mut self, mhs: bool) {
+        self.sent = MdtSvc { control: SvcControl::new(mhs, Element::Close, false, false), info: 0 };
+    }
+
+    /// Permits or stops new requests. A request on the wire goes on.
+    pub fn set_open(&mut self, open: bool) {
+        self.open = open;
+    }
+
+    /// Whether nothing is on the wire and nothing waits.
+    pub fn is_idle(&self) -> bool {
+        self.active.is_none() && !self.slots.iter().any(|slot| matches!(slot.place, Place::Waiting))
+    }
+
+    /// Takes a request of the application; gives it back when all places are taken.
+    pub fn submit(&mut self, request: SvcRequest) -> Result<(usize, u64), SvcRequest> {
+        let free = self.slots[..OWN].iter().position(|slot| matches!(slot.place, Place::Free));
+        match free {
+            Some(index) => Ok((index, self.occupy(index, request))),
+            None => Err(request),
+        }
+    }
+
+    /// Takes a request of the master itself, which goes before all others; one at a time.
+    pub fn submit_own(&mut self, request: SvcRequest) {
+        debug_assert!(matches!(self.slots[OWN].place, Place::Free));
+        self.occupy(OWN, request);
+    }
+
+    fn occupy(&mut self, index: usize, request: SvcRequest) -> u64 {
+        self.serial += 1;
+        self.slots[index] = Slot { place: Place::Waiting, serial: self.serial, request };
+        self.serial
+    }
+
+    /// The outcome of one finished request of the application, oldest first, with its place and serial number.
+    pub fn take_outcome(&mut self) -> Option<(usize, u64, SvcOutcome)> {
+        let index = (0..OWN)
+            .filter(|&index| matches!(self.slots[index].place, Place::Finished(_)))
+            .min_by_key(|&index| self.slots[index].serial)?;
+        let serial = self.slots[index].serial;
+        self.take(index).map(|outcome| (index, serial, outcome))
+    }
+
+    /// The outcome of the master's own request.
+    pub fn take_own(&mut self) -> Option<SvcOutcome> {
+        self.take(OWN)
+    }
+
+    fn take(&mut self, index: usize) -> Option<SvcOutcome> {
+        let slot = &mut self.slots[index];
+        let Place::Finished(result) = slot.place else {
+            return None;
+        };
+        slot.place = Place::Free;
+        Some(SvcOutcome {
+            idn: slot.request.idn,
+            operation: slot.request.operation,
+            result,
+            data: core::mem::take(&mut slot.request.data),
+        })
+    }
+
+    /// Ends every request with `failure`.
+    pub fn abort(&mut self, failure: SvcFailure) {
+        self.active = None;
+        for slot in &mut self.slots {
+            if matches!(slot.place, Place::Waiting | Place::Active) {
+                slot.place = Place::Finished(Err(failure));
+            }
+        }
+    }
+
+    /// Takes what the AT of this cycle said, `None` when it did not come, and prepares the next MDT.
+    pub fn receive(&mut self, now: MonotonicTime, answer: Option<AtSvc>) {
+        if self.active.is_none() && !self.start() {
+            self.missing_cycles = 0;
+            self.busy_since = None;
+            return;
+        }
+        match self.judge(answer) {
+            Answer::Through(info) => {
+                self.missing_cycles = 0;
+                self.busy_since = None;
+                self.go_on(now, info);
+            }
+            Answer::Busy => {
+                self.missing_cycles = 0;
+                let since = *self.busy_since.get_or_insert(now);
+                if now - since >= self.limits.busy_timeout {
+                    let milliseconds = self.limits.busy_timeout.as_nanos() / 1_000_000;
+                    let milliseconds = u32::try_from(milliseconds).unwrap_or(u32::MAX);
+                    self.fail(SvcFailure::BusyTimeout { milliseconds });
+                }
+            }
+            Answer::Missing => {
+                self.missing_cycles = self.missing_cycles.saturating_add(1);
+                if self.missing_cycles >= self.limits.handshake_cycles {
+                    self.fail(SvcFailure::HandshakeTimeout { cycles: self.missing_cycles });
+                }
+            }
+        }
+    }
+
+    fn judge(&self, answer: Option<AtSvc>) -> Answer {
+        let Some(answer) = answer else {
+            return Answer::Missing;
+        };
+        let handshake = answer.status.contains(SvcStatus::AHS) == self.mhs();
+        if !handshake || !answer.status.contains(SvcStatus::VALID) {
+            Answer::Missing
+        } else if answer.status.contains(SvcStatus::BUSY) {
+            Answer::Busy
+        } else if answer.status.contains(SvcStatus::ERROR) {
+            Answer::Through(Err(SvcError(answer.info_word())))
+        } else {
+            Answer::Through(Ok(answer.info))
+        }
+    }
+
+    /// Makes the most urgent waiting request the active one.
+    fn start(&mut self) -> bool {
+        let rank = |index: usize, slot: &Slot| (index == OWN, slot.request.priority == Priority::Urgent);
+        let next = (0..self.slots.len())
+            .filter(|&index| self.open && matches!(self.slots[index].place, Place::Waiting))
+            .max_by_key(|&index| {
+                let slot = &self.slots[index];
+                (rank(index, slot), core::cmp::Reverse(slot.serial))
+            });
+        let Some(index) = next else {
+            return false;
+        };
+        let slot = &mut self.slots[index];
+        slot.place = Place::Active;
+        self.active = Some((index, Transfer::new(&mut slot.request), false));
+        true
+    }
+
+    /// The channel is through with the last step: take its answer and put the next step on the wire.
+    fn go_on(&mut self, now: MonotonicTime, mut info: Result<u32, SvcError>) {
+        let timeout = self.limits.command_timeout;
+        while let Some((index, transfer, on_wire)) = &mut self.active {
+            let data = &mut self.slots[*index].request.data;
+            // What the slave answers before the first step belongs to the request before.
+            let flow = if *on_wire { transfer.advance(now, timeout, info, data) } else { Flow::Next };
+            match flow {
+                Flow::Next => {
+                    *on_wire = true;
+                    let step = transfer.step(data);
+                    let mhs = !self.sent.control.mhs();
+                    self.sent = MdtSvc {
+                        control: SvcControl::new(mhs, step.element, step.write, step.last),
+                        info: step.info,
+                    };
+                    return;
+                }
+                Flow::Finished(result) => {
+                    self.slots[*index].place = Place::Finished(result);
+                    self.active = None;
+                    info = Ok(0);
+                    self.start();
+                }
+            }
+        }
+    }
+
+    fn fail(&mut self, failure: SvcFailure) {
+        if let Some((index, _, _)) = self.active.take() {
+            self.slots[index].place = Place::Finished(Err(failure));
+        }
+        self.missing_cycles = 0;
+        self.busy_since = None;
+    }
+}
+
+#[cfg(test)]
+mod tests;
