@@ -1,3 +1,40 @@
 //! The controller role of CIP Motion.
+//!
+//! [`Controller`] opens the session and the motion I/O connection to one device, configures the class and the axes,
+//! synchronizes, carries out a program of [`Step`]s, and closes everything again. It shares the wire code with the
+//! target role, not its state machines. It has no sockets and no clocks:
+//!
+//! - in: [`Controller::tcp_connected`], [`Controller::handle_stream`], [`Controller::handle_datagram`],
+//!   [`Controller::handle_time`], [`Controller::tcp_closed`], [`Controller::finish`];
+//! - out, to be drained after every input: [`Controller::poll_stream_transmit`],
+//!   [`Controller::poll_datagram_transmit`], [`Controller::poll_event`];
+//! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due.
+//!
+//! The start-up procedure stands in [`engine`], limits and units in [`config`] and [`program`], and the figures of a
+//! run in [`report`].
 
+mod axis;
+pub mod config;
+pub mod engine;
+pub mod event;
+mod executor;
+mod following;
+mod handshake;
+mod link;
+mod number;
+pub mod program;
+pub mod report;
+mod services;
+mod session;
+mod status;
 pub mod trajectory;
+
+pub use config::{AttributeSet, AxisSetup, ControllerConfig};
+pub use engine::Controller;
+pub use event::{Event, Failure};
+pub use program::{AxisSet, Step};
+pub use report::Report;
+pub use trajectory::Limits;
+
+/// Longest C-to-D datagram in bytes: class 1 header and the largest connection.
+pub const DATAGRAM_MAX: usize = crate::wire::class1::CLASS1_HEADER_LEN + config::CONNECTION_SIZE_MAX as usize;

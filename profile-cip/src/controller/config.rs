@@ -1,0 +1,354 @@
+//! What the controller is told before it starts.
+
+use core::fmt;
+
+use super::link::cyclic_len;
+use crate::wire::motion::attribute_list::AttributeSelector;
+use crate::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode, FeedbackSource};
+use profile_generic::time::DurationNs;
+
+/// Most axis instances of one connection; the EtherNet/IP part of the standard (IEC 61800-7-302) allows 16.
+pub const MAX_AXES: usize = 16;
+/// Largest connection size in bytes; what fits one Ethernet frame without fragments.
+pub const CONNECTION_SIZE_MAX: u16 = 1400;
+/// Room of the service channel beside the cyclic data, in bytes; the default connection has it.
+const SERVICE_ROOM: usize = 192;
+/// Room of the service channel below which hardly an attribute fits.
+const SERVICE_ROOM_MIN: usize = 32;
+
+/// A value to be written by Set_Axis_Attributes_List.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AttributeSet {
+    /// Attribute ID, element size and array part.
+    pub selector: AttributeSelector,
+    /// The value in wire order; as long as `selector` says.
+    pub value: Vec<u8>,
+    /// Whether the start-up fails when the device refuses it.
+    pub required: bool,
+}
+
+macro_rules! typed {
+    ($($(#[$doc:meta])* $name:ident($kind:ty);)*) => {$(
+        $(#[$doc])*
+        #[must_use]
+        pub fn $name(id: u16, value: $kind) -> Self {
+            Self::bytes(id, &value.to_le_bytes())
+        }
+    )*};
+}
+
+impl AttributeSet {
+    /// A single value in wire order; at most 255 bytes count.
+    #[must_use]
+    pub fn bytes(id: u16, value: &[u8]) -> Self {
+        let size = u8::try_from(value.len()).unwrap_or(u8::MAX);
+        let value = value[..usize::from(size)].to_vec();
+        Self { selector: AttributeSelector::scalar(id, size), value, required: true }
+    }
+
+    typed! {
+        /// A USINT, BYTE or BOOL.
+        usint(u8);
+        /// A UINT or WORD.
+        uint(u16);
+        /// A UDINT or DWORD.
+        udint(u32);
+        /// A DINT.
+        dint(i32);
+        /// A LINT.
+        lint(i64);
+        /// A REAL.
+        real(f32);
+        /// An LREAL.
+        lreal(f64);
+    }
+
+    /// The same value, but a refusal is only reported.
+    #[must_use]
+    pub fn optional(mut self) -> Self {
+        self.required = false;
+        self
+    }
+}
+
+/// What the device is expected to be: the electronic key of the Forward_Open. Zero matches anything.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct KeyExpectation {
+    /// Vendor ID.
+    pub vendor: u16,
+    /// Device type; CIP Motion drives have 0x25.
+    pub device_type: u16,
+    /// Product code.
+    pub product_code: u16,
+    /// Major revision, 0..=127.
+    pub major_revision: u8,
+    /// Minor revision.
+    pub minor_revision: u8,
+    /// Whether a compatible revision will do.
+    pub compatible: bool,
+}
+
+/// One axis of the device; its instance number is its place in [`ControllerConfig::axes`], counted from 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisSetup {
+    /// Counts (position control units) per unit of the program; above zero.
+    pub counts_per_unit: f64,
+    /// Control Mode outside of jogs; position or velocity.
+    pub control_mode: ControlMode,
+    /// Feedback Mode sent in every update.
+    pub feedback_mode: FeedbackMode,
+    /// Send Command Position as DINT instead of LREAL.
+    pub integer_position: bool,
+    /// Send Command Velocity along with Command Position.
+    pub velocity_feed_forward: bool,
+    /// Send Command Acceleration along with the other commands.
+    pub acceleration_feed_forward: bool,
+    /// Ask for Actual Velocity; not every device has it.
+    pub actual_velocity: bool,
+    /// Attributes written before Configuration Complete, in this order.
+    pub attributes: Vec<AttributeSet>,
+}
+
+impl AxisSetup {
+    /// A position-controlled axis on its motor feedback, commanded in LREAL with velocity feed-forward.
+    #[must_use]
+    pub fn position(counts_per_unit: f64) -> Self {
+        Self {
+            counts_per_unit,
+            control_mode: ControlMode::POSITION,
+            feedback_mode: FeedbackMode(FeedbackSource::MOTOR.0),
+            integer_position: false,
+            velocity_feed_forward: true,
+            acceleration_feed_forward: false,
+            actual_velocity: true,
+            attributes: Vec::new(),
+        }
+    }
+}
+
+/// How long the controller waits for what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeOuts {
+    /// For the answer to an explicit request.
+    pub explicit: DurationNs,
+    /// For the first D-to-C update after the connection was opened.
+    pub first_update: DurationNs,
+    /// For the answer to a request in the service channel.
+    pub service: DurationNs,
+    /// For Group_Sync and then for Sync Mode; clause 7-1.3 asks for at least a minute.
+    pub synchronization: DurationNs,
+    /// For all axes to leave the Initializing state.
+    pub initialization: DurationNs,
+    /// For the acknowledge of an Axis Control request.
+    pub axis_control: DurationNs,
+    /// Beyond the planned length of a motion.
+    pub motion_margin: DurationNs,
+}
+
+impl Default for TimeOuts {
+    fn default() -> Self {
+        Self {
+            explicit: DurationNs::from_secs(5),
+            first_update: DurationNs::from_secs(5),
+            service: DurationNs::from_secs(5),
+            synchronization: DurationNs::from_secs(60),
+            initialization: DurationNs::from_secs(10),
+            axis_control: DurationNs::from_secs(10),
+            motion_margin: DurationNs::from_secs(5),
+        }
+    }
+}
+
+/// Everything about the device and the connection to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControllerConfig {
+    /// Vendor ID of this originator.
+    pub originator_vendor: u16,
+    /// Serial number of this originator.
+    pub originator_serial: u32,
+    /// Serial number of the connection.
+    pub connection_serial: u16,
+    /// Ask who the device is by ListIdentity before the session is registered.
+    pub list_identity: bool,
+    /// What the device is expected to be.
+    pub key: KeyExpectation,
+    /// Drive Power Structure Class ID that the device has to verify; `None` leaves it unverified.
+    pub power_structure: Option<u32>,
+    /// Controller Update Period in microseconds, which is the RPI of both directions.
+    pub rpi_us: u32,
+    /// Connection Timeout Multiplier code, 0..=7 for 4..512 intervals.
+    pub timeout_multiplier: u8,
+    /// Connection size of both directions in bytes with the 2-byte sequence count; above 511 the connection is
+    /// opened with Large_Forward_Open.
+    pub connection_size: u16,
+    /// Connection ID for the D-to-C datagrams.
+    pub t_to_o_id: u32,
+    /// UDP port at which this controller wants the D-to-C datagrams if not 2222.
+    pub t_to_o_port: Option<u16>,
+    /// Grand master clock of the controller, bytes as in the Time Sync object; `None` runs asynchronously: no
+    /// Group_Sync, no time stamps.
+    pub grand_master: Option<[u8; 8]>,
+    /// Update for which the commands are meant, in synchronous operation.
+    pub command_target: CommandTarget,
+    /// D-to-C updates older than this many update periods count as late.
+    pub update_delay_low_limit: u8,
+    /// Consecutive update periods without a D-to-C update after which the controller gives up before the
+    /// connection times out; `None` leaves it to the connection.
+    pub update_delay_high_limit: Option<u8>,
+    /// Attributes of the class (instance 0), written first.
+    pub class_attributes: Vec<AttributeSet>,
+    /// The axes.
+    pub axes: Vec<AxisSetup>,
+    /// Waiting times.
+    pub time_outs: TimeOuts,
+}
+
+impl ControllerConfig {
+    /// A connection of 2 ms and time-out after 16 ms to whatever device answers, synchronous to `grand_master`
+    /// with interpolation, for these axes.
+    #[must_use]
+    pub fn new(grand_master: Option<[u8; 8]>, axes: Vec<AxisSetup>) -> Self {
+        let wanted = cyclic_len(axes.len()) + SERVICE_ROOM;
+        let connection_size =
+            u16::try_from(wanted).unwrap_or(CONNECTION_SIZE_MAX).clamp(500, CONNECTION_SIZE_MAX);
+        Self {
+            originator_vendor: 0xFFFF,
+            originator_serial: 1,
+            connection_serial: 1,
+            list_identity: false,
+            key: KeyExpectation::default(),
+            power_structure: None,
+            rpi_us: 2_000,
+            timeout_multiplier: 1,
+            connection_size,
+            t_to_o_id: 0x4258_0001,
+            t_to_o_port: None,
+            grand_master,
+            command_target: CommandTarget::INTERPOLATE,
+            update_delay_low_limit: 2,
+            update_delay_high_limit: None,
+            class_attributes: Vec::new(),
+            axes,
+            time_outs: TimeOuts::default(),
+        }
+    }
+
+    /// The Controller Update Period.
+    #[must_use]
+    pub fn period(&self) -> DurationNs {
+        DurationNs::from_micros(i64::from(self.rpi_us))
+    }
+
+    /// Silence in one direction after which the connection has timed out.
+    #[must_use]
+    pub fn connection_timeout(&self) -> DurationNs {
+        self.period() * (4_i64 << self.timeout_multiplier.min(7))
+    }
+
+    /// Finds what cannot work, before anything is sent.
+    ///
+    /// # Errors
+    /// The first value out of its range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let bad = |what, value: f64, wanted| Err(ConfigError { what, value, wanted });
+        if self.axes.is_empty() || self.axes.len() > MAX_AXES {
+            let count = u32::try_from(self.axes.len()).unwrap_or(u32::MAX);
+            return bad("number of axes", f64::from(count), "1 to 16");
+        }
+        if !(100..=1_000_000).contains(&self.rpi_us) {
+            return bad("rpi_us", f64::from(self.rpi_us), "100 to 1000000");
+        }
+        if self.timeout_multiplier > 7 {
+            return bad("timeout_multiplier", f64::from(self.timeout_multiplier), "0 to 7");
+        }
+        let least = cyclic_len(self.axes.len()) + SERVICE_ROOM_MIN;
+        if usize::from(self.connection_size) < least || self.connection_size > CONNECTION_SIZE_MAX {
+            let wanted = "room for all axes and a service (78 + 56 for each axis) and at most 1400";
+            return bad("connection_size", f64::from(self.connection_size), wanted);
+        }
+        if self.command_target.0 > 2 {
+            return bad("command_target", f64::from(self.command_target.0), "0 to 2");
+        }
+        if self.key.major_revision > 127 {
+            return bad("major_revision", f64::from(self.key.major_revision), "0 to 127");
+        }
+        for axis in &self.axes {
+            let scale = axis.counts_per_unit;
+            if !(scale.is_finite() && scale > 0.0) {
+                return bad("counts_per_unit", scale, "a finite number above zero");
+            }
+            if ![ControlMode::POSITION, ControlMode::VELOCITY].contains(&axis.control_mode) {
+                return bad("control_mode", f64::from(axis.control_mode.0), "1 (position) or 2 (velocity)");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A value of the configuration that cannot work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConfigError {
+    /// The value's name.
+    pub what: &'static str,
+    /// The value.
+    pub value: f64,
+    /// What it may be.
+    pub wanted: &'static str,
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: expected {}, found {}", self.what, self.wanted, self.value)
+    }
+}
+
+impl std::error::Error for ConfigError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_take_their_wire_form() {
+        let real = AttributeSet::real(461, 1.5);
+        assert_eq!((real.selector.id, real.selector.element_size, real.required), (461, 4, true));
+        assert_eq!(real.value, [0, 0, 0xC0, 0x3F]);
+        assert_eq!(AttributeSet::lreal(1, -2.0).value, [0, 0, 0, 0, 0, 0, 0, 0xC0]);
+        assert_eq!(AttributeSet::dint(1, -2).value, [0xFE, 0xFF, 0xFF, 0xFF]);
+        assert!(!AttributeSet::usint(610, 1).optional().required);
+        assert_eq!(AttributeSet::bytes(7, &[1; 300]).selector.value_len(), Some(255));
+    }
+
+    #[test]
+    fn a_sound_configuration_passes_and_each_bad_value_is_named() {
+        let good = ControllerConfig::new(None, vec![AxisSetup::position(1000.0)]);
+        assert_eq!(good.check(), Ok(()));
+        assert_eq!(good.connection_timeout(), DurationNs::from_millis(16));
+        type Spoil = fn(&mut ControllerConfig);
+        let broken: [(Spoil, &str); 8] = [
+            (|c| c.axes.clear(), "number of axes: expected 1 to 16, found 0"),
+            (|c| c.rpi_us = 50, "rpi_us: expected 100 to 1000000, found 50"),
+            (|c| c.timeout_multiplier = 8, "timeout_multiplier: expected 0 to 7, found 8"),
+            (
+                |c| c.connection_size = 133,
+                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at most 1400, \
+                 found 133",
+            ),
+            (|c| c.command_target = CommandTarget(3), "command_target: expected 0 to 2, found 3"),
+            (|c| c.key.major_revision = 128, "major_revision: expected 0 to 127, found 128"),
+            (
+                |c| c.axes[0].counts_per_unit = -1.0,
+                "counts_per_unit: expected a finite number above zero, found -1",
+            ),
+            (
+                |c| c.axes[0].control_mode = ControlMode::TORQUE,
+                "control_mode: expected 1 (position) or 2 (velocity), found 4",
+            ),
+        ];
+        for (spoil, text) in broken {
+            let mut config = good.clone();
+            spoil(&mut config);
+            assert_eq!(config.check().unwrap_err().to_string(), text);
+        }
+    }
+}

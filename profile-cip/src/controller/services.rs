@@ -1,0 +1,319 @@
+//! The service channel of the motion I/O connection, clause 6-2.7.1.2.5.
+//!
+//! A job is a list of request bodies to one instance. One request is under way at a time; it stays in the updates
+//! until the response with its transaction ID has come. The next one has the transaction ID incremented.
+
+use std::collections::VecDeque;
+
+use super::config::{AttributeSet, MAX_AXES};
+use super::event::{AttributeValue, Failure};
+use crate::wire::Error;
+use crate::wire::motion::attribute_list::{
+    AttributeSelector, GetItem, GetResponse, HEAD_LEN, ListWriter, SetResponse,
+};
+use crate::wire::motion::codes::{MotionService, SyncStatus};
+use crate::wire::motion::{ServiceRequest, ServiceResponse};
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+/// General status that says: look at the status of each attribute.
+const ATTRIBUTE_LIST_ERROR: u8 = 0x0A;
+/// Bytes of a status in a Set response and of an error in a Get response.
+const STATUS_LEN: usize = 4;
+
+/// Names a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Ticket(u64);
+
+/// What came of a job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// All sets were answered; these attributes were refused with these general statuses.
+    Set { refused: Vec<(u16, u8)> },
+    /// The values read.
+    Get { values: Vec<AttributeValue> },
+    /// The answer to Group_Sync.
+    Sync(SyncStatus),
+}
+
+/// Room of one request and one response in the connection, in bytes of body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    pub request: usize,
+    pub response: usize,
+}
+
+#[derive(Debug)]
+struct Body {
+    bytes: Vec<u8>,
+    attributes: u16,
+}
+
+#[derive(Debug)]
+struct Job {
+    ticket: Ticket,
+    instance: u8,
+    service: MotionService,
+    bodies: VecDeque<Body>,
+    outcome: Outcome,
+}
+
+#[derive(Debug)]
+struct UnderWay {
+    since: MonotonicTime,
+}
+
+/// The service channel.
+#[derive(Debug)]
+pub(super) struct Services {
+    jobs: VecDeque<Job>,
+    under_way: Option<UnderWay>,
+    transactions: [u8; MAX_AXES + 1],
+    next_ticket: u64,
+    done: Vec<(Ticket, Result<Outcome, Failure>)>,
+    time_out: DurationNs,
+}
+
+impl Services {
+    pub fn new(time_out: DurationNs) -> Self {
+        Self {
+            jobs: VecDeque::new(),
+            under_way: None,
+            transactions: [0; MAX_AXES + 1],
+            next_ticket: 0,
+            done: Vec::new(),
+            time_out,
+        }
+    }
+
+    /// Writes attributes, in as many requests as the room asks for.
+    pub fn set(&mut self, instance: u8, sets: &[AttributeSet], room: Room) -> Result<Ticket, Failure> {
+        let items: Vec<_> = sets
+            .iter()
+            .map(|set| {
+                let needed = set.selector.head_len() + set.value.len().next_multiple_of(4);
+                Item { id: set.selector.id, needed, answer: STATUS_LEN }
+            })
+            .collect();
+        let bodies = split(instance, &items, room, |index, list| {
+            list.value(&sets[index].selector, &sets[index].value)
+        })?;
+        let outcome = Outcome::Set { refused: Vec::new() };
+        Ok(self.submit(instance, MotionService::SET_AXIS_ATTRIBUTES_LIST, bodies, outcome))
+    }
+
+    /// Reads attributes, in as many requests as the room asks for.
+    pub fn get(
+        &mut self,
+        instance: u8,
+        selectors: &[AttributeSelector],
+        room: Room,
+    ) -> Result<Ticket, Failure> {
+        let items: Vec<_> = selectors
+            .iter()
+            .map(|selector| {
+                let value = selector.value_len().unwrap_or(usize::MAX / 2).next_multiple_of(4);
+                let answer = selector.head_len() + value;
+                Item { id: selector.id, needed: selector.head_len(), answer }
+            })
+            .collect();
+        let bodies = split(instance, &items, room, |index, list| list.select(&selectors[index]))?;
+        let outcome = Outcome::Get { values: Vec::new() };
+        Ok(self.submit(instance, MotionService::GET_AXIS_ATTRIBUTES_LIST, bodies, outcome))
+    }
+
+    /// Asks whether the device is synchronized to this grand master.
+    pub fn group_sync(&mut self, grand_master: [u8; 8]) -> Ticket {
+        let body = Body { bytes: grand_master.to_vec(), attributes: 0 };
+        let outcome = Outcome::Sync(SyncStatus::NOT_SYNCHRONIZED);
+        self.submit(0, MotionService::GROUP_SYNC, VecDeque::from([body]), outcome)
+    }
+
+    fn submit(
+        &mut self,
+        instance: u8,
+        service: MotionService,
+        bodies: VecDeque<Body>,
+        outcome: Outcome,
+    ) -> Ticket {
+        self.next_ticket += 1;
+        let ticket = Ticket(self.next_ticket);
+        if bodies.is_empty() {
+            self.done.push((ticket, Ok(outcome)));
+        } else {
+            self.jobs.push_back(Job { ticket, instance, service, bodies, outcome });
+        }
+        ticket
+    }
+
+    /// The result of a job, once it is there.
+    pub fn take(&mut self, ticket: Ticket) -> Option<Result<Outcome, Failure>> {
+        let at = self.done.iter().position(|(done, _)| *done == ticket)?;
+        Some(self.done.swap_remove(at).1)
+    }
+
+    /// Drops what has not been asked yet and what is under way.
+    pub fn clear(&mut self) {
+        self.jobs.clear();
+        self.under_way = None;
+    }
+
+    /// Begins the next request if none is under way, and gives up one that lasts too long.
+    pub fn advance(&mut self, now: MonotonicTime) {
+        match &self.under_way {
+            Some(request) if now - request.since > self.time_out => {
+                let waited = now - request.since;
+                self.finish(|job| {
+                    Err(Failure::ServiceTimeOut { instance: job.instance, service: job.service, waited })
+                });
+            }
+            Some(_) => {}
+            None => {
+                if let Some(job) = self.jobs.front() {
+                    let transaction = &mut self.transactions[usize::from(job.instance)];
+                    *transaction = transaction.wrapping_add(1);
+                    self.under_way = Some(UnderWay { since: now });
+                }
+            }
+        }
+    }
+
+    fn finish(&mut self, result: impl FnOnce(&mut Job) -> Result<(), Failure>) {
+        self.under_way = None;
+        if let Some(mut job) = self.jobs.pop_front() {
+            let result = result(&mut job);
+            self.done.push((job.ticket, result.map(|()| job.outcome)));
+        }
+    }
+
+    /// The request to put into the next update, and the instance it is for.
+    pub fn request(&self) -> Option<(u8, ServiceRequest<'_>)> {
+        self.under_way.as_ref()?;
+        let job = self.jobs.front()?;
+        let transaction_id = self.transactions[usize::from(job.instance)];
+        let data = &job.bodies.front()?.bytes;
+        Some((job.instance, ServiceRequest { transaction_id, service: job.service, data }))
+    }
+
+    /// Takes a response; one that answers nothing under way is a repetition and does not count.
+    pub fn handle(&mut self, now: MonotonicTime, instance: u8, response: &ServiceResponse<'_>) {
+        let Some((asked, request)) = self.request() else { return };
+        if asked != instance
+            || response.transaction_id != request.transaction_id
+            || response.service != request.service
+        {
+            return;
+        }
+        let Some(job) = self.jobs.front_mut() else { return };
+        let Some(body) = job.bodies.pop_front() else { return };
+        self.under_way = None;
+        let taken = job.take_response(&body, response);
+        if taken.is_err() || job.bodies.is_empty() {
+            self.finish(|_| taken);
+        }
+        self.advance(now);
+    }
+}
+
+impl Job {
+    fn take_response(&mut self, body: &Body, response: &ServiceResponse<'_>) -> Result<(), Failure> {
+        let (instance, service) = (self.instance, self.service);
+        let malformed = |error| Failure::ServiceMalformed { instance, service, error };
+        let status = response.general_status;
+        if status != 0 && status != ATTRIBUTE_LIST_ERROR {
+            return Err(Failure::ServiceRefused { instance, service, status });
+        }
+        match &mut self.outcome {
+            Outcome::Set { refused } => {
+                let list = SetResponse::new(response.data).map_err(malformed)?;
+                same_count(body.attributes, list.left()).map_err(malformed)?;
+                for item in list {
+                    let item = item.map_err(malformed)?;
+                    if item.status != 0 {
+                        refused.push((item.id, item.status));
+                    }
+                }
+            }
+            Outcome::Get { values } => {
+                let list = GetResponse::new(response.data).map_err(malformed)?;
+                same_count(body.attributes, list.left()).map_err(malformed)?;
+                for item in list {
+                    values.push(match item.map_err(malformed)? {
+                        GetItem::Value(selector, value) => {
+                            AttributeValue { id: selector.id, value: Ok(value.to_vec()) }
+                        }
+                        GetItem::Error(id, status) => AttributeValue { id, value: Err(status) },
+                    });
+                }
+            }
+            Outcome::Sync(sync) => {
+                if status != 0 {
+                    return Err(Failure::ServiceRefused { instance, service, status });
+                }
+                let Some(code) = response.data.first() else {
+                    let (needed, available) = (1, 0);
+                    return Err(malformed(Error::Truncated {
+                        what: "sync status",
+                        offset: 0,
+                        needed,
+                        available,
+                    }));
+                };
+                *sync = SyncStatus(*code);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn same_count(asked: u16, answered: u16) -> Result<(), Error> {
+    if asked == answered {
+        return Ok(());
+    }
+    let (found, expected) = (u32::from(answered), u32::from(asked));
+    Err(Error::Invalid { what: "number of attributes", offset: 0, found, expected })
+}
+
+/// What an attribute takes in a request and in its response.
+struct Item {
+    id: u16,
+    needed: usize,
+    answer: usize,
+}
+
+/// Fills bodies one after the other so that each request and each response keeps to its room.
+fn split(
+    instance: u8,
+    items: &[Item],
+    room: Room,
+    write: impl Fn(usize, &mut ListWriter<'_>) -> Result<(), Error>,
+) -> Result<VecDeque<Body>, Failure> {
+    let mut bodies = VecDeque::new();
+    let mut start = 0;
+    while start < items.len() {
+        let (mut request, mut response, mut end) = (HEAD_LEN, HEAD_LEN, start);
+        while let Some(item) = items.get(end) {
+            let (more, answer) = (request.saturating_add(item.needed), response.saturating_add(item.answer));
+            if more > room.request || answer > room.response {
+                break;
+            }
+            (request, response, end) = (more, answer, end + 1);
+        }
+        if end == start {
+            let room = room.request.min(room.response);
+            return Err(Failure::AttributeTooLong { instance, attribute: items[start].id, room });
+        }
+        let mut bytes = vec![0; request];
+        let service = MotionService::SET_AXIS_ATTRIBUTES_LIST;
+        let malformed = |error| Failure::ServiceMalformed { instance, service, error };
+        let mut list = ListWriter::new(&mut bytes).map_err(malformed)?;
+        for index in start..end {
+            write(index, &mut list).map_err(malformed)?;
+        }
+        let written = list.finish();
+        bytes.truncate(written);
+        let attributes = u16::try_from(end - start).unwrap_or(u16::MAX);
+        bodies.push_back(Body { bytes, attributes });
+        start = end;
+    }
+    Ok(bodies)
+}

@@ -1,0 +1,530 @@
+//! The explicit side: encapsulation session, Identity, Forward_Open and Forward_Close on one TCP stream.
+//!
+//! | state | sent | next |
+//! |---|---|---|
+//! | Idle | | `start` |
+//! | Asked(ListIdentity) | ListIdentity | RegisterSession |
+//! | Asked(RegisterSession) | RegisterSession | Identity |
+//! | Asked(ReadIdentity) | Get_Attributes_All | Forward_Open |
+//! | Asked(ForwardOpen) | Forward_Open, or the large one above 511 bytes | Open |
+//! | Open | | `close` |
+//! | Asked(ForwardClose) | Forward_Close | Closed |
+//! | Closed | UnRegisterSession | |
+//!
+//! A reply counts only with the sender context of the request under way.
+
+use core::net::{Ipv4Addr, SocketAddrV4};
+use std::collections::VecDeque;
+
+use super::config::ControllerConfig;
+use super::event::{DeviceIdentity, Exchange, Failure};
+use crate::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
+use crate::wire::encapsulation::{
+    Command, EncapsulationStatus, HEADER_LEN, Header, PROTOCOL_VERSION, Packet,
+};
+use crate::wire::epath::{ElectronicKey, Encoding, Segment, emit_path, path_len};
+use crate::wire::forward_close::ForwardClose;
+use crate::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
+use crate::wire::list_identity::IdentityItem;
+use crate::wire::message_router::{Reply, Request};
+use crate::wire::motion::FORMAT_REVISION;
+use crate::wire::network_parameters::{ConnectionType, NetworkParameters, Priority, SMALL_SIZE_MAX};
+use crate::wire::register_session::RegisterSession;
+use crate::wire::sockaddr::{SOCKADDR_LEN, SockaddrInfo};
+use crate::wire::status::{GeneralStatus, Service};
+use crate::wire::{ConnectionTriad, Error, Reader};
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+/// Longest packet that the device may send: far more than any answer to what is asked here.
+const PACKET_MAX: usize = 4096;
+/// Class code of the Motion Device Axis Object.
+const MOTION_DEVICE_AXIS: u16 = 0x42;
+const IDENTITY: u16 = 1;
+const CONNECTION_MANAGER: u16 = 6;
+/// Connection point of the configuration block of format revision 1, clause 7-1.1.
+const CONFIGURATION_POINT: u16 = 0x51;
+const CONFIGURATION_REVISION: u8 = 1;
+const VERIFY_POWER_RATING: u8 = 1;
+/// Priority and time tick, and ticks: 2^10 ms times 4 for the request itself.
+const TIME_TICK: u8 = 10;
+const TIME_OUT_TICKS: u8 = 4;
+
+/// What the session tells the controller.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Output {
+    Identified(DeviceIdentity),
+    Registered(u32),
+    Opened(Opened),
+    Closed,
+    Malformed(Error),
+    Failed(Failure),
+}
+
+/// The connection as the device granted it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Opened {
+    pub o_to_t_id: u32,
+    pub t_to_o_id: u32,
+    /// Where C-to-D datagrams go, if the device said so.
+    pub destination: Option<SocketAddrV4>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Idle,
+    Asked { exchange: Exchange, since: MonotonicTime },
+    Open,
+    Closed,
+}
+
+/// The explicit side of the controller.
+#[derive(Debug)]
+pub(super) struct Session {
+    state: State,
+    handle: u32,
+    context: u64,
+    received: Vec<u8>,
+    sent: Vec<u8>,
+    outputs: VecDeque<Output>,
+    time_out: DurationNs,
+    list_identity: bool,
+    rpi_us: u32,
+    triad: ConnectionTriad,
+    path: Vec<u8>,
+    timeout_multiplier: u8,
+    connection_size: u16,
+    t_to_o_id: u32,
+    t_to_o_port: Option<u16>,
+}
+
+impl Session {
+    pub fn new(config: &ControllerConfig) -> Self {
+        Self {
+            state: State::Idle,
+            handle: 0,
+            context: 0,
+            received: Vec::with_capacity(PACKET_MAX),
+            sent: Vec::with_capacity(1024),
+            outputs: VecDeque::with_capacity(8),
+            time_out: config.time_outs.explicit,
+            list_identity: config.list_identity,
+            rpi_us: config.rpi_us,
+            triad: ConnectionTriad {
+                connection_serial: config.connection_serial,
+                originator_vendor: config.originator_vendor,
+                originator_serial: config.originator_serial,
+            },
+            path: connection_path(config),
+            timeout_multiplier: config.timeout_multiplier,
+            connection_size: config.connection_size,
+            t_to_o_id: config.t_to_o_id,
+            t_to_o_port: config.t_to_o_port,
+        }
+    }
+
+    /// The stream to the device is there.
+    pub fn start(&mut self, now: MonotonicTime) {
+        if self.state != State::Idle {
+            return;
+        }
+        if self.list_identity {
+            self.ask(now, Exchange::ListIdentity, Command::LIST_IDENTITY, &[]);
+        } else {
+            self.register(now);
+        }
+    }
+
+    /// Closes the connection as far as it was opened, and the session.
+    pub fn close(&mut self, now: MonotonicTime) {
+        match self.state {
+            State::Open => {
+                let close = ForwardClose {
+                    priority_tick: TIME_TICK,
+                    timeout_ticks: TIME_OUT_TICKS,
+                    triad: self.triad,
+                    path: &self.path,
+                };
+                let mut data = vec![0; close.buffer_len()];
+                let length = close.emit(&mut data);
+                self.ask_object(now, Exchange::ForwardClose, CONNECTION_MANAGER, length.map(|_| data), None);
+            }
+            State::Idle | State::Asked { .. } => self.unregister(),
+            State::Closed => {}
+        }
+    }
+
+    /// The stream is gone; what was to be sent cannot be sent any more.
+    pub fn stream_closed(&mut self) {
+        self.sent.clear();
+        if self.state != State::Closed {
+            self.state = State::Closed;
+            self.outputs.push_back(Output::Closed);
+        }
+    }
+
+    /// The next thing to tell.
+    pub fn poll(&mut self) -> Option<Output> {
+        self.outputs.pop_front()
+    }
+
+    /// Bytes for the stream.
+    pub fn poll_transmit(&mut self, buffer: &mut [u8]) -> Option<usize> {
+        if self.sent.is_empty() || buffer.is_empty() {
+            return None;
+        }
+        let count = self.sent.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&self.sent[..count]);
+        self.sent.drain(..count);
+        Some(count)
+    }
+
+    /// When the request under way has lasted too long.
+    pub fn wake_at(&self) -> Option<MonotonicTime> {
+        match self.state {
+            State::Asked { since, .. } => Some(since + self.time_out),
+            _ => None,
+        }
+    }
+
+    /// Checks the time-out.
+    pub fn handle_time(&mut self, now: MonotonicTime) {
+        if let State::Asked { exchange, since } = self.state
+            && now - since >= self.time_out
+        {
+            self.fail(Failure::ExplicitTimeOut { exchange, waited: now - since });
+        }
+    }
+
+    /// Takes bytes of the stream.
+    pub fn handle_stream(&mut self, now: MonotonicTime, bytes: &[u8]) {
+        if self.state == State::Closed {
+            return;
+        }
+        self.received.extend_from_slice(bytes);
+        while let Ok(header) = Header::parse(&self.received) {
+            let length = HEADER_LEN + usize::from(header.length);
+            if length > PACKET_MAX {
+                let (value, max) = (u32::from(header.length), 4096 - 24);
+                let error = Error::OutOfRange { what: "encapsulation length", value, max };
+                self.received.clear();
+                self.fail(Failure::StreamMalformed(error));
+                return;
+            }
+            if self.received.len() < length {
+                return;
+            }
+            let rest = self.received.split_off(length);
+            let packet = core::mem::replace(&mut self.received, rest);
+            match Packet::parse(&packet) {
+                Ok(packet) => self.handle_packet(now, &packet),
+                Err(error) => self.outputs.push_back(Output::Malformed(error)),
+            }
+        }
+    }
+
+    fn handle_packet(&mut self, now: MonotonicTime, packet: &Packet<'_>) {
+        if packet.command == Command::NOP {
+            return;
+        }
+        let expected = self.context.to_le_bytes();
+        let State::Asked { exchange, .. } = self.state else {
+            return self.unexpected(packet);
+        };
+        if packet.sender_context != expected || packet.command != command_of(exchange) {
+            return self.unexpected(packet);
+        }
+        if packet.status != EncapsulationStatus::SUCCESS {
+            return self.fail(Failure::Encapsulation { exchange, status: packet.status.0 });
+        }
+        let taken = match exchange {
+            Exchange::ListIdentity => self.take_identity_list(now, packet.data),
+            Exchange::RegisterSession => self.take_registration(now, packet),
+            _ => self.take_reply(now, exchange, packet.data),
+        };
+        if let Err(error) = taken {
+            self.fail(Failure::AnswerMalformed { exchange, error });
+        }
+    }
+
+    fn unexpected(&mut self, packet: &Packet<'_>) {
+        let found = u32::from(packet.command.0);
+        let expected = match self.state {
+            State::Asked { exchange, .. } => u32::from(command_of(exchange).0),
+            _ => 0,
+        };
+        let error = Error::Invalid { what: "reply to nothing asked, command", offset: 0, found, expected };
+        self.outputs.push_back(Output::Malformed(error));
+    }
+
+    fn take_identity_list(&mut self, now: MonotonicTime, data: &[u8]) -> Result<(), Error> {
+        let list = CommonPacket::parse(data)?;
+        if let Some(item) = list.find(ItemType::IDENTITY) {
+            let item = IdentityItem::parse(item)?;
+            self.outputs.push_back(Output::Identified(DeviceIdentity {
+                vendor: item.vendor,
+                device_type: item.device_type,
+                product_code: item.product_code,
+                major_revision: item.revision.0,
+                minor_revision: item.revision.1,
+                status: item.status,
+                serial_number: item.serial_number,
+                product_name: String::from_utf8_lossy(item.product_name).into_owned(),
+            }));
+        }
+        self.register(now);
+        Ok(())
+    }
+
+    fn take_registration(&mut self, now: MonotonicTime, packet: &Packet<'_>) -> Result<(), Error> {
+        RegisterSession::parse(packet.data)?;
+        self.handle = packet.session_handle;
+        self.outputs.push_back(Output::Registered(self.handle));
+        self.ask_object(now, Exchange::ReadIdentity, IDENTITY, Ok(Vec::new()), None);
+        Ok(())
+    }
+
+    fn take_reply(&mut self, now: MonotonicTime, exchange: Exchange, data: &[u8]) -> Result<(), Error> {
+        let packet = EncapsulatedPacket::parse(data)?.packet;
+        let missing = Error::Truncated { what: "unconnected data item", offset: 0, needed: 4, available: 0 };
+        let reply = Reply::parse(packet.find(ItemType::UNCONNECTED_DATA).ok_or(missing)?)?;
+        let service = service_of(exchange);
+        if reply.service != service {
+            let (found, expected) = (u32::from(reply.service.0), u32::from(service.0));
+            return Err(Error::Invalid { what: "reply service", offset: 0, found, expected });
+        }
+        if reply.status != GeneralStatus::SUCCESS {
+            let failure = Failure::Explicit {
+                exchange,
+                general: reply.status.0,
+                extended: reply.extended.first().copied(),
+                detail: reply.extended.get(1).copied(),
+            };
+            self.fail(failure);
+            return Ok(());
+        }
+        match exchange {
+            Exchange::ReadIdentity => {
+                self.outputs.push_back(Output::Identified(parse_identity(reply.data)?));
+                self.forward_open(now);
+            }
+            Exchange::ForwardClose => self.unregister(),
+            _ => self.take_forward_open(&reply, &packet)?,
+        }
+        Ok(())
+    }
+
+    fn take_forward_open(&mut self, reply: &Reply<'_>, packet: &CommonPacket<'_>) -> Result<(), Error> {
+        let open = ForwardOpenReply::parse(reply.data)?;
+        if open.triad != self.triad {
+            let found = u32::from(open.triad.connection_serial);
+            let expected = u32::from(self.triad.connection_serial);
+            return Err(Error::Invalid { what: "connection triad", offset: 8, found, expected });
+        }
+        let destination = packet.find(ItemType::SOCKADDR_O_TO_T).map(SockaddrInfo::parse).transpose()?;
+        // From here on the connection is there and has to be closed, whatever is wrong with it.
+        self.state = State::Open;
+        if open.o_to_t_api_us != self.rpi_us || open.t_to_o_api_us != self.rpi_us {
+            self.outputs.push_back(Output::Failed(Failure::PacketInterval {
+                requested_us: self.rpi_us,
+                o_to_t_us: open.o_to_t_api_us,
+                t_to_o_us: open.t_to_o_api_us,
+            }));
+            return Ok(());
+        }
+        self.outputs.push_back(Output::Opened(Opened {
+            o_to_t_id: open.o_to_t_id,
+            t_to_o_id: open.t_to_o_id,
+            destination: destination.map(|info| info.address),
+        }));
+        Ok(())
+    }
+
+    fn register(&mut self, now: MonotonicTime) {
+        let mut data = [0; 4];
+        let block = RegisterSession { protocol_version: PROTOCOL_VERSION, options: 0 };
+        match block.emit(&mut data) {
+            Ok(_) => self.ask(now, Exchange::RegisterSession, Command::REGISTER_SESSION, &data),
+            Err(error) => {
+                self.fail(Failure::AnswerMalformed { exchange: Exchange::RegisterSession, error });
+            }
+        }
+    }
+
+    fn unregister(&mut self) {
+        if self.handle != 0 {
+            self.context += 1;
+            self.send(Command::UNREGISTER_SESSION, &[]);
+        }
+        self.state = State::Closed;
+        self.outputs.push_back(Output::Closed);
+    }
+
+    fn forward_open(&mut self, now: MonotonicTime) {
+        let parameters = NetworkParameters {
+            redundant_owner: false,
+            connection_type: ConnectionType::POINT_TO_POINT,
+            priority: Priority::URGENT,
+            variable: true,
+            size: self.connection_size,
+        };
+        let large = self.connection_size > SMALL_SIZE_MAX;
+        let open = ForwardOpen {
+            large,
+            priority_tick: TIME_TICK,
+            timeout_ticks: TIME_OUT_TICKS,
+            o_to_t_id: 0,
+            t_to_o_id: self.t_to_o_id,
+            triad: self.triad,
+            timeout_multiplier: self.timeout_multiplier,
+            o_to_t_rpi_us: self.rpi_us,
+            o_to_t: parameters,
+            t_to_o_rpi_us: self.rpi_us,
+            t_to_o: parameters,
+            transport: Transport { server: false, trigger: Trigger::CYCLIC, class: 1 },
+            path: &self.path,
+        };
+        let exchange = if large { Exchange::LargeForwardOpen } else { Exchange::ForwardOpen };
+        let mut data = vec![0; open.buffer_len()];
+        let length = open.emit(&mut data);
+        let port = self.t_to_o_port;
+        self.ask_object(now, exchange, CONNECTION_MANAGER, length.map(|_| data), port);
+    }
+
+    /// Sends a request to instance 1 of `class` as an unconnected message, with the UDP port for answers if one is
+    /// given.
+    fn ask_object(
+        &mut self,
+        now: MonotonicTime,
+        exchange: Exchange,
+        class: u16,
+        data: Result<Vec<u8>, Error>,
+        port: Option<u16>,
+    ) {
+        match data.and_then(|data| unconnected(service_of(exchange), class, &data, port)) {
+            Ok(block) => self.ask(now, exchange, Command::SEND_RR_DATA, &block),
+            Err(error) => self.fail(Failure::AnswerMalformed { exchange, error }),
+        }
+    }
+
+    fn ask(&mut self, now: MonotonicTime, exchange: Exchange, command: Command, data: &[u8]) {
+        self.context += 1;
+        self.state = State::Asked { exchange, since: now };
+        self.send(command, data);
+    }
+
+    fn send(&mut self, command: Command, data: &[u8]) {
+        let packet = Packet {
+            command,
+            session_handle: self.handle,
+            status: EncapsulationStatus::SUCCESS,
+            sender_context: self.context.to_le_bytes(),
+            options: 0,
+            data,
+        };
+        let start = self.sent.len();
+        self.sent.resize(start + packet.buffer_len(), 0);
+        // The room is right and no request here comes near 65535 bytes.
+        if packet.emit(&mut self.sent[start..]).is_err() {
+            self.sent.truncate(start);
+        }
+    }
+
+    /// A failed Forward_Close leaves nothing more to be done than to end the session.
+    fn fail(&mut self, failure: Failure) {
+        let closing = matches!(self.state, State::Asked { exchange: Exchange::ForwardClose, .. });
+        self.state = State::Idle;
+        self.outputs.push_back(Output::Failed(failure));
+        if closing {
+            self.unregister();
+        }
+    }
+}
+
+const fn command_of(exchange: Exchange) -> Command {
+    match exchange {
+        Exchange::ListIdentity => Command::LIST_IDENTITY,
+        Exchange::RegisterSession => Command::REGISTER_SESSION,
+        _ => Command::SEND_RR_DATA,
+    }
+}
+
+const fn service_of(exchange: Exchange) -> Service {
+    match exchange {
+        Exchange::ForwardOpen => Service::FORWARD_OPEN,
+        Exchange::LargeForwardOpen => Service::LARGE_FORWARD_OPEN,
+        Exchange::ForwardClose => Service::FORWARD_CLOSE,
+        _ => Service::GET_ATTRIBUTES_ALL,
+    }
+}
+
+/// Electronic key, 20 42 2C 51 2C 02, and the configuration block of format revision 1: clause 7-1.1.
+fn connection_path(config: &ControllerConfig) -> Vec<u8> {
+    let key = &config.key;
+    let mut block = [0; 8];
+    block[0] = CONFIGURATION_REVISION;
+    if let Some(id) = config.power_structure {
+        block[1] = VERIFY_POWER_RATING;
+        block[4..].copy_from_slice(&id.to_le_bytes());
+    }
+    let segments = [
+        Segment::Key(ElectronicKey {
+            vendor: key.vendor,
+            device_type: key.device_type,
+            product_code: key.product_code,
+            compatible: key.compatible,
+            major: key.major_revision,
+            minor: key.minor_revision,
+        }),
+        Segment::class(MOTION_DEVICE_AXIS),
+        Segment::connection_point(CONFIGURATION_POINT),
+        Segment::connection_point(u16::from(FORMAT_REVISION)),
+        Segment::Data(&block),
+    ];
+    let mut path = vec![0; path_len(&segments, Encoding::Padded)];
+    // Only a major revision above 127 could fail, which the configuration check refuses.
+    if emit_path(&segments, Encoding::Padded, &mut path).is_err() {
+        path.clear();
+    }
+    path
+}
+
+fn unconnected(service: Service, class: u16, data: &[u8], port: Option<u16>) -> Result<Vec<u8>, Error> {
+    let mut path = [0; 8];
+    let segments = [Segment::class(class), Segment::instance(1)];
+    let length = emit_path(&segments, Encoding::Padded, &mut path)?;
+    let request = Request { service, path: &path[..length], data };
+    let mut message = vec![0; request.buffer_len()];
+    request.emit(&mut message)?;
+    let mut items = vec![
+        Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
+        Item { item_type: ItemType::UNCONNECTED_DATA, data: &message },
+    ];
+    let mut address = [0; SOCKADDR_LEN];
+    if let Some(port) = port {
+        SockaddrInfo { address: SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, port) }.emit(&mut address)?;
+        items.push(Item { item_type: ItemType::SOCKADDR_T_TO_O, data: &address });
+    }
+    let packet = EncapsulatedPacket { interface_handle: 0, timeout_s: 0, packet: CommonPacket::new(&items) };
+    let mut block = vec![0; packet.buffer_len()];
+    packet.emit(&mut block)?;
+    Ok(block)
+}
+
+/// Attributes 1 to 7 of the Identity object in order; a device may append more.
+fn parse_identity(data: &[u8]) -> Result<DeviceIdentity, Error> {
+    let mut r = Reader::new(data);
+    let mut identity = DeviceIdentity {
+        vendor: r.u16("vendor ID")?,
+        device_type: r.u16("device type")?,
+        product_code: r.u16("product code")?,
+        major_revision: r.u8("major revision")?,
+        minor_revision: r.u8("minor revision")?,
+        status: r.u16("status")?,
+        serial_number: r.u32("serial number")?,
+        product_name: String::new(),
+    };
+    let length = r.u8("product name length")?;
+    let name = r.take("product name", usize::from(length))?;
+    identity.product_name = String::from_utf8_lossy(name).into_owned();
+    Ok(identity)
+}
