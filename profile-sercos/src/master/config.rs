@@ -1,0 +1,342 @@
+//! What the master is told before it starts.
+
+use arrayvec::ArrayVec;
+use profile_generic::time::DurationNs;
+
+use super::svc::SvcLimits;
+use crate::wire::connection::{ConfigurationType, ConnectionSetup, ConnectionTiming};
+use crate::wire::cp0;
+use crate::wire::header::MacAddress;
+use crate::wire::idn::Idn;
+
+/// Connections which the master can set up per slave.
+pub const CONNECTIONS_MAX: usize = 8;
+
+/// IDNs in the configuration list of one connection; the list fits into a request without a buffer.
+pub const CONNECTION_IDNS_MAX: usize = 16;
+
+/// Bytes of one connection with C-CON.
+pub const CONNECTION_LEN_MAX: usize = 256;
+
+/// Largest SERCOS cycle time in nanoseconds.
+pub const CYCLE_NS_MAX: u32 = 65_000_000;
+
+/// One cyclic connection of a slave.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConnectionConfig {
+    /// The connection's number at the slave, x of S-0-1050.x.
+    pub instance: u8,
+    /// Whether the slave produces (AT, feedback) or consumes (MDT, command values).
+    pub slave_produces: bool,
+    /// What the data is made of, S-0-1050.x.1 bits 5..4. Only for an IDN list is `idns` written.
+    pub configuration: ConfigurationType,
+    /// How the connection is timed, S-0-1050.x.1 bits 1..0.
+    pub timing: ConnectionTiming,
+    /// Configuration list, S-0-1050.x.6.
+    pub idns: ArrayVec<Idn, CONNECTION_IDNS_MAX>,
+    /// The producer has a new value every so many cycles, 1 or more; S-0-1050.x.10 in units of the cycle time.
+    pub producer_cycles: u16,
+    /// Consecutive losses which the consumer bears, S-0-1050.x.11.
+    pub allowed_losses: u16,
+}
+
+impl ConnectionConfig {
+    /// A clock synchronous connection of an IDN list, produced every cycle, ten losses allowed. IDNs beyond
+    /// [`CONNECTION_IDNS_MAX`] make [`MasterConfig::check`] fail: `None` here.
+    #[must_use]
+    pub fn new(instance: u8, slave_produces: bool, idns: &[Idn]) -> Option<ConnectionConfig> {
+        Some(ConnectionConfig {
+            instance,
+            slave_produces,
+            configuration: ConfigurationType::IdnList,
+            timing: ConnectionTiming::ClockSynchronous,
+            idns: ArrayVec::try_from(idns).ok()?,
+            producer_cycles: 1,
+            allowed_losses: 10,
+        })
+    }
+
+    /// The word for S-0-1050.x.1.
+    #[must_use]
+    pub fn setup(&self) -> ConnectionSetup {
+        ConnectionSetup::synchronous(self.slave_produces)
+            .with_configuration(self.configuration)
+            .with_timing(self.timing)
+    }
+}
+
+/// The connections of one slave.
+pub type Connections = ArrayVec<ConnectionConfig, CONNECTIONS_MAX>;
+
+/// One slave that is expected on the network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SlaveConfig {
+    /// SERCOS address, 1..=511.
+    pub address: u16,
+    /// Its connections; may also be set in CP2 with [`super::Master::set_connections`].
+    pub connections: Connections,
+}
+
+/// Configuration of the master.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MasterConfig {
+    /// Source address of all telegrams. Frames with another source are refused.
+    pub mac: MacAddress,
+    /// Cycle time of CP3 and CP4 (tScyc) in nanoseconds: 31250, 62500, 125000 or a multiple of 250000 up to
+    /// 65 ms.
+    pub cycle_ns: u32,
+    /// Cycle time of CP0, CP1 and CP2 in nanoseconds: a multiple of 250000, 1 ms (2 ms with more than 255
+    /// slaves) to 65 ms.
+    pub setup_cycle_ns: u32,
+    /// Deviation of the master's own cycle start in nanoseconds, S-0-1023 follows from it. Above 1000 the master
+    /// declares itself a soft master in S-0-1032.
+    pub mst_jitter_ns: u32,
+    /// Deviation of one slave's forwarding in nanoseconds; the inter frame gap follows from it.
+    pub slave_jitter_ns: u32,
+    /// Slaves for which storage is set aside, 1..=511. Above 255 the network uses four telegrams in CP1 and CP2.
+    pub slaves_max: u16,
+    /// Expected slaves. Others found on the network take part without connections.
+    pub slaves: Vec<SlaveConfig>,
+    /// Consecutive cycles for which topology, and then the address list, must stay the same in CP0.
+    pub stable_cycles: u16,
+    /// Cycles after which CP0 reports that topology or list do not become stable.
+    pub scan_timeout_cycles: u16,
+    /// Silence before a phase is entered with new telegrams; at least 120 ms.
+    pub pause: DurationNs,
+    /// Wait at the start of CP0 before the telegrams are evaluated.
+    pub settle: DurationNs,
+    /// Time for the slaves to meet each condition of a phase switch.
+    pub switch_timeout: DurationNs,
+    /// Times of the service channel.
+    pub svc: SvcLimits,
+    /// Consecutive cycles without SlaveValid before a slave counts as lost.
+    pub slave_valid_misses: u8,
+    /// S-0-1003, MST losses which the slaves bear in CP3 and CP4.
+    pub mst_losses: u16,
+    /// S-0-1027.0.1, requested MTU of the unified communication channel in bytes.
+    pub mtu: u16,
+    /// A hot-plug field at the start of every telegram, as slaves before specification 1.3.0 need it, and not
+    /// of MDT0 and AT0 only.
+    pub hot_plug_in_all: bool,
+    /// Bytes set aside per slave for lists which the master itself reads (S-0-1000, S-0-0021, S-0-0022).
+    pub list_capacity: usize,
+}
+
+impl MasterConfig {
+    /// A configuration with the usual times: 1 ms in CP0 to CP2, 120 ms pauses, 200 ms waits, 100 stable
+    /// cycles, 45 us jitter of a soft master, room for 64 slaves.
+    #[must_use]
+    pub fn new(mac: MacAddress, cycle_ns: u32) -> MasterConfig {
+        MasterConfig {
+            mac,
+            cycle_ns,
+            setup_cycle_ns: 1_000_000,
+            mst_jitter_ns: 45_000,
+            slave_jitter_ns: 80,
+            slaves_max: 64,
+            slaves: Vec::new(),
+            stable_cycles: 100,
+            scan_timeout_cycles: 1000,
+            pause: DurationNs::from_millis(120),
+            settle: DurationNs::from_millis(200),
+            switch_timeout: DurationNs::from_millis(200),
+            svc: SvcLimits::default(),
+            slave_valid_misses: 2,
+            mst_losses: 10,
+            mtu: 1500,
+            hot_plug_in_all: true,
+            list_capacity: 1024,
+        }
+    }
+
+    /// MDTs, and ATs, in CP1 and CP2: 2, or 4 for more than 255 slaves.
+    #[must_use]
+    pub fn setup_telegrams(&self) -> u8 {
+        if self.slaves_max > 255 { 4 } else { 2 }
+    }
+
+    /// Checks every value against its range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let cycle = self.cycle_ns;
+        let fine = matches!(cycle, 31_250 | 62_500 | 125_000);
+        let coarse = cycle > 0 && cycle.is_multiple_of(250_000) && cycle <= CYCLE_NS_MAX;
+        if !fine && !coarse {
+            return Err(ConfigError::CycleTime { nanoseconds: cycle });
+        }
+        let setup = self.setup_cycle_ns;
+        let minimum = if self.setup_telegrams() == 4 { 2_000_000 } else { 1_000_000 };
+        if setup < minimum || setup > CYCLE_NS_MAX || !setup.is_multiple_of(250_000) {
+            return Err(ConfigError::SetupCycleTime { nanoseconds: setup, minimum });
+        }
+        if self.slaves_max == 0 || usize::from(self.slaves_max) > cp0::SLAVES_MAX {
+            return Err(ConfigError::SlavesMax(self.slaves_max));
+        }
+        if self.slaves.len() > usize::from(self.slaves_max) {
+            return Err(ConfigError::TooManySlaves { configured: self.slaves.len(), max: self.slaves_max });
+        }
+        if self.pause < DurationNs::from_millis(120) {
+            return Err(ConfigError::Pause(self.pause));
+        }
+        if self.mst_jitter_ns >= self.cycle_ns {
+            return Err(ConfigError::Jitter { nanoseconds: self.mst_jitter_ns, cycle_ns: self.cycle_ns });
+        }
+        for (index, slave) in self.slaves.iter().enumerate() {
+            if slave.address == 0 || usize::from(slave.address) > cp0::SLAVES_MAX {
+                return Err(ConfigError::Address(slave.address));
+            }
+            if self.slaves[..index].iter().any(|other| other.address == slave.address) {
+                return Err(ConfigError::DoubleAddress(slave.address));
+            }
+            check_connections(slave.address, &slave.connections, self.cycle_ns)?;
+        }
+        Ok(())
+    }
+}
+
+/// Checks the connections of one slave.
+pub(crate) fn check_connections(
+    address: u16,
+    connections: &[ConnectionConfig],
+    cycle_ns: u32,
+) -> Result<(), ConfigError> {
+    for (index, connection) in connections.iter().enumerate() {
+        let instance = connection.instance;
+        if connections[..index].iter().any(|other| other.instance == instance) {
+            return Err(ConfigError::DoubleInstance { address, instance });
+        }
+        let cycles = connection.producer_cycles;
+        if cycles == 0 || u32::from(cycles).checked_mul(cycle_ns).is_none() {
+            return Err(ConfigError::ProducerCycles { address, instance, cycles });
+        }
+        if connection.configuration == ConfigurationType::IdnList && connection.idns.is_empty() {
+            return Err(ConfigError::NoIdns { address, instance });
+        }
+    }
+    Ok(())
+}
+
+/// What is wrong with a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// The SERCOS cycle time is none of the permitted ones.
+    #[error("cycle time {nanoseconds} ns: 31250, 62500, 125000 or a multiple of 250000 up to 65000000")]
+    CycleTime {
+        /// The value given.
+        nanoseconds: u32,
+    },
+    /// The cycle time of CP0 to CP2 is out of range.
+    #[error("cycle time of CP0 to CP2 {nanoseconds} ns: a multiple of 250000, {minimum} to 65000000")]
+    SetupCycleTime {
+        /// The value given.
+        nanoseconds: u32,
+        /// The smallest permitted value.
+        minimum: u32,
+    },
+    /// Storage for an impossible number of slaves.
+    #[error("room for {0} slaves: 1 to 511")]
+    SlavesMax(u16),
+    /// More slaves configured than there is storage for.
+    #[error("{configured} slaves configured, room for {max}")]
+    TooManySlaves {
+        /// Slaves configured.
+        configured: usize,
+        /// Slaves that fit.
+        max: u16,
+    },
+    /// The pause between phases is too short.
+    #[error("pause between phases {0}: at least 120 ms")]
+    Pause(DurationNs),
+    /// The master's jitter exceeds the cycle.
+    #[error("jitter {nanoseconds} ns is not below the cycle time {cycle_ns} ns")]
+    Jitter {
+        /// The value given.
+        nanoseconds: u32,
+        /// Cycle time in nanoseconds.
+        cycle_ns: u32,
+    },
+    /// A SERCOS address out of range.
+    #[error("SERCOS address {0}: 1 to 511")]
+    Address(u16),
+    /// Two slaves with the same SERCOS address.
+    #[error("SERCOS address {0} is configured twice")]
+    DoubleAddress(u16),
+    /// Two connections of a slave with the same number.
+    #[error("slave {address}: connection {instance} is configured twice")]
+    DoubleInstance {
+        /// SERCOS address.
+        address: u16,
+        /// Connection number.
+        instance: u8,
+    },
+    /// An impossible producer cycle.
+    #[error("slave {address} connection {instance}: production every {cycles} cycles")]
+    ProducerCycles {
+        /// SERCOS address.
+        address: u16,
+        /// Connection number.
+        instance: u8,
+        /// The value given.
+        cycles: u16,
+    },
+    /// An IDN list connection without IDNs.
+    #[error("slave {address} connection {instance}: the configuration list is empty")]
+    NoIdns {
+        /// SERCOS address.
+        address: u16,
+        /// Connection number.
+        instance: u8,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAC: MacAddress = [2, 0, 0, 0, 0, 1];
+
+    #[test]
+    fn cycle_times() {
+        let good = [31_250, 62_500, 125_000, 250_000, 1_000_000, 65_000_000];
+        let bad = [0, 1, 31_251, 200_000, 375_000, 65_250_000];
+        let check = |cycle| MasterConfig { mst_jitter_ns: 0, ..MasterConfig::new(MAC, cycle) }.check();
+        assert!(good.iter().all(|&cycle| check(cycle) == Ok(())));
+        assert!(bad.iter().all(|&cycle| check(cycle) == Err(ConfigError::CycleTime { nanoseconds: cycle })));
+        let wide = MasterConfig { slaves_max: 256, ..MasterConfig::new(MAC, 1_000_000) };
+        assert_eq!(
+            wide.check(),
+            Err(ConfigError::SetupCycleTime { nanoseconds: 1_000_000, minimum: 2_000_000 })
+        );
+    }
+
+    #[test]
+    fn each_fault_has_its_error() {
+        let base = MasterConfig::new(MAC, 1_000_000);
+        let slave = |address| SlaveConfig { address, connections: Connections::new() };
+        let with = |slaves: &[SlaveConfig]| MasterConfig { slaves: slaves.to_vec(), ..base.clone() }.check();
+        assert_eq!(with(&[slave(0)]), Err(ConfigError::Address(0)));
+        assert_eq!(with(&[slave(512)]), Err(ConfigError::Address(512)));
+        assert_eq!(with(&[slave(7), slave(7)]), Err(ConfigError::DoubleAddress(7)));
+        let connection = |instance| ConnectionConfig::new(instance, true, &[Idn(40)]).unwrap();
+        let connected = |connections: &[ConnectionConfig]| {
+            with(&[SlaveConfig { address: 1, connections: connections.iter().cloned().collect() }])
+        };
+        assert_eq!(
+            connected(&[connection(1), connection(1)]),
+            Err(ConfigError::DoubleInstance { address: 1, instance: 1 })
+        );
+        assert_eq!(
+            connected(&[ConnectionConfig::new(0, true, &[]).unwrap()]),
+            Err(ConfigError::NoIdns { address: 1, instance: 0 })
+        );
+        assert_eq!(
+            connected(&[ConnectionConfig { producer_cycles: 0, ..connection(3) }]),
+            Err(ConfigError::ProducerCycles { address: 1, instance: 3, cycles: 0 })
+        );
+        assert_eq!(connected(&[connection(0), connection(1)]), Ok(()));
+        assert_eq!(ConnectionConfig::new(0, true, &[Idn(1); 17]), None);
+        let short = MasterConfig { pause: DurationNs::from_millis(119), ..base.clone() };
+        assert_eq!(short.check(), Err(ConfigError::Pause(DurationNs::from_millis(119))));
+        let shaky = MasterConfig { mst_jitter_ns: 1_000_000, ..base };
+        assert_eq!(shaky.check(), Err(ConfigError::Jitter { nanoseconds: 1_000_000, cycle_ns: 1_000_000 }));
+    }
+}
