@@ -2,4 +2,7 @@
 
 pub mod capture;
 pub mod config;
+pub mod latest;
+pub mod modbus;
+pub mod status;
 pub mod sys;

@@ -1,0 +1,176 @@
+//! A cell that holds the latest value: one writer that never waits, any number of readers.
+//!
+//! The writer is the cycle thread, the readers are servers. A value is stored as 64-bit words in atomics, guarded by
+//! a sequence number that is odd while the words change (a sequence lock): a reader that saw the number change
+//! reads again. No reader can hold up the writer, nothing is allocated after construction, and there is no unsafe code,
+//! because torn words are plain numbers that are thrown away before they are looked at.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+
+/// Reads that may meet a writer before a reader gives its time slice away.
+const SPINS: u32 = 64;
+
+/// A value that can be laid out in 64-bit words.
+pub trait Words: Copy {
+    /// The words, an array of `u64`.
+    type Array: AsRef<[u64]> + AsMut<[u64]>;
+
+    /// An array to be filled.
+    const EMPTY: Self::Array;
+
+    /// Writes every word.
+    fn to_words(&self, words: &mut Self::Array);
+
+    /// The value of words that [`Words::to_words`] wrote.
+    fn from_words(words: &Self::Array) -> Self;
+}
+
+#[derive(Debug)]
+struct Cell {
+    /// Even: the words are whole; odd: they are being written.
+    sequence: AtomicU64,
+    words: Box<[AtomicU64]>,
+}
+
+/// The writing end.
+#[derive(Debug)]
+pub struct Publisher<T> {
+    cell: Arc<Cell>,
+    value: std::marker::PhantomData<fn(T)>,
+}
+
+/// A reading end.
+#[derive(Debug)]
+pub struct Reader<T> {
+    cell: Arc<Cell>,
+    value: std::marker::PhantomData<fn() -> T>,
+}
+
+impl<T> Clone for Reader<T> {
+    fn clone(&self) -> Self {
+        Self { cell: Arc::clone(&self.cell), value: std::marker::PhantomData }
+    }
+}
+
+/// A cell that holds `initial`.
+#[must_use]
+pub fn latest<T: Words>(initial: T) -> (Publisher<T>, Reader<T>) {
+    let mut words = T::EMPTY;
+    initial.to_words(&mut words);
+    let words = words.as_ref().iter().map(|word| AtomicU64::new(*word)).collect();
+    let cell = Arc::new(Cell { sequence: AtomicU64::new(0), words });
+    let publisher = Publisher { cell: Arc::clone(&cell), value: std::marker::PhantomData };
+    (publisher, Reader { cell, value: std::marker::PhantomData })
+}
+
+impl<T: Words> Publisher<T> {
+    /// Replaces the value. Takes `&mut self`: there is one writer.
+    pub fn publish(&mut self, value: &T) {
+        let mut words = T::EMPTY;
+        value.to_words(&mut words);
+        let cell = &*self.cell;
+        let sequence = cell.sequence.load(Ordering::Relaxed);
+        cell.sequence.store(sequence.wrapping_add(1), Ordering::Relaxed);
+        // No word below may be seen before the odd number above.
+        fence(Ordering::Release);
+        for (place, word) in cell.words.iter().zip(words.as_ref()) {
+            place.store(*word, Ordering::Relaxed);
+        }
+        // Whoever sees the even number sees all words.
+        cell.sequence.store(sequence.wrapping_add(2), Ordering::Release);
+    }
+}
+
+impl<T: Words> Reader<T> {
+    /// The value published last. Waits only while a publication, well under a microsecond, is under way.
+    #[must_use]
+    pub fn read(&self) -> T {
+        let cell = &*self.cell;
+        let mut words = T::EMPTY;
+        let mut tries = 0_u32;
+        loop {
+            let before = cell.sequence.load(Ordering::Acquire);
+            if before.is_multiple_of(2) {
+                for (word, place) in words.as_mut().iter_mut().zip(&cell.words) {
+                    *word = place.load(Ordering::Relaxed);
+                }
+                // No word above may be read after the number below.
+                fence(Ordering::Acquire);
+                if cell.sequence.load(Ordering::Relaxed) == before {
+                    return T::from_words(&words);
+                }
+            }
+            tries = tries.wrapping_add(1);
+            if tries.is_multiple_of(SPINS) {
+                // The writer may have been put off in the middle, on this processor.
+                std::thread::yield_now();
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    const LEN: usize = 200;
+
+    /// Every word is the same number: a mixture of two values shows.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Uniform(u64);
+
+    impl Words for Uniform {
+        type Array = [u64; LEN];
+        const EMPTY: Self::Array = [0; LEN];
+
+        fn to_words(&self, words: &mut Self::Array) {
+            words.fill(self.0);
+        }
+
+        fn from_words(words: &Self::Array) -> Self {
+            assert!(words.iter().all(|word| *word == words[0]), "torn: {words:?}");
+            Self(words[0])
+        }
+    }
+
+    #[test]
+    fn the_value_published_last_is_read_by_every_reader() {
+        let (mut publisher, reader) = latest(Uniform(7));
+        let other = reader.clone();
+        assert_eq!(reader.read(), Uniform(7));
+        publisher.publish(&Uniform(8));
+        publisher.publish(&Uniform(9));
+        assert_eq!((reader.read(), other.read()), (Uniform(9), Uniform(9)));
+    }
+
+    #[test]
+    fn readers_see_whole_values_in_order_while_the_writer_writes() {
+        const VALUES: u64 = 100_000;
+        let (mut publisher, reader) = latest(Uniform(0));
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                let reader = reader.clone();
+                let done = &done;
+                scope.spawn(move || {
+                    let mut last = 0;
+                    while !done.load(Ordering::Relaxed) {
+                        let Uniform(value) = reader.read();
+                        assert!(value >= last, "{value} after {last}");
+                        last = value;
+                    }
+                });
+            }
+            for value in 1..=VALUES {
+                publisher.publish(&Uniform(value));
+            }
+            done.store(true, Ordering::Relaxed);
+        });
+        assert_eq!(reader.read(), Uniform(VALUES));
+    }
+}

@@ -1,0 +1,415 @@
+//! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
+
+use profile_generic::fault::FaultCause;
+use profile_generic::image::StatusBits;
+use profile_generic::inhibit::Inhibits;
+use profile_generic::mode::OperatingMode;
+use profile_generic::open_code;
+use profile_generic::quantity::{Position, Torque, Velocity};
+use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
+
+use crate::config::AXES_MAX;
+use crate::latest::Words;
+
+/// Words of one axis in the published form.
+const AXIS_WORDS: usize = 10;
+
+/// Words of the box itself.
+const BOX_WORDS: usize = 9;
+
+const WORDS: usize = BOX_WORDS + AXES_MAX * AXIS_WORDS;
+
+open_code! {
+    /// What the box as a whole is doing.
+    pub struct BoxState(u8) {
+        /// Reading configuration, opening sockets.
+        STARTING = 0 => "starting",
+        /// The bus is on its way up to cyclic operation.
+        PHASE_UP = 1 => "phase_up",
+        /// The bus is in cyclic operation; no controller is connected.
+        READY = 2 => "ready",
+        /// The bus is in cyclic operation and a controller is connected.
+        RUNNING = 3 => "running",
+        /// The bus has failed and is being brought up again.
+        BUS_LOST = 4 => "bus_lost",
+        /// The box is ending.
+        STOPPING = 5 => "stopping",
+    }
+}
+
+/// SERCOS phase value when there is none: no bus is running.
+pub const PHASE_NONE: u8 = 0xFF;
+
+/// What has been counted since the box started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Cycles run.
+    pub cycles: u64,
+    /// Cycles that began later than half a cycle after their time.
+    pub late_cycles: u64,
+    /// Updates from controllers that did not come or came too late.
+    pub lost_updates: u64,
+    /// Bus cycles from which a drive's data did not come back.
+    pub lost_telegrams: u64,
+    /// Frames and datagrams that were malformed or from a stranger.
+    pub refused_frames: u64,
+    /// Frames and datagrams that could not be sent.
+    pub send_failures: u64,
+}
+
+/// The state of one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AxisStatus {
+    /// Instance number in its device; 0 where there is no such axis.
+    pub instance: u8,
+    /// Number of its device in the configuration, from 0.
+    pub device: u8,
+    /// Generic drive state.
+    pub state: DriveState,
+    /// Motion Device Axis Object, attribute Axis State.
+    pub cip_axis_state: u8,
+    /// What is controlled.
+    pub mode: OperatingMode,
+    /// Status bits of the drive.
+    pub status: StatusBits,
+    /// Why the axis cannot be enabled.
+    pub inhibits: Inhibits,
+    /// The fault present, if any.
+    pub fault: Option<FaultCause>,
+    /// The drive's own code for the fault, 0 when it gave none.
+    pub fault_vendor_code: u32,
+    /// Actual position.
+    pub position: Position,
+    /// Actual position in counts of the controller.
+    pub position_counts: i32,
+    /// Actual velocity.
+    pub velocity: Velocity,
+    /// Actual torque.
+    pub torque: Torque,
+    /// Commanded less actual position.
+    pub following_error: Position,
+    /// Commands taken over from the controller.
+    pub commands: u64,
+    /// Updates of the controller that were lost or late.
+    pub lost_updates: u32,
+    /// Bus cycles without fresh data of the drive.
+    pub lost_telegrams: u32,
+    /// Values that were clamped on their way.
+    pub saturated: u32,
+    /// Faults that have occurred.
+    pub faults: u32,
+}
+
+impl AxisStatus {
+    /// No axis.
+    pub const NONE: Self = Self {
+        instance: 0,
+        device: 0,
+        state: DriveState::NotReady,
+        cip_axis_state: 0,
+        mode: OperatingMode::None,
+        status: StatusBits::empty(),
+        inhibits: Inhibits::empty(),
+        fault: None,
+        fault_vendor_code: 0,
+        position: Position(0),
+        position_counts: 0,
+        velocity: Velocity(0),
+        torque: Torque(0),
+        following_error: Position(0),
+        commands: 0,
+        lost_updates: 0,
+        lost_telegrams: 0,
+        saturated: 0,
+        faults: 0,
+    };
+}
+
+/// The state of the box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BoxStatus {
+    /// What it is doing.
+    pub state: BoxState,
+    /// SERCOS communication phase 0 to 4, or [`PHASE_NONE`].
+    pub phase: u8,
+    /// CIP Motion connections open.
+    pub connections: u8,
+    /// Axes configured; the rest of `axes` is [`AxisStatus::NONE`].
+    pub axis_count: u8,
+    /// Length of the bus cycle in nanoseconds.
+    pub cycle_time_ns: u32,
+    /// The latest that a cycle has begun after its time, in nanoseconds.
+    pub lateness_max_ns: u32,
+    /// Since the box started.
+    pub uptime: DurationNs,
+    /// What has been counted.
+    pub counters: Counters,
+    /// The axes in the order of the configuration.
+    pub axes: [AxisStatus; AXES_MAX],
+}
+
+impl BoxStatus {
+    /// A box that has just been started.
+    pub const STARTING: Self = Self {
+        state: BoxState::STARTING,
+        phase: PHASE_NONE,
+        connections: 0,
+        axis_count: 0,
+        cycle_time_ns: 0,
+        lateness_max_ns: 0,
+        uptime: DurationNs(0),
+        counters: Counters {
+            cycles: 0,
+            late_cycles: 0,
+            lost_updates: 0,
+            lost_telegrams: 0,
+            refused_frames: 0,
+            send_failures: 0,
+        },
+        axes: [AxisStatus::NONE; AXES_MAX],
+    };
+
+    /// The configured axes.
+    #[must_use]
+    pub fn configured_axes(&self) -> &[AxisStatus] {
+        self.axes.get(..usize::from(self.axis_count)).unwrap_or(&self.axes)
+    }
+}
+
+/// Codes of [`DriveState`] for programs outside; never changed, only added to.
+#[must_use]
+pub const fn state_code(state: DriveState) -> u8 {
+    match state {
+        DriveState::NotReady => 0,
+        DriveState::Inhibited => 1,
+        DriveState::AwaitingPower => 2,
+        DriveState::Ready => 3,
+        DriveState::Starting => 4,
+        DriveState::Operating => 5,
+        DriveState::Testing => 6,
+        DriveState::Stopping => 7,
+        DriveState::FaultReaction => 8,
+        DriveState::Faulted => 9,
+        DriveState::Shutdown => 10,
+    }
+}
+
+/// Codes of [`OperatingMode`] for programs outside: those of the CIP Motion control mode, homing after them.
+#[must_use]
+pub const fn mode_code(mode: OperatingMode) -> u8 {
+    match mode {
+        OperatingMode::None => 0,
+        OperatingMode::Position => 1,
+        OperatingMode::Velocity => 2,
+        OperatingMode::Acceleration => 3,
+        OperatingMode::Torque => 4,
+        OperatingMode::Homing => 5,
+    }
+}
+
+/// Two halves in one word, the first one high.
+const fn pair(high: u32, low: u32) -> u64 {
+    (high as u64) << 32 | low as u64
+}
+
+const fn split(word: u64) -> (u32, u32) {
+    let [a, b, c, d, e, f, g, h] = word.to_be_bytes();
+    (u32::from_be_bytes([a, b, c, d]), u32::from_be_bytes([e, f, g, h]))
+}
+
+impl AxisStatus {
+    fn to_words(self) -> [u64; AXIS_WORDS] {
+        let [cause_high, cause_low] = self.fault.map_or(0, |cause| cause.0).to_be_bytes();
+        let head = [
+            self.instance,
+            self.device,
+            state_code(self.state),
+            self.cip_axis_state,
+            mode_code(self.mode),
+            u8::from(self.fault.is_some()),
+            cause_high,
+            cause_low,
+        ];
+        [
+            u64::from_be_bytes(head),
+            pair(self.status.bits(), self.inhibits.bits()),
+            pair(self.fault_vendor_code, self.position_counts.cast_unsigned()),
+            self.position.0.cast_unsigned(),
+            self.velocity.0.cast_unsigned(),
+            self.torque.0.cast_unsigned(),
+            self.following_error.0.cast_unsigned(),
+            self.commands,
+            pair(self.lost_updates, self.lost_telegrams),
+            pair(self.saturated, self.faults),
+        ]
+    }
+
+    fn from_words(words: &[u64; AXIS_WORDS]) -> Self {
+        let [head, bits, codes, position, velocity, torque, error, commands, lost, other] = *words;
+        let [instance, device, state, cip_axis_state, mode, faulted, cause_high, cause_low] =
+            head.to_be_bytes();
+        let (status, inhibits) = split(bits);
+        let (fault_vendor_code, counts) = split(codes);
+        let (lost_updates, lost_telegrams) = split(lost);
+        let (saturated, faults) = split(other);
+        let state = DriveState::ALL.iter().copied().find(|known| state_code(*known) == state);
+        let mode = OperatingMode::ALL.iter().copied().find(|known| mode_code(*known) == mode);
+        Self {
+            instance,
+            device,
+            state: state.unwrap_or_default(),
+            cip_axis_state,
+            mode: mode.unwrap_or_default(),
+            status: StatusBits::from_bits_retain(status),
+            inhibits: Inhibits::from_bits_retain(inhibits),
+            fault: (faulted != 0).then(|| FaultCause(u16::from_be_bytes([cause_high, cause_low]))),
+            fault_vendor_code,
+            position: Position(position.cast_signed()),
+            position_counts: counts.cast_signed(),
+            velocity: Velocity(velocity.cast_signed()),
+            torque: Torque(torque.cast_signed()),
+            following_error: Position(error.cast_signed()),
+            commands,
+            lost_updates,
+            lost_telegrams,
+            saturated,
+            faults,
+        }
+    }
+}
+
+impl Words for BoxStatus {
+    type Array = [u64; WORDS];
+    const EMPTY: Self::Array = [0; WORDS];
+
+    fn to_words(&self, words: &mut Self::Array) {
+        let counters = &self.counters;
+        let head = [self.state.0, self.phase, self.connections, self.axis_count, 0, 0, 0, 0];
+        let of_box = [
+            u64::from_be_bytes(head),
+            pair(self.cycle_time_ns, self.lateness_max_ns),
+            self.uptime.0.cast_unsigned(),
+            counters.cycles,
+            counters.late_cycles,
+            counters.lost_updates,
+            counters.lost_telegrams,
+            counters.refused_frames,
+            counters.send_failures,
+        ];
+        let (front, rest) = words.split_at_mut(BOX_WORDS);
+        front.copy_from_slice(&of_box);
+        for (place, axis) in rest.chunks_exact_mut(AXIS_WORDS).zip(&self.axes) {
+            place.copy_from_slice(&axis.to_words());
+        }
+    }
+
+    fn from_words(words: &Self::Array) -> Self {
+        let (front, rest) = words.split_at(BOX_WORDS);
+        let [state, phase, connections, axis_count, ..] = front[0].to_be_bytes();
+        let (cycle_time_ns, lateness_max_ns) = split(front[1]);
+        let mut axes = [AxisStatus::NONE; AXES_MAX];
+        for (axis, place) in axes.iter_mut().zip(rest.as_chunks::<AXIS_WORDS>().0) {
+            *axis = AxisStatus::from_words(place);
+        }
+        Self {
+            state: BoxState(state),
+            phase,
+            connections,
+            axis_count,
+            cycle_time_ns,
+            lateness_max_ns,
+            uptime: DurationNs(front[2].cast_signed()),
+            counters: Counters {
+                cycles: front[3],
+                late_cycles: front[4],
+                lost_updates: front[5],
+                lost_telegrams: front[6],
+                refused_frames: front[7],
+                send_failures: front[8],
+            },
+            axes,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::latest::latest;
+
+    /// A status in which no two values are the same.
+    pub(crate) fn distinct() -> BoxStatus {
+        let mut status = BoxStatus {
+            state: BoxState::RUNNING,
+            phase: 4,
+            connections: 2,
+            axis_count: 2,
+            cycle_time_ns: 2_000_000,
+            lateness_max_ns: 123_456,
+            uptime: DurationNs(987_654_321_012),
+            counters: Counters {
+                cycles: 0x0102_0304_0506_0708,
+                late_cycles: 11,
+                lost_updates: 12,
+                lost_telegrams: 13,
+                refused_frames: 14,
+                send_failures: 15,
+            },
+            ..BoxStatus::STARTING
+        };
+        status.axes[0] = AxisStatus {
+            instance: 1,
+            device: 0,
+            state: DriveState::Operating,
+            cip_axis_state: 4,
+            mode: OperatingMode::Position,
+            status: StatusBits::READY | StatusBits::TRACKING,
+            inhibits: Inhibits::empty(),
+            fault: None,
+            fault_vendor_code: 0,
+            position: Position(-1_234_567_890_123),
+            position_counts: -1_234_567,
+            velocity: Velocity(-2_500_000_000),
+            torque: Torque(-333_333),
+            following_error: Position(77),
+            commands: 0x1111_2222_3333_4444,
+            lost_updates: 0x5555_6666,
+            lost_telegrams: 0x7777_8888,
+            saturated: 0x0999_0AAA,
+            faults: 0x0BBB_0CCC,
+        };
+        status.axes[1] = AxisStatus {
+            instance: 200,
+            device: 1,
+            state: DriveState::Faulted,
+            cip_axis_state: 8,
+            mode: OperatingMode::Homing,
+            inhibits: Inhibits::SAFETY,
+            fault: Some(FaultCause(0x0905)),
+            fault_vendor_code: 0xC30A_0040,
+            position_counts: i32::MAX,
+            ..AxisStatus::NONE
+        };
+        status
+    }
+
+    #[test]
+    fn a_status_crosses_the_cell_unchanged() {
+        let (mut publisher, reader) = latest(BoxStatus::STARTING);
+        assert_eq!(reader.read(), BoxStatus::STARTING);
+        publisher.publish(&distinct());
+        assert_eq!(reader.read(), distinct());
+        assert_eq!(distinct().configured_axes().len(), 2);
+    }
+
+    #[test]
+    fn every_state_and_mode_has_a_code_of_its_own_and_crosses() {
+        for state in DriveState::ALL {
+            for mode in OperatingMode::ALL {
+                let axis = AxisStatus { state: *state, mode: *mode, ..AxisStatus::NONE };
+                assert_eq!(AxisStatus::from_words(&axis.to_words()), axis);
+            }
+        }
+    }
+}
