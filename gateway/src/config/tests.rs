@@ -321,3 +321,21 @@ fn the_mappings_folder_counts_from_the_file() {
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(config.mappings_dir, Some(folder.join("maps")));
 }
+
+#[test]
+fn the_guide_describes_every_key() {
+    let guide = include_str!("../../../docs/guide.md");
+    let keys =
+        include_str!("file.rs").lines().filter_map(|line| line.strip_prefix("    pub ")?.split(':').next());
+    for key in keys {
+        // The tables of the top level stand in their headings, without a row of their own.
+        let shown = match key {
+            "the_box" => "`[box]`".to_owned(),
+            "time" | "log" | "modbus" | "mappings" => format!("`[{key}]`"),
+            "device" | "axis" => format!("`[[{key}]]`"),
+            "south" | "sercos" => "`[south.sercos]`".to_owned(),
+            key => format!("`{key}`"),
+        };
+        assert!(guide.contains(&shown), "docs/guide.md does not describe {shown}");
+    }
+}
