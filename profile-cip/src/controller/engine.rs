@@ -466,10 +466,8 @@ impl Controller {
         }
         match self.phase {
             Phase::FirstUpdate { .. } if self.link.received_at().is_some() => {
-                let sets = core::mem::take(&mut self.config.class_attributes);
-                let submitted = self.services.set(0, &sets, self.link.room());
-                self.config.class_attributes = sets;
-                self.phase = Phase::ClassConfiguration { ticket: submitted? };
+                let ticket = self.services.set(0, &self.config.class_attributes, self.link.room())?;
+                self.phase = Phase::ClassConfiguration { ticket };
             }
             Phase::ClassConfiguration { ticket } => self.configure_class(now, ticket)?,
             Phase::GroupSync { since, ticket, next, last } => {
@@ -535,8 +533,9 @@ impl Controller {
             0 => &self.config.class_attributes,
             axis => &self.config.axes[usize::from(axis) - 1].attributes,
         };
-        let attributes = sets.len();
+        let mut attributes = sets.len();
         if let Outcome::Set { refused } = result? {
+            attributes = attributes.saturating_sub(refused.len());
             let events = &mut self.events;
             report_refused(instance, sets, &refused, &mut |event| push(events, event))?;
         }

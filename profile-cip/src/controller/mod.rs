@@ -8,7 +8,8 @@
 //!   [`Controller::handle_time`], [`Controller::tcp_closed`], [`Controller::finish`];
 //! - out, to be drained after every input: [`Controller::poll_stream_transmit`],
 //!   [`Controller::poll_datagram_transmit`], [`Controller::poll_event`];
-//! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due.
+//! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due. Datagrams that have come are to be handed
+//!   in before it, so that a caller who was held up does not take its own delay for the device's silence.
 //!
 //! The start-up procedure stands in [`engine`], limits and units in [`config`] and [`program`], and the figures of a
 //! run in [`report`].
@@ -27,6 +28,8 @@ pub mod report;
 mod services;
 mod session;
 mod status;
+#[cfg(test)]
+mod tests;
 pub mod trajectory;
 
 pub use config::{AttributeSet, AxisSetup, ControllerConfig};

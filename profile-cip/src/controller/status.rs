@@ -31,10 +31,10 @@ impl fmt::Display for Extended {
             }
             // Clause 7-1.1: 4 for the class ID, 5 + n for the ID of the axis with index n.
             (GeneralStatus::INVALID_ATTRIBUTE_VALUE, 4) => {
-                f.write_str(" (drive power structure of the class)")
+                f.write_str(" (data segment: drive power structure of the class)")
             }
             (GeneralStatus::INVALID_ATTRIBUTE_VALUE, code @ 5..) => {
-                write!(f, " (drive power structure of axis {})", code - 4)
+                write!(f, " (data segment: drive power structure of axis {})", code - 4)
             }
             _ => Ok(()),
         }
@@ -52,8 +52,8 @@ mod tests {
         let text = |general, code| Extended { general, code }.to_string();
         assert_eq!(text(1, 0x0106), "extended status 0x0106 (ownership conflict)");
         assert_eq!(text(1, 0xFFFF), "extended status 0xffff");
-        assert_eq!(text(9, 4), "extended status 0x0004 (drive power structure of the class)");
-        assert_eq!(text(9, 6), "extended status 0x0006 (drive power structure of axis 2)");
+        assert_eq!(text(9, 4), "extended status 0x0004 (data segment: drive power structure of the class)");
+        assert_eq!(text(9, 6), "extended status 0x0006 (data segment: drive power structure of axis 2)");
         assert_eq!(text(9, 3), "extended status 0x0003");
     }
 }

@@ -1,0 +1,6 @@
+//! Whole runs of the controller in virtual time.
+
+mod failures;
+mod peer;
+mod rig;
+mod runs;
