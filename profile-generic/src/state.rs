@@ -34,6 +34,7 @@
 //! running         Shutdown                                             Stopping       Disable, latch
 //! Stopping, FaultReaction, Faulted  Shutdown                           same           None, latch
 //! Shutdown        ShutdownReset                                        standby        Energize, unlatch
+//! Faulted         FaultReset                   drive has torque        same           Reject
 //! Faulted         FaultReset                   fault still active      same           ResetFault
 //! Faulted         FaultReset                   else                    standby        ResetFault
 //! Faulted         FaultCleared, idle report    reset was asked for     standby        None
@@ -62,7 +63,7 @@
 //! Operating           Faulted (2)     Faulted (2)     Operating (4)   same               same            same            TorqueOff (2)
 //! Halted              Faulted (2)     Faulted (2)     Operating (4)   same               same            same            TorqueOff (2)
 //! Stopping            FaultReaction(5) FaultReaction(5) FaultReaction(3) FaultReaction(3) same           same            same
-//! FaultReaction       FaultReaction   FaultReaction   FaultReaction   FaultReaction      FaultReaction   same            same
+//! FaultReaction       FaultReaction(7) FaultReaction(7) FaultReaction(7) FaultReaction(7) FaultReaction(7) same         same
 //! Faulted             Faulted         Faulted         Faulted         Faulted            Faulted         Faulted         same
 //! Silent              Faulted (6)     Faulted [south] FaultReaction [south]              FaultReaction [south] same      same
 //! ```
@@ -73,6 +74,7 @@
 //! 4. Testing when a test is active.
 //! 5. The drive decelerates unasked: it is left to its controlled stop (Disable), [unexpected_torque].
 //! 6. \[south_silence\]; but NotReady stays: a drive that was never heard is not lost.
+//! 7. With the action Disable, so that the drive does not find itself enabled when its reaction ends.
 //!
 //! "same" for a drive that is running means: unless a fault is active or the shutdown is latched, in which case the
 //! machine catches up with the stop that should have come. A request that changes nothing because its aim is
@@ -193,7 +195,7 @@ named_enum! {
         Halt = "halt",
         /// Switch the torque off at once.
         TorqueOff = "torque_off",
-        /// Clear the faults of the drive; no torque.
+        /// Clear the faults of the drive; no torque. A pulse: afterwards what [`Action::TorqueOff`] writes stands again.
         ResetFault = "reset_fault",
         /// The request is refused; nothing is done.
         Reject = "reject",
@@ -276,6 +278,8 @@ pub struct Conditions {
     pub initialised: bool,
     /// Whether the drive's last report is Halted.
     pub halted: bool,
+    /// Whether the drive's last report says that it has torque, see [`Report::has_torque`].
+    pub torque: bool,
     /// Whether a fault reset was asked for and not yet answered.
     pub reset_pending: bool,
 }

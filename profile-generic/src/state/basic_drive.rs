@@ -1,6 +1,6 @@
 //! The state machine together with its conditions.
 
-use super::{Conditions, DriveState, Event, Report, Request, Transition};
+use super::{Action, Conditions, DriveState, Event, Report, Request, Transition};
 use crate::fault::Reaction;
 use crate::inhibit::Inhibits;
 
@@ -103,6 +103,7 @@ impl BasicDrive {
             Event::Report(report) => {
                 conditions.initialised = !matches!(report, Report::NotReady | Report::Silent);
                 conditions.halted = report == Report::Halted;
+                conditions.torque = report.has_torque();
                 match report {
                     Report::Ready | Report::Enabling | Report::Operating | Report::Halted => {
                         conditions.power = true;
@@ -127,7 +128,7 @@ impl BasicDrive {
         let conditions = &mut self.conditions;
         conditions.shutdown_latched = transition.shutdown.unwrap_or(conditions.shutdown_latched);
         conditions.test_active &= matches!(self.state, DriveState::Starting | DriveState::Testing);
-        conditions.reset_pending &= self.state == DriveState::Faulted;
+        conditions.reset_pending &= self.state == DriveState::Faulted && transition.action != Action::Reject;
         if !conditions.fault_active && !matches!(self.state, DriveState::FaultReaction | DriveState::Faulted)
         {
             conditions.reaction = Reaction::default();

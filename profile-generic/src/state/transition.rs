@@ -43,7 +43,7 @@ impl Conditions {
         let power = self.power && !matches!(report, Report::AwaitingPower);
         let fault_active = self.fault_active || matches!(report, Report::Faulted | Report::FaultReaction);
         let halted = matches!(report, Report::Halted);
-        Self { initialised, power, fault_active, halted, ..self }
+        Self { initialised, power, fault_active, halted, torque: report.has_torque(), ..self }
     }
 
     /// The cause to report for an inhibit that takes the torque away.
@@ -151,7 +151,7 @@ impl DriveState {
 
     const fn on_enable(self, request: Request, conditions: &Conditions) -> Transition {
         match (self, request) {
-            (Self::Ready, _) if matches!(conditions.standby(), Self::Ready) => {
+            (Self::Ready, _) if matches!(conditions.standby(), Self::Ready) && !conditions.torque => {
                 Transition::to(Self::Starting, Action::Enable)
             }
             (Self::Operating, Request::Enable) if matches!(conditions.standby(), Self::Ready) => {
@@ -176,6 +176,8 @@ impl DriveState {
 
     const fn on_fault_reset(self, conditions: &Conditions) -> Transition {
         match self {
+            // A drive that still has torque is not done with its fault, whatever it says about the cause.
+            Self::Faulted if conditions.torque => self.reject(),
             Self::Faulted => Transition::to(conditions.standby(), Action::ResetFault),
             Self::FaultReaction if !conditions.fault_active && conditions.halted => {
                 Transition::to(Self::Stopping, Action::Disable)
@@ -237,7 +239,7 @@ impl DriveState {
     /// Leaves Faulted when a reset was asked for and nothing stands against it any more.
     const fn after_reset(self, conditions: &Conditions) -> Transition {
         match self {
-            Self::Faulted if conditions.reset_pending && !conditions.fault_active => {
+            Self::Faulted if conditions.reset_pending && !conditions.fault_active && !conditions.torque => {
                 Transition::to(conditions.standby(), Action::None)
             }
             _ => self.stay(),
@@ -276,8 +278,8 @@ impl DriveState {
             },
             Report::FaultReaction => match self {
                 Self::Faulted | Self::FaultReaction => self.stay(),
-                // The drive is about it already; an order could only disturb its own choice of stop.
-                _ => Transition::to(Self::FaultReaction, Action::None),
+                // The drive is about it already, but it shall not find itself enabled when it is done.
+                _ => Transition::to(Self::FaultReaction, Action::Disable),
             },
             Report::Faulted => match self {
                 Self::Faulted => self.stay(),
