@@ -117,7 +117,8 @@ impl AttributeSelector {
         Ok(selector)
     }
 
-    fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
+    /// Reads a head with its ranges.
+    pub(crate) fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
         let id = reader.u16(BODY)?;
         let (dimension, element_size) = (reader.u8(BODY)?, reader.u8(BODY)?);
         Self::parse_after_id(reader, id, dimension, element_size)
@@ -135,7 +136,10 @@ impl AttributeSelector {
 }
 
 /// Takes a value with its padding; the padding of the last value may be missing.
-fn take_value<'a>(reader: &mut Reader<'a>, selector: &AttributeSelector) -> Result<&'a [u8], Error> {
+pub(crate) fn take_value<'a>(
+    reader: &mut Reader<'a>,
+    selector: &AttributeSelector,
+) -> Result<&'a [u8], Error> {
     let len = selector.value_len().unwrap_or(usize::MAX);
     let value = reader.take("attribute value", len)?;
     let padding = (len.next_multiple_of(4) - len).min(reader.remaining());

@@ -1,0 +1,670 @@
+//! The attributes of the Motion Device Axis Object: definitions, table, values.
+//!
+//! Which attributes a device has, with type and access, is data that the device is built with
+//! ([`AttributeDefinition`]). Only those the protocol itself needs are listed here ([`id`]); they are always there.
+//! Lookup is a binary search in a sorted table; values of an instance are one run of octets. Nothing is allocated
+//! after construction.
+
+use core::fmt;
+
+use crate::wire::status::GeneralStatus;
+
+/// Numbers of the attributes that the protocol engine itself works with.
+pub mod id {
+    /// Class: Revision, Table 5-2.3.
+    pub const REVISION: u16 = 1;
+    /// Class: Node Control.
+    pub const NODE_CONTROL: u16 = 14;
+    /// Class: Node Status.
+    pub const NODE_STATUS: u16 = 15;
+    /// Class: Node Fault Code.
+    pub const NODE_FAULT_CODE: u16 = 16;
+    /// Class: Node Alarm Code.
+    pub const NODE_ALARM_CODE: u16 = 17;
+    /// Class: Controller Update Period, ns.
+    pub const CONTROLLER_UPDATE_PERIOD: u16 = 18;
+    /// Class: Controller Time Offset, ns.
+    pub const CONTROLLER_TIME_OFFSET: u16 = 19;
+    /// Class: Controller Time Stamp, ns of system time.
+    pub const CONTROLLER_TIME_STAMP: u16 = 20;
+    /// Class: Controller Update Delay High Limit, update periods.
+    pub const UPDATE_DELAY_HIGH_LIMIT: u16 = 21;
+    /// Class: Controller Update Delay Low Limit, update periods.
+    pub const UPDATE_DELAY_LOW_LIMIT: u16 = 22;
+    /// Class: Time Data Set.
+    pub const TIME_DATA_SET: u16 = 31;
+    /// Class: Lost Controller Updates.
+    pub const LOST_UPDATES: u16 = 32;
+    /// Class: Late Controller Updates.
+    pub const LATE_UPDATES: u16 = 33;
+    /// Class: Drive Power Structure Class ID.
+    pub const POWER_STRUCTURE_CLASS_ID: u16 = 34;
+    /// Class: Step Threshold, ns.
+    pub const STEP_THRESHOLD: u16 = 35;
+    /// Control Mode.
+    pub const CONTROL_MODE: u16 = 40;
+    /// Feedback Mode.
+    pub const FEEDBACK_MODE: u16 = 42;
+    /// Event Checking Control.
+    pub const EVENT_CHECKING_CONTROL: u16 = 60;
+    /// Event Checking Status.
+    pub const EVENT_CHECKING_STATUS: u16 = 61;
+    /// Control Status.
+    pub const CONTROL_STATUS: u16 = 89;
+    /// Actual Data Set.
+    pub const ACTUAL_DATA_SET: u16 = 90;
+    /// Command Data Set.
+    pub const COMMAND_DATA_SET: u16 = 91;
+    /// Command Control.
+    pub const COMMAND_CONTROL: u16 = 92;
+    /// Command Target Time, ns of system time.
+    pub const COMMAND_TARGET_TIME: u16 = 93;
+    /// Status Data Set.
+    pub const STATUS_DATA_SET: u16 = 94;
+    /// Axis State.
+    pub const AXIS_STATE: u16 = 650;
+    /// Axis Status.
+    pub const AXIS_STATUS: u16 = 651;
+    /// Axis Status - Mfg.
+    pub const AXIS_STATUS_MFG: u16 = 652;
+    /// Axis I/O Status.
+    pub const AXIS_IO_STATUS: u16 = 653;
+    /// Axis I/O Status - Mfg.
+    pub const AXIS_IO_STATUS_MFG: u16 = 654;
+    /// Axis Faults.
+    pub const AXIS_FAULTS: u16 = 657;
+    /// Start Inhibits.
+    pub const START_INHIBITS: u16 = 676;
+    /// Start Inhibits - Mfg.
+    pub const START_INHIBITS_MFG: u16 = 677;
+}
+
+/// CIP data type of an attribute element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DataType {
+    /// One octet, 0 or 1.
+    Bool,
+    /// Signed 8 bits.
+    Sint,
+    /// Signed 16 bits.
+    Int,
+    /// Signed 32 bits.
+    Dint,
+    /// Signed 64 bits.
+    Lint,
+    /// Unsigned 8 bits.
+    Usint,
+    /// Unsigned 16 bits.
+    Uint,
+    /// Unsigned 32 bits.
+    Udint,
+    /// Unsigned 64 bits.
+    Ulint,
+    /// 8 bits.
+    Byte,
+    /// 16 bits.
+    Word,
+    /// 32 bits.
+    Dword,
+    /// 64 bits.
+    Lword,
+    /// Floating point, 32 bits.
+    Real,
+    /// Floating point, 64 bits.
+    Lreal,
+}
+
+impl DataType {
+    const NAMES: [(&'static str, Self); 15] = [
+        ("BOOL", Self::Bool),
+        ("SINT", Self::Sint),
+        ("INT", Self::Int),
+        ("DINT", Self::Dint),
+        ("LINT", Self::Lint),
+        ("USINT", Self::Usint),
+        ("UINT", Self::Uint),
+        ("UDINT", Self::Udint),
+        ("ULINT", Self::Ulint),
+        ("BYTE", Self::Byte),
+        ("WORD", Self::Word),
+        ("DWORD", Self::Dword),
+        ("LWORD", Self::Lword),
+        ("REAL", Self::Real),
+        ("LREAL", Self::Lreal),
+    ];
+
+    /// The type with this name of the standard, for example `UDINT`.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(known, _)| *known == name).map(|(_, data_type)| *data_type)
+    }
+
+    /// Octets of one element.
+    #[must_use]
+    pub const fn size(self) -> u8 {
+        match self {
+            Self::Bool | Self::Sint | Self::Usint | Self::Byte => 1,
+            Self::Int | Self::Uint | Self::Word => 2,
+            Self::Dint | Self::Udint | Self::Dword | Self::Real => 4,
+            Self::Lint | Self::Ulint | Self::Lword | Self::Lreal => 8,
+        }
+    }
+
+    /// One element as a number, for range checks. Integers beyond 53 bits are rounded.
+    #[must_use]
+    pub fn to_f64(self, element: &[u8]) -> Option<f64> {
+        let mut octets = [0; 8];
+        let size = usize::from(self.size());
+        octets.get_mut(..size)?.copy_from_slice(element.get(..size)?);
+        let shift = 64 - 8 * u32::from(self.size());
+        let raw = u64::from_le_bytes(octets);
+        Some(match self {
+            Self::Real => f64::from(f32::from_bits(u32::try_from(raw).ok()?)),
+            Self::Lreal => f64::from_bits(raw),
+            Self::Sint | Self::Int | Self::Dint | Self::Lint => {
+                i64_to_f64((raw << shift).cast_signed() >> shift)
+            }
+            _ => u64_to_f64(raw),
+        })
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "only compared with range limits, which are f64 themselves")]
+fn i64_to_f64(value: i64) -> f64 {
+    value as f64
+}
+
+#[expect(clippy::cast_precision_loss, reason = "only compared with range limits, which are f64 themselves")]
+fn u64_to_f64(value: u64) -> f64 {
+    value as f64
+}
+
+/// Who has an attribute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scope {
+    /// The class, instance 0.
+    Class,
+    /// Every axis.
+    Instance,
+}
+
+/// Access rule of the standard's tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Get only.
+    Get,
+    /// Get and Set by a service.
+    Set,
+    /// `Set*`: set by the cyclic connection data, not by a service.
+    Cyclic,
+}
+
+/// Where the value lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backing {
+    /// In the device; the owner of the device may publish values with `put_attribute`.
+    Stored,
+    /// In the device, and every Set is carried to the drive before it is acknowledged.
+    WriteThrough,
+    /// In the drive: every Get and Set is carried to it.
+    Drive,
+}
+
+/// Value an attribute has before it is set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DefaultValue {
+    /// For the integer and bit string types.
+    Integer(i64),
+    /// For REAL and LREAL.
+    Real(f64),
+}
+
+/// What an attribute is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttributeDefinition {
+    /// Who has it.
+    pub scope: Scope,
+    /// Attribute ID.
+    pub id: u16,
+    /// Type of an element.
+    pub data_type: DataType,
+    /// Number of elements of an array; `None` for a single value.
+    pub elements: Option<u16>,
+    /// Access rule.
+    pub access: Access,
+    /// Whether it may be set while the axis is Running, Table 5-2.110.
+    pub settable_in_running: bool,
+    /// Where the value lives.
+    pub backing: Backing,
+    /// Default of every element.
+    pub default: DefaultValue,
+    /// Permitted values, ends included.
+    pub range: Option<(f64, f64)>,
+    /// Name of the standard.
+    pub name: String,
+}
+
+impl AttributeDefinition {
+    /// A stored single value with default 0 and no range.
+    #[must_use]
+    pub fn new(scope: Scope, id: u16, data_type: DataType, access: Access, name: &str) -> Self {
+        Self {
+            scope,
+            id,
+            data_type,
+            elements: None,
+            access,
+            settable_in_running: false,
+            backing: Backing::Stored,
+            default: DefaultValue::Integer(0),
+            range: None,
+            name: name.to_owned(),
+        }
+    }
+
+    /// Octets of the whole value.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        usize::from(self.data_type.size()) * usize::from(self.elements.unwrap_or(1))
+    }
+}
+
+/// Attributes of the engine: scope, ID, type, access, default, name.
+const ENGINE: &[(Scope, u16, DataType, Access, i64, &str)] = {
+    use Access::{Cyclic, Get, Set};
+    use DataType::{Byte, Dword, Lint, Lword, Udint, Uint, Usint, Word};
+    use Scope::{Class, Instance};
+    &[
+        (Class, id::REVISION, Uint, Get, 4, "Revision"),
+        (Class, id::NODE_CONTROL, Byte, Cyclic, 0, "Node Control"),
+        (Class, id::NODE_STATUS, Byte, Get, 0, "Node Status"),
+        (Class, id::NODE_FAULT_CODE, Usint, Get, 0, "Node Fault Code"),
+        (Class, id::NODE_ALARM_CODE, Usint, Get, 0, "Node Alarm Code"),
+        (Class, id::CONTROLLER_UPDATE_PERIOD, Udint, Cyclic, 0, "Controller Update Period"),
+        (Class, id::CONTROLLER_TIME_OFFSET, Lint, Cyclic, 0, "Controller Time Offset"),
+        (Class, id::CONTROLLER_TIME_STAMP, Lint, Cyclic, 0, "Controller Time Stamp"),
+        (Class, id::UPDATE_DELAY_HIGH_LIMIT, Usint, Set, 4, "Controller Update Delay High Limit"),
+        (Class, id::UPDATE_DELAY_LOW_LIMIT, Usint, Set, 2, "Controller Update Delay Low Limit"),
+        (Class, id::TIME_DATA_SET, Byte, Cyclic, 0, "Time Data Set"),
+        (Class, id::LOST_UPDATES, Byte, Set, 0, "Lost Controller Updates"),
+        (Class, id::LATE_UPDATES, Byte, Set, 0, "Late Controller Updates"),
+        (Class, id::POWER_STRUCTURE_CLASS_ID, Udint, Get, 0, "Drive Power Structure Class ID"),
+        (Class, id::STEP_THRESHOLD, Udint, Set, 1_000_000, "Step Threshold"),
+        (Instance, id::CONTROL_MODE, Usint, Cyclic, 0, "Control Mode"),
+        (Instance, id::FEEDBACK_MODE, Byte, Cyclic, 0, "Feedback Mode"),
+        (Instance, id::EVENT_CHECKING_CONTROL, Dword, Cyclic, 0, "Event Checking Control"),
+        (Instance, id::EVENT_CHECKING_STATUS, Dword, Get, 0, "Event Checking Status"),
+        (Instance, id::CONTROL_STATUS, Byte, Cyclic, 0, "Control Status"),
+        (Instance, id::ACTUAL_DATA_SET, Byte, Cyclic, 0, "Actual Data Set"),
+        (Instance, id::COMMAND_DATA_SET, Byte, Cyclic, 0, "Command Data Set"),
+        (Instance, id::COMMAND_CONTROL, Byte, Cyclic, 0, "Command Control"),
+        (Instance, id::COMMAND_TARGET_TIME, Lint, Get, 0, "Command Target Time"),
+        (Instance, id::STATUS_DATA_SET, Byte, Cyclic, 0, "Status Data Set"),
+        (Instance, id::AXIS_STATE, Usint, Get, 0, "Axis State"),
+        (Instance, id::AXIS_STATUS, Dword, Get, 0, "Axis Status"),
+        (Instance, id::AXIS_STATUS_MFG, Dword, Get, 0, "Axis Status - Mfg"),
+        (Instance, id::AXIS_IO_STATUS, Dword, Get, 0, "Axis I/O Status"),
+        (Instance, id::AXIS_IO_STATUS_MFG, Dword, Get, 0, "Axis I/O Status - Mfg"),
+        (Instance, id::AXIS_FAULTS, Lword, Get, 0, "Axis Faults"),
+        (Instance, id::START_INHIBITS, Word, Get, 0, "Start Inhibits"),
+        (Instance, id::START_INHIBITS_MFG, Word, Get, 0, "Start Inhibits - Mfg"),
+    ]
+};
+
+/// Why a table of definitions cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TableError {
+    /// Two definitions have the same scope and ID.
+    Duplicate(Scope, u16),
+    /// The engine needs this attribute with another type, or as a single value.
+    EngineType {
+        /// Scope of the attribute.
+        scope: Scope,
+        /// Attribute ID.
+        id: u16,
+        /// The type that the engine needs.
+        expected: DataType,
+    },
+    /// A default does not fit its type or its range.
+    Default(Scope, u16),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Duplicate(scope, id) => write!(f, "{scope:?} attribute {id} is defined twice"),
+            Self::EngineType { scope, id, expected } => {
+                write!(f, "{scope:?} attribute {id}: expected a single {expected:?}")
+            }
+            Self::Default(scope, id) => {
+                write!(f, "{scope:?} attribute {id}: the default does not fit its type or range")
+            }
+        }
+    }
+}
+
+impl std::error::Error for TableError {}
+
+/// One attribute with the place of its value.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// What it is.
+    pub definition: AttributeDefinition,
+    offset: usize,
+    default: [u8; 8],
+}
+
+/// The sorted attributes of one scope.
+#[derive(Debug, Clone)]
+pub struct AttributeTable {
+    entries: Vec<Entry>,
+    octets: usize,
+}
+
+fn encode_default(definition: &AttributeDefinition) -> Option<[u8; 8]> {
+    let size = usize::from(definition.data_type.size());
+    let octets = match (definition.data_type, definition.default) {
+        (DataType::Real, DefaultValue::Real(value)) => {
+            let narrow = narrow(value);
+            let mut octets = [0; 8];
+            octets[..4].copy_from_slice(&narrow.to_le_bytes());
+            octets
+        }
+        (DataType::Lreal, DefaultValue::Real(value)) => value.to_le_bytes(),
+        (DataType::Real | DataType::Lreal, DefaultValue::Integer(0)) => [0; 8],
+        (DataType::Real | DataType::Lreal, _) | (_, DefaultValue::Real(_)) => return None,
+        (_, DefaultValue::Integer(value)) => {
+            let octets = value.to_le_bytes();
+            let (low, high) = octets.split_at(size);
+            let negative = low[size - 1] & 0x80 != 0;
+            let clean = high.iter().all(|o| *o == 0) || (negative && high.iter().all(|o| *o == 0xFF));
+            if !clean {
+                return None;
+            }
+            octets
+        }
+    };
+    check_value(definition, &octets[..size]).ok()?;
+    Some(octets)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a REAL holds the nearest single precision number")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// Checks one element: finite and within the range.
+fn check_value(definition: &AttributeDefinition, element: &[u8]) -> Result<(), GeneralStatus> {
+    let value = definition.data_type.to_f64(element).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?;
+    let (low, high) = definition.range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    if value.is_finite() && value >= low && value <= high {
+        Ok(())
+    } else {
+        Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)
+    }
+}
+
+impl AttributeTable {
+    /// Builds the table of one scope: the definitions of that scope and those of the engine that are missing.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn new(scope: Scope, definitions: &[AttributeDefinition]) -> Result<Self, TableError> {
+        let mut all: Vec<AttributeDefinition> =
+            definitions.iter().filter(|d| d.scope == scope).cloned().collect();
+        for (_, id, data_type, access, default, name) in ENGINE.iter().filter(|row| row.0 == scope) {
+            match all.iter().find(|d| d.id == *id) {
+                Some(d) if d.data_type.size() == data_type.size() && d.elements.is_none() => {}
+                Some(_) => return Err(TableError::EngineType { scope, id: *id, expected: *data_type }),
+                None => {
+                    let mut definition = AttributeDefinition::new(scope, *id, *data_type, *access, name);
+                    definition.default = DefaultValue::Integer(*default);
+                    definition.settable_in_running = true;
+                    all.push(definition);
+                }
+            }
+        }
+        all.sort_by_key(|d| d.id);
+        if let Some(pair) = all.windows(2).find(|pair| pair[0].id == pair[1].id) {
+            return Err(TableError::Duplicate(scope, pair[0].id));
+        }
+        let mut entries = Vec::with_capacity(all.len());
+        let mut octets = 0;
+        for definition in all {
+            let default = encode_default(&definition).ok_or(TableError::Default(scope, definition.id))?;
+            let size = definition.size();
+            entries.push(Entry { definition, offset: octets, default });
+            octets += size;
+        }
+        Ok(Self { entries, octets })
+    }
+
+    /// The attribute with this ID.
+    #[must_use]
+    pub fn find(&self, id: u16) -> Option<&Entry> {
+        self.entries.binary_search_by_key(&id, |e| e.definition.id).ok().map(|at| &self.entries[at])
+    }
+
+    /// All attributes in the order of their IDs.
+    pub fn iter(&self) -> impl Iterator<Item = &AttributeDefinition> {
+        self.entries.iter().map(|e| &e.definition)
+    }
+}
+
+/// Part of an attribute: `count` elements from `start`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// First element.
+    pub start: u16,
+    /// Number of elements.
+    pub count: u16,
+}
+
+impl Entry {
+    /// The whole value.
+    #[must_use]
+    pub fn whole(&self) -> Part {
+        Part { start: 0, count: self.definition.elements.unwrap_or(1) }
+    }
+
+    /// Checks that the part lies within the attribute, and gives its octets within the whole value.
+    fn range(&self, part: Part) -> Result<core::ops::Range<usize>, GeneralStatus> {
+        let size = usize::from(self.definition.data_type.size());
+        let end = u32::from(part.start) + u32::from(part.count);
+        if part.count == 0 || end > u32::from(self.whole().count) {
+            return Err(GeneralStatus::INVALID_PARAMETER);
+        }
+        let start = usize::from(part.start) * size;
+        Ok(start..start + usize::from(part.count) * size)
+    }
+
+    /// Checks a value for a part without writing it.
+    ///
+    /// # Errors
+    /// The general status and the index of the element that caused it.
+    pub fn check_set(&self, part: Part, value: &[u8], running: bool) -> Result<(), (GeneralStatus, u16)> {
+        let definition = &self.definition;
+        if definition.access != Access::Set {
+            return Err((GeneralStatus::ATTRIBUTE_NOT_SETTABLE, 0));
+        }
+        let range = self.range(part).map_err(|status| (status, part.start))?;
+        if value.len() != range.len() {
+            let short = value.len() < range.len();
+            let status = if short { GeneralStatus::NOT_ENOUGH_DATA } else { GeneralStatus::TOO_MUCH_DATA };
+            return Err((status, 0));
+        }
+        if running && !definition.settable_in_running {
+            return Err((GeneralStatus::OBJECT_STATE_CONFLICT, 0));
+        }
+        let size = usize::from(definition.data_type.size());
+        for (index, element) in (part.start..).zip(value.chunks_exact(size)) {
+            check_value(definition, element).map_err(|status| (status, index))?;
+        }
+        Ok(())
+    }
+}
+
+/// The values of one instance.
+#[derive(Debug, Clone)]
+pub struct AttributeStore {
+    octets: Box<[u8]>,
+}
+
+impl AttributeStore {
+    /// Values at their defaults.
+    #[must_use]
+    pub fn new(table: &AttributeTable) -> Self {
+        let mut store = Self { octets: vec![0; table.octets].into_boxed_slice() };
+        store.reset(table);
+        store
+    }
+
+    /// Puts every value back to its default.
+    pub fn reset(&mut self, table: &AttributeTable) {
+        for entry in &table.entries {
+            let size = usize::from(entry.definition.data_type.size());
+            for element in
+                self.octets[entry.offset..entry.offset + entry.definition.size()].chunks_exact_mut(size)
+            {
+                element.copy_from_slice(&entry.default[..size]);
+            }
+        }
+    }
+
+    /// The octets of a part.
+    ///
+    /// # Errors
+    /// The part does not lie within the attribute.
+    pub fn get(&self, entry: &Entry, part: Part) -> Result<&[u8], GeneralStatus> {
+        let range = entry.range(part)?;
+        Ok(&self.octets[entry.offset + range.start..entry.offset + range.end])
+    }
+
+    /// Writes the octets of a part, without looking at access or range.
+    ///
+    /// # Errors
+    /// The part does not lie within the attribute, or the octets are not as many.
+    pub fn put(&mut self, entry: &Entry, part: Part, value: &[u8]) -> Result<(), GeneralStatus> {
+        let range = entry.range(part)?;
+        let place = &mut self.octets[entry.offset + range.start..entry.offset + range.end];
+        if place.len() != value.len() {
+            return Err(GeneralStatus::NOT_ENOUGH_DATA);
+        }
+        place.copy_from_slice(value);
+        Ok(())
+    }
+
+    /// A single unsigned value up to 64 bits; `None` if there is no such attribute.
+    #[must_use]
+    pub fn unsigned(&self, table: &AttributeTable, id: u16) -> Option<u64> {
+        let entry = table.find(id)?;
+        let value = self.get(entry, Part { start: 0, count: 1 }).ok()?;
+        let mut octets = [0; 8];
+        octets[..value.len()].copy_from_slice(value);
+        Some(u64::from_le_bytes(octets))
+    }
+
+    /// Publishes a single value given as 64 bits; the excess octets are cut off. Unknown IDs are ignored.
+    pub fn publish(&mut self, table: &AttributeTable, id: u16, value: u64) {
+        if let Some(entry) = table.find(id) {
+            let size = usize::from(entry.definition.data_type.size());
+            // A single element of its own size always fits.
+            let _ = self.put(entry, Part { start: 0, count: 1 }, &value.to_le_bytes()[..size]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> AttributeTable {
+        let set = |id, data_type| {
+            AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, "an attribute")
+        };
+        let definitions = [
+            AttributeDefinition {
+                range: Some((-1.0, 1.0)),
+                default: DefaultValue::Real(0.5),
+                settable_in_running: true,
+                ..set(461, DataType::Real)
+            },
+            AttributeDefinition {
+                elements: Some(64),
+                range: Some((0.0, 4.0)),
+                default: DefaultValue::Integer(3),
+                ..set(672, DataType::Usint)
+            },
+            AttributeDefinition { default: DefaultValue::Integer(-7), ..set(100, DataType::Int) },
+        ];
+        AttributeTable::new(Scope::Instance, &definitions).expect("a table")
+    }
+
+    #[test]
+    fn values_start_at_their_defaults_and_return_to_them() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let real = table.find(461).expect("defined");
+        assert_eq!(store.get(real, real.whole()), Ok(&0.5_f32.to_le_bytes()[..]));
+        assert_eq!(store.unsigned(&table, 100), Some(u64::from((-7_i16).cast_unsigned())));
+        let array = table.find(672).expect("defined");
+        assert_eq!(store.put(array, Part { start: 62, count: 2 }, &[1, 2]), Ok(()));
+        assert_eq!(store.get(array, Part { start: 61, count: 3 }), Ok(&[3, 1, 2][..]));
+        store.reset(&table);
+        assert_eq!(store.get(array, Part { start: 61, count: 3 }), Ok(&[3, 3, 3][..]));
+    }
+
+    #[test]
+    fn a_set_is_refused_with_its_reason_and_index() {
+        let table = table();
+        let real = table.find(461).expect("defined");
+        let array = table.find(672).expect("defined");
+        let check = |entry: &Entry, part, value: &[u8], running| entry.check_set(part, value, running);
+        let one = Part { start: 0, count: 1 };
+        assert_eq!(check(real, one, &1.0_f32.to_le_bytes(), true), Ok(()));
+        let invalid = GeneralStatus::INVALID_ATTRIBUTE_VALUE;
+        assert_eq!(check(real, one, &1.5_f32.to_le_bytes(), false), Err((invalid, 0)));
+        assert_eq!(check(real, one, &f32::NAN.to_le_bytes(), false), Err((invalid, 0)));
+        assert_eq!(check(real, one, &[0; 3], false), Err((GeneralStatus::NOT_ENOUGH_DATA, 0)));
+        assert_eq!(check(real, one, &[0; 5], false), Err((GeneralStatus::TOO_MUCH_DATA, 0)));
+        assert_eq!(check(array, one, &[3], true), Err((GeneralStatus::OBJECT_STATE_CONFLICT, 0)));
+        assert_eq!(check(array, Part { start: 10, count: 3 }, &[3, 5, 3], false), Err((invalid, 11)));
+        let outside = Part { start: 63, count: 2 };
+        assert_eq!(check(array, outside, &[3, 3], false), Err((GeneralStatus::INVALID_PARAMETER, 63)));
+        let state = table.find(id::AXIS_STATE).expect("an engine attribute");
+        assert_eq!(check(state, one, &[1], false), Err((GeneralStatus::ATTRIBUTE_NOT_SETTABLE, 0)));
+    }
+
+    #[test]
+    fn a_table_that_contradicts_the_engine_or_itself_is_refused() {
+        let new = |id, data_type| {
+            AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, "an attribute")
+        };
+        let build = |definitions: &[AttributeDefinition]| {
+            AttributeTable::new(Scope::Instance, definitions).map(|t| t.iter().count())
+        };
+        let expected = TableError::EngineType { scope: Scope::Instance, id: 650, expected: DataType::Usint };
+        assert_eq!(build(&[new(650, DataType::Udint)]), Err(expected));
+        let twice = [new(5, DataType::Int), new(5, DataType::Dint)];
+        assert_eq!(build(&twice), Err(TableError::Duplicate(Scope::Instance, 5)));
+        let default = AttributeDefinition { default: DefaultValue::Integer(256), ..new(7, DataType::Usint) };
+        assert_eq!(build(&[default]), Err(TableError::Default(Scope::Instance, 7)));
+        let engine = ENGINE.iter().filter(|row| row.0 == Scope::Instance).count();
+        assert_eq!(build(&[new(5, DataType::Int)]), Ok(engine + 1));
+    }
+
+    #[test]
+    fn numbers_of_every_type_are_read_with_their_sign() {
+        let f = |data_type: DataType, octets: &[u8]| data_type.to_f64(octets);
+        assert_eq!(f(DataType::Sint, &[0xFF]), Some(-1.0));
+        assert_eq!(f(DataType::Usint, &[0xFF]), Some(255.0));
+        assert_eq!(f(DataType::Int, &[0, 0x80]), Some(-32768.0));
+        assert_eq!(f(DataType::Dint, &(-5_i32).to_le_bytes()), Some(-5.0));
+        assert_eq!(f(DataType::Lint, &(-6_i64).to_le_bytes()), Some(-6.0));
+        assert_eq!(f(DataType::Real, &2.5_f32.to_le_bytes()), Some(2.5));
+        assert_eq!(f(DataType::Lreal, &(-0.25_f64).to_le_bytes()), Some(-0.25));
+        assert_eq!(f(DataType::Dint, &[1, 2]), None);
+        assert_eq!(DataType::from_name("LWORD"), Some(DataType::Lword));
+        assert_eq!(DataType::from_name("STRING"), None);
+    }
+}

@@ -1,0 +1,236 @@
+//! Cyclic write and read data: attribute lists agreed by service and carried in every update, clauses 6-2.7.1.2.3,
+//! 6-2.7.2.1.6, 5-2.5.1.3 and 5-2.5.1.4.
+//!
+//! A list in use stays valid until the controller uses its successor, so two are kept. Only values that are stored in
+//! the device can be carried: the drive cannot be asked within a cycle.
+
+use arrayvec::ArrayVec;
+
+use super::attribute::{Access, AttributeStore, AttributeTable, Backing, Entry};
+use crate::wire::motion::id_list::{IdList, IdStatus, IdStatusList};
+use crate::wire::status::GeneralStatus;
+
+/// Most attributes of one list.
+pub const CYCLIC_ATTRIBUTES_MAX: usize = 16;
+/// Most octets of cyclic read data.
+pub(super) const CYCLIC_DATA_MAX: usize = 256;
+
+/// Direction of a list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    Write,
+    Read,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Layout {
+    id: u8,
+    attributes: ArrayVec<u16, CYCLIC_ATTRIBUTES_MAX>,
+}
+
+/// The lists of one direction.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CyclicLists {
+    current: Layout,
+    previous: Layout,
+}
+
+/// Octets to skip so that the elements of an attribute are aligned to their size, at most to 32 bits.
+fn align(at: usize, entry: &Entry) -> usize {
+    at.next_multiple_of(usize::from(entry.definition.data_type.size()).min(4))
+}
+
+impl CyclicLists {
+    fn layout(&self, id: u8) -> Option<&Layout> {
+        [&self.current, &self.previous].into_iter().find(|layout| layout.id == id)
+    }
+
+    fn suits(table: &AttributeTable, id: u16, direction: Direction) -> GeneralStatus {
+        match (table.find(id), direction) {
+            (None, _) => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+            (Some(e), Direction::Write)
+                if e.definition.access != Access::Set || e.definition.backing != Backing::Stored =>
+            {
+                GeneralStatus::ATTRIBUTE_NOT_SETTABLE
+            }
+            (Some(e), Direction::Read) if e.definition.backing == Backing::Drive => {
+                GeneralStatus::OBJECT_STATE_CONFLICT
+            }
+            (Some(_), _) => GeneralStatus::SUCCESS,
+        }
+    }
+
+    /// Carries out a Set_Cyclic_Write_List or Set_Cyclic_Read_List and writes its response body.
+    pub fn configure(
+        &mut self,
+        table: &AttributeTable,
+        direction: Direction,
+        body: &[u8],
+        response: &mut [u8],
+    ) -> (GeneralStatus, usize) {
+        let Ok(list) = IdList::parse(body) else { return (GeneralStatus::NOT_ENOUGH_DATA, 0) };
+        if list.len() > CYCLIC_ATTRIBUTES_MAX {
+            return (GeneralStatus::RESOURCE_UNAVAILABLE, 0);
+        }
+        let statuses: ArrayVec<IdStatus, CYCLIC_ATTRIBUTES_MAX> =
+            list.iter().map(|id| IdStatus { id, status: Self::suits(table, id, direction).0 }).collect();
+        let size: usize = list.iter().filter_map(|id| table.find(id)).map(|e| e.definition.size() + 3).sum();
+        let fits = size <= CYCLIC_DATA_MAX;
+        let good = fits && statuses.iter().all(|s| s.status == 0);
+        if good {
+            // ID 0 is the empty list for good, so the count skips it.
+            let id = self.current.id.checked_add(1).unwrap_or(1);
+            let next = Layout { id, attributes: list.iter().collect() };
+            self.previous = core::mem::replace(&mut self.current, next);
+        }
+        let status = match (good, fits) {
+            (true, _) => GeneralStatus::SUCCESS,
+            (false, true) => GeneralStatus::ATTRIBUTE_LIST_ERROR,
+            (false, false) => GeneralStatus::RESOURCE_UNAVAILABLE,
+        };
+        IdStatusList::emit(response, self.current.id, &statuses)
+            .map_or((GeneralStatus::REPLY_DATA_TOO_LARGE, 0), |len| (status, len))
+    }
+
+    /// Applies cyclic write data; all of it or nothing.
+    pub fn write(
+        &self,
+        table: &AttributeTable,
+        store: &mut AttributeStore,
+        id: u8,
+        data: &[u8],
+        running: bool,
+    ) -> GeneralStatus {
+        if id == 0 {
+            return if data.is_empty() { GeneralStatus::SUCCESS } else { GeneralStatus::TOO_MUCH_DATA };
+        }
+        let Some(layout) = self.layout(id) else { return GeneralStatus::INVALID_PARAMETER };
+        for apply in [false, true] {
+            let mut at = 0;
+            for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
+                at = align(at, entry);
+                let Some(value) = data.get(at..at + entry.definition.size()) else {
+                    return GeneralStatus::NOT_ENOUGH_DATA;
+                };
+                let checked = if apply {
+                    store.put(entry, entry.whole(), value)
+                } else {
+                    entry.check_set(entry.whole(), value, running).map_err(|(status, _)| status)
+                };
+                if let Err(status) = checked {
+                    return status;
+                }
+                at += value.len();
+            }
+            if data.len() != at.next_multiple_of(4) {
+                return GeneralStatus::TOO_MUCH_DATA;
+            }
+        }
+        GeneralStatus::SUCCESS
+    }
+
+    /// Collects cyclic read data.
+    ///
+    /// # Errors
+    /// There is no list with this ID.
+    pub fn read(
+        &self,
+        table: &AttributeTable,
+        store: &AttributeStore,
+        id: u8,
+    ) -> Result<ArrayVec<u8, CYCLIC_DATA_MAX>, GeneralStatus> {
+        let mut data = ArrayVec::new();
+        if id == 0 {
+            return Ok(data);
+        }
+        let layout = self.layout(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
+        for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
+            let padding = align(data.len(), entry) - data.len();
+            data.extend([0; 4].into_iter().take(padding));
+            data.try_extend_from_slice(store.get(entry, entry.whole())?)
+                .map_err(|_| GeneralStatus::REPLY_DATA_TOO_LARGE)?;
+        }
+        Ok(data)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::attribute::{AttributeDefinition, DataType, Scope};
+    use super::*;
+
+    fn table() -> AttributeTable {
+        let new = |id, data_type, access, backing| AttributeDefinition {
+            backing,
+            ..AttributeDefinition::new(Scope::Instance, id, data_type, access, "an attribute")
+        };
+        let definitions = [
+            new(1, DataType::Udint, Access::Set, Backing::Stored),
+            new(2, DataType::Uint, Access::Set, Backing::Stored),
+            new(3, DataType::Lint, Access::Set, Backing::Stored),
+            new(4, DataType::Udint, Access::Get, Backing::Stored),
+            new(5, DataType::Udint, Access::Set, Backing::Drive),
+        ];
+        AttributeTable::new(Scope::Instance, &definitions).expect("a table")
+    }
+
+    fn configure(lists: &mut CyclicLists, direction: Direction, ids: &[u16]) -> (GeneralStatus, Vec<u8>) {
+        let (mut body, mut response) = ([0; 64], [0xA5; 128]);
+        let len = IdList::emit(&mut body, ids).expect("room");
+        let (status, len) = lists.configure(&table(), direction, &body[..len], &mut response);
+        (status, response[..len].to_vec())
+    }
+
+    #[test]
+    fn data_is_aligned_as_in_table_6_2_27() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let mut lists = CyclicLists::default();
+        let answer = configure(&mut lists, Direction::Write, &[1, 2, 3]);
+        assert_eq!(answer, (GeneralStatus::SUCCESS, vec![3, 0, 1, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0]));
+        let data = [1, 1, 1, 1, 2, 2, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0x80];
+        assert_eq!(lists.write(&table, &mut store, 1, &data, false), GeneralStatus::SUCCESS);
+        assert_eq!(store.unsigned(&table, 2), Some(0x0202));
+        assert_eq!(store.unsigned(&table, 3), Some(0x8000_0000_0000_0003));
+        assert_eq!(lists.read(&table, &store, 1).as_deref(), Ok(&data[..]));
+    }
+
+    #[test]
+    fn bad_write_data_changes_nothing() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let mut lists = CyclicLists::default();
+        configure(&mut lists, Direction::Write, &[1, 2]);
+        let mut write = |id, data: &[u8], running| lists.write(&table, &mut store, id, data, running);
+        assert_eq!(write(1, &[1; 4], false), GeneralStatus::NOT_ENOUGH_DATA);
+        assert_eq!(write(1, &[1; 12], false), GeneralStatus::TOO_MUCH_DATA);
+        assert_eq!(write(2, &[1; 8], false), GeneralStatus::INVALID_PARAMETER);
+        assert_eq!(write(1, &[1; 8], true), GeneralStatus::OBJECT_STATE_CONFLICT);
+        assert_eq!(write(0, &[], false), GeneralStatus::SUCCESS);
+        assert_eq!(write(0, &[0; 4], false), GeneralStatus::TOO_MUCH_DATA);
+        assert_eq!(store.unsigned(&table, 1), Some(0));
+    }
+
+    #[test]
+    fn the_list_before_stays_until_the_one_after_and_a_bad_list_changes_nothing() {
+        let mut lists = CyclicLists::default();
+        assert_eq!(configure(&mut lists, Direction::Read, &[1]).0, GeneralStatus::SUCCESS);
+        assert_eq!(configure(&mut lists, Direction::Read, &[2]).0, GeneralStatus::SUCCESS);
+        let (status, body) = configure(&mut lists, Direction::Read, &[1, 9, 5]);
+        assert_eq!(status, GeneralStatus::ATTRIBUTE_LIST_ERROR);
+        assert_eq!(body, [3, 0, 2, 0, 1, 0, 0, 0, 9, 0, 0x14, 0, 5, 0, 0x0C, 0], "the ID stays 2");
+        let table = table();
+        let store = AttributeStore::new(&table);
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
+        assert_eq!(lists.read(&table, &store, 2).map(|d| d.len()), Ok(2));
+        assert_eq!(configure(&mut lists, Direction::Read, &[3]).0, GeneralStatus::SUCCESS);
+        assert_eq!(lists.read(&table, &store, 1), Err(GeneralStatus::INVALID_PARAMETER));
+        let write = configure(&mut lists, Direction::Write, &[4]);
+        assert_eq!(write.1[6], GeneralStatus::ATTRIBUTE_NOT_SETTABLE.0);
+        let many = [1; CYCLIC_ATTRIBUTES_MAX + 1];
+        assert_eq!(
+            configure(&mut lists, Direction::Read, &many),
+            (GeneralStatus::RESOURCE_UNAVAILABLE, vec![])
+        );
+    }
+}

@@ -1,0 +1,176 @@
+//! What passes between the motion device and whoever runs the drive of an axis.
+//!
+//! The law: an axis never moves on a stale, late, malformed or half-understood command. These types are made so that
+//! breaking it takes effort:
+//!
+//! - set-points are inside [`Command::Follow`] and exist only while the axis is Running, the connection is alive, the
+//!   controller is in remote control, the last update was proven timely and complete, and no fault is active. In every
+//!   other case there is a [`Withheld`] reason and no number.
+//! - what the drive has to do is a level, [`DriveAction`], that is true at any time and survives missed cycles. It
+//!   rises to [`DriveAction::Enable`] only by a new request of the controller.
+//! - the drive's answers name the action they belong to ([`DriveImage::action_id`]): "stopped" from before an enable
+//!   never ends the stop after it.
+
+use crate::wire::motion::CommandValues;
+use crate::wire::motion::actual::SafetyStatus;
+use crate::wire::motion::codes::{
+    AlarmType, AxisIoStatus, AxisStatus, CommandTarget, ControlMode, FaultType, FeedbackMode,
+};
+
+use super::axis_state::AxisState;
+
+/// What the drive has to do now, and to keep doing until it changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DriveAction {
+    /// Nothing: no configured connection. The power structure stays off.
+    #[default]
+    None,
+    /// Be ready: let the bus charge; the power structure makes no torque.
+    PowerUp,
+    /// Energize and follow the command.
+    Enable,
+    /// Stop by the configured Stopping Action, then stay stopped.
+    Disable,
+    /// Stop by the configured Shutdown Action and stay torque-free.
+    Shutdown,
+    /// Stop by the fault's stopping action and stay stopped.
+    Abort,
+}
+
+/// Why there is no set-point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Withheld {
+    /// No connection is open.
+    NotConnected,
+    /// The axis is not Running.
+    NotRunning,
+    /// No update came for longer than the update delay high limit.
+    Stale,
+    /// The controller has not taken remote control.
+    LocalControl,
+    /// A node fault is active.
+    NodeFault,
+    /// No update with the set-point of the Control Mode has come since the axis runs.
+    NoSetPoint,
+}
+
+/// Set-points of the newest good update.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetPoints {
+    /// Control Mode of the values.
+    pub control_mode: ControlMode,
+    /// Feedback Mode of the values.
+    pub feedback_mode: FeedbackMode,
+    /// The values as they came; the one that `control_mode` needs is present.
+    pub values: CommandValues,
+    /// Whether the set-points are to be applied at once, extrapolated or interpolated.
+    pub target: CommandTarget,
+    /// Controller Time Stamp in this device's system time, ns; `None` in asynchronous operation.
+    pub time_stamp: Option<u64>,
+    /// Command Target Time in this device's system time, ns; `None` in asynchronous operation.
+    pub target_time: Option<u64>,
+    /// Subtract from a position command to get back to the reference system of power-up, position control units
+    /// (Change Command Position Reference, clause 5-2.6.1.2).
+    pub position_reference: i64,
+    /// Changes with every update that brought values; equal numbers are the same set-points.
+    pub sequence: u32,
+    /// Update periods since these values came; 0 is the newest that could be.
+    pub age_updates: u32,
+}
+
+/// Set-points, or why there are none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Follow these.
+    Follow(SetPoints),
+    /// Follow nothing; the action says what to do.
+    Withheld(Withheld),
+}
+
+/// Everything the drive of an axis needs from the motion device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisCommandImage {
+    /// State of the axis.
+    pub state: AxisState,
+    /// What to do.
+    pub action: DriveAction,
+    /// Changes whenever the action changes; to be returned in [`DriveImage::action_id`].
+    pub action_id: u32,
+    /// Changes whenever the drive has to reset its faults; to be returned in [`DriveImage::reset_id`] once it has
+    /// tried, with success or not.
+    pub reset_id: u32,
+    /// Set-points.
+    pub command: Command,
+}
+
+/// A fault of the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DriveFault {
+    /// Source.
+    pub fault_type: FaultType,
+    /// Bit number of the fault in the table of its source.
+    pub code: u8,
+    /// Sub code.
+    pub sub_code: u8,
+    /// Axis Fault Action, attribute 668: stopping action in the low nibble, state change in the high one. State change
+    /// 0 makes it a minor fault that only reports; 3 latches a shutdown.
+    pub action: u8,
+}
+
+/// An alarm of the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DriveAlarm {
+    /// Source.
+    pub alarm_type: AlarmType,
+    /// Bit number of the alarm in the table of its source.
+    pub code: u8,
+    /// Sub code.
+    pub sub_code: u8,
+}
+
+/// What the drive of an axis reports each cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveImage {
+    /// The drive answers and is ready to be used. Losing it while energized is a major fault.
+    pub online: bool,
+    /// [`AxisCommandImage::action_id`] that `start_complete` and `stop_complete` speak of.
+    pub action_id: u32,
+    /// The last [`AxisCommandImage::reset_id`] that was carried out.
+    pub reset_id: u32,
+    /// The DC bus is up.
+    pub bus_up: bool,
+    /// The start asked for by `action_id` has ended: the drive follows set-points.
+    pub start_complete: bool,
+    /// The stop asked for by `action_id` has ended: the axis stands, or its time limit has run out.
+    pub stop_complete: bool,
+    /// The power structure is energized.
+    pub power_enabled: bool,
+    /// The drive tracks the command.
+    pub tracking: bool,
+    /// Fault that is present.
+    pub fault: Option<DriveFault>,
+    /// Alarm that is present.
+    pub alarm: Option<DriveAlarm>,
+    /// Start Inhibits, attribute 676.
+    pub start_inhibits: u16,
+    /// Start Inhibits - Mfg, attribute 677.
+    pub start_inhibits_mfg: u16,
+    /// Actual position in the reference system of power-up, position control units.
+    pub position: i64,
+    /// Actual velocity, velocity control units.
+    pub velocity: f32,
+    /// Actual acceleration, acceleration control units.
+    pub acceleration: f32,
+    /// Bits of Axis Status that only the drive knows; those that the state machine owns are replaced.
+    pub axis_status: AxisStatus,
+    /// Axis Status - Mfg.
+    pub axis_status_mfg: u32,
+    /// Axis I/O Status.
+    pub io_status: AxisIoStatus,
+    /// Axis I/O Status - Mfg.
+    pub io_status_mfg: u32,
+    /// Safety status of a drive with a safety core.
+    pub safety: Option<SafetyStatus>,
+    /// System time at which the actual values were captured, ns.
+    pub captured_at: u64,
+}

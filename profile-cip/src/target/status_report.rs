@@ -1,0 +1,148 @@
+//! Status values and log records on their way to the controller, clause 6-2.7.1.2.2 (Status Data Set).
+//!
+//! A value is sent when it has changed, in every update until the controller's Last Received ID reaches an update that
+//! carried it. Records of a log go one after the other, the next one only when the one before it has arrived.
+
+use arrayvec::ArrayVec;
+
+/// Records that a log keeps for transmission, clause 5-2.3.14.
+pub(super) const LOG_MAX: usize = 25;
+
+/// Whether Update ID `received` is at or behind `sent`, on the circle of 256.
+fn reached(received: u8, sent: u8) -> bool {
+    received.wrapping_sub(sent) < 128
+}
+
+/// A value that is reported when it changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reported<T> {
+    arrived: Option<T>,
+    in_flight: Option<(u8, T)>,
+}
+
+impl<T: Copy + PartialEq> Reported<T> {
+    pub const fn new() -> Self {
+        Self { arrived: None, in_flight: None }
+    }
+
+    /// The value if it is to be put into update `update_id`.
+    pub fn due(&mut self, value: T, update_id: u8) -> Option<T> {
+        if self.arrived == Some(value) {
+            self.in_flight = None;
+            return None;
+        }
+        if !matches!(self.in_flight, Some((_, sent)) if sent == value) {
+            self.in_flight = Some((update_id, value));
+        }
+        Some(value)
+    }
+
+    /// The controller has processed update `received`.
+    pub fn acknowledge(&mut self, received: u8) {
+        if let Some((sent, value)) = self.in_flight
+            && reached(received, sent)
+        {
+            self.arrived = Some(value);
+            self.in_flight = None;
+        }
+    }
+}
+
+/// A log of records.
+#[derive(Debug, Clone)]
+pub(super) struct RecordLog<T> {
+    records: ArrayVec<T, LOG_MAX>,
+    in_flight: Option<u8>,
+    dropped: u32,
+}
+
+impl<T: Copy> RecordLog<T> {
+    pub const fn new() -> Self {
+        Self { records: ArrayVec::new_const(), in_flight: None, dropped: 0 }
+    }
+
+    /// Adds a record. A full log loses its oldest one that is not under way, and counts it.
+    pub fn push(&mut self, record: T) {
+        if self.records.is_full() {
+            self.records.remove(usize::from(self.in_flight.is_some()));
+            self.dropped = self.dropped.saturating_add(1);
+        }
+        self.records.push(record);
+    }
+
+    /// The record to put into update `update_id`.
+    pub fn due(&mut self, update_id: u8) -> Option<T> {
+        let record = self.records.first().copied()?;
+        self.in_flight.get_or_insert(update_id);
+        Some(record)
+    }
+
+    /// The controller has processed update `received`.
+    pub fn acknowledge(&mut self, received: u8) {
+        if self.in_flight.is_some_and(|sent| reached(received, sent)) {
+            self.records.remove(0);
+            self.in_flight = None;
+        }
+    }
+
+    /// Records lost because the log was full.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Forgets what is under way, so that it is sent again from the start.
+    pub fn restart(&mut self) {
+        self.in_flight = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_sent_until_an_update_with_it_has_arrived() {
+        let mut value = Reported::new();
+        assert_eq!(value.due(7, 254), Some(7));
+        value.acknowledge(253);
+        assert_eq!(value.due(7, 255), Some(7), "253 is before the first update with it");
+        value.acknowledge(0);
+        assert_eq!(value.due(7, 1), None, "0 is behind 254");
+        assert_eq!(value.due(8, 2), Some(8));
+        assert_eq!(value.due(9, 3), Some(9));
+        value.acknowledge(2);
+        assert_eq!(value.due(9, 4), Some(9), "update 2 carried another value");
+        value.acknowledge(3);
+        assert_eq!(value.due(9, 5), None);
+    }
+
+    #[test]
+    fn records_go_one_after_the_other() {
+        let mut log = RecordLog::new();
+        log.push('a');
+        log.push('b');
+        assert_eq!(log.due(10), Some('a'));
+        assert_eq!(log.due(11), Some('a'));
+        log.acknowledge(9);
+        assert_eq!(log.due(12), Some('a'));
+        log.acknowledge(10);
+        assert_eq!(log.due(13), Some('b'));
+        log.acknowledge(12);
+        assert_eq!(log.due(14), Some('b'), "12 carried the record before");
+        log.acknowledge(13);
+        assert_eq!(log.due(15), None);
+    }
+
+    #[test]
+    fn a_full_log_loses_the_oldest_that_is_not_under_way() {
+        let mut log = RecordLog::new();
+        for number in 0..LOG_MAX {
+            log.push(number);
+        }
+        assert_eq!(log.due(1), Some(0));
+        log.push(100);
+        assert_eq!(log.dropped(), 1);
+        log.acknowledge(1);
+        assert_eq!(log.due(2), Some(2), "1 was lost, 0 was under way");
+    }
+}
