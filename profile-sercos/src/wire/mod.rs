@@ -9,6 +9,7 @@ pub mod cp0;
 pub mod cp12;
 pub mod cyclic;
 pub mod data_status;
+pub mod describe;
 pub mod device_control;
 pub mod device_status;
 pub mod drive_words;
