@@ -1,11 +1,13 @@
 //! One axis as the controller sees it: what the device says of it, and the command stream to it.
 //!
-//! Commands are planned for an instant of the controller's own clock, the command target time, so that an update
-//! that is sent late or lost leaves the path as it is. Whenever the axis is not Running the command stands at the
-//! actual position; a motion begins there, and the control mode changes only at standstill. So no command jumps.
+//! Commands are planned for an instant of the controller's own clock, the command target time, so that an
+//! update that is sent late or lost leaves the path as it is. Whenever the axis is not Running the command
+//! stands at the actual position; a motion begins there, and the control mode changes only at standstill.
+//! So no command jumps.
 
 use super::config::AxisSetup;
-use super::event::{Event, Failure};
+use super::event::Event;
+use super::failure::Failure;
 use super::following::Following;
 use super::handshake::Handshake;
 use super::number::{counts, float, real, roll, seconds, unroll};
@@ -229,8 +231,8 @@ impl Axis {
         }
     }
 
-    /// Command Position has 32 bits: a position beyond them, after endless turning, is counted anew from what the
-    /// device gives.
+    /// Command Position has 32 bits: a position beyond them, after endless turning, is counted anew from
+    /// what the device gives.
     fn rebased(&mut self, actual: i64) -> i64 {
         if i32::try_from(actual).is_ok() {
             return actual;

@@ -178,8 +178,8 @@ pub struct ControllerConfig {
     pub rpi_us: u32,
     /// Connection Timeout Multiplier code, 0..=7 for 4..512 intervals.
     pub timeout_multiplier: u8,
-    /// Connection size of both directions in bytes with the 2-byte sequence count; above 511 the connection is
-    /// opened with Large_Forward_Open.
+    /// Connection size of both directions in bytes with the 2-byte sequence count; above 511 the connection
+    /// is opened with Large_Forward_Open.
     pub connection_size: u16,
     /// Connection ID for the D-to-C datagrams.
     pub t_to_o_id: u32,
@@ -204,8 +204,8 @@ pub struct ControllerConfig {
 }
 
 impl ControllerConfig {
-    /// A connection of 2 ms and time-out after 16 ms to whatever device answers, synchronous to `grand_master`
-    /// with interpolation, for these axes.
+    /// A connection of 2 ms and time-out after 16 ms to whatever device answers, synchronous to
+    /// `grand_master` with interpolation, for these axes.
     #[must_use]
     pub fn new(grand_master: Option<[u8; 8]>, axes: Vec<AxisSetup>) -> Self {
         let wanted = cyclic_len(axes.len()) + SERVICE_ROOM;
@@ -331,8 +331,8 @@ mod tests {
             (|c| c.timeout_multiplier = 8, "timeout_multiplier: expected 0 to 7, found 8"),
             (
                 |c| c.connection_size = 133,
-                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at most 1400, \
-                 found 133",
+                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at most \
+                 1400, found 133",
             ),
             (|c| c.command_target = CommandTarget(3), "command_target: expected 0 to 2, found 3"),
             (|c| c.key.major_revision = 128, "major_revision: expected 0 to 127, found 128"),

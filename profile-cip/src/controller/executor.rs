@@ -2,7 +2,8 @@
 
 use super::axis::Axis;
 use super::config::{AttributeSet, TimeOuts};
-use super::event::{Event, Failure};
+use super::event::Event;
+use super::failure::Failure;
 use super::number::span;
 use super::program::{AxisSet, Step};
 use super::services::{Outcome, Room, Services, Ticket};

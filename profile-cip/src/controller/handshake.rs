@@ -7,8 +7,9 @@
 //! | takes the answer | 0 | x | |
 //! | | 0 | 0 | is free for the next request |
 //!
-//! A request that lasts is given up by Cancel, which the device acknowledges at once (Table 5-2.108). This code
-//! waits for the response to become 0 before it asks again, so that an old acknowledge is never taken for a new one.
+//! A request that lasts is given up by Cancel, which the device acknowledges at once (Table 5-2.108). This
+//! code waits for the response to become 0 before it asks again, so that an old acknowledge is never taken
+//! for a new one.
 
 use crate::wire::motion::codes::AxisControl;
 

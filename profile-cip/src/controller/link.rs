@@ -16,8 +16,8 @@ const COMMAND_HEADER_MAX: usize = 24;
 const ACTUAL_HEADER_MAX: usize = 44;
 /// Largest cyclic part of an axis from this controller: instance header, block header, LREAL, two REAL.
 pub(super) const COMMAND_AXIS_MAX: usize = 8 + 8 + 8 + 4 + 4;
-/// Largest cyclic part of an axis that this controller asks for: instance header, block header, DINT, REAL, fault,
-/// alarm, axis status.
+/// Largest cyclic part of an axis that this controller asks for: instance header, block header, DINT, REAL,
+/// fault, alarm, axis status.
 pub(super) const ACTUAL_AXIS_MAX: usize = 8 + 8 + 4 + 4 + 12 + 12 + 8;
 /// Header of an instance and of its service block.
 const SERVICE_HEADERS: usize = 8 + 4;

@@ -1,28 +1,31 @@
 //! The controller role of CIP Motion.
 //!
-//! [`Controller`] opens the session and the motion I/O connection to one device, configures the class and the axes,
-//! synchronizes, carries out a program of [`Step`]s, and closes everything again. It shares the wire code with the
-//! target role, not its state machines. It has no sockets and no clocks:
+//! [`Controller`] opens the session and the motion I/O connection to one device, configures the class and
+//! the axes, synchronizes, carries out a program of [`Step`]s, and closes everything again. It shares the
+//! wire code with the target role, not its state machines. It has no sockets and no clocks:
 //!
 //! - in: [`Controller::tcp_connected`], [`Controller::handle_stream`], [`Controller::handle_datagram`],
 //!   [`Controller::handle_time`], [`Controller::tcp_closed`], [`Controller::finish`];
 //! - out, to be drained after every input: [`Controller::poll_stream_transmit`],
 //!   [`Controller::poll_datagram_transmit`], [`Controller::poll_event`];
-//! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due. Datagrams that have come are to be handed
-//!   in before it, so that a caller who was held up does not take its own delay for the device's silence.
+//! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due. Datagrams that have come are to
+//!   be handed in before it, so that a caller who was held up does not take its own delay for the device's
+//!   silence.
 //!
-//! The start-up procedure stands in [`engine`], limits and units in [`config`] and [`program`], and the figures of a
-//! run in [`report`].
+//! The start-up procedure stands in `phases.rs`, limits and units in [`config`] and [`program`], and the
+//! figures of a run in [`report`].
 
 mod axis;
 pub mod config;
-pub mod engine;
+mod engine;
 pub mod event;
 mod executor;
+pub mod failure;
 mod following;
 mod handshake;
 mod link;
 mod number;
+mod phases;
 pub mod program;
 pub mod report;
 mod services;
@@ -30,11 +33,13 @@ mod session;
 mod status;
 #[cfg(test)]
 mod tests;
+mod time_offset;
 pub mod trajectory;
 
 pub use config::{AttributeSet, AxisSetup, ControllerConfig};
 pub use engine::Controller;
-pub use event::{Event, Failure};
+pub use event::Event;
+pub use failure::Failure;
 pub use program::{AxisSet, Step};
 pub use report::Report;
 pub use trajectory::Limits;

@@ -1,7 +1,7 @@
 //! What the controller does once the axes are ready: a list of steps.
 //!
-//! Axes are named by their instance number, from 1. Positions, velocities and so on are in units of the program;
-//! [`AxisSetup::counts_per_unit`](super::config::AxisSetup::counts_per_unit) leads to counts.
+//! Axes are named by their instance number, from 1. Positions, velocities and so on are in units of the
+//! program; [`AxisSetup::counts_per_unit`](super::config::AxisSetup::counts_per_unit) leads to counts.
 
 use core::fmt;
 
@@ -70,8 +70,8 @@ impl fmt::Display for AxisSet {
     }
 }
 
-/// One step of a program. It has finished when what it says has happened, and it fails when that cannot happen
-/// or takes too long.
+/// One step of a program. It has finished when what it says has happened, and it fails when that cannot
+/// happen or takes too long.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
     /// Close the loops; ends with every axis Running. The command stands at the actual position.
@@ -119,8 +119,8 @@ pub enum Step {
         /// Seconds from the start of the jog to the start of slowing down.
         seconds: f64,
     },
-    /// End the motion under way on an axis, in a controlled manner; the axis stays Running. The step that began
-    /// the motion ends with it.
+    /// End the motion under way on an axis, in a controlled manner; the axis stays Running. The step that
+    /// began the motion ends with it.
     Stop {
         /// Instance number.
         axis: u8,

@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-use super::event::{DeviceIdentity, Failure, FaultText};
+use super::event::{DeviceIdentity, FaultText};
+use super::failure::Failure;
 use crate::wire::motion::codes::{AxisStateCode, NodeAlarm, NodeFault};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
 

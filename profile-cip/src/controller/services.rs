@@ -1,12 +1,14 @@
 //! The service channel of the motion I/O connection, clause 6-2.7.1.2.5.
 //!
-//! A job is a list of request bodies to one instance. One request is under way at a time; it stays in the updates
-//! until the response with its transaction ID has come. The next one has the transaction ID incremented.
+//! A job is a list of request bodies to one instance. One request is under way at a time; it stays in the
+//! updates until the response with its transaction ID has come. The next one has the transaction ID
+//! incremented.
 
 use std::collections::VecDeque;
 
 use super::config::{AttributeSet, MAX_AXES};
-use super::event::{AttributeValue, Failure};
+use super::event::AttributeValue;
+use super::failure::Failure;
 use crate::wire::Error;
 use crate::wire::motion::attribute_list::{
     AttributeSelector, GetItem, GetResponse, HEAD_LEN, ListWriter, SetResponse,

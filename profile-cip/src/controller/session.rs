@@ -17,7 +17,8 @@ use core::net::{Ipv4Addr, SocketAddrV4};
 use std::collections::VecDeque;
 
 use super::config::ControllerConfig;
-use super::event::{DeviceIdentity, Exchange, Failure};
+use super::event::DeviceIdentity;
+use super::failure::{Exchange, Failure};
 use crate::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
 use crate::wire::encapsulation::{
     Command, EncapsulationStatus, HEADER_LEN, Header, PROTOCOL_VERSION, Packet,
@@ -390,8 +391,8 @@ impl Session {
         self.ask_object(now, exchange, CONNECTION_MANAGER, length.map(|_| data), port);
     }
 
-    /// Sends a request to instance 1 of `class` as an unconnected message, with the UDP port for answers if one is
-    /// given.
+    /// Sends a request to instance 1 of `class` as an unconnected message, with the UDP port for answers if
+    /// one is given.
     fn ask_object(
         &mut self,
         now: MonotonicTime,

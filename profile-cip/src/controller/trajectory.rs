@@ -5,7 +5,7 @@
 //!
 //! | profile | segments |
 //! |---|---|
-//! | [`Profile::to_position`] | jerk up, constant acceleration, jerk down, cruise, and the mirror image of it |
+//! | [`Profile::to_position`] | jerk up, acceleration, jerk down, cruise, and the mirror image of it |
 //! | [`Profile::to_velocity`] | jerk up, constant acceleration, jerk down |
 //! | [`Profile::jog`] | to the velocity, cruise, to standstill |
 //!
@@ -150,7 +150,8 @@ impl Profile {
         Ok(profile)
     }
 
-    /// From any state to the constant velocity `to`; [`Limits::velocity`] does not count, `to` is the velocity.
+    /// From any state to the constant velocity `to`; [`Limits::velocity`] does not count, `to` is the
+    /// velocity.
     ///
     /// # Errors
     /// A limit that is not finite and above zero, or a value of the state or the velocity that is not finite.
@@ -229,9 +230,9 @@ impl Profile {
 
     /// Adds three segments that lead from the end to the constant velocity `to`.
     ///
-    /// With all signs turned so that the acceleration peak A is positive: coming from acceleration a and gaining
-    /// velocity dv, (A² - a²)/2j is gained on the way to A and A²/2j on the way from A to zero. Without a
-    /// phase at A this gives A² = j·dv + a²/2.
+    /// With all signs turned so that the acceleration peak A is positive: coming from acceleration a and
+    /// gaining velocity dv, (A² - a²)/2j is gained on the way to A and A²/2j on the way from A to zero.
+    /// Without a phase at A this gives A² = j·dv + a²/2.
     fn change_velocity(&mut self, to: f64, limits: Limits) -> Result<(), ProfileError> {
         limits.check()?;
         finite("velocity", to)?;
@@ -273,7 +274,8 @@ struct MoveTimes {
 }
 
 impl MoveTimes {
-    /// Speeding up with jerk time T and constant-acceleration time C reaches v = j·T·(T + C) over v·(2T + C)/2.
+    /// Speeding up with jerk time T and constant-acceleration time C reaches v = j·T·(T + C) over v·(2T +
+    /// C)/2.
     fn plan(distance: f64, limits: Limits) -> Self {
         let Limits { velocity: v, acceleration: a, jerk: j } = limits;
         let (jerk, acceleration) =
@@ -304,8 +306,8 @@ mod tests {
 
     const LIMITS: Limits = Limits { velocity: 10.0, acceleration: 50.0, jerk: 1000.0 };
 
-    /// Largest |velocity| and |acceleration|, and the largest step of each quantity against what the next higher
-    /// derivative allows, over `steps` equal steps.
+    /// Largest |velocity| and |acceleration|, and the largest step of each quantity against what the next
+    /// higher derivative allows, over `steps` equal steps.
     fn walk(profile: &Profile, steps: u32, limits: Limits) {
         let total = profile.seconds();
         let dt = total / f64::from(steps);

@@ -143,8 +143,8 @@ fn an_axis_fault_amid_a_move_is_in_the_failure() {
         }
     });
     let report = rig.run(30);
-    let expected = "axis 2: expected state Running, found state Major Faulted, Axis Fault code 54 sub code 1 action \
-                    0x11 at 1000 ns";
+    let expected = "axis 2: expected state Running, found state Major Faulted, Axis Fault code 54 sub code 1 \
+                    action 0x11 at 1000 ns";
     assert_eq!(text(&report), expected);
     // The other axis is stopped and disabled before the connection is closed.
     assert_eq!(rig.peer.axes[0].state, AxisStateCode::STOPPED);
