@@ -1,6 +1,24 @@
 //! The device role: the explicit side ([`adapter`]) and the motion device behind it.
 
+pub mod adapter;
+pub mod config;
+mod connection_manager;
+mod connection_path;
+pub mod counters;
+pub mod event;
+mod exchange;
+mod forward_close;
+mod forward_open;
+pub mod identity;
+mod list;
 pub mod motion_link;
+mod motion_open;
+mod network_objects;
+mod node;
+mod object;
+mod refusal;
+mod router;
+mod session;
 pub mod axis_state;
 pub mod attribute;
 mod axis_control;
