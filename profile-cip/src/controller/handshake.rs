@@ -166,6 +166,47 @@ mod tests {
         assert!(h.take(AxisControl::DISABLE).is_some());
     }
 
+    /// Every state of the exchange with every input: the code sent then, and the answer.
+    #[test]
+    fn the_whole_table() {
+        use AxisControl as C;
+        let idle = Handshake::default();
+        let mut asked = idle.clone();
+        asked.request(C::ENABLE);
+        let mut cancelling = asked.clone();
+        cancelling.cancel();
+        let mut clearing = asked.clone();
+        clearing.handle(C::ENABLE, 0);
+        let mut waiting = clearing.clone();
+        waiting.request(C::DISABLE);
+        let states = [
+            ("idle", idle),
+            ("asked", asked),
+            ("cancelling", cancelling),
+            ("clearing", clearing),
+            ("waiting", waiting),
+        ];
+        type Input = fn(&mut Handshake);
+        let inputs: [(&str, Input); 6] = [
+            ("request Disable", |h| h.request(C::DISABLE)),
+            ("cancel", Handshake::cancel),
+            ("response None", |h| h.handle(C::NONE, 0)),
+            ("response Enable", |h| h.handle(C::ENABLE, 0)),
+            ("response Enable refused", |h| h.handle(C::ENABLE, 0x0C)),
+            ("response Cancel", |h| h.handle(C::CANCEL, 0)),
+        ];
+        let mut table = String::new();
+        for (state, start) in &states {
+            for (input, apply) in &inputs {
+                let mut h = start.clone();
+                apply(&mut h);
+                let answer = h.acknowledge.map(|a| format!(", {} with {:#04x}", a.request, a.status));
+                table += &format!("{state:10} | {input:23} | {}{}\n", h.code(), answer.unwrap_or_default());
+            }
+        }
+        insta::assert_snapshot!(table);
+    }
+
     #[test]
     fn a_response_without_a_request_is_no_answer() {
         let mut h = Handshake::default();

@@ -189,3 +189,77 @@ impl Link {
         Ok(Some((arrival, frame)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::motion::codes::{NodeAlarm, NodeFault, NodeStatus};
+    use crate::wire::motion::{ActualHeader, ActualWriter};
+
+    fn update(id: u32, sequence: u32, count: u16, update_id: u8) -> Vec<u8> {
+        let header = ActualHeader {
+            update_id,
+            node_status: NodeStatus::REMOTE_MODE,
+            instance_count: 0,
+            node_fault: NodeFault::NONE,
+            node_alarm: NodeAlarm::NONE,
+            last_received_id: 0,
+            time_stamp: None,
+            time_offset: None,
+            update_diagnostics: None,
+            time_diagnostics: None,
+        };
+        let mut data = [0; 8];
+        let length = ActualWriter::new(&mut data, &header).unwrap().finish();
+        let datagram = Class1Datagram {
+            connection_id: id,
+            encapsulation_sequence: sequence,
+            sequence_count: count,
+            data: &data[..length],
+        };
+        let mut bytes = vec![0; datagram.buffer_len()];
+        datagram.emit(&mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn arrivals_are_told_apart() {
+        let mut link = Link::new(200, 1);
+        let mut receive = |id, sequence, count, update_id| {
+            if !link.is_open() {
+                link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
+            }
+            let bytes = update(id, sequence, count, update_id);
+            let arrival = link.receive(MonotonicTime(5), &bytes).unwrap();
+            (arrival.map(|(arrival, _)| arrival), link.last_received())
+        };
+        use Arrival as A;
+        assert_eq!(receive(9, 1, 1, 7), (None, 0), "another connection");
+        assert_eq!(receive(2, u32::MAX, u16::MAX, 254), (Some(A::Fresh { lost: 0 }), 254), "the first one");
+        assert_eq!(receive(2, 0, u16::MAX, 254), (Some(A::Repeated), 254), "a refresh");
+        assert_eq!(receive(2, 1, 0, 255), (Some(A::Fresh { lost: 0 }), 255), "all counters roll over");
+        assert_eq!(receive(2, 4, 3, 2), (Some(A::Fresh { lost: 2 }), 2), "0 and 1 are missing");
+        assert_eq!(receive(2, 3, 2, 1), (Some(A::Overtaken), 2));
+        assert_eq!(receive(2, 4, 3, 2), (Some(A::Overtaken), 2), "the same datagram doubled");
+        assert_eq!(receive(2, 5, 4, 2), (Some(A::Fresh { lost: 0 }), 2), "new data under the same ID");
+    }
+
+    #[test]
+    fn the_room_of_a_service_leaves_the_cyclic_data_theirs() {
+        // 500 - 2 - 24 - 2 x 32 - 12 and 500 - 2 - 44 - 2 x 56 - 12, in whole words.
+        let room = Link::new(500, 2).room();
+        assert_eq!((room.request, room.response), (396, 328));
+        // Block sizes are counted in one byte: 1020 - 32 - 12 and 1020 - 56 - 12.
+        let room = Link::new(1400, 1).room();
+        assert_eq!((room.request, room.response), (976, 952));
+        assert_eq!(Link::new(20, 1).room().request, 0);
+    }
+
+    #[test]
+    fn an_update_longer_than_the_connection_is_refused() {
+        let mut link = Link::new(9, 1);
+        link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
+        let error = link.receive(MonotonicTime(0), &update(2, 1, 1, 1)).unwrap_err();
+        assert_eq!(error.to_string(), "connection data: expected at most 7, found 8");
+    }
+}

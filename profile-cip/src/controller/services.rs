@@ -319,3 +319,133 @@ fn split(
     }
     Ok(bodies)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::motion::attribute_list::SetStatus;
+
+    const ROOM: Room = Room { request: 400, response: 400 };
+    const NOW: MonotonicTime = MonotonicTime(0);
+
+    fn services() -> Services {
+        Services::new(DurationNs::from_secs(1))
+    }
+
+    /// Answers the request under way with `data` and these changes to the right head.
+    fn answer(services: &mut Services, status: u8, data: &[u8], id_step: u8, instance_step: u8) {
+        services.advance(NOW);
+        let (instance, request) = services.request().unwrap();
+        let response = ServiceResponse {
+            transaction_id: request.transaction_id.wrapping_add(id_step),
+            service: request.service,
+            general_status: status,
+            extended_status: 0,
+            data,
+        };
+        services.handle(NOW, instance + instance_step, &response);
+    }
+
+    fn statuses(rows: &[(u16, u8)]) -> Vec<u8> {
+        let mut body = vec![0; 4 + 4 * rows.len()];
+        let mut list = ListWriter::new(&mut body).unwrap();
+        for &(id, status) in rows {
+            list.status(SetStatus { id, status, index: 0 }).unwrap();
+        }
+        let _ = list.finish();
+        body
+    }
+
+    #[test]
+    fn a_response_counts_only_for_its_request() {
+        let mut s = services();
+        let ticket = s.set(1, &[AttributeSet::usint(610, 1)], ROOM).unwrap();
+        let good = statuses(&[(610, 0)]);
+        answer(&mut s, 0, &good, 1, 0);
+        answer(&mut s, 0, &good, 255, 0);
+        answer(&mut s, 0, &good, 0, 1);
+        assert_eq!(s.take(ticket), None);
+        answer(&mut s, 0, &good, 0, 0);
+        assert_eq!(s.take(ticket), Some(Ok(Outcome::Set { refused: vec![] })));
+        assert_eq!(s.take(ticket), None);
+        assert!(s.request().is_none());
+    }
+
+    #[test]
+    fn transactions_count_per_instance() {
+        let mut s = services();
+        let mut ids = Vec::new();
+        for instance in [1, 2, 1, 0, 2] {
+            s.set(instance, &[AttributeSet::usint(610, 1)], ROOM).unwrap();
+            s.advance(NOW);
+            ids.push((instance, s.request().unwrap().1.transaction_id));
+            answer(&mut s, 0, &statuses(&[(610, 0)]), 0, 0);
+        }
+        assert_eq!(ids, [(1, 1), (2, 1), (1, 2), (0, 1), (2, 2)]);
+    }
+
+    #[test]
+    fn answers_that_do_not_fit_fail_the_job() {
+        let fail = |status: u8, data: &[u8]| {
+            let mut s = services();
+            let sets = [AttributeSet::usint(610, 1), AttributeSet::usint(611, 1)];
+            let ticket = s.set(3, &sets, ROOM).unwrap();
+            answer(&mut s, status, data, 0, 0);
+            s.take(ticket).unwrap().unwrap_err().to_string()
+        };
+        assert_eq!(
+            fail(0x08, &[]),
+            "axis 3: Set_Axis_Attributes_List refused with status 0x08 (service not supported)"
+        );
+        assert_eq!(
+            fail(0, &statuses(&[(610, 0)])),
+            "axis 3: answer to Set_Axis_Attributes_List: number of attributes at byte 0: expected 0x2, found 0x1"
+        );
+        let cut = &statuses(&[(610, 0), (611, 0)])[..8];
+        assert!(
+            fail(0, cut).ends_with("attribute list at byte 8: expected 2 bytes, found 0"),
+            "{}",
+            fail(0, cut)
+        );
+        assert!(
+            fail(0, &[]).starts_with("axis 3: answer to Set_Axis_Attributes_List: attribute list at byte 0")
+        );
+    }
+
+    #[test]
+    fn silence_fails_the_job_and_frees_the_channel() {
+        let mut s = services();
+        let first = s.group_sync([0; 8]);
+        let second = s.group_sync([0; 8]);
+        s.advance(NOW);
+        s.advance(MonotonicTime(1_000_000_001));
+        let expected = "the class: Group_Sync not answered within 1.000000001 s";
+        assert_eq!(s.take(first).unwrap().unwrap_err().to_string(), expected);
+        s.advance(MonotonicTime(1_000_000_002));
+        assert_eq!(s.request().unwrap().1.transaction_id, 2);
+        answer(&mut s, 0, &[3, 0, 0, 0], 0, 0);
+        assert_eq!(s.take(second), Some(Ok(Outcome::Sync(SyncStatus::CLOCK_SKEW))));
+    }
+
+    #[test]
+    fn lists_are_split_by_request_and_by_response() {
+        let mut s = services();
+        let sets: Vec<_> = (1..=10).map(|id| AttributeSet::udint(id, 0)).collect();
+        // Head 4, attribute head and value 8: three to a request.
+        s.set(1, &sets, Room { request: 31, response: 400 }).unwrap();
+        let counts: Vec<_> = s.jobs[0].bodies.iter().map(|b| (b.attributes, b.bytes.len())).collect();
+        assert_eq!(counts, [(3, 28), (3, 28), (3, 28), (1, 12)]);
+        // Reading, the response is what is long: head 4, attribute head and value 8.
+        let selectors: Vec<_> = (1..=4).map(|id| AttributeSelector::scalar(id, 4)).collect();
+        s.get(1, &selectors, Room { request: 400, response: 20 }).unwrap();
+        assert_eq!(s.jobs[1].bodies.iter().map(|b| b.attributes).collect::<Vec<_>>(), [2, 2]);
+        let long = [AttributeSet::bytes(7, &[0; 200])];
+        let error = s.set(2, &long, Room { request: 100, response: 100 }).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "axis 2: attribute 7 does not fit the 100 bytes that the connection leaves"
+        );
+        let nothing = s.set(1, &[], ROOM).unwrap();
+        assert_eq!(s.take(nothing), Some(Ok(Outcome::Set { refused: vec![] })));
+    }
+}

@@ -227,12 +227,19 @@ impl Session {
         if packet.command == Command::NOP {
             return;
         }
-        let expected = self.context.to_le_bytes();
         let State::Asked { exchange, .. } = self.state else {
-            return self.unexpected(packet);
+            let found = u32::from(packet.command.0);
+            return self.unexpected("command of a reply to nothing asked", 0, found, 0);
         };
-        if packet.sender_context != expected || packet.command != command_of(exchange) {
-            return self.unexpected(packet);
+        let (found, expected) = (packet.command, command_of(exchange));
+        if found != expected {
+            let (found, expected) = (u32::from(found.0), u32::from(expected.0));
+            return self.unexpected("command of a reply", 0, found, expected);
+        }
+        if packet.sender_context != self.context.to_le_bytes() {
+            let low = |context: [u8; 8]| u32::from_le_bytes([context[0], context[1], context[2], context[3]]);
+            let (found, expected) = (low(packet.sender_context), low(self.context.to_le_bytes()));
+            return self.unexpected("sender context of a reply", 12, found, expected);
         }
         if packet.status != EncapsulationStatus::SUCCESS {
             return self.fail(Failure::Encapsulation { exchange, status: packet.status.0 });
@@ -247,14 +254,8 @@ impl Session {
         }
     }
 
-    fn unexpected(&mut self, packet: &Packet<'_>) {
-        let found = u32::from(packet.command.0);
-        let expected = match self.state {
-            State::Asked { exchange, .. } => u32::from(command_of(exchange).0),
-            _ => 0,
-        };
-        let error = Error::Invalid { what: "reply to nothing asked, command", offset: 0, found, expected };
-        self.outputs.push_back(Output::Malformed(error));
+    fn unexpected(&mut self, what: &'static str, offset: usize, found: u32, expected: u32) {
+        self.outputs.push_back(Output::Malformed(Error::Invalid { what, offset, found, expected }));
     }
 
     fn take_identity_list(&mut self, now: MonotonicTime, data: &[u8]) -> Result<(), Error> {

@@ -248,7 +248,7 @@ fn malformed_bytes_are_counted_and_survived() {
     let report = rig.run(30);
     assert_eq!(report.failure, None, "{}", rig.log());
     assert!(report.malformed > 100);
-    assert!(rig.log().contains("dropped malformed data: reply to nothing asked"));
+    assert!(rig.log().contains("dropped malformed data: command of a reply to nothing asked"));
 }
 
 #[test]

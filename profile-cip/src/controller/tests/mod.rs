@@ -4,3 +4,4 @@ mod failures;
 mod peer;
 mod rig;
 mod runs;
+mod session_table;

@@ -204,6 +204,13 @@ fn late_wake_ups_leave_the_path_as_it_is() {
     assert_good(&report, &rig);
     assert_eq!(report.axes[0].reached, Some(50.0));
     assert!(report.missed_cycles > 9, "{report}");
+    let headers = rig.peer.updates.iter().map(|u| *CommandFrame::parse(u).unwrap().header());
+    let stamped: Vec<_> = headers.filter_map(|h| h.time_stamp.map(|stamp| (stamp, h.update_id))).collect();
+    for pair in stamped.windows(2) {
+        let periods = (pair[1].0 - pair[0].0) / 2_000_000;
+        let ids = u64::from(pair[1].1.wrapping_sub(pair[0].1));
+        assert_eq!(ids, periods, "the update ID counts periods, missed ones too");
+    }
     assert_smooth(&rig, 50_000.0);
 }
 
