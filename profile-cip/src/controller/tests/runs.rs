@@ -374,3 +374,42 @@ fn finish_stops_disables_and_closes() {
     assert_smooth(&rig, 50_000.0);
     assert_eq!(rig.peer.axes[0].state, AxisStateCode::STOPPED);
 }
+
+#[test]
+fn an_axis_in_velocity_control_jogs_but_does_not_move() {
+    let mut config = config(1);
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    let jog = Step::Jog { axis: 1, velocity: 5.0, acceleration: 100.0, jerk: 5000.0, seconds: 0.2 };
+    let program = vec![
+        Step::Enable(AxisSet::one(1)),
+        jog,
+        Step::MoveAbsolute { axis: 1, position: 0.0, limits: LIMITS },
+    ];
+    let mut rig = Rig::new(config, Peer::new(&[0.0]), program);
+    let report = rig.run(10);
+    assert_eq!(report.steps_finished, 2);
+    assert_eq!(report.failure.unwrap().to_string(), "axis 1: expected position control for this step");
+    assert!((report.axes[0].reached.unwrap() - 1.0).abs() < 0.1, "{report}");
+    assert!(rig.peer.axes[0].commands.iter().all(|(_, b)| b.control_mode == ControlMode::VELOCITY));
+    assert!(rig.peer.axes[0].commands.iter().all(|(_, b)| b.values.position.is_none()));
+}
+
+#[test]
+fn endless_turning_rolls_over_and_position_control_goes_on_there() {
+    let start = f64::from(i32::MAX) - 1000.0;
+    let program = vec![
+        Step::Enable(AxisSet::one(1)),
+        Step::Jog { axis: 1, velocity: 20.0, acceleration: 200.0, jerk: 5000.0, seconds: 0.5 },
+        Step::MoveRelative { axis: 1, distance: 1.0, limits: LIMITS },
+    ];
+    let mut rig = Rig::new(config(1), Peer::new(&[start]), program);
+    let report = rig.run(10);
+    assert_good(&report, &rig);
+    let commands = &rig.peer.axes[0].commands;
+    let back = commands.iter().rposition(|(_, b)| b.control_mode == ControlMode::VELOCITY).unwrap() + 1;
+    let resumed = commands[back].1.values.position.unwrap().as_f64();
+    // 10 units on, less the 1000 counts to the end of the range, from its other end.
+    let expected = f64::from(i32::MIN) + 10_000.0 - 1001.0;
+    assert!((resumed - expected).abs() < 500.0, "{resumed} against {expected}");
+    assert!((report.axes[0].reached.unwrap() * 1000.0 - (resumed + 1000.0)).abs() <= 1.0);
+}
