@@ -7,6 +7,7 @@ pub mod fault;
 pub mod functional_element;
 pub mod image;
 pub mod inhibit;
+pub mod interpolation;
 pub mod mode;
 pub mod parameter;
 pub mod program;

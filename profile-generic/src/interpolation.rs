@@ -1,0 +1,375 @@
+//! Fine interpolation: from the controller's updates to the cycle of the drive.
+//!
+//! Each update carries set-points and the system time at which they shall be reached. Between two targets a
+//! polynomial is followed whose coefficients are those of CIP Motion (Volume 9, 5-2.6.5.2): third order for the
+//! position, second for the velocity, first for acceleration and torque. The same polynomial goes on beyond its
+//! target when an update is late, for a stated number of periods and no longer: then the axis is held, and the
+//! interpolator says so until it is started again.
+//!
+//! All arithmetic is in integers. At each target the set-point is met exactly; between targets the error of the
+//! arithmetic is below one nanounit as long as the axis moves less than 2000 units in a period.
+
+use crate::code::named_enum;
+use crate::image::{AxisCommand, CommandSet};
+use crate::quantity::{Acceleration, Position, Torque, Velocity};
+use crate::time::{DurationNs, SystemTime};
+use arrayvec::ArrayVec;
+
+mod polynomial;
+
+use polynomial::{Channel, Polynomial};
+
+named_enum! {
+    /// How far ahead of its time stamp an update is meant: CIP Motion's Command Target Update (Volume 9, table
+    /// 6-2.24).
+    #[derive(Default)]
+    pub enum TargetUpdate {
+        /// For the instant of the stamp: taken as it comes, without any curve.
+        Immediate = "immediate",
+        /// For one update period after the stamp: it is reached by extrapolation.
+        Extrapolate = "extrapolate",
+        /// For two update periods after the stamp: it is reached by interpolation.
+        #[default]
+        Interpolate = "interpolate",
+    }
+}
+
+impl TargetUpdate {
+    /// The update periods from the stamp to the target.
+    pub const fn periods(self) -> u32 {
+        match self {
+            Self::Immediate => 0,
+            Self::Extrapolate => 1,
+            Self::Interpolate => 2,
+        }
+    }
+
+    /// The periods beyond its target that an update is in use when nothing is late. An update can be on its way for
+    /// one period and is then in use for one, so two periods after the stamp the next one is there.
+    const fn usual_overrun(self) -> u32 {
+        2 - self.periods()
+    }
+
+    /// The target of an update with this stamp.
+    pub fn target(self, stamp: SystemTime, period: DurationNs) -> SystemTime {
+        stamp + period * i64::from(self.periods())
+    }
+}
+
+/// The longest update period. CIP Motion uses some milliseconds; a tenth of a second is beyond any of them.
+pub const MAX_PERIOD: DurationNs = DurationNs::from_millis(100);
+
+/// The most periods that may be extrapolated after a loss.
+pub const MAX_EXTRAPOLATION: u32 = 4;
+
+/// The most periods between the targets of two updates that are taken as a gap and not as a wrong time stamp.
+pub const MAX_GAP: i64 = 16;
+
+/// Segments that may wait for their time: updates can come early by two periods at most.
+const MAX_SEGMENTS: usize = 4;
+
+/// Set-points at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SetPoints {
+    /// Position, if it is commanded.
+    pub position: Option<Position>,
+    /// Velocity, if it is commanded; as a result also the derivative of a commanded position.
+    pub velocity: Option<Velocity>,
+    /// Acceleration, if it is commanded.
+    pub acceleration: Option<Acceleration>,
+    /// Torque, if it is commanded.
+    pub torque: Option<Torque>,
+}
+
+impl From<&AxisCommand> for SetPoints {
+    fn from(command: &AxisCommand) -> Self {
+        let has = |bit| command.present.contains(bit);
+        Self {
+            position: has(CommandSet::POSITION).then_some(command.position),
+            velocity: has(CommandSet::VELOCITY).then_some(command.velocity),
+            acceleration: has(CommandSet::ACCELERATION).then_some(command.acceleration),
+            torque: has(CommandSet::TORQUE).then_some(command.torque),
+        }
+    }
+}
+
+impl SetPoints {
+    /// Puts these set-points into a command: those that are there are set, those that are not are marked absent.
+    pub fn write_to(&self, command: &mut AxisCommand) {
+        command.position = self.position.unwrap_or(command.position);
+        command.velocity = self.velocity.unwrap_or(command.velocity);
+        command.acceleration = self.acceleration.unwrap_or(command.acceleration);
+        command.torque = self.torque.unwrap_or(command.torque);
+        command.present.set(CommandSet::POSITION, self.position.is_some());
+        command.present.set(CommandSet::VELOCITY, self.velocity.is_some());
+        command.present.set(CommandSet::ACCELERATION, self.acceleration.is_some());
+        command.present.set(CommandSet::TORQUE, self.torque.is_some());
+    }
+}
+
+/// How good a fine set-point is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// No update came since the start; the position of the start is held.
+    Waiting,
+    /// From updates that are as fresh as they should be.
+    Fresh,
+    /// Updates are overdue by this many periods; the polynomial goes on.
+    Extrapolated {
+        /// Overdue periods, from 1.
+        periods: u32,
+    },
+    /// Updates stopped coming; position is held, velocity, acceleration and torque are zero. Stays until the next
+    /// [`FineInterpolator::start`].
+    Lost,
+}
+
+/// A fine set-point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FineCommand {
+    /// The set-points for the instant asked for.
+    pub set_points: SetPoints,
+    /// How good they are.
+    pub quality: Quality,
+}
+
+/// An update was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UpdateError {
+    /// Its target is not later than that of the update before by at least half a period.
+    #[error("expected a target after {last}, got {target}")]
+    NotNewer {
+        /// The last target taken.
+        last: SystemTime,
+        /// The target of this update.
+        target: SystemTime,
+    },
+    /// Its target is too far from that of the update before: more than [`MAX_GAP`] periods.
+    #[error("target {target} is too far after {last}")]
+    Gap {
+        /// The last target taken.
+        last: SystemTime,
+        /// The target of this update.
+        target: SystemTime,
+    },
+    /// A set-point is further from the one before than any machine moves in a period.
+    #[error("a set-point jumps further than any axis can move")]
+    Jump,
+    /// Updates were lost before; the interpolator has to be started again.
+    #[error("updates were lost; expected a start before the next one")]
+    Lost,
+}
+
+/// How an interpolator works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InterpolatorConfig {
+    /// How far ahead of their stamp updates are meant.
+    pub target_update: TargetUpdate,
+    /// The controller's update period: above zero, at most [`MAX_PERIOD`].
+    pub period: DurationNs,
+    /// How many periods to go on when updates are overdue: at most [`MAX_EXTRAPOLATION`].
+    pub extrapolate_periods: u32,
+}
+
+/// The polynomials between two targets.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    start: SystemTime,
+    /// Above zero.
+    length: DurationNs,
+    position: Option<Polynomial>,
+    velocity: Option<Polynomial>,
+    acceleration: Option<Polynomial>,
+    torque: Option<Polynomial>,
+}
+
+/// Follows the updates of one axis.
+#[derive(Clone, Debug)]
+pub struct FineInterpolator {
+    config: InterpolatorConfig,
+    /// In the order of their starts; the first is the one in use.
+    segments: ArrayVec<Segment, MAX_SEGMENTS>,
+    last_target: Option<SystemTime>,
+    position: Channel<3>,
+    velocity: Channel<2>,
+    acceleration: Channel<1>,
+    torque: Channel<1>,
+    /// What is given while there is nothing to follow: before the first update and after a loss.
+    held: SetPoints,
+    lost: bool,
+}
+
+impl FineInterpolator {
+    /// An interpolator that was not started yet, or `None` when the configuration is out of its limits.
+    pub fn new(config: InterpolatorConfig) -> Option<Self> {
+        let fits = config.period > DurationNs::ZERO
+            && config.period <= MAX_PERIOD
+            && config.extrapolate_periods <= MAX_EXTRAPOLATION;
+        fits.then(|| Self {
+            config,
+            segments: ArrayVec::new(),
+            last_target: None,
+            position: Channel::default(),
+            velocity: Channel::default(),
+            acceleration: Channel::default(),
+            torque: Channel::default(),
+            held: SetPoints::default(),
+            lost: false,
+        })
+    }
+
+    /// The configuration.
+    pub const fn config(&self) -> &InterpolatorConfig {
+        &self.config
+    }
+
+    /// Forgets everything and holds `position` until the first update: when the axis is enabled, and after a loss.
+    pub fn start(&mut self, position: Option<Position>) {
+        self.segments.clear();
+        self.last_target = None;
+        self.position = Channel::starting_at(position.map(Position::get));
+        self.velocity = Channel::default();
+        self.acceleration = Channel::default();
+        self.torque = Channel::default();
+        self.held = SetPoints { position, ..SetPoints::default() };
+        self.lost = false;
+    }
+
+    /// Takes an update for the instant `target`, which may be past already.
+    ///
+    /// # Errors
+    /// See [`UpdateError`]; the update is then left out of account.
+    pub fn update(&mut self, target: SystemTime, set_points: &SetPoints) -> Result<(), UpdateError> {
+        if self.lost {
+            return Err(UpdateError::Lost);
+        }
+        let (periods, length) = self.spacing(target)?;
+        // The channels are worked on as copies, so that a refused update leaves no trace.
+        let mut channels = (self.position, self.velocity, self.acceleration, self.torque);
+        if let Some(segment) = self.segments.last() {
+            for missing in (1..periods).rev() {
+                let at = self.limit_time(segment, target - length * missing);
+                channels.0.fill(segment.position.map(|curve| segment.value(&curve, at)));
+                channels.1.fill(segment.velocity.map(|curve| segment.value(&curve, at)));
+                channels.2.fill(segment.acceleration.map(|curve| segment.value(&curve, at)));
+                channels.3.fill(segment.torque.map(|curve| segment.value(&curve, at)));
+            }
+        }
+        let immediate = self.config.target_update == TargetUpdate::Immediate;
+        let segment = Segment {
+            start: target - length,
+            length,
+            position: channels.0.push(set_points.position.map(Position::get), immediate)?,
+            velocity: channels.1.push(set_points.velocity.map(Velocity::get), immediate)?,
+            acceleration: channels.2.push(set_points.acceleration.map(Acceleration::get), immediate)?,
+            torque: channels.3.push(set_points.torque.map(Torque::get), immediate)?,
+        };
+        (self.position, self.velocity, self.acceleration, self.torque) = channels;
+        if immediate {
+            self.segments.clear();
+        } else if self.segments.is_full() {
+            self.segments.remove(0);
+        }
+        self.segments.push(segment);
+        self.last_target = Some(target);
+        Ok(())
+    }
+
+    /// The fine set-points for the instant `now`.
+    pub fn at(&mut self, now: SystemTime) -> FineCommand {
+        while self.segments.get(1).is_some_and(|next| next.start <= now) {
+            self.segments.remove(0);
+        }
+        let (Some(segment), Some(last_target)) = (self.segments.first(), self.last_target) else {
+            let quality = if self.lost { Quality::Lost } else { Quality::Waiting };
+            return FineCommand { set_points: self.held, quality };
+        };
+        let overdue = self.overdue(last_target, now);
+        if overdue > self.config.extrapolate_periods {
+            self.held = segment.at_rest(self.limit_time(segment, now));
+            self.segments.clear();
+            self.lost = true;
+            return FineCommand { set_points: self.held, quality: Quality::Lost };
+        }
+        let quality = match overdue {
+            0 => Quality::Fresh,
+            periods => Quality::Extrapolated { periods },
+        };
+        FineCommand { set_points: segment.at(now), quality }
+    }
+
+    /// Whether updates were lost, so that a new start is needed.
+    pub const fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    /// Moves everything by a step of the system time, so that targets and the present time keep one reference.
+    pub fn shift(&mut self, step: DurationNs) {
+        for segment in &mut self.segments {
+            segment.start = segment.start + step;
+        }
+        self.last_target = self.last_target.map(|target| target + step);
+    }
+
+    /// The periods from the last target to this one, and the length of one of them.
+    fn spacing(&self, target: SystemTime) -> Result<(i64, DurationNs), UpdateError> {
+        let period = self.config.period;
+        let Some(last) = self.last_target else { return Ok((1, period)) };
+        let spacing = target.since(last);
+        if spacing.0 < period.0 / 2 || spacing.0 <= 0 {
+            return Err(UpdateError::NotNewer { last, target });
+        }
+        let periods = (spacing.0.saturating_add(period.0 / 2) / period.0).max(1);
+        if periods > MAX_GAP {
+            return Err(UpdateError::Gap { last, target });
+        }
+        Ok((periods, DurationNs(spacing.0 / periods)))
+    }
+
+    /// Periods, begun ones included, by which the next update is overdue.
+    fn overdue(&self, last_target: SystemTime, now: SystemTime) -> u32 {
+        let beyond = now.since(last_target).0.max(0);
+        let periods = beyond / self.config.period.0 + i64::from(beyond % self.config.period.0 != 0);
+        u32::try_from(periods).unwrap_or(u32::MAX).saturating_sub(self.config.target_update.usual_overrun())
+    }
+
+    /// `at`, or the last instant that a segment may be followed to.
+    fn limit_time(&self, segment: &Segment, at: SystemTime) -> SystemTime {
+        let beyond = self.config.target_update.usual_overrun() + self.config.extrapolate_periods;
+        at.min(segment.start + segment.length + self.config.period * i64::from(beyond))
+    }
+}
+
+impl Segment {
+    fn at(&self, now: SystemTime) -> SetPoints {
+        let velocity = match (self.velocity, self.position) {
+            (Some(curve), _) => Some(Velocity(self.value(&curve, now))),
+            (None, Some(curve)) => Some(Velocity(curve.slope_per_second(now.since(self.start), self.length))),
+            (None, None) => None,
+        };
+        SetPoints {
+            position: self.position.map(|curve| Position(self.value(&curve, now))),
+            velocity,
+            acceleration: self.acceleration.map(|curve| Acceleration(self.value(&curve, now))),
+            torque: self.torque.map(|curve| Torque(self.value(&curve, now))),
+        }
+    }
+
+    /// The position at `now` and nothing that would move the axis on from there.
+    fn at_rest(&self, now: SystemTime) -> SetPoints {
+        let moving = self.at(now);
+        SetPoints {
+            position: moving.position,
+            velocity: moving.velocity.map(|_| Velocity::ZERO),
+            acceleration: moving.acceleration.map(|_| Acceleration::ZERO),
+            torque: moving.torque.map(|_| Torque::ZERO),
+        }
+    }
+
+    fn value(&self, curve: &Polynomial, at: SystemTime) -> i64 {
+        curve.value(at.since(self.start), self.length)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! The polynomials of fine interpolation (CIP Volume 9, 5-2.6.5.2), in fixed point.
+//!
+//! With `s` the part of the segment that has passed, and the differences `d1`, `d2`, `d3` of the last values,
+//! all of them are `base + (d1 - d2/2 - d3/6) s + (d2/2) s^2 + (d3/6) s^3`, of which lower orders leave out the
+//! higher differences. The coefficients are held times six, so that they are whole.
+
+use super::UpdateError;
+use crate::time::DurationNs;
+
+/// Binary places of the part of the segment that has passed.
+const TIME_PLACES: u32 = 40;
+
+/// Binary places of intermediate results.
+const VALUE_PLACES: u32 = 20;
+
+/// The largest step between two values: some 17000 units in one period.
+const MAX_STEP: i64 = 1 << 44;
+
+/// The furthest a polynomial is followed, in lengths of its segment.
+const MAX_LENGTHS: i128 = 8;
+
+/// A polynomial over one segment. As steps are at most 2^44, the coefficients are below 2^49.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Polynomial {
+    base: i64,
+    first: i128,
+    second: i128,
+    third: i128,
+}
+
+impl Polynomial {
+    const fn constant(base: i64) -> Self {
+        Self { base, first: 0, second: 0, third: 0 }
+    }
+
+    const fn new(base: i64, d1: i128, d2: i128, d3: i128) -> Self {
+        Self { base, first: 6 * d1 - 3 * d2 - d3, second: 3 * d2, third: d3 }
+    }
+
+    /// The value `elapsed` after the start of the segment, saturated; before the start, that at the start.
+    pub(super) fn value(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
+        let part = part(elapsed, length);
+        // Below 2^49 with 20 places; the part of at most 8 with 40 places takes that below 2^116 in the last step.
+        let sum = times(self.third << VALUE_PLACES, part) + (self.second << VALUE_PLACES);
+        let sum = times(sum, part) + (self.first << VALUE_PLACES);
+        saturate(i128::from(self.base) + rounded(times(sum, part), 6 << VALUE_PLACES))
+    }
+
+    /// The derivative `elapsed` after the start of the segment, per second, saturated.
+    pub(super) fn slope_per_second(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
+        let part = part(elapsed, length);
+        let sum = times((3 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
+        let per_segment = times(sum, part) + (self.first << VALUE_PLACES);
+        // Below 2^90 with 20 places; a second is below 2^30 nanoseconds.
+        let per_second = per_segment.saturating_mul(1_000_000_000);
+        saturate(rounded(per_second, (6 * i128::from(length.0)) << VALUE_PLACES))
+    }
+}
+
+/// The part of the segment that has passed, with [`TIME_PLACES`] places.
+fn part(elapsed: DurationNs, length: DurationNs) -> i128 {
+    let part = rounded(i128::from(elapsed.0) << TIME_PLACES, i128::from(length.0));
+    part.clamp(0, MAX_LENGTHS << TIME_PLACES)
+}
+
+fn times(value: i128, part: i128) -> i128 {
+    rounded(value * part, 1 << TIME_PLACES)
+}
+
+/// The quotient to the nearest, ties away from zero; `den` is above zero.
+fn rounded(num: i128, den: i128) -> i128 {
+    let half = den / 2;
+    if num >= 0 { (num + half) / den } else { (num - half) / den }
+}
+
+fn saturate(value: i128) -> i64 {
+    i64::try_from(value).unwrap_or(if value > 0 { i64::MAX } else { i64::MIN })
+}
+
+/// The last values of one kind of set-point; makes polynomials of at most `ORDER`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Channel<const ORDER: usize> {
+    /// The newest first.
+    values: [i64; 4],
+    known: usize,
+}
+
+impl<const ORDER: usize> Channel<ORDER> {
+    /// A channel that knows one value, or none.
+    pub(super) fn starting_at(value: Option<i64>) -> Self {
+        let mut channel = Self::default();
+        channel.fill(value);
+        channel
+    }
+
+    /// Takes a value that nobody sent: the start, or an estimate for an update that was lost. An estimate is held
+    /// within the largest step, so that the bounds of the polynomials hold whatever is lost.
+    pub(super) fn fill(&mut self, value: Option<i64>) {
+        if let Some(value) = value {
+            let last = self.values[0];
+            let nearest = last.saturating_sub(MAX_STEP)..=last.saturating_add(MAX_STEP);
+            let value = if self.known > 0 { value.clamp(*nearest.start(), *nearest.end()) } else { value };
+            self.values.rotate_right(1);
+            self.values[0] = value;
+            self.known = (self.known + 1).min(self.values.len());
+        }
+    }
+
+    /// Takes a value that was sent and returns the polynomial that leads to it. A value that is absent makes the
+    /// channel forget its past.
+    pub(super) fn push(
+        &mut self,
+        value: Option<i64>,
+        immediate: bool,
+    ) -> Result<Option<Polynomial>, UpdateError> {
+        let Some(value) = value else {
+            *self = Self::default();
+            return Ok(None);
+        };
+        if self.known > 0 && self.values[0].abs_diff(value) > MAX_STEP.unsigned_abs() {
+            return Err(UpdateError::Jump);
+        }
+        self.fill(Some(value));
+        let order = if immediate { 0 } else { ORDER.min(self.known - 1) };
+        let [v0, v1, v2, v3] = self.values.map(i128::from);
+        let d1 = v0 - v1;
+        let d2 = if order >= 2 { v0 - 2 * v1 + v2 } else { 0 };
+        let d3 = if order >= 3 { v0 - 3 * v1 + 3 * v2 - v3 } else { 0 };
+        let [newest, before, ..] = self.values;
+        Ok(Some(if order == 0 { Polynomial::constant(newest) } else { Polynomial::new(before, d1, d2, d3) }))
+    }
+}

@@ -1,0 +1,301 @@
+use super::*;
+use crate::cast;
+use proptest::prelude::*;
+
+const PERIOD: DurationNs = DurationNs::from_millis(2);
+const EPOCH: SystemTime = SystemTime(1_700_000_000_000_000_000);
+
+fn interpolator(target_update: TargetUpdate, extrapolate_periods: u32) -> FineInterpolator {
+    let config = InterpolatorConfig { target_update, period: PERIOD, extrapolate_periods };
+    FineInterpolator::new(config).unwrap()
+}
+
+/// The instant `periods` and `part` thousandths after the epoch.
+fn time(periods: i64, part: i64) -> SystemTime {
+    EPOCH + PERIOD * periods + DurationNs(PERIOD.0 / 1000 * part)
+}
+
+fn position(value: i64) -> SetPoints {
+    SetPoints { position: Some(Position(value)), ..SetPoints::default() }
+}
+
+fn position_at(interpolator: &mut FineInterpolator, now: SystemTime) -> i64 {
+    interpolator.at(now).set_points.position.unwrap().0
+}
+
+/// An interpolator that took `values` for targets 1, 2, 3... and was started at 0.
+fn fed(values: &[i64]) -> FineInterpolator {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+    interpolator.start(Some(Position(0)));
+    for (target, value) in (1..).zip(values) {
+        interpolator.update(time(target, 0), &position(*value)).unwrap();
+    }
+    interpolator
+}
+
+#[test]
+fn targets_follow_the_stamp_by_the_stated_periods() {
+    let stamps = [TargetUpdate::Immediate, TargetUpdate::Extrapolate, TargetUpdate::Interpolate];
+    assert_eq!(stamps.map(|update| update.target(EPOCH, PERIOD).since(EPOCH).0), [0, 2_000_000, 4_000_000]);
+}
+
+#[test]
+fn configurations_outside_their_limits_are_refused() {
+    let good =
+        InterpolatorConfig { target_update: TargetUpdate::default(), period: PERIOD, extrapolate_periods: 4 };
+    assert!(FineInterpolator::new(good).is_some());
+    for bad in [
+        InterpolatorConfig { period: DurationNs(0), ..good },
+        InterpolatorConfig { period: MAX_PERIOD + DurationNs(1), ..good },
+        InterpolatorConfig { extrapolate_periods: MAX_EXTRAPOLATION + 1, ..good },
+    ] {
+        assert!(FineInterpolator::new(bad).is_none());
+    }
+}
+
+/// The coefficients of Volume 9, 5-2.6.5.2, worked by hand for P-3..P0 = 0, 60, 240, 600 and half a period:
+/// dP = 360, dV = 180, dA = 60; 240 + (360 - 90 - 10)/2 + 90/4 + 10/8 = 393.75.
+#[test]
+fn the_cubic_has_the_coefficients_of_the_standard() {
+    let mut interpolator = fed(&[60, 240, 600]);
+    assert_eq!(position_at(&mut interpolator, time(2, 0)), 240);
+    assert_eq!(position_at(&mut interpolator, time(2, 500)), 394);
+    assert_eq!(position_at(&mut interpolator, time(3, 0)), 600);
+    // Slope at the end: (260 + 2*90 + 3*10) in 2 ms.
+    let fine = interpolator.at(time(3, 0));
+    assert_eq!(fine.set_points.velocity, Some(Velocity(470 * 500)));
+}
+
+/// For V-2..V0 = 0, 100, 400: dV = 300, dA = 200; 100 + (300 - 100)/2 + 100/4 = 225.
+#[test]
+fn velocity_is_quadratic_and_torque_linear() {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+    interpolator.start(None);
+    for (target, velocity, torque) in [(1, 0, 0), (2, 100, 50), (3, 400, 60)] {
+        let set_points = SetPoints {
+            velocity: Some(Velocity(velocity)),
+            torque: Some(Torque(torque)),
+            acceleration: Some(Acceleration(-torque)),
+            ..SetPoints::default()
+        };
+        interpolator.update(time(target, 0), &set_points).unwrap();
+    }
+    let fine = interpolator.at(time(2, 500)).set_points;
+    assert_eq!(fine.velocity, Some(Velocity(225)));
+    assert_eq!(fine.torque, Some(Torque(55)));
+    assert_eq!(fine.acceleration, Some(Acceleration(-55)));
+    assert_eq!(fine.position, None);
+}
+
+#[test]
+fn a_commanded_velocity_is_preferred_to_the_derivative() {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+    interpolator.start(Some(Position(0)));
+    let set_points = SetPoints { velocity: Some(Velocity(7)), ..position(1_000_000) };
+    interpolator.update(time(1, 0), &set_points).unwrap();
+    assert_eq!(interpolator.at(time(0, 500)).set_points.velocity, Some(Velocity(7)));
+    assert_eq!(position_at(&mut interpolator, time(0, 500)), 500_000);
+}
+
+#[test]
+fn the_order_grows_with_the_values_known() {
+    // One value after the start: a line. Two: a parabola; 100 + (200 - 50)/2 + 50/4 = 187.5.
+    assert_eq!(position_at(&mut fed(&[100]), time(0, 250)), 25);
+    assert_eq!(position_at(&mut fed(&[100, 300]), time(1, 500)), 188);
+}
+
+#[test]
+fn a_segment_begins_at_its_own_time_and_not_when_it_arrives() {
+    let mut interpolator = fed(&[1_000, 2_000, 3_000]);
+    for (periods, part, expected) in
+        [(0, 0, 0), (0, 500, 500), (1, 0, 1_000), (1, 999, 1_999), (2, 500, 2_500)]
+    {
+        assert_eq!(position_at(&mut interpolator, time(periods, part)), expected, "{periods}.{part}");
+    }
+}
+
+#[test]
+fn before_the_first_update_the_start_is_held() {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 1);
+    interpolator.start(Some(Position(42)));
+    let fine = interpolator.at(time(1_000, 0));
+    assert_eq!((fine.set_points, fine.quality), (position(42), Quality::Waiting));
+}
+
+#[test]
+fn immediate_takes_updates_as_they_come() {
+    let mut interpolator = interpolator(TargetUpdate::Immediate, 1);
+    interpolator.start(Some(Position(0)));
+    interpolator.update(time(0, 0), &position(500)).unwrap();
+    for part in [0, 500, 1_000, 2_000] {
+        let fine = interpolator.at(time(0, part));
+        assert_eq!((fine.set_points.position, fine.quality), (Some(Position(500)), Quality::Fresh), "{part}");
+        assert_eq!(fine.set_points.velocity, Some(Velocity(0)));
+    }
+    interpolator.update(time(1, 0), &position(-500)).unwrap();
+    assert_eq!(position_at(&mut interpolator, time(1, 0)), -500);
+    assert_eq!(interpolator.at(time(3, 1)).quality, Quality::Extrapolated { periods: 1 });
+    assert_eq!(interpolator.at(time(4, 1)).quality, Quality::Lost);
+}
+
+/// Updates stop: the polynomial goes on for the stated periods, then everything stands and says so.
+#[test]
+fn a_loss_is_ridden_through_and_then_held() {
+    for (update, usual) in [(TargetUpdate::Extrapolate, 1), (TargetUpdate::Interpolate, 0)] {
+        for allowed in 0..=MAX_EXTRAPOLATION {
+            let mut interpolator = interpolator(update, allowed);
+            interpolator.start(Some(Position(0)));
+            for target in 1..=5 {
+                interpolator.update(time(target, 0), &position(target * 1_000)).unwrap();
+            }
+            let last = 5 + usual + i64::from(allowed);
+            let mut highest = 0;
+            for step in 0..20_000 {
+                let now = time(4, step);
+                let fine = interpolator.at(now);
+                let beyond = now.since(time(5 + usual, 0)).0.max(0);
+                let overdue = u32::try_from((beyond + PERIOD.0 - 1) / PERIOD.0).unwrap();
+                let quality = match overdue {
+                    0 => Quality::Fresh,
+                    periods if periods <= allowed => Quality::Extrapolated { periods },
+                    _ => Quality::Lost,
+                };
+                assert_eq!(fine.quality, quality, "{update} {allowed} {step}");
+                let moved = fine.set_points.position.unwrap().0;
+                assert!(moved >= highest && moved <= last * 1_000, "{update} {allowed} {step}: {moved}");
+                highest = moved;
+                let speed = if quality == Quality::Lost { 0 } else { 500_000 };
+                assert_eq!(fine.set_points.velocity, Some(Velocity(speed)), "{update} {allowed} {step}");
+            }
+            assert_eq!(highest, last * 1_000, "goes on to the limit and not beyond");
+            assert_eq!(
+                interpolator.at(time(4, 0)).set_points.position,
+                Some(Position(highest)),
+                "time stepped back"
+            );
+            assert_eq!(interpolator.update(time(30, 0), &position(0)), Err(UpdateError::Lost));
+            interpolator.start(Some(Position(9)));
+            assert_eq!(interpolator.update(time(30, 0), &position(9)), Ok(()));
+        }
+    }
+}
+
+#[test]
+fn velocity_and_torque_go_to_zero_after_a_loss() {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 0);
+    interpolator.start(None);
+    let set_points =
+        SetPoints { velocity: Some(Velocity(9)), torque: Some(Torque(8)), ..SetPoints::default() };
+    interpolator.update(time(1, 0), &set_points).unwrap();
+    assert_eq!(interpolator.at(time(1, 0)).set_points, set_points);
+    let expected = SetPoints { velocity: Some(Velocity(0)), torque: Some(Torque(0)), ..SetPoints::default() };
+    assert_eq!(interpolator.at(time(1, 1)).set_points, expected);
+}
+
+#[test]
+fn a_lost_update_is_bridged() {
+    let mut interpolator = fed(&[1_000, 2_000, 3_000]);
+    // Target 4 never comes; 5 does, while the polynomial is still being followed.
+    assert_eq!(interpolator.at(time(3, 500)).quality, Quality::Extrapolated { periods: 1 });
+    interpolator.update(time(5, 0), &position(5_000)).unwrap();
+    for (periods, part, expected) in [(3, 500, 3_500), (4, 0, 4_000), (4, 500, 4_500), (5, 0, 5_000)] {
+        let fine = interpolator.at(time(periods, part));
+        assert_eq!(fine.set_points.position, Some(Position(expected)), "{periods}.{part}");
+        assert_eq!(fine.quality, Quality::Fresh);
+    }
+}
+
+#[test]
+fn stamps_that_cannot_be_right_are_refused_and_leave_no_trace() {
+    let mut interpolator = fed(&[1_000, 2_000, 3_000]);
+    let last = time(3, 0);
+    for target in [time(3, 0), time(2, 0), time(3, 499)] {
+        let refused = interpolator.update(target, &position(9_999));
+        assert_eq!(refused, Err(UpdateError::NotNewer { last, target }));
+    }
+    let target = time(3 + MAX_GAP + 1, 0);
+    assert_eq!(interpolator.update(target, &position(9_999)), Err(UpdateError::Gap { last, target }));
+    let target = SystemTime::MAX;
+    assert_eq!(interpolator.update(target, &position(9_999)), Err(UpdateError::Gap { last, target }));
+    assert_eq!(interpolator.update(time(4, 0), &position(i64::MAX)), Err(UpdateError::Jump));
+    interpolator.update(time(4, 0), &position(4_000)).unwrap();
+    assert_eq!(position_at(&mut interpolator, time(3, 500)), 3_500);
+}
+
+#[test]
+fn a_step_of_the_system_time_moves_nothing() {
+    let step = DurationNs::from_secs(37);
+    let (mut plain, mut shifted) = (fed(&[60, 240, 600]), fed(&[60, 240, 600]));
+    shifted.shift(step);
+    for part in (0..3_000).step_by(111) {
+        assert_eq!(plain.at(time(0, part)), shifted.at(time(0, part) + step));
+    }
+}
+
+#[test]
+fn commands_carry_set_points_both_ways() {
+    let mut command =
+        AxisCommand { position: Position(5), present: CommandSet::POSITION, ..AxisCommand::default() };
+    assert_eq!(SetPoints::from(&command), position(5));
+    SetPoints { velocity: Some(Velocity(6)), ..SetPoints::default() }.write_to(&mut command);
+    assert_eq!(
+        (command.position, command.velocity, command.present),
+        (Position(5), Velocity(6), CommandSet::VELOCITY)
+    );
+}
+
+proptest! {
+    /// Whatever comes, at each target the value is exactly the one sent, and neighbouring segments meet.
+    #[test]
+    fn every_target_is_met(steps in prop::collection::vec(-(1_i64 << 40)..1 << 40, 1..30)) {
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 0);
+        interpolator.start(Some(Position(0)));
+        let mut value = 0;
+        for (target, step) in (1..).zip(steps) {
+            let before = value;
+            value += step;
+            interpolator.update(time(target, 0), &position(value)).unwrap();
+            prop_assert_eq!(position_at(&mut interpolator, time(target - 1, 0)), before);
+            prop_assert_eq!(position_at(&mut interpolator, time(target, 0)), value);
+        }
+    }
+
+    /// The fixed point stays within a nanounit of the polynomial in doubles where doubles are good enough.
+    #[test]
+    fn the_fixed_point_is_accurate(values in prop::array::uniform4(-(1_i64 << 34)..1 << 34), part in 0..1_000_i64) {
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+        interpolator.start(Some(Position(values[0])));
+        for (target, value) in (1..).zip(&values[1..]) {
+            interpolator.update(time(target, 0), &position(*value)).unwrap();
+        }
+        let [p3, p2, p1, p0] = values.map(cast::f64_from_i64);
+        let s = cast::f64_from_i64(part) / 1000.0;
+        let (d1, d2, d3) = (p0 - p1, p0 - 2.0 * p1 + p2, p0 - 3.0 * p1 + 3.0 * p2 - p3);
+        let exact = p1 + (d1 - d2 / 2.0 - d3 / 6.0) * s + d2 / 2.0 * s * s + d3 / 6.0 * s * s * s;
+        let fine = position_at(&mut interpolator, time(2, part));
+        prop_assert!((cast::f64_from_i64(fine) - exact).abs() <= 1.0, "{fine} {exact}");
+    }
+
+    /// Nothing that comes off a wire makes it panic.
+    #[test]
+    fn any_input_is_survived(
+        updates in prop::collection::vec((any::<u64>(), any::<i64>(), any::<i64>()), 1..40), spread in 0..64_u32,
+    ) {
+        let mut interpolator = interpolator(TargetUpdate::Extrapolate, MAX_EXTRAPOLATION);
+        interpolator.start(Some(Position(0)));
+        for (time, place, speed) in updates {
+            let time = SystemTime(time >> spread);
+            let set_points = SetPoints {
+                position: Some(Position(place >> (spread / 2))),
+                velocity: Some(Velocity(speed >> (spread / 2))),
+                ..SetPoints::default()
+            };
+            if interpolator.update(time, &set_points) == Err(UpdateError::Lost) {
+                interpolator.start(None);
+            }
+            interpolator.at(time);
+            interpolator.shift(DurationNs(speed));
+            interpolator.at(SystemTime(time.0.wrapping_mul(3)));
+        }
+    }
+}
