@@ -2,6 +2,7 @@
 
 pub mod capture;
 pub mod config;
+pub mod decode;
 pub mod latest;
 pub mod modbus;
 pub mod status;

@@ -1,0 +1,216 @@
+//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, and SERCOS III.
+//!
+//! A frame is understood with what came before it: TCP streams are put together, class-1 data are known by the
+//! Forward_Open that opened their connection, SERCOS telegrams by the layout that the master wrote over the service channel.
+//! So every frame is read, also those that are not printed; none is kept.
+
+mod connections;
+mod ethernet_ip;
+mod explicit;
+mod packet;
+mod stream;
+mod text;
+
+use std::io::{self, Read, Write};
+
+use profile_sercos::wire::describe::{DecodeContext, Names, describe};
+use thiserror::Error;
+
+use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
+use crate::sys::clock::KernelTime;
+
+use ethernet_ip::EtherNetIp;
+use packet::Packet;
+use text::Text;
+
+/// SERCOS buses told apart by the interface they were recorded on; frames of further ones share the last place.
+const BUSES_MAX: usize = 8;
+
+/// One of the protocols that can be chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Protocol {
+    /// EtherNet/IP, CIP, CIP Motion.
+    EtherNetIp,
+    /// SERCOS III.
+    Sercos,
+    /// Everything else; one line tells what it is.
+    Other,
+}
+
+/// What to print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Number of the first frame to print, from 1.
+    pub first: u64,
+    /// Number of the last frame to print; reading ends there.
+    pub last: u64,
+    /// Print only this protocol.
+    pub only: Option<Protocol>,
+    /// Print no more lines than this.
+    pub lines_max: u64,
+}
+
+impl Default for Options {
+    /// Everything.
+    fn default() -> Self {
+        Self { first: 1, last: u64::MAX, only: None, lines_max: u64::MAX }
+    }
+}
+
+/// What was read and printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Frames read.
+    pub frames: u64,
+    /// Frames printed.
+    pub printed: u64,
+    /// Whether printing ended because of [`Options::lines_max`].
+    pub cut: bool,
+}
+
+/// Why decoding ended.
+#[derive(Debug, Error)]
+pub enum DecodeError {
+    /// The recording cannot be read on.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The text cannot be written.
+    #[error("cannot write: {0}")]
+    Write(#[source] io::Error),
+}
+
+/// Reads a recording to its end, or the last frame asked for, and prints it.
+///
+/// `names` gives the names and lengths of SERCOS parameters.
+///
+/// # Errors
+/// [`DecodeError`]; what came before has been printed.
+pub fn decode<R: Read>(
+    mut reader: Reader<R>,
+    options: &Options,
+    names: &dyn Names,
+    out: &mut dyn Write,
+) -> Result<Summary, DecodeError> {
+    let mut decoder = Decoder::new(names);
+    let mut summary = Summary::default();
+    let mut lines_left = options.lines_max;
+    while let Some(frame) = reader.next_frame()? {
+        if frame.number > options.last {
+            break;
+        }
+        summary.frames = frame.number;
+        let protocol = decoder.frame(&frame);
+        let wanted = options.only.is_none_or(|only| only == protocol);
+        if frame.number < options.first || !wanted {
+            continue;
+        }
+        if lines_left == 0 {
+            summary.cut = true;
+            break;
+        }
+        summary.printed += 1;
+        for line in decoder.text.as_str().lines() {
+            if lines_left == 0 {
+                summary.cut = true;
+                break;
+            }
+            writeln!(out, "{line}").map_err(DecodeError::Write)?;
+            lines_left -= 1;
+        }
+    }
+    Ok(summary)
+}
+
+struct Decoder<'n> {
+    names: &'n dyn Names,
+    buses: Vec<(u32, DecodeContext<'n>)>,
+    ethernet_ip: EtherNetIp,
+    start: Option<KernelTime>,
+    text: Text,
+}
+
+impl<'n> Decoder<'n> {
+    fn new(names: &'n dyn Names) -> Self {
+        Self {
+            names,
+            buses: Vec::new(),
+            ethernet_ip: EtherNetIp::default(),
+            start: None,
+            text: Text::default(),
+        }
+    }
+
+    /// Reads a frame and leaves its tree in `self.text`.
+    fn frame(&mut self, frame: &Frame<'_>) -> Protocol {
+        self.text.clear();
+        self.heading(frame);
+        if frame.link_type != LINK_TYPE_ETHERNET {
+            self.text.append(format_args!("link type {} is not Ethernet", frame.link_type));
+            return Protocol::Other;
+        }
+        let protocol = match packet::parse(frame.data) {
+            Packet::Sercos => {
+                self.text.append(format_args!("SERCOS III"));
+                self.comment(frame);
+                let tree = describe(frame.data, self.bus(frame.interface));
+                self.text.block(1, &tree);
+                Protocol::Sercos
+            }
+            Packet::Udp { from, to, payload } => {
+                self.text.append(format_args!("UDP {from} -> {to}"));
+                self.comment(frame);
+                self.ethernet_ip.datagram(from, to, payload, &mut self.text)
+            }
+            Packet::Tcp(segment) => {
+                self.text.append(format_args!("TCP {} -> {}", segment.from, segment.to));
+                self.comment(frame);
+                self.ethernet_ip.segment(&segment, &mut self.text)
+            }
+            Packet::Other(what) => {
+                self.text.append(format_args!("{what}"));
+                self.comment(frame);
+                Protocol::Other
+            }
+        };
+        let lost = usize::try_from(frame.original_len).unwrap_or(usize::MAX).saturating_sub(frame.data.len());
+        if lost > 0 {
+            self.text.line(1, format_args!("cut in the recording: {lost} bytes are missing"));
+        }
+        protocol
+    }
+
+    fn heading(&mut self, frame: &Frame<'_>) {
+        self.text.line(0, format_args!("frame {}", frame.number));
+        if let Some(at) = frame.at {
+            let start = self.start.get_or_insert(at).0;
+            let since = at.0.abs_diff(start);
+            let sign = if at.0 < start { "-" } else { "" };
+            let (seconds, rest) = (since / 1_000_000_000, since % 1_000_000_000);
+            self.text.append(format_args!("at {sign}{seconds}.{rest:09} s"));
+        }
+        if let Some(name) = frame.interface_name {
+            self.text.append(format_args!("on {}", name.escape_debug()));
+        }
+        self.text.append(format_args!("{} bytes:", frame.original_len));
+    }
+
+    fn comment(&mut self, frame: &Frame<'_>) {
+        if let Some(comment) = frame.comment {
+            self.text.line(1, format_args!("comment: {}", comment.escape_debug()));
+        }
+    }
+
+    fn bus(&mut self, interface: u32) -> &mut DecodeContext<'n> {
+        let known = self.buses.iter().position(|(id, _)| *id == interface);
+        let index = known.unwrap_or_else(|| {
+            if self.buses.len() < BUSES_MAX {
+                self.buses.push((interface, DecodeContext::new(self.names)));
+            }
+            self.buses.len() - 1
+        });
+        &mut self.buses[index].1
+    }
+}
+
+#[cfg(test)]
+mod tests;
