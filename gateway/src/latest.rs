@@ -1,9 +1,10 @@
 //! A cell that holds the latest value: one writer that never waits, any number of readers.
 //!
-//! The writer is the cycle thread, the readers are servers. A value is stored as 64-bit words in atomics, guarded by
-//! a sequence number that is odd while the words change (a sequence lock): a reader that saw the number change
-//! reads again. No reader can hold up the writer, nothing is allocated after construction, and there is no unsafe code,
-//! because torn words are plain numbers that are thrown away before they are looked at.
+//! The writer is the cycle thread, the readers are servers. A value is stored as 64-bit words in atomics,
+//! guarded by a sequence number that is odd while the words change (a sequence lock): a reader that saw the
+//! number change reads again. No reader can hold up the writer, nothing is allocated after construction, and
+//! there is no unsafe code, because torn words are plain numbers that are thrown away before they are looked
+//! at.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering, fence};

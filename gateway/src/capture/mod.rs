@@ -1,7 +1,8 @@
 //! Recordings: writing and reading pcapng files, and dressing up socket payloads as frames.
 //!
-//! A box sees whole Ethernet frames only on the south side. North of it there are UDP and TCP sockets; [`synth`] puts
-//! the headers around their payloads that the network had there, so that any protocol analyser dissects the file.
+//! A box sees whole Ethernet frames only on the south side. North of it there are UDP and TCP sockets;
+//! [`synth`] puts the headers around their payloads that the network had there, so that any protocol analyser
+//! dissects the file.
 
 pub mod reader;
 pub mod recorder;

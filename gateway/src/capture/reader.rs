@@ -1,13 +1,14 @@
 //! Reads pcap and pcapng files, one frame at a time.
 //!
-//! Only the frame at hand is held. Nothing is allocated by a length in the file before as many bytes have been read, and
-//! every error says at which offset of the file what was expected and what was found.
+//! Only the frame at hand is held. Nothing is allocated by a length in the file before as many bytes have
+//! been read, and every error says at which offset of the file what was expected and what was found.
 //!
-//! pcap: global header of 24 bytes (magic number, version, zone, accuracy, snap length, link type), then for each frame
-//! seconds, fraction (microseconds or nanoseconds by the magic number), captured length, original length, data.
+//! pcap: global header of 24 bytes (magic number, version, zone, accuracy, snap length, link type), then for
+//! each frame seconds, fraction (microseconds or nanoseconds by the magic number), captured length, original
+//! length, data.
 //!
-//! pcapng: blocks of type, length, body, length again. Read are section headers, interface descriptions, enhanced,
-//! simple and (obsolete) plain packets; all others are passed over.
+//! pcapng: blocks of type, length, body, length again. Read are section headers, interface descriptions,
+//! enhanced, simple and (obsolete) plain packets; all others are passed over.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};

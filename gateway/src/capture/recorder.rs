@@ -1,8 +1,9 @@
 //! Records what the box sends and receives, without the cycle thread ever waiting for a disk.
 //!
-//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one writer thread. Pushing copies the bytes and
-//! returns; when the queue is full the record is dropped and counted. The writer thread takes the oldest
-//! record of all taps, dresses socket payloads up as frames ([`super::synth`]) and writes the file, up to a limit of bytes.
+//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one writer thread. Pushing copies
+//! the bytes and returns; when the queue is full the record is dropped and counted. The writer thread takes
+//! the oldest record of all taps, dresses socket payloads up as frames ([`super::synth`]) and writes the
+//! file, up to a limit of bytes.
 
 use std::fs::File;
 use std::io;
@@ -164,7 +165,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates the file and starts the writer thread with `taps` taps, in the order in which they are returned.
+    /// Creates the file and starts the writer thread with `taps` taps, in the order in which they are
+    /// returned.
     ///
     /// # Errors
     /// The file cannot be created, or the thread not started.
@@ -312,8 +314,8 @@ mod tests {
         let path = path("merge");
         let settings = Settings::new(&path);
         let (recorder, mut taps) = Recorder::start(settings, 2).unwrap();
-        // Held back by the lock-step of this thread: the writer may take either tap first, so push the later first
-        // only where it is of the same tap.
+        // Held back by the lock-step of this thread: the writer may take either tap first, so push the later
+        // first only where it is of the same tap.
         let [cycle, supervisor] = &mut taps[..] else { panic!() };
         supervisor.opened(KernelTime(10), CLIENT, SERVER);
         supervisor.stream(KernelTime(20), CLIENT, SERVER, &[1; 1461]);

@@ -1,15 +1,16 @@
 //! Puts Ethernet, IPv4 and UDP or TCP headers around payloads seen at a socket.
 //!
-//! The frames are such as the network carried, as far as a socket can know: right lengths and checksums; for TCP a
-//! handshake, sequence and acknowledge numbers without gaps in each stream, so that an analyser reassembles it. The Ethernet
-//! addresses are made from the IP addresses (locally administered `02:00` and the four bytes), identification
-//! and initial sequence numbers are counted.
+//! The frames are such as the network carried, as far as a socket can know: right lengths and checksums; for
+//! TCP a handshake, sequence and acknowledge numbers without gaps in each stream, so that an analyser
+//! reassembles it. The Ethernet addresses are made from the IP addresses (locally administered `02:00` and
+//! the four bytes), identification and initial sequence numbers are counted.
 
 use std::net::SocketAddrV4;
 
 use thiserror::Error;
 
-/// Streams tracked at once; the one silent for the longest makes room for a new one, and starts anew when it speaks.
+/// Streams tracked at once; the one silent for the longest makes room for a new one, and starts anew when it
+/// speaks.
 pub const STREAMS_MAX: usize = 64;
 
 /// The longest payload of a TCP segment: a 1500-byte packet less two headers of 20 bytes.
@@ -124,7 +125,8 @@ impl Synthesizer {
         self.segment(index, 0, ACK, &[], emit);
     }
 
-    /// Bytes of a stream, in as many segments as they need. A stream that was not opened is opened first, `from` as client.
+    /// Bytes of a stream, in as many segments as they need. A stream that was not opened is opened first,
+    /// `from` as client.
     pub fn tcp_data(
         &mut self,
         from: SocketAddrV4,
@@ -260,7 +262,8 @@ fn transport_checksum(
     fold(sum(total, payload))
 }
 
-/// Adds 16-bit words; an odd last byte counts as the high half of one. Only the last part of a sum may be odd.
+/// Adds 16-bit words; an odd last byte counts as the high half of one. Only the last part of a sum may be
+/// odd.
 fn sum(start: u32, bytes: &[u8]) -> u32 {
     bytes.chunks(2).fold(start, |total, pair| {
         let low = pair.get(1).copied().unwrap_or(0);
@@ -383,12 +386,17 @@ mod tests {
             let mut synth = Synthesizer::new();
             let (from, to) = (at(1, port), at(2, 44_818));
             let frames = collect(|emit| {
-                if udp { synth.udp(from, to, 0, &payload, emit).unwrap() } else { synth.tcp_data(from, to, &payload, emit) }
+                if udp {
+                    synth.udp(from, to, 0, &payload, emit).unwrap();
+                } else {
+                    synth.tcp_data(from, to, &payload, emit);
+                }
             });
             for frame in frames {
                 prop_assert_eq!(fold(sum(0, &frame[14..34])), 0);
                 let segment = &frame[34..];
-                let pseudo = sum(sum(0, &frame[26..34]), &[0, frame[23]]) + u32::try_from(segment.len()).unwrap();
+                let length = u32::try_from(segment.len()).unwrap();
+                let pseudo = sum(sum(0, &frame[26..34]), &[0, frame[23]]) + length;
                 prop_assert_eq!(fold(sum(pseudo, segment)), 0);
             }
         }

@@ -82,8 +82,8 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// What the destination says.
     pub fn statistics(&mut self, side: Side, at: KernelTime, seen: u64, dropped: u64) -> io::Result<()> {
-        // The format has the high half first whatever the byte order; the library writes one 64-bit number, which
-        // in a little endian file is the low half first.
+        // The format has the high half first whatever the byte order; the library writes one 64-bit number,
+        // which in a little endian file is the low half first.
         let timestamp = at.0.rotate_left(32);
         self.block(InterfaceStatisticsBlock {
             interface_id: side.number(),

@@ -57,7 +57,8 @@ pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
     }
 }
 
-/// Collects problems. A method returns `None` when it has reported one: the rest of the file is still checked.
+/// Collects problems. A method returns `None` when it has reported one: the rest of the file is still
+/// checked.
 #[derive(Default)]
 struct Checker {
     problems: Vec<Problem>,

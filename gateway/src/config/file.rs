@@ -1,7 +1,7 @@
 //! The file as it is written. Every key that is not listed here is an error.
 //!
-//! Times are strings with a unit: `"2 ms"`, `"31.25 us"`, `"31250 ns"`, `"1 s"`. Names are 1 to 32 letters, digits, `-`
-//! and `_`. Positions count in axis units: revolutions or millimetres.
+//! Times are strings with a unit: `"2 ms"`, `"31.25 us"`, `"31250 ns"`, `"1 s"`. Names are 1 to 32 letters,
+//! digits, `-` and `_`. Positions count in axis units: revolutions or millimetres.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -41,7 +41,8 @@ pub struct BoxTable {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeTable {
-    /// Where system time comes from. Default: `"host"`, the host's clock (TAI where the kernel knows the offset from UTC).
+    /// Where system time comes from. Default: `"host"`, the host's clock (TAI where the kernel knows the
+    /// offset from UTC).
     pub source: Option<Spanned<String>>,
 }
 
@@ -67,7 +68,8 @@ pub struct ModbusTable {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MappingsTable {
-    /// A folder of dictionaries and mapping tables used in place of the built-in ones; counts from the folder of this file.
+    /// A folder of dictionaries and mapping tables used in place of the built-in ones; counts from the folder
+    /// of this file.
     pub dir: Spanned<String>,
 }
 
@@ -83,8 +85,8 @@ pub struct DeviceTable {
     pub axes: Spanned<Vec<Spanned<String>>>,
     /// What it calls itself.
     pub identity: IdentityTable,
-    /// Drive Power Structure Class ID (class attribute 34); controllers may ask for it when they connect. Default: 0, each axis has
-    /// its own.
+    /// Drive Power Structure Class ID (class attribute 34); controllers may ask for it when they connect.
+    /// Default: 0, each axis has its own.
     pub power_structure_class_id: Option<Spanned<i64>>,
     /// The controller update periods (RPI) it accepts.
     pub update_period: Option<UpdatePeriodTable>,
@@ -130,7 +132,8 @@ pub struct AxisTable {
     pub unit: Spanned<String>,
     /// Position counts of the controller in one unit, 1 to 2147483647. Default: 1000000.
     pub motion_resolution: Option<Spanned<i64>>,
-    /// For an axis without ends: position counts after which it is at its start again, 1 to 2147483647. Default: an axis with ends.
+    /// For an axis without ends: position counts after which it is at its start again, 1 to 2147483647.
+    /// Default: an axis with ends.
     pub unwind_counts: Option<Spanned<i64>>,
     /// Drive Power Structure Axis ID (attribute 725). Default: 0.
     pub power_structure_axis_id: Option<Spanned<i64>>,
@@ -174,16 +177,18 @@ pub struct SouthTable {
 pub struct SercosTable {
     /// Network interface of the bus, such as `"enp3s0"`, or `"in-process"` for simulated drives.
     pub interface: Spanned<String>,
-    /// Communication cycle: `31.25 us`, `62.5 us`, `125 us`, `250 us`, or a multiple of `250 us` up to `65 ms`.
+    /// Communication cycle: `31.25 us`, `62.5 us`, `125 us`, `250 us`, or a multiple of `250 us` up to `65
+    /// ms`.
     pub cycle_time: Spanned<String>,
     /// Ethernet address the master sends from, such as `"02:00:00:00:00:01"`. Default: the interface's own.
     pub master_mac: Option<Spanned<String>>,
-    /// How far the start of a cycle may lie off its time, `1 us` to a quarter of the cycle; declared to the slaves. Default: `"50 us"`,
-    /// or a quarter of the cycle where that is shorter.
+    /// How far the start of a cycle may lie off its time, `1 us` to a quarter of the cycle; declared to the
+    /// slaves. Default: `"50 us"`, or a quarter of the cycle where that is shorter.
     pub jitter: Option<Spanned<String>>,
     /// Cycles for which topology and addresses must stay the same in phase 0, 1 to 1000. Default: 100.
     pub cp0_stable_cycles: Option<Spanned<i64>>,
-    /// Cycles in a row that may be lost in phases 3 and 4 before a slave or the master gives up, 1 to 65535. Default: 5.
+    /// Cycles in a row that may be lost in phases 3 and 4 before a slave or the master gives up, 1 to 65535.
+    /// Default: 5.
     pub allowed_losses: Option<Spanned<i64>>,
     /// What to ask of the kernel for the cycle thread; refusals are reported and do not stop the box.
     pub realtime: Option<RealtimeTable>,
@@ -211,8 +216,8 @@ pub struct DriveTable {
     pub name: Spanned<String>,
     /// SERCOS address, 1 to 511, unique.
     pub address: Spanned<i64>,
-    /// How the contents of its connections are agreed: `"idn-list"` (S-0-1050.x.6), or `"standard-1"` to `"standard-6"` for a
-    /// telegram of the drive profile (S-0-0015). Default: `"idn-list"`.
+    /// How the contents of its connections are agreed: `"idn-list"` (S-0-1050.x.6), or `"standard-1"` to
+    /// `"standard-6"` for a telegram of the drive profile (S-0-0015). Default: `"idn-list"`.
     pub telegram: Option<Spanned<String>>,
     /// Mapping overlays for this drive, applied in this order. Default: none.
     pub overlays: Option<Vec<Spanned<String>>>,

@@ -66,7 +66,8 @@ impl Connections {
         self.0.retain(|connection| connection.opening.triad != *triad);
     }
 
-    /// The connection of a datagram. Targets choose their IDs alone, so the ends must fit as well; a T->O datagram may be multicast.
+    /// The connection of a datagram. Targets choose their IDs alone, so the ends must fit as well; a T->O
+    /// datagram may be multicast.
     pub fn find(&self, id: u32, from: Ipv4Addr, to: Ipv4Addr) -> Option<(Connection, Direction)> {
         self.0.iter().rev().find_map(|connection| {
             if connection.o_to_t_id == id && connection.originator == from && connection.target == to {

@@ -209,7 +209,8 @@ fn inner_reply(bytes: &[u8], level: usize, text: &mut Text) {
     }
 }
 
-/// Prints class-1 data. `expected` is whether the connection is known to be one of CIP Motion, or `None` when its opening was not seen.
+/// Prints class-1 data. `expected` is whether the connection is known to be one of CIP Motion, or `None` when
+/// its opening was not seen.
 pub(super) fn class1(datagram: &Class1Datagram<'_>, expected: Option<bool>, level: usize, text: &mut Text) {
     if datagram.data.is_empty() {
         return;
@@ -265,7 +266,8 @@ fn forward_open(open: &ForwardOpen<'_>, level: usize, text: &mut Text) {
     }
 }
 
-/// The service block's tree without its first line, which names a transaction that explicit messages do not have.
+/// The service block's tree without its first line, which names a transaction that explicit messages do not
+/// have.
 fn motion_body(tree: &str, level: usize, text: &mut Text) {
     for line in tree.lines().skip(1) {
         text.line(level, format_args!("{}", line.trim_start()));

@@ -1,8 +1,9 @@
-//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, and SERCOS III.
+//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, and SERCOS
+//! III.
 //!
-//! A frame is understood with what came before it: TCP streams are put together, class-1 data are known by the
-//! Forward_Open that opened their connection, SERCOS telegrams by the layout that the master wrote over the service channel.
-//! So every frame is read, also those that are not printed; none is kept.
+//! A frame is understood with what came before it: TCP streams are put together, class-1 data are known by
+//! the Forward_Open that opened their connection, SERCOS telegrams by the layout that the master wrote over
+//! the service channel. So every frame is read, also those that are not printed; none is kept.
 
 mod connections;
 mod ethernet_ip;
@@ -23,7 +24,8 @@ use ethernet_ip::EtherNetIp;
 use packet::Packet;
 use text::Text;
 
-/// SERCOS buses told apart by the interface they were recorded on; frames of further ones share the last place.
+/// SERCOS buses told apart by the interface they were recorded on; frames of further ones share the last
+/// place.
 const BUSES_MAX: usize = 8;
 
 /// One of the protocols that can be chosen.

@@ -1,7 +1,7 @@
 //! Puts the bytes of TCP streams together, in order, each direction for itself.
 //!
-//! What has arrived again is passed over; after a gap the stream is read anew from the segment behind it, which is taken
-//! to begin with a message.
+//! What has arrived again is passed over; after a gap the stream is read anew from the segment behind it,
+//! which is taken to begin with a message.
 
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;
@@ -43,7 +43,8 @@ pub(super) enum Arrival {
 pub(super) struct Streams(VecDeque<Direction>);
 
 impl Streams {
-    /// Takes a segment in; the bytes not yet consumed of its direction are given to `read`, which returns how many it used.
+    /// Takes a segment in; the bytes not yet consumed of its direction are given to `read`, which returns how
+    /// many it used.
     pub fn segment(&mut self, segment: &Segment<'_>, mut read: impl FnMut(Arrival, &[u8]) -> usize) {
         let known = self.0.iter().position(|known| known.from == segment.from && known.to == segment.to);
         let mut direction = known.and_then(|index| self.0.remove(index)).unwrap_or_else(|| Direction {

@@ -1,7 +1,7 @@
 //! The register map: which register holds what.
 //!
-//! `docs/modbus.md` holds the same tables; a test compares them. Numbers of more than one register begin with the
-//! most significant one. Registers that are not in the table read 0.
+//! `docs/modbus.md` holds the same tables; a test compares them. Numbers of more than one register begin with
+//! the most significant one. Registers that are not in the table read 0.
 
 use crate::config::AXES_MAX;
 use crate::status::{AxisStatus, BoxStatus, mode_code, state_code};

@@ -1,8 +1,9 @@
 //! A read-only Modbus TCP server with the state of the box and its axes.
 //!
-//! Input registers and holding registers show the same [`map`]. Whatever would write is answered with *illegal
-//! function*, an address outside the map with *illegal data address*, a count of 0 or above 125 with *illegal data value*.
-//! Any unit identifier is answered. One request sees one status: its registers belong together.
+//! Input registers and holding registers show the same [`map`]. Whatever would write is answered with
+//! *illegal function*, an address outside the map with *illegal data address*, a count of 0 or above 125 with
+//! *illegal data value*. Any unit identifier is answered. One request sees one status: its registers belong
+//! together.
 
 pub mod map;
 mod server;

@@ -6,9 +6,10 @@
 //! | [`SystemClock::now`] | `CLOCK_TAI`, else `CLOCK_REALTIME` | CIP Sync system time |
 //! | [`KernelTime`] | `CLOCK_REALTIME` | the kernel's receive time stamps |
 //!
-//! CIP Sync counts the seconds of TAI. The kernel knows the offset from UTC to TAI only when a time daemon has told
-//! it (`ptp4l`, `phc2sys`, `chronyd` with `leapsectz`). Without one the offset is zero and `CLOCK_TAI` would be UTC
-//! under another name; [`SystemClock::detect`] says which of the two it found, so that the box can report it.
+//! CIP Sync counts the seconds of TAI. The kernel knows the offset from UTC to TAI only when a time daemon
+//! has told it (`ptp4l`, `phc2sys`, `chronyd` with `leapsectz`). Without one the offset is zero and
+//! `CLOCK_TAI` would be UTC under another name; [`SystemClock::detect`] says which of the two it found, so
+//! that the box can report it.
 #![allow(unsafe_code)]
 
 use std::fmt;
@@ -89,7 +90,8 @@ impl fmt::Display for TimeScale {
 
 /// The host's clock as CIP Sync system time.
 ///
-/// The scale is looked up once: an offset that appears later would step the time by 37 s under a running axis.
+/// The scale is looked up once: an offset that appears later would step the time by 37 s under a running
+/// axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SystemClock {
     scale: TimeScale,

@@ -1,8 +1,8 @@
 //! The operating system: sockets, clocks, scheduling.
 //!
-//! The files in this module are the only ones of the project that contain `unsafe`: each allows it for itself and
-//! gives the reason at each block. Nothing here knows a protocol; nothing here allocates, locks or logs once a
-//! socket is open, so the cycle thread may call any `send`, `recv`, clock or sleep.
+//! The files in this module are the only ones of the project that contain `unsafe`: each allows it for itself
+//! and gives the reason at each block. Nothing here knows a protocol; nothing here allocates, locks or logs
+//! once a socket is open, so the cycle thread may call any `send`, `recv`, clock or sleep.
 //!
 //! Linux only: packet sockets, kernel time stamps and absolute sleeps are taken as Linux has them.
 

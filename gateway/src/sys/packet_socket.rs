@@ -1,7 +1,7 @@
 //! Whole Ethernet frames of one EtherType on one interface (`AF_PACKET`).
 //!
-//! The south bus of a SERCOS box: frames leave past the queueing discipline and arrive with the kernel's time stamp;
-//! frames sent by this host are not seen. Sending and receiving never wait and never allocate.
+//! The south bus of a SERCOS box: frames leave past the queueing discipline and arrive with the kernel's time
+//! stamp; frames sent by this host are not seen. Sending and receiving never wait and never allocate.
 #![allow(unsafe_code)]
 
 use std::ffi::CString;
@@ -87,7 +87,8 @@ pub enum LinkError {
     /// The transmit queue is full or the link has no carrier (`ENOBUFS`, `EAGAIN`).
     #[error("the transmit queue is full or there is no carrier")]
     Full,
-    /// The frame is longer than the interface takes (`EMSGSIZE`), or shorter than an Ethernet header (`EINVAL`).
+    /// The frame is longer than the interface takes (`EMSGSIZE`), or shorter than an Ethernet header
+    /// (`EINVAL`).
     #[error("the frame's length does not suit the interface")]
     Length,
     /// Another error of the system.
@@ -318,8 +319,8 @@ impl AsFd for PacketSocket {
     }
 }
 
-/// `struct ifreq` of Linux, as far as it is used here: `SIOCGIFFLAGS` and `SIOCGIFHWADDR` fill at most 16 bytes after
-/// the name; the kernel copies 40 bytes in and out.
+/// `struct ifreq` of Linux, as far as it is used here: `SIOCGIFFLAGS` and `SIOCGIFHWADDR` fill at most 16
+/// bytes after the name; the kernel copies 40 bytes in and out.
 #[repr(C, align(8))]
 struct InterfaceRequest {
     name: [u8; libc::IFNAMSIZ],

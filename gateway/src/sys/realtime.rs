@@ -1,8 +1,8 @@
 //! Asking the kernel for real-time treatment of the calling thread.
 //!
 //! Every measure may be refused: by missing privilege, by a control group without real-time budget
-//! (`CONFIG_RT_GROUP_SCHED`), by a processor that does not exist. The box then runs on without it, so a refusal is
-//! data in a [`Report`], to be shown, and never an error.
+//! (`CONFIG_RT_GROUP_SCHED`), by a processor that does not exist. The box then runs on without it, so a
+//! refusal is data in a [`Report`], to be shown, and never an error.
 #![allow(unsafe_code)]
 
 use std::fmt;
@@ -44,8 +44,8 @@ pub enum Measure {
     },
     /// Memory locked, including what is allocated later.
     LockMemory,
-    /// Memory locked as far as it is allocated now: the process has a limit on locked memory, and locking what comes
-    /// later would make allocations fail once the limit is reached.
+    /// Memory locked as far as it is allocated now: the process has a limit on locked memory, and locking
+    /// what comes later would make allocations fail once the limit is reached.
     LockPresentMemory,
 }
 
@@ -187,7 +187,8 @@ fn set_affinity(cpu: u16) -> libc::c_int {
         // SAFETY: `cpu` is below the number of bits of the set, checked above.
         unsafe { libc::CPU_SET(cpu, &mut set) };
     }
-    // SAFETY: `set` is valid for the size given; thread 0 is the calling one. An empty set is refused with EINVAL.
+    // SAFETY: `set` is valid for the size given; thread 0 is the calling one. An empty set is refused with
+    // EINVAL.
     unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) }
 }
 

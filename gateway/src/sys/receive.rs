@@ -1,4 +1,5 @@
-//! One `recvmsg` with sender address and the kernel's receive time stamp, shared by the sockets of this module.
+//! One `recvmsg` with sender address and the kernel's receive time stamp, shared by the sockets of this
+//! module.
 #![allow(unsafe_code)]
 
 use std::io;
@@ -55,7 +56,8 @@ pub(super) fn receive<Address: PlainAddress>(
     message.msg_control = control.0.as_mut_ptr().cast();
     message.msg_controllen = control.0.len() as _;
 
-    // SAFETY: name, buffer and control point to writable memory of the lengths given, all alive through the call.
+    // SAFETY: name, buffer and control point to writable memory of the lengths given, all alive through the
+    // call.
     let received = unsafe { libc::recvmsg(socket.as_raw_fd(), &raw mut message, libc::MSG_DONTWAIT) };
     let Ok(len) = usize::try_from(received) else {
         let error = io::Error::last_os_error();
@@ -66,7 +68,8 @@ pub(super) fn receive<Address: PlainAddress>(
     };
 
     let mut at = None;
-    // SAFETY: the kernel has filled `message`; the macros walk only within `msg_controllen` bytes of `control`.
+    // SAFETY: the kernel has filled `message`; the macros walk only within `msg_controllen` bytes of
+    // `control`.
     let mut header = unsafe { libc::CMSG_FIRSTHDR(&raw const message) };
     while !header.is_null() {
         // SAFETY: a header that is not null points into `control`, at a place aligned and long enough for it.

@@ -1,7 +1,8 @@
-//! The UDP socket of class-1 I/O: never waits, marks what it sends as urgent, and knows when each datagram came.
+//! The UDP socket of class-1 I/O: never waits, marks what it sends as urgent, and knows when each datagram
+//! came.
 //!
-//! EtherNet/IP's implicit messages go from and to port 2222 at both ends. Two ends on one host work when each binds an
-//! address of its own, which is why the address is always given and `SO_REUSEADDR` is set.
+//! EtherNet/IP's implicit messages go from and to port 2222 at both ends. Two ends on one host work when each
+//! binds an address of its own, which is why the address is always given and `SO_REUSEADDR` is set.
 #![allow(unsafe_code)]
 
 use std::io;
