@@ -1,6 +1,6 @@
 //! The configuration file of the box: TOML in, a checked [`Config`] out.
 //!
-//! [`file`] is the file as it is written: every key, what it means, its default. [`check`] turns it into the
+//! [`mod@file`] is the file as it is written: every key, what it means, its default. `check` turns it into the
 //! types below, in which every reference is an index and every value is in range, or into a [`ConfigError`]
 //! that shows each fault at its line.
 
