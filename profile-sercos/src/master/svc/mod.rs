@@ -83,6 +83,8 @@ pub(crate) struct ServiceChannel {
     active: Option<(usize, Transfer, bool)>,
     missing_cycles: u16,
     busy_since: Option<MonotonicTime>,
+    /// The slave was through with everything in the last cycle.
+    free: bool,
     slots: [Slot; REQUESTS_MAX + 1],
     serial: u64,
 }
@@ -96,6 +98,7 @@ impl ServiceChannel {
             active: None,
             missing_cycles: 0,
             busy_since: None,
+            free: false,
             slots: core::array::from_fn(|_| Slot::empty()),
             serial: 0,
         }
@@ -120,6 +123,11 @@ impl ServiceChannel {
     /// Permits or stops new requests. A request on the wire goes on.
     pub fn set_open(&mut self, open: bool) {
         self.open = open;
+    }
+
+    /// Whether a request is on the wire.
+    pub fn is_running(&self) -> bool {
+        self.active.is_some()
     }
 
     /// Whether nothing is on the wire and nothing waits.
@@ -179,6 +187,7 @@ impl ServiceChannel {
     /// Ends every request with `failure`.
     pub fn abort(&mut self, failure: SvcFailure) {
         self.active = None;
+        self.free = false;
         for slot in &mut self.slots {
             if matches!(slot.place, Place::Waiting | Place::Active) {
                 slot.place = Place::Finished(Err(failure));
@@ -186,14 +195,23 @@ impl ServiceChannel {
         }
     }
 
+    /// Puts the first step of a waiting request on the wire when the slave was through in the last cycle.
+    pub fn kick(&mut self) {
+        if self.free && self.active.is_none() && self.start() {
+            self.put_step();
+        }
+    }
+
     /// Takes what the AT of this cycle said, `None` when it did not come, and prepares the next MDT.
     pub fn receive(&mut self, now: MonotonicTime, answer: Option<AtSvc>) {
+        let answer = self.judge(answer);
+        self.free = matches!(answer, Answer::Through(_));
         if self.active.is_none() && !self.start() {
             self.missing_cycles = 0;
             self.busy_since = None;
             return;
         }
-        match self.judge(answer) {
+        match answer {
             Answer::Through(info) => {
                 self.missing_cycles = 0;
                 self.busy_since = None;
@@ -260,13 +278,7 @@ impl ServiceChannel {
             let flow = if *on_wire { transfer.advance(now, timeout, info, data) } else { Flow::Next };
             match flow {
                 Flow::Next => {
-                    *on_wire = true;
-                    let step = transfer.step(data);
-                    let mhs = !self.sent.control.mhs();
-                    self.sent = MdtSvc {
-                        control: SvcControl::new(mhs, step.element, step.write, step.last),
-                        info: step.info,
-                    };
+                    self.put_step();
                     return;
                 }
                 Flow::Finished(result) => {
@@ -276,6 +288,17 @@ impl ServiceChannel {
                     self.start();
                 }
             }
+        }
+    }
+
+    /// Toggles the handshake bit with the next step of the active request.
+    fn put_step(&mut self) {
+        if let Some((index, transfer, on_wire)) = &mut self.active {
+            *on_wire = true;
+            let step = transfer.step(&self.slots[*index].request.data);
+            let control = SvcControl::new(!self.sent.control.mhs(), step.element, step.write, step.last);
+            self.sent = MdtSvc { control, info: step.info };
+            self.free = false;
         }
     }
 

@@ -1,0 +1,569 @@
+//! One cycle: evaluate what came back, move on, build the next telegrams.
+
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+use super::Master;
+use super::event::{Event, SlaveId};
+use super::layout::CyclicLayout;
+use super::phase::{PhaseEvent, State};
+use super::scan::{self, ScanResult};
+use super::station::{End, Presence, Station};
+use super::svc::request::SvcFailure;
+use crate::wire::cp0::{self, AtRepr, CommunicationVersion, MdtRepr};
+use crate::wire::cp12;
+use crate::wire::device_control::DeviceControl;
+use crate::wire::device_status::DeviceStatus;
+use crate::wire::error::{put_u16, u16_at};
+use crate::wire::extended::{EXTENDED_LEN, EXTENDED_OFFSET, Extended};
+use crate::wire::header::{Kind, Phase, PhaseField, TELEGRAMS_MAX};
+use crate::wire::layout::DEVICE_WORD_LEN;
+use crate::wire::svc::{AtSvc, SVC_LEN, SvcStatus};
+
+/// Cycles with CPS set, at least; CP4 may have connections between slaves, which need one more.
+const LEAVE_CYCLES: u32 = 2;
+const LEAVE_CYCLES_CP3: u32 = 3;
+/// States which one cycle can pass at most; more would be a loop in the table.
+const STATES_PER_CYCLE: usize = 8;
+
+/// Telegram and offsets of a slave's service channel and device word.
+#[derive(Clone, Copy)]
+struct Slot {
+    svc: (u8, usize),
+    device: (u8, usize),
+}
+
+/// Where a slave's part is in the telegrams of `kind`.
+fn slot(phase: Phase, layout: &CyclicLayout, index: usize, kind: Kind) -> Option<Slot> {
+    if phase < Phase::CP3 {
+        let place = cp12::place(SlaveId::from_index(index).topology_address())?;
+        return Some(Slot { svc: (place.telegram, place.svc), device: (place.telegram, place.device) });
+    }
+    let places = layout.slaves.get(index)?.as_ref()?;
+    let (svc, device) = match kind {
+        Kind::Mdt => (places.svc_mdt, places.control),
+        Kind::At => (places.svc_at, places.status),
+    };
+    let pair = |offset: crate::wire::layout::Offset| (offset.telegram, usize::from(offset.offset));
+    Some(Slot { svc: pair(svc), device: pair(device) })
+}
+
+impl Master {
+    /// Runs one cycle; its time has come.
+    pub(super) fn cycle(&mut self, now: MonotonicTime) {
+        if self.state == State::Nrt {
+            self.advance(now, PhaseEvent::Up);
+            return;
+        }
+        if self.state.phase().is_some() || self.state == State::Down {
+            if !self.evaluated {
+                self.statistics.at_missing += 1;
+                self.evaluate(now);
+            }
+            if !self.frames.all_back(Kind::Mdt) {
+                self.statistics.mdt_missing += 1;
+            }
+        }
+        for _ in 0..STATES_PER_CYCLE {
+            let moved = self.decide(now).is_some_and(|event| self.advance(now, event));
+            if !moved {
+                break;
+            }
+        }
+        if self.state.phase().is_none() && self.state != State::Down {
+            return;
+        }
+        self.build();
+        self.schedule(now);
+    }
+
+    /// Sets the time of the next cycle on the grid of the present one; cycles that are over are left out.
+    fn schedule(&mut self, now: MonotonicTime) {
+        let cycle = self.cycle_time();
+        self.next_cycle = self.next_cycle + cycle;
+        let late = now - self.next_cycle;
+        if late >= DurationNs::ZERO {
+            let missed = late.as_nanos() / cycle.as_nanos() + 1;
+            self.next_cycle = self.next_cycle + cycle * missed;
+            self.statistics.skipped += missed.unsigned_abs();
+        }
+    }
+
+    /// What the present state asks for; also starts work that goes on in the slaves.
+    fn decide(&mut self, now: MonotonicTime) -> Option<PhaseEvent> {
+        if let Some(event) = self.wants_down() {
+            return Some(event);
+        }
+        let target = self.target.unwrap_or(Phase::CP0);
+        match self.state {
+            State::Nrt | State::Cp4 => None,
+            State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3 => {
+                (now >= self.next_cycle).then_some(PhaseEvent::Elapsed)
+            }
+            State::Settle => (now - self.since >= self.config.settle).then_some(PhaseEvent::Elapsed),
+            State::Scan => self.scan_ready.then_some(PhaseEvent::Ready),
+            State::Cp0 if self.condition => Some(PhaseEvent::Failed),
+            State::Cp0 => {
+                let known = self.found > 0;
+                (known && target > Phase::CP0).then_some(PhaseEvent::Up)
+            }
+            State::Cp1 => (target > Phase::CP1).then_some(PhaseEvent::Up),
+            State::Leave0 | State::Leave1 | State::Leave2 | State::Leave3 | State::Down => {
+                self.decide_leave(now)
+            }
+            State::Identify | State::OpenSvc | State::Start2 | State::Start3 | State::Start4 => {
+                self.decide_start(now)
+            }
+            State::Await2 => self.decide_await(target > Phase::CP2),
+            State::Await3 => self.decide_await(target > Phase::CP3),
+            State::Read2
+            | State::Connect2
+            | State::Write2
+            | State::Measure2
+            | State::Check2
+            | State::Check3 => self.decide_work(),
+        }
+    }
+
+    /// A lower phase is wanted, or no telegrams.
+    fn wants_down(&self) -> Option<PhaseEvent> {
+        let level = match self.state {
+            State::Silence1 => Phase::CP1,
+            State::Silence2 => Phase::CP2,
+            State::Silence3 => Phase::CP3,
+            state => state.phase().unwrap_or(Phase::CP0),
+        };
+        match self.target {
+            Some(target) => (target < level).then_some(PhaseEvent::Restart),
+            None if level > Phase::CP0 => Some(PhaseEvent::Restart),
+            None => (self.state != State::Down && self.state != State::Nrt).then_some(PhaseEvent::Stop),
+        }
+    }
+
+    fn decide_leave(&mut self, now: MonotonicTime) -> Option<PhaseEvent> {
+        let cycles = if self.state == State::Leave3 { LEAVE_CYCLES_CP3 } else { LEAVE_CYCLES };
+        if self.cycles >= cycles && self.condition {
+            return Some(PhaseEvent::Ready);
+        }
+        if now - self.since < self.config.switch_timeout {
+            return None;
+        }
+        let to = self.state.announces().unwrap_or(Phase::CP0);
+        self.emit(Event::SwitchFailed { from: self.layout_phase, to });
+        if self.state == State::Down {
+            return Some(PhaseEvent::Elapsed);
+        }
+        self.target = Some(Phase::CP0);
+        Some(PhaseEvent::Failed)
+    }
+
+    /// Waits for the slaves; those that do not come in time are lost, the others go on.
+    fn decide_start(&mut self, now: MonotonicTime) -> Option<PhaseEvent> {
+        if self.cycles > 0 && self.condition {
+            return Some(PhaseEvent::Ready);
+        }
+        if now - self.since < self.config.switch_timeout {
+            return None;
+        }
+        for index in 0..self.found {
+            if self.stations[index].is_active() && !self.meets(index) {
+                self.lose(index);
+            }
+        }
+        if self.stations[..self.found].iter().any(Station::is_active) {
+            return Some(PhaseEvent::Ready);
+        }
+        self.all_lost();
+        Some(PhaseEvent::Failed)
+    }
+
+    /// Takes what the ATs of this cycle say.
+    pub(super) fn evaluate(&mut self, now: MonotonicTime) {
+        self.evaluated = true;
+        if self.layout_phase == Phase::CP0 {
+            self.evaluate_scan();
+            return;
+        }
+        for index in 0..self.found {
+            self.read_station(index);
+        }
+        if self.state.supervises() {
+            self.supervise();
+        }
+        self.condition = match self.state {
+            State::Leave1 | State::Leave2 | State::Leave3 | State::Down => {
+                (0..self.found).all(|index| !self.stations[index].is_active() || self.has_left(index))
+            }
+            _ => (0..self.found).all(|index| !self.stations[index].is_active() || self.meets(index)),
+        };
+        if self.state.serves() {
+            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
+                let answer = station.svc;
+                station.channel.receive(now, answer);
+            }
+        }
+        if self.layout_phase == Phase::CP4 {
+            self.consume();
+        }
+    }
+
+    fn evaluate_scan(&mut self) {
+        let at = self.frames.at(0).and_then(|data| AtRepr::parse(data).ok());
+        match self.state {
+            State::Scan => match self.scan.update(at.as_ref()) {
+                ScanResult::Going => {}
+                ScanResult::Nobody => self.emit(Event::NoSlaves),
+                ScanResult::Unstable => self.emit(Event::ScanUnstable),
+                ScanResult::Stable(slaves) if slaves > self.config.slaves_max => {
+                    self.emit(Event::TooManySlaves { found: slaves, max: self.config.slaves_max });
+                    self.scan.start();
+                }
+                ScanResult::Stable(slaves) => {
+                    self.found = usize::from(slaves);
+                    self.scan_ready = true;
+                }
+            },
+            State::Cp0 => self.condition = self.scan.has_changed(at.as_ref()),
+            State::Leave0 | State::Down => self.condition = at.as_ref().is_some_and(scan::is_untouched),
+            _ => {}
+        }
+    }
+
+    fn read_station(&mut self, index: usize) {
+        let slot = slot(self.layout_phase, &self.layout, index, Kind::At);
+        let part = |(telegram, offset): (u8, usize), len: usize| {
+            self.frames.at(telegram).and_then(|data| data.get(offset..offset + len))
+        };
+        let svc = slot.and_then(|slot| part(slot.svc, SVC_LEN)).and_then(|bytes| AtSvc::parse(bytes).ok());
+        let status = slot
+            .and_then(|slot| part(slot.device, DEVICE_WORD_LEN))
+            .map(|bytes| DeviceStatus::from_bits_retain(u16_at(bytes, 0)));
+        let station = &mut self.stations[index];
+        station.svc = svc;
+        station.status = status;
+    }
+
+    /// A slave is there: S-DEV is not empty in CP2, SlaveValid in the other phases.
+    fn is_valid(&self, station: &Station) -> bool {
+        station.status.is_some_and(|status| match self.layout_phase {
+            Phase::CP2 => !status.is_empty(),
+            _ => status.contains(DeviceStatus::SLAVE_VALID),
+        })
+    }
+
+    /// A slave meets the condition of the present state.
+    fn meets(&self, index: usize) -> bool {
+        let station = &self.stations[index];
+        let svc = station.svc.unwrap_or_default().status;
+        let handshake = svc.contains(SvcStatus::AHS) == station.channel.mhs();
+        let svc_valid = svc.contains(SvcStatus::VALID);
+        self.is_valid(station)
+            && match self.state {
+                State::Identify => svc_valid,
+                State::OpenSvc | State::Start2 | State::Start3 => svc_valid && handshake,
+                _ => true,
+            }
+    }
+
+    /// A slave has stopped inserting data for the phase that is left.
+    fn has_left(&self, index: usize) -> bool {
+        let station = &self.stations[index];
+        match self.layout_phase {
+            Phase::CP1 => {
+                station.svc.is_some_and(|svc| !svc.status.intersects(SvcStatus::VALID | SvcStatus::AHS))
+            }
+            Phase::CP2 => station.status.is_some_and(|status| status.is_empty()),
+            _ => station.status.is_some_and(|status| !status.contains(DeviceStatus::SLAVE_VALID)),
+        }
+    }
+
+    fn supervise(&mut self) {
+        for index in 0..self.found {
+            let valid = self.is_valid(&self.stations[index]);
+            let allowed = self.config.slave_valid_misses;
+            let station = &mut self.stations[index];
+            match station.presence {
+                Presence::Active if valid => station.misses = 0,
+                Presence::Active => {
+                    station.misses = station.misses.saturating_add(1);
+                    if station.misses > allowed {
+                        self.lose(index);
+                    }
+                }
+                Presence::Lost if valid && !station.returned => {
+                    station.returned = true;
+                    self.emit(Event::SlaveReturned { slave: SlaveId::from_index(index) });
+                }
+                Presence::Lost | Presence::Excluded => {}
+            }
+        }
+        if !self.stations[..self.found].iter().any(Station::is_active) {
+            self.all_lost();
+        }
+    }
+
+    fn lose(&mut self, index: usize) {
+        let station = &mut self.stations[index];
+        station.presence = Presence::Lost;
+        station.channel.abort(SvcFailure::SlaveLost);
+        let address = station.address;
+        let slave = SlaveId::from_index(index);
+        self.emit(Event::SlaveLost { slave, address, phase: self.layout_phase });
+    }
+
+    fn all_lost(&mut self) {
+        if self.target != Some(Phase::CP0) {
+            self.target = Some(Phase::CP0);
+            self.emit(Event::AllSlavesLost);
+        }
+    }
+
+    fn consume(&mut self) {
+        for index in 0..self.found {
+            let valid = self.stations[index].is_active() && self.is_valid(&self.stations[index]);
+            let Some(Some(places)) = self.layout.slaves.get(index) else { continue };
+            let station = &mut self.stations[index];
+            for (connection, end) in station.connections.iter().zip(&mut station.ends) {
+                let End::Consumer(consumer) = end else { continue };
+                let instance = connection.instance;
+                let place = places.connections.iter().find(|place| place.instance == instance);
+                let bytes = place.filter(|_| valid).and_then(|place| {
+                    let data = self.frames.at(place.at.telegram)?;
+                    data.get(place.at.range(usize::from(place.len)))
+                });
+                if let Some(state) = consumer.update(bytes) {
+                    let event = Event::Connection { slave: SlaveId::from_index(index), instance, state };
+                    super::push(&mut self.events, &mut self.statistics, event);
+                }
+            }
+        }
+    }
+
+    /// Enters the present state; `last` is the one before.
+    pub(super) fn enter(&mut self, now: MonotonicTime, last: State) {
+        match self.state {
+            State::Nrt => {
+                self.frames.silence();
+                self.emit(Event::Stopped);
+            }
+            State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3 => {
+                self.frames.silence();
+                self.evaluated = true;
+                self.next_cycle = now + self.config.pause;
+            }
+            State::Settle => self.start_phase(Phase::CP0),
+            State::Scan => {
+                self.scan.start();
+                self.scan_ready = false;
+            }
+            State::Cp0 => self.take_scan(),
+            State::Identify => {
+                self.start_phase(Phase::CP1);
+                self.rest_channels(Some(false));
+            }
+            State::OpenSvc => self.rest_channels(Some(true)),
+            State::Start2 => {
+                self.start_phase(Phase::CP2);
+                self.rest_channels(None);
+            }
+            State::Start3 => {
+                self.start_phase(Phase::CP3);
+                self.rest_channels(None);
+            }
+            State::Start4 => self.layout_phase = Phase::CP4,
+            State::Cp4 => {
+                self.open_channels(true);
+                self.emit(Event::Phase(Phase::CP4));
+            }
+            State::Await2 | State::Await3 => self.enter_await(last),
+            State::Read2
+            | State::Connect2
+            | State::Write2
+            | State::Measure2
+            | State::Check2
+            | State::Check3 => {
+                self.open_channels(true);
+                self.begin_work();
+            }
+            State::Down => {
+                for station in &mut self.stations[..self.found] {
+                    station.channel.abort(SvcFailure::PhaseLeft);
+                }
+                self.open_channels(false);
+            }
+            State::Cp1 | State::Leave0 | State::Leave1 | State::Leave2 | State::Leave3 => {}
+        }
+    }
+
+    fn start_phase(&mut self, phase: Phase) {
+        self.layout_phase = phase;
+        for station in &mut self.stations[..self.found] {
+            station.misses = 0;
+        }
+        self.emit(Event::Phase(phase));
+    }
+
+    fn rest_channels(&mut self, mhs: Option<bool>) {
+        for station in &mut self.stations[..self.found] {
+            let mhs = mhs.unwrap_or(station.channel.mhs());
+            station.channel.rest(mhs);
+        }
+    }
+
+    pub(super) fn open_channels(&mut self, open: bool) {
+        for station in &mut self.stations[..self.found] {
+            station.channel.set_open(open);
+        }
+    }
+
+    /// Makes the slaves of the finished scan known.
+    fn take_scan(&mut self) {
+        for index in 0..self.found {
+            let address = self.scan.address(index);
+            let config = self.config.slaves.iter().find(|slave| slave.address == address);
+            self.stations[index].found(address, config.map(|slave| &slave.connections));
+        }
+        let slaves = SlaveId::from_index(self.found).0;
+        self.emit(Event::Scanned { slaves });
+        for index in 0..self.found {
+            let (slave, address) = (SlaveId::from_index(index), self.stations[index].address);
+            if !self.stations[index].configured {
+                self.emit(Event::Unknown { slave, address });
+            }
+            let first = self.stations[..index].iter().position(|other| other.address == address);
+            if let Some(first) = first.filter(|_| address != 0) {
+                let first = SlaveId::from_index(first);
+                self.emit(Event::DoubleAddress { address, first, second: slave });
+            }
+        }
+        for index in 0..self.config.slaves.len() {
+            let address = self.config.slaves[index].address;
+            if !self.stations[..self.found].iter().any(|station| station.address == address) {
+                self.emit(Event::Missing { address });
+            }
+        }
+    }
+
+    /// Builds the telegrams of the next cycle.
+    fn build(&mut self) {
+        if self.state.serves() {
+            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
+                station.channel.kick();
+            }
+        }
+        let switching = self.state.announces();
+        let phase = switching.unwrap_or(self.layout_phase);
+        self.frames.begin(PhaseField::new(switching.is_some(), self.cycle_count, phase));
+        match self.layout_phase {
+            Phase::CP0 => self.build_scan(),
+            Phase::CP1 | Phase::CP2 => {
+                let telegrams = self.config.setup_telegrams();
+                let lengths =
+                    core::array::from_fn(
+                        |number| {
+                            if number < usize::from(telegrams) { cp12::LEN } else { 0 }
+                        },
+                    );
+                self.build_telegrams(lengths, lengths, None);
+            }
+            _ => {
+                let extended = self.extended().filter(|_| switching.is_none());
+                let lengths = |lengths: [u16; TELEGRAMS_MAX]| lengths.map(usize::from);
+                self.build_telegrams(lengths(self.layout.mdt_len), lengths(self.layout.at_len), extended);
+            }
+        }
+        self.cycle_count = (self.cycle_count + 1) & 7;
+        self.cycles = self.cycles.saturating_add(1);
+        self.evaluated = false;
+        self.statistics.cycles += 1;
+    }
+
+    fn build_scan(&mut self) {
+        let mut version = CommunicationVersion::ADDRESS_ALLOCATION;
+        if self.config.setup_telegrams() == 4 {
+            version |= CommunicationVersion::FOUR_TELEGRAMS;
+        }
+        let mdt = MdtRepr { version, ..MdtRepr::default() };
+        self.frames.add(Kind::Mdt, 0, cp0::MDT_LEN, |data| {
+            // The length is the one of the telegram.
+            let _ = mdt.emit(data);
+        });
+        self.frames.add(Kind::At, 0, cp0::AT_LEN, |data| {
+            let _ = scan::empty().emit(data);
+        });
+    }
+
+    fn build_telegrams(
+        &mut self,
+        mdt: [usize; TELEGRAMS_MAX],
+        at: [usize; TELEGRAMS_MAX],
+        extended: Option<Extended>,
+    ) {
+        let (stations, layout, phase) = (&self.stations[..self.found], &self.layout, self.layout_phase);
+        let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
+        for (number, len) in used(mdt) {
+            self.frames.add(Kind::Mdt, number, len, |data| {
+                if let (0, Some(extended)) = (number, extended) {
+                    let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
+                    let _ = field.map(|field| extended.emit(field));
+                }
+                for (index, station) in stations.iter().enumerate().filter(|(_, station)| station.is_active())
+                {
+                    if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
+                        fill_station(data, number, slot, station);
+                    }
+                    if phase == Phase::CP4 {
+                        fill_connections(data, number, layout, index, station);
+                    }
+                }
+            });
+        }
+        for (number, len) in used(at) {
+            self.frames.add(Kind::At, number, len, |_| {});
+        }
+    }
+
+    /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
+    /// in four halves, each sent in two cycles, latched for all eight.
+    fn extended(&mut self) -> Option<Extended> {
+        if self.cycle_count == 0 {
+            let toggle = self.latched_time.is_some_and(|(_, toggle)| toggle);
+            self.latched_time = self.system_time.map(|time| (time, !toggle));
+        }
+        let (SystemTime(nanos), toggle) = self.latched_time?;
+        let seconds = u32::try_from(nanos / 1_000_000_000 & u64::from(u32::MAX)).unwrap_or(u32::MAX);
+        let nanos = u32::try_from(nanos % 1_000_000_000).unwrap_or(0);
+        let word = if self.cycle_count < 4 { seconds } else { nanos };
+        let [a, b, c, d] = word.to_le_bytes();
+        let half = if self.cycle_count & 2 == 0 { [c, d] } else { [a, b] };
+        let toggle = if toggle { Extended::TIME_TOGGLE } else { 0 };
+        Some(Extended { word: Extended::TIME_VALID | toggle, time_fragment: u16::from_le_bytes(half) })
+    }
+}
+
+/// Writes a slave's service channel and C-DEV into the MDT that has them.
+fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station) {
+    if slot.svc.0 == number
+        && let Some(bytes) = data.get_mut(slot.svc.1..slot.svc.1 + SVC_LEN)
+    {
+        let _ = station.channel.outgoing().emit(bytes);
+    }
+    if slot.device.0 == number
+        && let Some(bytes) = data.get_mut(slot.device.1..slot.device.1 + DEVICE_WORD_LEN)
+    {
+        put_u16(bytes, 0, DeviceControl::MASTER_VALID.bits());
+    }
+}
+
+/// Writes what a slave consumes into the MDT that has it.
+fn fill_connections(data: &mut [u8], number: u8, layout: &CyclicLayout, index: usize, station: &Station) {
+    let Some(Some(places)) = layout.slaves.get(index) else { return };
+    for (connection, end) in station.connections.iter().zip(&station.ends) {
+        let End::Producer(producer) = end else { continue };
+        let place = places.connections.iter().find(|place| place.instance == connection.instance);
+        if let Some(place) = place.filter(|place| place.at.telegram == number)
+            && let Some(bytes) = data.get_mut(place.at.range(usize::from(place.len)))
+        {
+            producer.emit(bytes);
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! What the master tells its caller.
+
+use core::fmt;
+
+use super::connection::ConsumerState;
+use super::layout::LayoutError;
+use super::svc::request::{SvcFailure, SvcOutcome};
+use crate::wire::header::Phase;
+use crate::wire::idn::Idn;
+
+/// One of the master's two Ethernet ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Port {
+    /// Sends the primary (P) telegrams. In a line they come back here.
+    One,
+    /// Sends the secondary (S) telegrams of a ring.
+    Two,
+}
+
+/// A slave by its position on the network, counted from 0 in the order of the line. It stays the same until the
+/// next scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SlaveId(pub u16);
+
+impl SlaveId {
+    /// Topology address, 1..=511.
+    #[must_use]
+    pub const fn topology_address(self) -> u16 {
+        self.0 + 1
+    }
+
+    pub(crate) fn index(self) -> usize {
+        usize::from(self.0)
+    }
+
+    pub(crate) fn from_index(index: usize) -> SlaveId {
+        SlaveId(u16::try_from(index).unwrap_or(u16::MAX))
+    }
+}
+
+impl fmt::Display for SlaveId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "slave at position {}", self.topology_address())
+    }
+}
+
+/// Names one submitted service channel request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Ticket {
+    /// The slave.
+    pub slave: SlaveId,
+    /// Place in the slave's queue.
+    pub(crate) place: usize,
+    /// Serial number at the slave.
+    pub(crate) serial: u64,
+}
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(clippy::large_enum_variant, reason = "events are taken one by one; only a few are kept")]
+pub enum Event {
+    /// The telegrams of this phase have started; CP4: all slaves are valid in it.
+    Phase(Phase),
+    /// No more SERCOS telegrams are sent.
+    Stopped,
+    /// CP0: topology and address list are stable.
+    Scanned {
+        /// Slaves found.
+        slaves: u16,
+    },
+    /// CP0: no telegram comes back, or nobody is there.
+    NoSlaves,
+    /// CP0: topology or address list do not become stable.
+    ScanUnstable,
+    /// CP0: more slaves than there is storage for. No higher phase is entered.
+    TooManySlaves {
+        /// Slaves found.
+        found: u16,
+        /// Slaves that fit.
+        max: u16,
+    },
+    /// A configured slave was not found.
+    Missing {
+        /// Its SERCOS address.
+        address: u16,
+    },
+    /// A slave was found which is not configured. It takes part without connections.
+    Unknown {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address, 0 when none is set.
+        address: u16,
+    },
+    /// Two slaves have the same SERCOS address. CP2 is possible, CP3 is not.
+    DoubleAddress {
+        /// The address.
+        address: u16,
+        /// The slave nearer to the master.
+        first: SlaveId,
+        /// The other one.
+        second: SlaveId,
+    },
+    /// The slave has no SERCOS address, or shares it. CP3 was refused.
+    AddressConflict {
+        /// The slave.
+        slave: SlaveId,
+    },
+    /// The application may work and then call `proceed`.
+    AwaitingApplication {
+        /// CP2 or CP3.
+        phase: Phase,
+    },
+    /// A step of the phase-up failed at a slave.
+    StepFailed {
+        /// The slave.
+        slave: SlaveId,
+        /// The parameter.
+        idn: Idn,
+        /// Why.
+        failure: SvcFailure,
+    },
+    /// The slave's SCP classes leave open how its connections are configured: it needs exactly one of SCP_FixCFG
+    /// and SCP_VarCFG.
+    ClassMismatch {
+        /// The slave.
+        slave: SlaveId,
+    },
+    /// S-0-0127 or S-0-0128 failed; `invalid_parameters` lists what the slave finds wrong.
+    CheckFailed {
+        /// The slave.
+        slave: SlaveId,
+        /// The phase that cannot be left: CP2 or CP3.
+        phase: Phase,
+    },
+    /// The telegrams of CP3 and CP4 cannot be laid out.
+    LayoutRefused(LayoutError),
+    /// Slaves did not stop or start within the time of a phase switch.
+    SwitchFailed {
+        /// The phase left.
+        from: Phase,
+        /// The phase wanted.
+        to: Phase,
+    },
+    /// A slave is not valid any more. It takes no part until the next scan.
+    SlaveLost {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+        /// The phase in which it went.
+        phase: Phase,
+    },
+    /// A lost slave is valid again; it takes no part until the next scan.
+    SlaveReturned {
+        /// The slave.
+        slave: SlaveId,
+    },
+    /// Every slave is lost; the master goes back to CP0.
+    AllSlavesLost,
+    /// A consumer has changed its state.
+    Connection {
+        /// The producing slave.
+        slave: SlaveId,
+        /// Connection number at the slave.
+        instance: u8,
+        /// The new state.
+        state: ConsumerState,
+    },
+    /// A service channel request is finished.
+    Svc {
+        /// What `svc_submit` gave.
+        ticket: Ticket,
+        /// What came out.
+        outcome: SvcOutcome,
+    },
+}
+
+/// Why a received frame was refused. It changed nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+pub enum Refusal {
+    /// Too short, another EtherType or not a broadcast.
+    #[error("not a SERCOS frame")]
+    NotSercos,
+    /// The header CRC is wrong.
+    #[error("wrong header CRC")]
+    Crc,
+    /// Another master's telegram.
+    #[error("telegram of another master")]
+    Foreign,
+    /// No telegrams are out.
+    #[error("no telegram is expected")]
+    Silence,
+    /// A port or channel on which the topology gives no telegram back.
+    #[error("telegram on a port where none is expected")]
+    Port,
+    /// The telegram number is not used in this phase.
+    #[error("telegram number that is not in use")]
+    Number,
+    /// Phase or CPS are not what was sent.
+    #[error("wrong phase")]
+    Phase,
+    /// The cycle counter is not the one of this cycle: late or replayed.
+    #[error("wrong cycle counter")]
+    CycleCount,
+    /// The data field has another length than was sent.
+    #[error("wrong length")]
+    Length,
+    /// The telegram has come back in this cycle already.
+    #[error("telegram came back twice")]
+    Duplicate,
+}
+
+impl Refusal {
+    /// All reasons.
+    pub const ALL: [Refusal; 10] = [
+        Refusal::NotSercos,
+        Refusal::Crc,
+        Refusal::Foreign,
+        Refusal::Silence,
+        Refusal::Port,
+        Refusal::Number,
+        Refusal::Phase,
+        Refusal::CycleCount,
+        Refusal::Length,
+        Refusal::Duplicate,
+    ];
+}
+
+/// Counters since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Statistics {
+    /// Cycles sent.
+    pub cycles: u64,
+    /// Cycles left out because `poll` came too late.
+    pub skipped: u64,
+    /// Frames accepted.
+    pub accepted: u64,
+    /// Cycles in which at least one AT did not come back.
+    pub at_missing: u64,
+    /// Cycles in which at least one MDT did not come back.
+    pub mdt_missing: u64,
+    /// Events dropped because nobody took them.
+    pub events_lost: u64,
+    refused: [u64; Refusal::ALL.len()],
+}
+
+impl Statistics {
+    /// Frames refused for this reason.
+    #[must_use]
+    pub const fn refused(&self, reason: Refusal) -> u64 {
+        self.refused[reason as usize]
+    }
+
+    pub(crate) fn count_refusal(&mut self, reason: Refusal) {
+        self.refused[reason as usize] += 1;
+    }
+}
+
+/// What `poll` gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output<'a> {
+    /// Send this frame now.
+    Transmit {
+        /// The port to send it on.
+        port: Port,
+        /// The whole Ethernet frame without FCS.
+        frame: &'a [u8],
+    },
+}

@@ -1,0 +1,254 @@
+//! The work of the phase-up: each list of steps for all slaves at the same time.
+
+use super::Master;
+use super::connection::{ConsumerEnd, ProducerEnd};
+use super::event::{Event, SlaveId};
+use super::layout::{ConnectionNeed, Timing};
+use super::phase::{PhaseEvent, State};
+use super::plan::{self, Cursor, Step, Values};
+use super::report::{ReportRow, RowOutcome};
+use super::station::{End, Station, Work};
+use super::svc::request::{SvcData, SvcFailure, SvcOutcome};
+use crate::wire::connection::CONNECTION_CONTROL_LEN;
+use crate::wire::header::Kind;
+use crate::wire::idn::Idn;
+use crate::wire::scp::ScpEntry;
+
+impl Master {
+    fn steps(&self) -> &'static [Step] {
+        match self.state {
+            State::Read2 => plan::READ,
+            State::Connect2 => plan::CONNECT,
+            State::Write2 => plan::WRITE,
+            State::Measure2 => plan::MEASURE,
+            State::Check2 | State::Check3 => plan::CHECK,
+            _ => &[],
+        }
+    }
+
+    /// Starts the list of steps of the present state at every slave.
+    pub(super) fn begin_work(&mut self) {
+        let state = self.state;
+        for index in 0..self.found {
+            let station = &mut self.stations[index];
+            station.work = Work::Free;
+            station.cursor = Cursor::default();
+            station.check_failed = false;
+            if state != State::Connect2 {
+                continue;
+            }
+            station.need = super::layout::SlaveNeed::default();
+            station.ends.clear();
+            station.report.truncate(station.read_rows);
+            if station.is_active() && !station.connections.is_empty() && !station.facts.is_consistent() {
+                station.work = Work::Failed;
+                self.emit(Event::ClassMismatch { slave: SlaveId::from_index(index) });
+            }
+        }
+    }
+
+    /// Goes on with the list of steps of the present state.
+    pub(super) fn decide_work(&mut self) -> Option<PhaseEvent> {
+        let steps = self.steps();
+        let (mut pending, mut failed) = (false, false);
+        for index in 0..self.found {
+            if !self.stations[index].is_active() {
+                continue;
+            }
+            self.collect(index);
+            self.ask(index, steps);
+            match self.stations[index].work {
+                Work::Free | Work::Asked(..) => pending = true,
+                Work::Failed => failed = true,
+                Work::Done => {}
+            }
+        }
+        if pending {
+            return None;
+        }
+        if failed {
+            return Some(PhaseEvent::Failed);
+        }
+        match self.state {
+            State::Connect2 => Some(if self.lay_out() { PhaseEvent::Ready } else { PhaseEvent::Failed }),
+            // The phase is left only when the application's running requests are through.
+            State::Check2 | State::Check3 => {
+                self.open_channels(false);
+                let quiet = self.stations[..self.found].iter().all(|station| !station.channel.is_running());
+                quiet.then_some(PhaseEvent::Ready)
+            }
+            _ => Some(PhaseEvent::Ready),
+        }
+    }
+
+    /// Asks for the slave's next step, if it is free for one.
+    fn ask(&mut self, index: usize, steps: &[Step]) {
+        let station = &mut self.stations[index];
+        if station.work != Work::Free {
+            return;
+        }
+        let mut cursor = station.cursor;
+        let next = cursor.next(steps, station);
+        station.cursor = cursor;
+        let Some((step, instance)) = next else {
+            station.work = if station.check_failed { Work::Failed } else { Work::Done };
+            if station.check_failed {
+                let slave = SlaveId::from_index(index);
+                self.emit(Event::CheckFailed { slave, phase: self.layout_phase });
+            }
+            return;
+        };
+        let check = match self.state {
+            State::Check3 => (Idn::CP4_CHECK, Idn::INVALID_CP3),
+            _ => (Idn::CP3_CHECK, Idn::INVALID_CP2),
+        };
+        let values = Values {
+            config: &self.config,
+            layout: &self.layout,
+            places: self.layout.slaves.get(index).and_then(Option::as_ref),
+            check,
+            extended: self.system_time.is_some(),
+        };
+        let request = step.request(instance, station, &values);
+        station.channel.submit_own(request);
+        station.work = Work::Asked(step, instance);
+    }
+
+    /// Takes the outcome of the slave's step, if there is one.
+    fn collect(&mut self, index: usize) {
+        let phase = self.layout_phase;
+        let station = &mut self.stations[index];
+        let Work::Asked(step, instance) = station.work else { return };
+        let Some(outcome) = station.channel.take_own() else { return };
+        let row = ReportRow::new(phase, &outcome, step.optional());
+        station.note(row);
+        let idn = outcome.idn;
+        let failure = match row.outcome {
+            RowOutcome::Failed(SvcFailure::CommandFailed(_)) if step == Step::CheckExecute => {
+                station.check_failed = true;
+                station.invalid.clear();
+                None
+            }
+            // The check has failed anyway; without its list there is less to show.
+            RowOutcome::Failed(_) if step == Step::CheckInvalid => None,
+            RowOutcome::Failed(failure) => Some(failure),
+            RowOutcome::Absent => None,
+            RowOutcome::Value { .. } | RowOutcome::Done => learn(station, step, instance, &outcome).err(),
+        };
+        if let SvcData::Buffer(buffer) = outcome.data {
+            station.list = buffer;
+        }
+        station.work = if failure.is_some() { Work::Failed } else { Work::Free };
+        if let Some(failure) = failure {
+            self.emit(Event::StepFailed { slave: SlaveId::from_index(index), idn, failure });
+        }
+    }
+
+    /// Computes the telegrams of CP3 and CP4 and makes the ends of the connections.
+    fn lay_out(&mut self) -> bool {
+        let stations = &mut self.stations[..self.found];
+        let timing = Timing {
+            cycle_ns: self.config.cycle_ns,
+            mst_jitter_ns: self.config.mst_jitter_ns,
+            slave_jitter_ns: self.config.slave_jitter_ns,
+            gap_adjustable: stations.iter().filter(|station| station.is_active()).all(|s| s.facts.gap),
+            hot_plug_in_all: self.config.hot_plug_in_all,
+        };
+        let needs = stations.iter().map(|station| station.is_active().then_some(&station.need));
+        if let Err(error) = self.layout.compute(&timing, needs) {
+            self.emit(Event::LayoutRefused(error));
+            return false;
+        }
+        for station in stations.iter_mut().filter(|station| station.is_active()) {
+            station.ends.clear();
+            for connection in &station.connections {
+                let need = station.need.connections.iter().find(|need| need.instance == connection.instance);
+                let len = need.map_or(0, |need| need.len);
+                station.ends.push(match plan::kind(connection) {
+                    Kind::Mdt => End::Producer(ProducerEnd::new(len)),
+                    Kind::At => End::Consumer(ConsumerEnd::new(
+                        len,
+                        connection.producer_cycles,
+                        connection.allowed_losses,
+                    )),
+                });
+            }
+        }
+        true
+    }
+
+    pub(super) fn enter_await(&mut self, last: State) {
+        self.open_channels(true);
+        if last == State::Read2 {
+            for station in &mut self.stations[..self.found] {
+                station.read_rows = station.report.len();
+            }
+        }
+        if let Some(phase) = self.state.awaits() {
+            self.emit(Event::AwaitingApplication { phase });
+        }
+    }
+
+    /// The application works, until it is through and its requests are too.
+    pub(super) fn decide_await(&mut self, higher: bool) -> Option<PhaseEvent> {
+        if !self.proceed || !higher {
+            return None;
+        }
+        let active = || self.stations[..self.found].iter().filter(|station| station.is_active());
+        if !active().all(|station| station.channel.is_idle()) {
+            return None;
+        }
+        let conflict = (0..self.found).find(|&index| {
+            let station = &self.stations[index];
+            let twice = active().filter(|other| other.address == station.address).count() > 1;
+            station.is_active() && (station.address == 0 || twice)
+        });
+        if let Some(index) = conflict.filter(|_| self.state == State::Await2) {
+            self.proceed = false;
+            self.emit(Event::AddressConflict { slave: SlaveId::from_index(index) });
+            return None;
+        }
+        Some(PhaseEvent::Proceed)
+    }
+}
+
+/// Takes what a step brought about the slave.
+fn learn(station: &mut Station, step: Step, instance: u8, outcome: &SvcOutcome) -> Result<(), SvcFailure> {
+    let number = outcome.data.unsigned().and_then(|value| u32::try_from(value).ok());
+    match step {
+        Step::FspType => station.facts.fsp_type = number,
+        Step::ScpClasses => {
+            station.facts.classes =
+                outcome.data.words().map(ScpEntry::from_word).take(super::station::CLASSES_MAX).collect();
+        }
+        Step::GapPresence => station.facts.gap = true,
+        Step::ConnectionImage => {
+            let head = outcome.result.ok().and_then(|reply| reply.head).unwrap_or_default();
+            station.facts.connections = head.current / 2;
+        }
+        Step::Length => {
+            let len = u16::try_from(number.unwrap_or(0)).unwrap_or(0);
+            if usize::from(len) < CONNECTION_CONTROL_LEN {
+                let given = usize::from(len);
+                return Err(SvcFailure::Length { expected: CONNECTION_CONTROL_LEN, given });
+            }
+            let slave_produces =
+                station.connection(instance).is_some_and(|connection| connection.slave_produces);
+            // As many as there are connections in the configuration, which have the same bound.
+            let _ = station.need.connections.try_push(ConnectionNeed {
+                instance,
+                slave_produces,
+                len: len.saturating_add(len % 2),
+            });
+        }
+        Step::FeedbackTime => station.need.feedback_ns = number.unwrap_or(0),
+        Step::AtStartMinimum => station.need.at_start_min_ns = number.unwrap_or(0),
+        Step::CheckInvalid => {
+            let room = station.invalid.capacity();
+            station.invalid.clear();
+            station.invalid.extend(outcome.data.double_words().take(room).map(Idn));
+        }
+        _ => {}
+    }
+    Ok(())
+}

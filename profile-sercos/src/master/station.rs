@@ -1,0 +1,201 @@
+//! What the master knows of one slave.
+
+use arrayvec::ArrayVec;
+
+use super::config::{CONNECTIONS_MAX, ConnectionConfig, Connections, MasterConfig};
+use super::connection::{ConsumerEnd, ProducerEnd};
+use super::layout::SlaveNeed;
+use super::plan::{Cursor, Step};
+use super::report::{REPORT_MAX, ReportRow};
+use super::svc::ServiceChannel;
+use crate::wire::device_status::DeviceStatus;
+use crate::wire::idn::Idn;
+use crate::wire::scp::{ScpClass, ScpEntry};
+use crate::wire::svc::AtSvc;
+
+/// SCP classes kept per slave; the written list of active classes then fits into a request.
+pub const CLASSES_MAX: usize = 32;
+
+/// Whether a slave takes part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Presence {
+    /// It takes part.
+    Active,
+    /// It was valid and is not any more.
+    Lost,
+    /// The application has excluded it.
+    Excluded,
+}
+
+/// What a slave says about itself in CP2.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Facts {
+    /// S-0-1302.0.1, function specific profile type: 1 I/O, 2 drive, 3 encoder, as far as known.
+    pub fsp_type: Option<u32>,
+    /// S-0-1000, SCP classes.
+    pub classes: ArrayVec<ScpEntry, CLASSES_MAX>,
+    /// Whether it has S-0-1036, inter frame gap.
+    pub gap: bool,
+    /// Connections which it has by S-0-1051.
+    pub connections: u16,
+}
+
+impl Facts {
+    /// The lowest version of the class which the slave has, `None` without the class.
+    #[must_use]
+    pub fn version(&self, class: ScpClass) -> Option<u8> {
+        self.classes.iter().filter(|entry| entry.class == class).map(|entry| entry.version).min()
+    }
+
+    /// Exactly one way to configure connections.
+    pub(super) fn is_consistent(&self) -> bool {
+        self.version(ScpClass::FIX_CFG).is_some() != self.version(ScpClass::VAR_CFG).is_some()
+    }
+
+    /// The list for S-0-1000.0.1: the lowest version of each class.
+    pub(super) fn active_classes(&self) -> ArrayVec<u8, { 2 * CLASSES_MAX }> {
+        self.classes
+            .iter()
+            .filter(|entry| self.version(entry.class) == Some(entry.version))
+            .flat_map(|entry| entry.to_word().to_le_bytes())
+            .collect()
+    }
+}
+
+/// The master's end of a connection.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "both ends hold the connection's data")]
+pub(super) enum End {
+    Producer(ProducerEnd),
+    Consumer(ConsumerEnd),
+}
+
+/// How far a slave is in the present list of steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Work {
+    /// The next step can be asked for.
+    Free,
+    /// This step is with the service channel.
+    Asked(Step, u8),
+    Done,
+    Failed,
+}
+
+/// One slave.
+#[derive(Debug)]
+pub(super) struct Station {
+    pub address: u16,
+    pub presence: Presence,
+    pub configured: bool,
+    pub connections: Connections,
+    pub facts: Facts,
+    pub need: SlaveNeed,
+    pub ends: ArrayVec<End, CONNECTIONS_MAX>,
+    pub channel: ServiceChannel,
+    /// S-DEV of the last cycle; `None` when its AT did not come.
+    pub status: Option<DeviceStatus>,
+    /// S-SVC of the last cycle; `None` when its AT did not come.
+    pub svc: Option<AtSvc>,
+    pub misses: u8,
+    pub returned: bool,
+    pub work: Work,
+    pub cursor: Cursor,
+    pub check_failed: bool,
+    /// Rows of the report that come from the first reading; a new attempt keeps them.
+    pub read_rows: usize,
+    pub report: ArrayVec<ReportRow, REPORT_MAX>,
+    /// Buffer of the master's own list requests.
+    pub list: Vec<u8>,
+    /// S-0-0021 or S-0-0022 after a failed check.
+    pub invalid: Vec<Idn>,
+}
+
+impl Station {
+    /// Storage for one slave.
+    pub fn new(config: &MasterConfig) -> Station {
+        Station {
+            address: 0,
+            presence: Presence::Active,
+            configured: false,
+            connections: Connections::new(),
+            facts: Facts::default(),
+            need: SlaveNeed::default(),
+            ends: ArrayVec::new(),
+            channel: ServiceChannel::new(config.svc),
+            status: None,
+            svc: None,
+            misses: 0,
+            returned: false,
+            work: Work::Done,
+            cursor: Cursor::default(),
+            check_failed: false,
+            read_rows: 0,
+            report: ArrayVec::new(),
+            list: Vec::with_capacity(config.list_capacity),
+            invalid: Vec::with_capacity(config.list_capacity / 4),
+        }
+    }
+
+    /// Makes it a slave that has just been found. Outcomes that wait for the application stay.
+    pub fn found(&mut self, address: u16, config: Option<&Connections>) {
+        self.address = address;
+        self.presence = Presence::Active;
+        self.configured = config.is_some();
+        self.connections.clear();
+        if let Some(connections) = config {
+            self.connections.extend(connections.iter().cloned());
+        }
+        self.facts = Facts::default();
+        self.need = SlaveNeed::default();
+        self.ends.clear();
+        self.channel.rest(false);
+        self.status = None;
+        self.svc = None;
+        self.misses = 0;
+        self.returned = false;
+        self.work = Work::Done;
+        self.check_failed = false;
+        self.read_rows = 0;
+        self.report.clear();
+        self.invalid.clear();
+    }
+
+    pub fn is_active(&self) -> bool {
+        self.presence == Presence::Active
+    }
+
+    pub fn connection(&self, instance: u8) -> Option<&ConnectionConfig> {
+        self.connections.iter().find(|connection| connection.instance == instance)
+    }
+
+    /// Position of a connection in the configuration, and of its end.
+    pub fn end(&mut self, instance: u8) -> Option<&mut End> {
+        let index = self.connections.iter().position(|connection| connection.instance == instance)?;
+        self.ends.get_mut(index)
+    }
+
+    pub fn note(&mut self, row: ReportRow) {
+        // The report is for people: rows that do not fit are left out.
+        let _ = self.report.try_push(row);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lowest_version_of_each_class_is_activated() {
+        let mut facts = Facts::default();
+        for word in [0x0201, 0x0302, 0x0301, 0x0A02] {
+            facts.classes.push(ScpEntry::from_word(word));
+        }
+        assert_eq!(facts.active_classes().as_slice(), [0x01, 0x02, 0x01, 0x03, 0x02, 0x0A]);
+        assert_eq!(facts.version(ScpClass::SYNC), Some(1));
+        assert_eq!(facts.version(ScpClass::HOT_PLUG), None);
+        assert!(facts.is_consistent());
+        facts.classes.push(ScpEntry::from_word(0x0101));
+        assert!(!facts.is_consistent());
+        assert!(!Facts::default().is_consistent());
+    }
+}
