@@ -4,6 +4,7 @@ pub mod capture;
 pub mod config;
 pub mod decode;
 pub mod latest;
+pub mod mapping;
 pub mod modbus;
 pub mod status;
 pub mod sys;

@@ -1,0 +1,212 @@
+//! The attributes that the device serves for one axis.
+
+use profile_generic::image::Signal;
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{Conversion, Width};
+
+use super::cip_scaling::CipScaling;
+use super::cip_tables::{CipTables, Served, ServedAttribute, has_direction};
+use super::dictionary::{Access, CipType};
+
+/// Who answers for an attribute, with the conversions of one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backing {
+    /// The device computes it.
+    Device,
+    /// The connection writes it.
+    Connection,
+    /// It is stored and given back, without effect on the drive.
+    Shadow,
+    /// It never changes.
+    Constant(i64),
+    /// A value of the process image.
+    Signal {
+        /// The signal.
+        signal: Signal,
+        /// From the generic unit.
+        from_generic: Conversion,
+    },
+    /// A parameter of the drive.
+    Parameter {
+        /// The parameter.
+        parameter: Parameter,
+        /// To the generic unit.
+        to_generic: Conversion,
+        /// From the generic unit.
+        from_generic: Conversion,
+        /// Whether a drive without the parameter makes the attribute unsupported; it is a shadow otherwise.
+        reject: bool,
+    },
+}
+
+/// One attribute of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AttributeEntry {
+    /// Attribute number.
+    pub id: u16,
+    /// Type of the value or of an array's elements.
+    pub data_type: CipType,
+    /// Elements of an array; `None` for a single value.
+    pub length: Option<u16>,
+    /// Access.
+    pub access: Access,
+    /// Whether it may be set in the Running state.
+    pub running: bool,
+    /// Value at power-up.
+    pub default: i64,
+    /// Who answers.
+    pub backing: Backing,
+}
+
+/// The attributes of an axis, by number.
+#[derive(Debug, Clone, Default)]
+pub struct AttributeTable {
+    entries: Vec<AttributeEntry>,
+}
+
+/// Why an attribute value cannot be converted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ValueError {
+    /// Another number of bytes than the type has.
+    #[error("expected {expected} bytes, got {got}")]
+    Length {
+        /// Bytes of the type.
+        expected: usize,
+        /// Bytes given.
+        got: usize,
+    },
+    /// Infinite, or not a number.
+    #[error("expected a finite number")]
+    NotFinite,
+    /// Beyond the range of the generic value.
+    #[error("the value is out of range")]
+    Range,
+    /// The attribute is no number, or nothing generic stands behind it.
+    #[error("the attribute has no generic value")]
+    NotConvertible,
+}
+
+impl AttributeTable {
+    pub(super) fn compile(tables: &CipTables, scaling: &CipScaling) -> Option<Self> {
+        let entries = tables.attributes.iter().map(|row| entry(row, scaling)).collect::<Option<_>>()?;
+        Some(Self { entries })
+    }
+
+    /// All attributes.
+    pub fn entries(&self) -> &[AttributeEntry] {
+        &self.entries
+    }
+
+    /// The attribute with this number, if the device serves it.
+    pub fn get(&self, id: u16) -> Option<&AttributeEntry> {
+        let at = self.entries.binary_search_by_key(&id, |entry| entry.id).ok()?;
+        self.entries.get(at)
+    }
+}
+
+fn entry(row: &ServedAttribute, scaling: &CipScaling) -> Option<AttributeEntry> {
+    let attribute = &row.attribute;
+    let backing = match row.served {
+        Served::Device => Backing::Device,
+        Served::Connection => Backing::Connection,
+        Served::Shadow => Backing::Shadow,
+        Served::Constant(value) => Backing::Constant(value),
+        Served::Signal { signal, unit } => {
+            let to_generic = scaling.convert(unit, has_direction(signal.quantity()))?;
+            Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
+        }
+        Served::Parameter { parameter, unit, reject } => {
+            let to_generic = scaling.convert(unit, false)?;
+            Backing::Parameter {
+                parameter,
+                to_generic: Conversion::new(to_generic),
+                from_generic: Conversion::new(to_generic.inverse()?),
+                reject,
+            }
+        }
+    };
+    Some(AttributeEntry {
+        id: attribute.id,
+        data_type: attribute.data_type,
+        length: attribute.length,
+        access: attribute.access,
+        running: attribute.running,
+        default: attribute.default,
+        backing,
+    })
+}
+
+impl AttributeEntry {
+    /// The generic value of the bytes of the attribute.
+    ///
+    /// # Errors
+    /// The bytes do not hold a value of the type, or the value is out of range, or no parameter stands behind it.
+    pub fn to_generic(&self, bytes: &[u8]) -> Result<i64, ValueError> {
+        let Backing::Parameter { to_generic, .. } = &self.backing else { return Err(ValueError::NotConvertible) };
+        let width = self.number_width()?;
+        if bytes.len() != width.bytes() {
+            return Err(ValueError::Length { expected: width.bytes(), got: bytes.len() });
+        }
+        let outcome = match (width, bytes) {
+            (Width::F32, &[a, b, c, d]) => {
+                let value = f64::from(f32::from_le_bytes([a, b, c, d]));
+                to_generic.convert_f64(value).ok_or(ValueError::NotFinite)?
+            }
+            (Width::F64, &[a, b, c, d, e, f, g, h]) => {
+                let value = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
+                to_generic.convert_f64(value).ok_or(ValueError::NotFinite)?
+            }
+            _ => to_generic.convert(integer(bytes, width)),
+        };
+        if outcome.saturated { Err(ValueError::Range) } else { Ok(outcome.value) }
+    }
+
+    /// Writes a generic value as the attribute into `out` and returns the bytes that count and whether the value
+    /// was clamped.
+    ///
+    /// # Errors
+    /// The attribute is no number, or neither a parameter nor a signal stands behind it.
+    pub fn from_generic(&self, generic: i64, out: &mut [u8; 8]) -> Result<(usize, bool), ValueError> {
+        let (Backing::Parameter { from_generic, .. } | Backing::Signal { from_generic, .. }) = &self.backing else {
+            return Err(ValueError::NotConvertible);
+        };
+        let width = self.number_width()?;
+        *out = [0; 8];
+        let clamped = match width {
+            Width::F32 => {
+                let (outcome, saturated) = from_generic.convert_to_f32(generic);
+                out[..4].copy_from_slice(&outcome.value.to_le_bytes());
+                saturated
+            }
+            Width::F64 => {
+                let (outcome, saturated) = from_generic.convert_to_f64(generic);
+                *out = outcome.value.to_le_bytes();
+                saturated
+            }
+            _ => {
+                let outcome = from_generic.convert(generic);
+                let (min, max) = width.range();
+                let wraps = matches!(self.backing, Backing::Signal { signal: Signal::PositionActual, .. });
+                let value = if wraps { outcome.value } else { outcome.value.clamp(min, max) };
+                let bytes = value.to_le_bytes();
+                out[..width.bytes()].copy_from_slice(&bytes[..width.bytes()]);
+                outcome.saturated || value != outcome.value
+            }
+        };
+        Ok((width.bytes(), clamped))
+    }
+
+    fn number_width(&self) -> Result<Width, ValueError> {
+        self.data_type.width().filter(|_| self.length.is_none()).ok_or(ValueError::NotConvertible)
+    }
+}
+
+/// The integer in little endian bytes of this width.
+fn integer(bytes: &[u8], width: Width) -> i64 {
+    let negative = width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
+    let mut all = [if negative { 0xFF } else { 0 }; 8];
+    for (to, from) in all.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    i64::from_le_bytes(all)
+}

@@ -1,0 +1,144 @@
+//! What is written to and read from a drive before it takes part in the cycle.
+
+use profile_generic::program::Width;
+use profile_sercos::wire::idn::Idn;
+
+use super::compile_sercos::{Compiler, SercosAxis, SercosError, Telegram, mode_rules};
+use super::dictionary::SercosDictionary;
+use super::scaling::DriveFacts;
+use super::sercos_tables::{SercosTables, StepKind, StepRule};
+
+/// What happens when a drive refuses a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refused {
+    /// Commissioning fails.
+    Fail,
+    /// The next step follows.
+    Continue,
+}
+
+/// One access to the service channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Step {
+    /// Writes element 7.
+    Write {
+        /// The parameter.
+        idn: Idn,
+        /// Encoded values in order of preference: the next is tried when the drive refuses one.
+        candidates: Vec<Vec<u8>>,
+        /// What happens when it refuses all.
+        refused: Refused,
+    },
+    /// Reads elements 3 and 7 and notes them in the [`DriveFacts`].
+    Read {
+        /// The parameter.
+        idn: Idn,
+        /// Element 3.
+        attribute: bool,
+        /// Element 7.
+        data: bool,
+        /// What happens when the drive refuses.
+        refused: Refused,
+    },
+    /// Executes a procedure command.
+    Command {
+        /// The command.
+        idn: Idn,
+        /// What happens when it ends with an error.
+        refused: Refused,
+    },
+}
+
+/// The steps of one communication phase, in order.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CommissioningPlan {
+    /// The steps.
+    pub steps: Vec<Step>,
+}
+
+impl CommissioningPlan {
+    /// The steps of a phase. Parameters are converted by the scaling that earlier phases have read.
+    ///
+    /// # Errors
+    /// A mode has no row, a parameter has no scaling yet, or its value does not fit the drive.
+    pub(super) fn compile(
+        tables: &SercosTables,
+        dictionary: &SercosDictionary,
+        axis: &SercosAxis,
+        phase: u8,
+        facts: &DriveFacts,
+    ) -> Result<Self, SercosError> {
+        let compiler = Compiler { tables, dictionary, axis, facts };
+        let mut plan = Self::default();
+        for rule in tables.steps.iter().filter(|rule| rule.phase == phase && applies(rule, axis)) {
+            compiler.step(rule, &mut plan.steps)?;
+        }
+        Ok(plan)
+    }
+}
+
+fn applies(rule: &StepRule, axis: &SercosAxis) -> bool {
+    rule.axis.is_none_or(|kind| kind == axis.units.kind)
+        && rule.modulo.is_none_or(|modulo| modulo == axis.modulo)
+        && rule.set_scaling.is_none_or(|set| set == axis.set_scaling)
+        && rule.mode.is_none_or(|mode| axis.modes.contains(&mode))
+}
+
+impl Compiler<'_> {
+    fn step(&self, rule: &StepRule, steps: &mut Vec<Step>) -> Result<(), SercosError> {
+        let refused = if rule.fail { Refused::Fail } else { Refused::Continue };
+        match rule.kind {
+            StepKind::WriteValue(idn, value) => {
+                let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
+                let candidates = vec![encode(idn, value, width)?];
+                steps.push(Step::Write { idn, candidates, refused });
+            }
+            StepKind::WriteParameter(parameter) => {
+                let values = self.axis.parameters.iter().filter(|(known, _)| *known == parameter);
+                let rules = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
+                for ((_, generic), rule) in values.zip(rules) {
+                    let Some(entry) = self.parameter(rule)? else { continue };
+                    let Some(conversion) = entry.to_drive else { continue };
+                    let value = conversion.convert(*generic).value;
+                    let candidates = vec![encode(entry.idn, value, entry.width)?];
+                    steps.push(Step::Write { idn: entry.idn, candidates, refused });
+                }
+            }
+            StepKind::WriteModes => {
+                for (mode, slot) in mode_rules(self.tables, self.axis)?.iter().zip(&self.tables.slots) {
+                    let candidates = mode.codes.iter().map(|code| code.to_le_bytes().to_vec()).collect();
+                    steps.push(Step::Write { idn: slot.idn, candidates, refused });
+                }
+            }
+            StepKind::Read { idn, attribute, data } => steps.push(Step::Read { idn, attribute, data, refused }),
+            StepKind::ReadScaling => {
+                let mut idns: Vec<Idn> = Vec::new();
+                for idn in self.tables.scalings.iter().flat_map(|rule| rule.idns()) {
+                    if !idns.contains(&idn) {
+                        idns.push(idn);
+                    }
+                }
+                for idn in idns {
+                    steps.push(Step::Read { idn, attribute: true, data: true, refused });
+                }
+            }
+            StepKind::ReadTelegram => {
+                let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
+                for idn in telegram.command.into_iter().chain(telegram.feedback) {
+                    steps.push(Step::Read { idn, attribute: true, data: false, refused });
+                }
+            }
+            StepKind::Command(idn) => steps.push(Step::Command { idn, refused }),
+        }
+        Ok(())
+    }
+}
+
+fn encode(idn: Idn, value: i64, width: Width) -> Result<Vec<u8>, SercosError> {
+    let (min, max) = width.range();
+    if !(min..=max).contains(&value) {
+        return Err(SercosError::Range { idn, value, width });
+    }
+    let bytes = value.to_le_bytes();
+    Ok(bytes.iter().copied().take(width.bytes()).collect())
+}

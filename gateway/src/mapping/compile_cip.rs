@@ -1,0 +1,468 @@
+//! CIP Motion <-> generic: the resolved mapping and the program of one axis.
+
+use arrayvec::ArrayVec;
+use bitflags::bitflags;
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
+use profile_generic::inhibit::Inhibits;
+use profile_generic::mode::OperatingMode;
+use profile_generic::program::Conversion;
+use profile_generic::ratio::{Outcome, Ratio};
+use profile_generic::scaling::{WrapTracker, fold};
+use profile_generic::state::{Action, DriveState, Request};
+
+use super::cip_scaling::CipScaling;
+use super::cip_tables::CipTables;
+use super::dictionary::CipType;
+
+/// Elements of a data set: one per bit.
+pub const ELEMENTS: usize = 8;
+
+/// Codes of an enumeration in a nibble.
+const NIBBLE: usize = 16;
+
+/// Counts of a DINT.
+const DINT_BITS: u32 = 32;
+
+/// The most Axis Control codes a table names.
+pub const MAX_REQUESTS: usize = 16;
+
+/// The most rules for Axis Status bits.
+pub const MAX_STATUS_RULES: usize = 48;
+
+/// The most fault causes a table names.
+pub const MAX_FAULTS: usize = 128;
+
+/// The most inhibits: the bits of [`Inhibits`].
+pub const MAX_INHIBITS: usize = 32;
+
+/// The most stopping actions a table names.
+pub const MAX_STOPPINGS: usize = 8;
+
+/// A value of the cyclic data block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CipValue {
+    /// DINT.
+    Dint(i32),
+    /// REAL.
+    Real(f32),
+    /// LREAL.
+    Lreal(f64),
+}
+
+/// The values of a data set, indexed by the bit of the set.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CyclicValues(pub [Option<CipValue>; ELEMENTS]);
+
+bitflags! {
+    /// Conditions of the axis state machine (Tables 5-2.97 and 5-2.98).
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+    pub struct CipConditions: u16 {
+        /// Initialization is complete.
+        const INITIALIZED = 1 << 0;
+        /// The DC bus is up.
+        const BUS_UP = 1 << 1;
+        /// A start inhibit is active.
+        const INHIBITED = 1 << 2;
+        /// The start sequence is complete.
+        const START_COMPLETE = 1 << 3;
+        /// The stop sequence is complete.
+        const STOP_COMPLETE = 1 << 4;
+        /// A major fault is active.
+        const FAULTED = 1 << 5;
+        /// The shutdown is latched.
+        const SHUTDOWN = 1 << 6;
+        /// A test is active.
+        const TEST_ACTIVE = 1 << 7;
+    }
+}
+
+impl CipConditions {
+    /// Every condition with its name in the tables.
+    pub const NAMED: &'static [(&'static str, Self)] = &[
+        ("initialized", Self::INITIALIZED),
+        ("bus_up", Self::BUS_UP),
+        ("inhibited", Self::INHIBITED),
+        ("start_complete", Self::START_COMPLETE),
+        ("stop_complete", Self::STOP_COMPLETE),
+        ("faulted", Self::FAULTED),
+        ("shutdown", Self::SHUTDOWN),
+        ("test_active", Self::TEST_ACTIVE),
+    ];
+}
+
+/// What a drive state means to the axis state machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CipState {
+    /// Axis State (attribute 650) it leads to.
+    pub axis_state: u8,
+    /// Conditions that hold.
+    pub conditions: CipConditions,
+}
+
+/// An Axis Control code and what it asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CipRequest {
+    /// Axis Control code.
+    pub axis_control: u8,
+    /// Generic request; `None` when the device carries it out without the drive.
+    pub request: Option<Request>,
+    /// Axis Response code of success.
+    pub axis_response: u8,
+}
+
+/// How CIP reports a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CipFault {
+    /// Bit of Axis Exceptions; Axis Fault Type 3.
+    Exception(u8),
+    /// Bit of Axis Exceptions - Mfg; Axis Fault Type 4.
+    Manufacturer(u8),
+    /// Node Fault Code.
+    Node(u8),
+    /// Bit of Initialization Faults; Axis Fault Type 1.
+    Initialization(u8),
+    /// Bit of APR Faults; Axis Fault Type 5.
+    AbsolutePosition(u8),
+}
+
+/// A stopping action.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CipStopping {
+    /// Stopping Action code (attribute 610).
+    pub code: u8,
+    /// What the drive is told.
+    pub action: Action,
+    /// Whether the axis is held with torque at the end (category 2 stop).
+    pub holds: bool,
+}
+
+/// What happens when a value is not there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MissingValue {
+    /// It stays absent.
+    Absent,
+    /// It is sent as zero.
+    Zero,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Element {
+    signal: Signal,
+    conversion: Conversion,
+    wraps: bool,
+    data_type: CipType,
+    missing: MissingValue,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StatusRule {
+    pub status: StatusBits,
+    pub mode: Option<OperatingMode>,
+    pub axis_status: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InhibitRule {
+    pub inhibit: Inhibits,
+    pub standard: u16,
+    pub manufacturer: u16,
+}
+
+/// What happened to the values of one update on their way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CipReport {
+    /// Values that were clamped.
+    pub saturated: u32,
+    /// Values that were infinite or not a number: left out.
+    pub not_finite: u32,
+    /// Elements that no row maps, or of another type than the row says: left out.
+    pub unmapped: u32,
+    /// Values that were not there.
+    pub missing: u32,
+    /// The signal that was clamped last.
+    pub last_saturated: Option<Signal>,
+}
+
+impl CipReport {
+    /// Whether every value arrived as it was meant.
+    pub const fn is_clean(&self) -> bool {
+        self.saturated == 0 && self.not_finite == 0 && self.unmapped == 0 && self.missing == 0
+    }
+
+    fn saturated(&mut self, signal: Signal) {
+        self.saturated = self.saturated.saturating_add(1);
+        self.last_saturated = Some(signal);
+    }
+}
+
+/// The unrolled count of the command position; one per connection and axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CipTrackers {
+    position: WrapTracker,
+}
+
+impl CipTrackers {
+    /// Forgets where the position was: the next value is taken as it is.
+    pub fn restart(&mut self) {
+        self.position.restart();
+    }
+
+    /// Sets the unrolled count: after the controller has redefined its position.
+    pub fn set_counts(&mut self, counts: i64) {
+        self.position.set_total(counts);
+    }
+}
+
+/// The program of one axis: flat, without names, hashes or allocation.
+#[derive(Debug, Clone)]
+pub struct CipProgram {
+    commands: [Option<Element>; ELEMENTS],
+    actuals: [Option<Element>; ELEMENTS],
+    /// Counts after which positions wrap; `None` for the range of a DINT.
+    unwind: Option<i64>,
+    tracker: WrapTracker,
+    position_counts: Ratio,
+    modes: [Option<OperatingMode>; NIBBLE],
+    requests: ArrayVec<CipRequest, MAX_REQUESTS>,
+    states: [CipState; DriveState::ALL.len()],
+    status: ArrayVec<StatusRule, MAX_STATUS_RULES>,
+    /// Sorted by cause.
+    faults: ArrayVec<(FaultCause, CipFault), MAX_FAULTS>,
+    reactions: [u8; Reaction::ALL.len()],
+    inhibits: ArrayVec<InhibitRule, MAX_INHIBITS>,
+    stoppings: ArrayVec<CipStopping, MAX_STOPPINGS>,
+}
+
+impl CipProgram {
+    /// The program for an axis with this scaling.
+    pub(super) fn compile(tables: &CipTables, scaling: &CipScaling) -> Option<Self> {
+        let position_counts = scaling.nanounits_per_count().inverse()?;
+        let mut program = Self {
+            commands: [None; ELEMENTS],
+            actuals: [None; ELEMENTS],
+            unwind: scaling.unwind,
+            tracker: match scaling.unwind {
+                Some(counts) => WrapTracker::new(counts)?,
+                None => WrapTracker::of_bits(DINT_BITS)?,
+            },
+            position_counts,
+            modes: tables.modes,
+            requests: tables.requests.iter().copied().collect(),
+            states: tables.states,
+            status: tables.status.iter().copied().collect(),
+            faults: tables.faults.iter().copied().collect(),
+            reactions: tables.reactions,
+            inhibits: tables.inhibits.iter().copied().collect(),
+            stoppings: tables.stoppings.iter().copied().collect(),
+        };
+        for row in &tables.cyclic {
+            let to_generic = scaling.convert(row.unit, row.turns)?;
+            let conversion = if row.to_generic { to_generic } else { to_generic.inverse()? };
+            let element = Element {
+                signal: row.signal,
+                conversion: Conversion::new(conversion),
+                wraps: row.wraps,
+                data_type: row.data_type,
+                missing: row.missing,
+            };
+            let set = if row.to_generic { &mut program.commands } else { &mut program.actuals };
+            *set.get_mut(usize::from(row.bit))? = Some(element);
+        }
+        Some(program)
+    }
+
+    /// Trackers for [`CipProgram::decode`].
+    pub fn trackers(&self) -> CipTrackers {
+        CipTrackers { position: self.tracker }
+    }
+
+    /// Puts the values of a Command Data Set into a command. Values that are not there become absent.
+    pub fn decode(&self, values: &CyclicValues, trackers: &mut CipTrackers, command: &mut AxisCommand) -> CipReport {
+        let mut report = CipReport::default();
+        command.present = profile_generic::image::CommandSet::empty();
+        for (value, element) in values.0.iter().zip(&self.commands) {
+            let (value, element) = match (value, element) {
+                (Some(value), Some(element)) => (*value, element),
+                (None, _) => continue,
+                (Some(_), None) => {
+                    report.unmapped += 1;
+                    continue;
+                }
+            };
+            let Some(outcome) = element.to_generic(value, &mut trackers.position) else {
+                report.not_finite += 1;
+                continue;
+            };
+            if !command.set(element.signal, outcome.value) || outcome.saturated {
+                report.saturated(element.signal);
+            }
+        }
+        report
+    }
+
+    /// Puts the actual values of an axis into the elements of an Actual Data Set whose bits are in `wanted`.
+    pub fn encode(&self, feedback: &AxisFeedback, wanted: u8, values: &mut CyclicValues) -> CipReport {
+        let mut report = CipReport::default();
+        for (bit, (value, element)) in values.0.iter_mut().zip(&self.actuals).enumerate() {
+            *value = None;
+            if wanted & (1 << bit) == 0 {
+                continue;
+            }
+            let Some(element) = element else {
+                report.unmapped += 1;
+                continue;
+            };
+            let generic = match (feedback.get(element.signal), element.missing) {
+                (Some(generic), _) => generic,
+                (None, missing) => {
+                    report.missing += 1;
+                    if missing == MissingValue::Absent {
+                        continue;
+                    }
+                    0
+                }
+            };
+            let (encoded, saturated) = element.from_generic(generic, self.unwind);
+            *value = Some(encoded);
+            if saturated {
+                report.saturated(element.signal);
+            }
+        }
+        report
+    }
+
+    /// Counts of the controller in a generic position.
+    pub fn counts(&self, nanounits: i64) -> Outcome {
+        Conversion::new(self.position_counts).convert(nanounits)
+    }
+
+    /// The operating mode of a Control Mode; `None` when the device does not know the mode.
+    pub fn mode(&self, control_mode: u8) -> Option<OperatingMode> {
+        self.modes.get(usize::from(control_mode & 0x0F)).copied().flatten()
+    }
+
+    /// The row of an Axis Control code; `None` when the code is reserved.
+    pub fn request(&self, axis_control: u8) -> Option<CipRequest> {
+        self.requests.iter().find(|row| row.axis_control == axis_control).copied()
+    }
+
+    /// What a drive state means to the axis state machine.
+    pub fn state(&self, state: DriveState) -> CipState {
+        DriveState::ALL
+            .iter()
+            .position(|known| *known == state)
+            .and_then(|at| self.states.get(at))
+            .copied()
+            .unwrap_or_default()
+    }
+
+    /// The Axis Status bits (attribute 651) that follow from the drive.
+    pub fn axis_status(&self, feedback: &AxisFeedback) -> u32 {
+        self.status
+            .iter()
+            .filter(|rule| feedback.status.contains(rule.status))
+            .filter(|rule| rule.mode.is_none_or(|mode| mode == feedback.mode))
+            .fold(0, |word, rule| word | rule.axis_status)
+    }
+
+    /// How CIP reports a cause; `None` for a cause that no row names.
+    pub fn fault(&self, cause: FaultCause) -> Option<CipFault> {
+        let at = self.faults.binary_search_by_key(&cause, |(known, _)| *known).ok()?;
+        self.faults.get(at).map(|(_, fault)| *fault)
+    }
+
+    /// The Axis Fault Action (attribute 668) of a reaction.
+    pub fn fault_action(&self, reaction: Reaction) -> u8 {
+        let at = Reaction::ALL.iter().position(|known| *known == reaction);
+        at.and_then(|at| self.reactions.get(at)).copied().unwrap_or(0)
+    }
+
+    /// Start Inhibits and Start Inhibits - Mfg (attributes 676 and 677).
+    pub fn start_inhibits(&self, inhibits: Inhibits) -> (u16, u16) {
+        let active = self.inhibits.iter().filter(|rule| inhibits.contains(rule.inhibit));
+        active.fold((0, 0), |(standard, manufacturer), rule| {
+            (standard | rule.standard, manufacturer | rule.manufacturer)
+        })
+    }
+
+    /// What a Stopping Action does.
+    pub fn stopping(&self, code: u8) -> Option<CipStopping> {
+        self.stoppings.iter().find(|row| row.code == code).copied()
+    }
+
+    /// Every Stopping Action the device knows.
+    pub fn stoppings(&self) -> &[CipStopping] {
+        &self.stoppings
+    }
+}
+
+impl Element {
+    fn to_generic(&self, value: CipValue, tracker: &mut WrapTracker) -> Option<Outcome> {
+        if !self.wraps {
+            return match value {
+                CipValue::Dint(value) => Some(self.conversion.convert(i64::from(value))),
+                CipValue::Real(value) => self.conversion.convert_f64(f64::from(value)),
+                CipValue::Lreal(value) => self.conversion.convert_f64(value),
+            };
+        }
+        let (whole, fraction) = match value {
+            CipValue::Dint(value) => (i64::from(value), 0.0),
+            CipValue::Real(value) => split(f64::from(value))?,
+            CipValue::Lreal(value) => split(value)?,
+        };
+        let counts = self.conversion.convert(tracker.update(whole));
+        if fraction == 0.0 {
+            return Some(counts);
+        }
+        // The fraction of a count is converted by itself: less than one nanounit is lost, and nothing adds up, as
+        // the count stays an integer.
+        let rest = self.conversion.convert_f64(fraction)?;
+        let sum = counts.value.checked_add(rest.value);
+        let saturated = counts.saturated || rest.saturated || sum.is_none();
+        let inexact = counts.inexact || rest.inexact;
+        Some(Outcome { value: sum.unwrap_or(counts.value), saturated, inexact })
+    }
+
+    fn from_generic(&self, generic: i64, unwind: Option<i64>) -> (CipValue, bool) {
+        match self.data_type {
+            CipType::Real => {
+                let (outcome, saturated) = self.conversion.convert_to_f32(generic);
+                (CipValue::Real(outcome.value), saturated)
+            }
+            CipType::Lreal => {
+                let (outcome, saturated) = self.conversion.convert_to_f64(generic);
+                (CipValue::Lreal(outcome.value), saturated)
+            }
+            _ => {
+                let Outcome { value, saturated, .. } = self.conversion.convert(generic);
+                let (value, clamped) = if self.wraps { (wrap(value, unwind), false) } else { clamp(value) };
+                (CipValue::Dint(value), saturated || clamped)
+            }
+        }
+    }
+}
+
+/// The whole counts in a double, and the rest; `None` when it is not finite or holds more than a DINT does.
+fn split(value: f64) -> Option<(i64, f64)> {
+    let whole = value.floor();
+    let counts = Conversion::IDENTITY.within(i64::from(i32::MIN), i64::from(i32::MAX)).convert_f64(whole)?;
+    (!counts.saturated).then_some((counts.value, value - whole))
+}
+
+/// The counts as the controller sees them: within one cycle of the machine, or the low 32 bits.
+fn wrap(counts: i64, unwind: Option<i64>) -> i32 {
+    let folded = match unwind {
+        Some(modulus) => fold(counts, modulus),
+        None => counts,
+    };
+    let bytes = folded.to_le_bytes();
+    i32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+}
+
+fn clamp(value: i64) -> (i32, bool) {
+    match i32::try_from(value) {
+        Ok(value) => (value, false),
+        Err(_) => (if value > 0 { i32::MAX } else { i32::MIN }, true),
+    }
+}

@@ -1,0 +1,487 @@
+//! Generic <-> SERCOS: the telegram and the program of one axis.
+
+use arrayvec::ArrayVec;
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
+use profile_generic::mode::OperatingMode;
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{
+    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field, StateTable,
+    Trackers, Width,
+};
+use profile_generic::quantity::Quantity;
+use profile_generic::ratio::Ratio;
+use profile_generic::state::{Action, Report};
+use profile_sercos::wire::idn::Idn;
+
+use super::dictionary::{IdnUnit, SercosDictionary};
+use super::scaling::{AxisUnits, DriveFacts, Lsb, ScalingError, power_of_ten};
+use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, SercosTables};
+
+/// Operating modes of one axis: the slots S-0-0032..35.
+pub const MAX_MODES: usize = 4;
+
+/// Bytes of the control and of the status word.
+const WORD_BYTES: u16 = 2;
+
+/// Wraps of a position that does not work modulo: the range of its 32 bits.
+const FULL_RANGE: i64 = 1 << 32;
+
+/// The most rows for status bits.
+pub const MAX_STATUS_ROWS: usize = 32;
+
+/// The most rows for faults and warnings.
+pub const MAX_FAULT_ROWS: usize = 96;
+
+/// What must be known of an axis to work with its SERCOS drive.
+#[derive(Debug, Clone, Default)]
+pub struct SercosAxis {
+    /// Units.
+    pub units: AxisUnits,
+    /// Operating modes in the order of their slots; the first is active at start.
+    pub modes: ArrayVec<OperatingMode, MAX_MODES>,
+    /// Whether positions wrap.
+    pub modulo: bool,
+    /// Whether commissioning sets the scaling of the drive; it is left alone otherwise.
+    pub set_scaling: bool,
+    /// Parameters to write at start, in generic units.
+    pub parameters: Vec<(Parameter, i64)>,
+}
+
+/// The IDNs in the two telegrams of an axis, in order. The control and the status word come first.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Telegram {
+    /// From the master.
+    pub command: Vec<Idn>,
+    /// From the drive.
+    pub feedback: Vec<Idn>,
+    /// Bytes of the master's values, without the connection control word.
+    pub command_bytes: u16,
+    /// Bytes of the drive's values, without the connection control word.
+    pub feedback_bytes: u16,
+}
+
+/// Why no program can be made for an axis.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SercosError {
+    /// An operating mode without a row.
+    #[error("no [[mode]] row for operating mode {0}")]
+    Mode(OperatingMode),
+    /// No operating mode at all.
+    #[error("expected at least one operating mode, got none")]
+    NoMode,
+    /// More modes than slots.
+    #[error("expected at most {slots} operating modes, got {modes}")]
+    Slots {
+        /// Rows in the table.
+        slots: usize,
+        /// Modes of the axis.
+        modes: usize,
+    },
+    /// The drive lacks a value that the mode needs.
+    #[error("the drive has no {idn}, which carries {signal}")]
+    Missing {
+        /// The IDN.
+        idn: Idn,
+        /// The signal.
+        signal: Signal,
+    },
+    /// Nobody knows how long a value is.
+    #[error("{0}: neither the drive nor the dictionary tells the length")]
+    Length(Idn),
+    /// The unit of a value is not known.
+    #[error(transparent)]
+    Scaling(#[from] ScalingError),
+    /// A table does not fit the program.
+    #[error("{0} does not fit the program of an axis")]
+    Full(&'static str),
+    /// A value that the parameter of the drive cannot hold.
+    #[error("{idn}: {value} does not fit a {width}")]
+    Range {
+        /// The IDN.
+        idn: Idn,
+        /// The value in the drive's unit.
+        value: i64,
+        /// How the value lies in the drive.
+        width: Width,
+    },
+}
+
+/// A parameter that the drive holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParameterEntry {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Where the drive keeps it.
+    pub idn: Idn,
+    /// How it lies there.
+    pub width: Width,
+    /// From the generic unit, when it can be written.
+    pub to_drive: Option<Conversion>,
+    /// To the generic unit, when it can be read.
+    pub from_drive: Option<Conversion>,
+}
+
+impl ParameterEntry {
+    /// The bytes for element 7; the bytes that count, and whether the value was clamped. `None` when the parameter
+    /// cannot be written.
+    pub fn encode(&self, generic: i64) -> Option<([u8; 8], usize, bool)> {
+        let outcome = self.to_drive?.convert(generic);
+        let (min, max) = self.width.range();
+        let value = outcome.value.clamp(min, max);
+        Some((value.to_le_bytes(), self.width.bytes(), outcome.saturated || value != outcome.value))
+    }
+
+    /// The generic value of the bytes of element 7. `None` when the parameter cannot be read or has another length.
+    pub fn decode(&self, data: &[u8]) -> Option<i64> {
+        let conversion = self.from_drive?;
+        if data.len() != self.width.bytes() {
+            return None;
+        }
+        let negative = self.width.range().0 < 0 && data.last().is_some_and(|byte| byte & 0x80 != 0);
+        let mut bytes = [if negative { 0xFF } else { 0 }; 8];
+        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        Some(conversion.convert(i64::from_le_bytes(bytes)).value)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct ModeEntry {
+    mode: OperatingMode,
+    control: BitPattern,
+    status: BitPattern,
+}
+
+/// The program of one axis: flat, without names, hashes or allocation in use.
+#[derive(Debug, Clone)]
+pub struct SercosProgram {
+    /// What the telegrams carry.
+    pub telegram: Telegram,
+    /// Values from the master, behind the control word.
+    pub command: CommandProgram,
+    /// Values from the drive, behind the status word.
+    pub feedback: FeedbackProgram,
+    /// The bits of the control word for each action.
+    pub actions: ActionTable,
+    /// What a status word says.
+    pub reports: StateTable,
+    modes: ArrayVec<ModeEntry, MAX_MODES>,
+    status: ArrayVec<(BitPattern, StatusBits), MAX_STATUS_ROWS>,
+    known_status: StatusBits,
+    faults: ArrayVec<FaultRule, MAX_FAULT_ROWS>,
+    commands: ArrayVec<(Action, Idn), { Action::ALL.len() }>,
+    parameters: Vec<ParameterEntry>,
+    rejected: Vec<Parameter>,
+}
+
+impl Telegram {
+    /// The telegrams of an axis. Values that the drive is known to lack and that the table lets go are left out.
+    ///
+    /// # Errors
+    /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
+    pub(super) fn compile(
+        tables: &SercosTables,
+        dictionary: &SercosDictionary,
+        axis: &SercosAxis,
+        facts: &DriveFacts,
+    ) -> Result<Self, SercosError> {
+        let mut telegram = Telegram::default();
+        let (command, actual) = signals(tables, axis, facts)?;
+        for (word, signals, idns, bytes) in [
+            (tables.control, command, &mut telegram.command, &mut telegram.command_bytes),
+            (tables.status_word, actual, &mut telegram.feedback, &mut telegram.feedback_bytes),
+        ] {
+            idns.push(word);
+            *bytes = WORD_BYTES;
+            for (_, idn) in signals {
+                let width = facts.width(idn, dictionary).ok_or(SercosError::Length(idn))?;
+                idns.push(idn);
+                *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
+            }
+        }
+        Ok(telegram)
+    }
+}
+
+type Signals = Vec<(Signal, Idn)>;
+
+/// The signals of all modes, each once, in the order of the modes.
+fn signals(tables: &SercosTables, axis: &SercosAxis, facts: &DriveFacts) -> Result<(Signals, Signals), SercosError> {
+    let (mut command, mut actual) = (Signals::new(), Signals::new());
+    for rule in mode_rules(tables, axis)? {
+        for (wanted, list) in [(&rule.command, &mut command), (&rule.actual, &mut actual)] {
+            for &signal in wanted {
+                let Some(row) = tables.signal(signal) else { continue };
+                if list.iter().any(|(known, _)| *known == signal) {
+                    continue;
+                }
+                match (facts.is_missing(row.idn), row.refuse) {
+                    (true, true) => return Err(SercosError::Missing { idn: row.idn, signal }),
+                    (true, false) => {}
+                    (false, _) => list.push((signal, row.idn)),
+                }
+            }
+        }
+    }
+    Ok((command, actual))
+}
+
+/// The rows of the modes of an axis.
+pub(super) fn mode_rules<'t>(tables: &'t SercosTables, axis: &SercosAxis) -> Result<Vec<&'t ModeRule>, SercosError> {
+    if axis.modes.is_empty() {
+        return Err(SercosError::NoMode);
+    }
+    if axis.modes.len() > tables.slots.len() {
+        return Err(SercosError::Slots { slots: tables.slots.len(), modes: axis.modes.len() });
+    }
+    let find = |mode: &OperatingMode| {
+        tables.modes.iter().find(|rule| rule.mode == *mode).ok_or(SercosError::Mode(*mode))
+    };
+    axis.modes.iter().map(find).collect()
+}
+
+/// What the values of an IDN measure, and generic units in one count.
+pub(super) fn unit_of(
+    tables: &SercosTables,
+    dictionary: &SercosDictionary,
+    units: AxisUnits,
+    facts: &DriveFacts,
+    idn: Idn,
+    quantity: Quantity,
+) -> Result<Lsb, SercosError> {
+    let plain = Lsb { quantity, generic: Ratio::ONE, modulo: None };
+    let row = dictionary.idn(idn);
+    match row.map(|row| &row.unit) {
+        None | Some(IdnUnit::None) => Ok(plain),
+        Some(IdnUnit::Fixed { unit, decimals }) => {
+            let found = tables.units.iter().find(|(known, of, _)| known == unit && *of == quantity);
+            let (_, _, ratio) = found.ok_or_else(|| ScalingError::Unknown(unit.clone()))?;
+            let decimals = facts.attribute(idn).map_or(*decimals, |attribute| attribute.decimals());
+            let power = power_of_ten(idn, -i64::from(decimals))?;
+            let generic = ratio.then(power).ok_or(ScalingError::Overflow(idn))?;
+            Ok(Lsb { generic, ..plain })
+        }
+        Some(IdnUnit::Scaled(scaling)) => {
+            let rule = tables.scalings.iter().find(|rule| rule.scaling == *scaling);
+            let rule = rule.ok_or_else(|| ScalingError::Unknown(scaling.clone()))?;
+            Ok(rule.lsb(units, facts, dictionary)?)
+        }
+    }
+}
+
+impl SercosProgram {
+    /// The program of an axis whose drive has told its scaling.
+    ///
+    /// # Errors
+    /// As [`Telegram::compile`], and when the scaling was not read or has no row.
+    pub(super) fn compile(
+        tables: &SercosTables,
+        dictionary: &SercosDictionary,
+        axis: &SercosAxis,
+        facts: &DriveFacts,
+    ) -> Result<Self, SercosError> {
+        let (command_signals, actual_signals) = signals(tables, axis, facts)?;
+        let mut program = Self {
+            telegram: Telegram::compile(tables, dictionary, axis, facts)?,
+            command: CommandProgram::new(),
+            feedback: FeedbackProgram::new(),
+            actions: ActionTable::new(),
+            reports: StateTable::new(),
+            modes: ArrayVec::new(),
+            status: ArrayVec::new(),
+            known_status: StatusBits::empty(),
+            faults: ArrayVec::new(),
+            commands: ArrayVec::new(),
+            parameters: Vec::new(),
+            rejected: Vec::new(),
+        };
+        let compiler = Compiler { tables, dictionary, axis, facts };
+        let mut offset = WORD_BYTES;
+        for (signal, idn) in command_signals {
+            let field = compiler.field(signal, idn, &mut offset)?;
+            program.command.push(field).map_err(|_| SercosError::Full("the master's telegram"))?;
+        }
+        let mut offset = WORD_BYTES;
+        for (signal, idn) in actual_signals {
+            let field = compiler.field(signal, idn, &mut offset)?;
+            program.feedback.push(field).map_err(|_| SercosError::Full("the drive's telegram"))?;
+        }
+        for (action, pattern) in &tables.actions {
+            program.actions.set(*action, *pattern);
+        }
+        for (pattern, report) in &tables.reports {
+            if !program.reports.push(*pattern, *report) {
+                return Err(SercosError::Full("the table of reports"));
+            }
+        }
+        for (mode, slot) in axis.modes.iter().zip(&tables.slots) {
+            program.modes.push(ModeEntry { mode: *mode, control: slot.control, status: slot.status });
+        }
+        for row in &tables.status {
+            program.status.try_push(*row).map_err(|_| SercosError::Full("the table of status bits"))?;
+            program.known_status |= row.1;
+        }
+        for row in &tables.faults {
+            program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
+        }
+        for row in &tables.commands {
+            program.commands.try_push(*row).map_err(|_| SercosError::Full("the table of commands"))?;
+        }
+        for rule in &tables.parameters {
+            match compiler.parameter(rule)? {
+                Some(entry) => program.parameters.push(entry),
+                None if rule.reject => program.rejected.push(rule.parameter),
+                None => {}
+            }
+        }
+        program.parameters.sort_by_key(|entry| entry.parameter);
+        Ok(program)
+    }
+
+    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last; the new
+    /// one comes back. An action without bits leaves the word alone, and so does a mode without a slot.
+    pub fn encode(
+        &self,
+        command: &AxisCommand,
+        action: Action,
+        word: u16,
+        telegram: &mut [u8],
+        report: &mut ConversionReport,
+    ) -> u16 {
+        let word = self.control_word(action, command.mode, word);
+        if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
+        self.command.encode(command, telegram, report);
+        word
+    }
+
+    /// The control word after an action in a mode.
+    pub fn control_word(&self, action: Action, mode: OperatingMode, word: u16) -> u16 {
+        let word = u32::from(word);
+        let word = self.actions.apply(action, word).unwrap_or(word);
+        let slot = self.modes.iter().find(|entry| entry.mode == mode);
+        let word = slot.map_or(word, |entry| entry.control.apply(word));
+        let bytes = word.to_le_bytes();
+        u16::from_le_bytes([bytes[0], bytes[1]])
+    }
+
+    /// Takes the drive's telegram apart into report, mode, status bits and actual values. Returns the status word, or
+    /// `None` when the telegram is too short to hold one.
+    pub fn decode(
+        &self,
+        telegram: &[u8],
+        feedback: &mut AxisFeedback,
+        trackers: &mut Trackers,
+        report: &mut ConversionReport,
+    ) -> Option<u16> {
+        let word = telegram.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))?;
+        feedback.report = self.report(word);
+        feedback.mode = self.mode(word).unwrap_or_default();
+        feedback.status = feedback.status.difference(self.known_status).union(self.status_bits(word));
+        self.feedback.decode(telegram, feedback, trackers, report);
+        Some(word)
+    }
+
+    /// What a status word says; a word that no row matches says that the drive is not ready.
+    pub fn report(&self, status: u16) -> Report {
+        self.reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
+    }
+
+    /// The operating mode that a status word reports.
+    pub fn mode(&self, status: u16) -> Option<OperatingMode> {
+        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.mode)
+    }
+
+    /// The status bits in a status word.
+    pub fn status_bits(&self, status: u16) -> StatusBits {
+        let rows = self.status.iter().filter(|(pattern, _)| pattern.matches(u32::from(status)));
+        rows.fold(StatusBits::empty(), |bits, (_, bit)| bits | *bit)
+    }
+
+    /// The first fault or warning that a diagnostic word shows.
+    pub fn fault(&self, idn: Idn, word: u32) -> Option<(FaultCause, Reaction)> {
+        let row = self.faults.iter().find(|row| row.word == idn && row.pattern.matches(word))?;
+        Some((row.cause, row.reaction))
+    }
+
+    /// The diagnostic words in the order in which they should be read.
+    pub fn diagnostic_words(&self) -> impl Iterator<Item = Idn> + '_ {
+        let first = |at: usize, idn: Idn| !self.faults[..at].iter().any(|row| row.word == idn);
+        self.faults.iter().enumerate().filter(move |(at, row)| first(*at, row.word)).map(|(_, row)| row.word)
+    }
+
+    /// The procedure command that belongs to an action.
+    pub fn command_of(&self, action: Action) -> Option<Idn> {
+        self.commands.iter().find(|(known, _)| *known == action).map(|(_, idn)| *idn)
+    }
+
+    /// Where the drive keeps a parameter; `None` when it has none.
+    pub fn parameter(&self, parameter: Parameter) -> Option<&ParameterEntry> {
+        let at = self.parameters.binary_search_by_key(&parameter, |entry| entry.parameter).ok()?;
+        self.parameters.get(at)
+    }
+
+    /// Whether access to a parameter that this drive lacks must be refused; it is a shadow otherwise.
+    pub fn rejects(&self, parameter: Parameter) -> bool {
+        self.rejected.contains(&parameter)
+    }
+
+    /// Everything the drive keeps, by parameter.
+    pub fn parameters(&self) -> &[ParameterEntry] {
+        &self.parameters
+    }
+}
+
+pub(super) struct Compiler<'t> {
+    pub tables: &'t SercosTables,
+    pub dictionary: &'t SercosDictionary,
+    pub axis: &'t SercosAxis,
+    pub facts: &'t DriveFacts,
+}
+
+impl Compiler<'_> {
+    fn unit(&self, idn: Idn, quantity: Quantity) -> Result<Lsb, SercosError> {
+        unit_of(self.tables, self.dictionary, self.axis.units, self.facts, idn, quantity)
+    }
+
+    fn field(&self, signal: Signal, idn: Idn, offset: &mut u16) -> Result<Field, SercosError> {
+        let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
+        let lsb = self.unit(idn, signal.quantity())?;
+        let absolute = signal.quantity() == Quantity::Position && signal != Signal::FollowingError;
+        let (ratio, modulo) = if signal.is_command() {
+            // An absolute position that leaves the range of the drive is clamped and reported.
+            (lsb.generic.inverse().ok_or(ScalingError::Overflow(idn))?, lsb.modulo.filter(|_| absolute))
+        } else {
+            let range = (width.bits() == 32).then_some(FULL_RANGE);
+            (lsb.generic, lsb.modulo.or(range).filter(|_| absolute))
+        };
+        let field = Field { signal, offset: *offset, width, conversion: Conversion::new(ratio), modulo };
+        *offset += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
+        Ok(field)
+    }
+
+    /// The entry of a parameter; `None` when the drive lacks it or does not tell its unit.
+    pub fn parameter(&self, rule: &ParameterRule) -> Result<Option<ParameterEntry>, SercosError> {
+        if self.facts.is_missing(rule.idn) {
+            return Ok(None);
+        }
+        let Some(width) = self.facts.width(rule.idn, self.dictionary) else { return Ok(None) };
+        let lsb = match self.unit(rule.idn, rule.quantity) {
+            Ok(lsb) => lsb,
+            // A quantity that no mode needs may well be unscaled: the parameter is served as if it were missing.
+            Err(SercosError::Scaling(_)) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let overflow = || ScalingError::Overflow(rule.idn);
+        let from_drive = lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
+        let to_drive = from_drive.inverse().ok_or_else(overflow)?;
+        Ok(Some(ParameterEntry {
+            parameter: rule.parameter,
+            idn: rule.idn,
+            width,
+            to_drive: rule.to_drive.then(|| Conversion::new(to_drive)),
+            from_drive: rule.from_drive.then(|| Conversion::new(from_drive)),
+        }))
+    }
+}

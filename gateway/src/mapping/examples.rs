@@ -1,0 +1,254 @@
+//! Worked examples: numbers that stand in the tables and must come out.
+
+use core::fmt;
+use std::ops::Range;
+
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
+use profile_generic::mode::OperatingMode;
+use profile_generic::parameter::Parameter;
+use profile_generic::scaling::UnitKind;
+use profile_sercos::wire::idn::Idn;
+
+use super::cip_tables::CipTables;
+use super::compile_sercos::{Compiler, unit_of};
+use super::format::{CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow};
+use super::load::{TableText, Tables};
+use super::{
+    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Reference, SercosAxis,
+};
+
+/// An example whose numbers do not come out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExampleFailure {
+    /// The file.
+    pub file: String,
+    /// Line, 1 first.
+    pub line: usize,
+    /// Column, 1 first.
+    pub column: usize,
+    /// What was expected and what came.
+    pub message: String,
+}
+
+impl fmt::Display for ExampleFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)
+    }
+}
+
+/// What is wrong, and the value it is wrong about.
+type Wrong = (Range<usize>, String);
+
+struct Runner<'m> {
+    mapping: &'m Mapping,
+    count: usize,
+    failures: Vec<ExampleFailure>,
+}
+
+/// Runs every example and returns how many there are.
+pub(super) fn run(mapping: &Mapping, tables: &Tables) -> Result<usize, Vec<ExampleFailure>> {
+    let mut runner = Runner { mapping, count: 0, failures: Vec::new() };
+    let cip = &tables.cip_generic;
+    for row in &cip.rows.cyclic {
+        for example in &row.examples {
+            let result = runner.mapping.cyclic_example(row, example);
+            runner.note(&cip.text, result);
+        }
+    }
+    for row in &cip.rows.attribute {
+        for example in &row.examples {
+            let result = runner.mapping.attribute_example(row, example);
+            runner.note(&cip.text, result);
+        }
+    }
+    let sercos = &tables.generic_sercos;
+    for row in &sercos.rows.scaling {
+        for example in &row.examples {
+            let result = runner.mapping.drive_example(None, example);
+            runner.note(&sercos.text, result);
+        }
+    }
+    for row in &sercos.rows.parameter {
+        for example in &row.examples {
+            let result = runner.mapping.drive_example(Parameter::from_name(row.parameter.get_ref()), example);
+            runner.note(&sercos.text, result);
+        }
+    }
+    if runner.failures.is_empty() { Ok(runner.count) } else { Err(runner.failures) }
+}
+
+impl Runner<'_> {
+    fn note(&mut self, text: &TableText, result: Result<(), Wrong>) {
+        self.count += 1;
+        if let Err((span, message)) = result {
+            let (line, column) = text.place(span.start);
+            self.failures.push(ExampleFailure { file: text.path.clone(), line, column, message });
+        }
+    }
+}
+
+fn expect<T: PartialEq + fmt::Debug>(span: Range<usize>, what: &str, expected: &T, got: &T) -> Result<(), Wrong> {
+    if expected == got { Ok(()) } else { Err((span, format!("{what}: the table says {expected:?}, got {got:?}"))) }
+}
+
+/// The bytes of a text such as `90 D0 03 00`.
+fn hex(name: &Name) -> Result<Vec<u8>, Wrong> {
+    let parse = |text: &str| u8::from_str_radix(text, 16).ok().filter(|_| text.len() == 2);
+    let bytes: Option<Vec<u8>> = name.get_ref().split_whitespace().map(parse).collect();
+    bytes.ok_or_else(|| (name.span(), format!("expected pairs of hexadecimal digits, got `{}`", name.get_ref())))
+}
+
+/// The value in the bytes, and the same as a double.
+fn cip_value(bytes: &[u8], data_type: CipType) -> Option<(CipValue, f64)> {
+    match (data_type, bytes) {
+        (CipType::Real, &[a, b, c, d]) => {
+            let value = f32::from_le_bytes([a, b, c, d]);
+            Some((CipValue::Real(value), f64::from(value)))
+        }
+        (CipType::Lreal, &[a, b, c, d, e, f, g, h]) => {
+            let value = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
+            Some((CipValue::Lreal(value), value))
+        }
+        (CipType::Dint, &[a, b, c, d]) => {
+            let value = i32::from_le_bytes([a, b, c, d]);
+            Some((CipValue::Dint(value), f64::from(value)))
+        }
+        _ => None,
+    }
+}
+
+fn cip_bytes(value: CipValue) -> Vec<u8> {
+    match value {
+        CipValue::Dint(value) => value.to_le_bytes().to_vec(),
+        CipValue::Real(value) => value.to_le_bytes().to_vec(),
+        CipValue::Lreal(value) => value.to_le_bytes().to_vec(),
+    }
+}
+
+fn number(number: Number) -> f64 {
+    match number {
+        Number::Integer(value) => profile_generic::cast::f64_from_i64(value),
+        Number::Float(value) => value,
+    }
+}
+
+impl CipTables {
+    /// The scaling that an example names; one turn of a million counts when it does not matter.
+    fn example_scaling(&self, example: &CipExampleRow) -> Result<CipScaling, Wrong> {
+        let mut scaling = CipScaling {
+            kind: UnitKind::Rotary,
+            nanounits_per_unit: profile_generic::scaling::NANO,
+            counts_per_unit: example.resolution.unwrap_or(1_000_000),
+            inverted: example.inverted,
+            unwind: None,
+        };
+        if let Some(name) = &example.displacement_unit {
+            let unit = self.motion_units.iter().find(|unit| unit.name == *name.get_ref());
+            let unit = unit.ok_or((name.span(), "expected a name of Motion Unit".to_owned()))?;
+            scaling.kind = unit.kind;
+            scaling.nanounits_per_unit = unit.nanounits;
+        }
+        Ok(scaling)
+    }
+}
+
+impl Mapping {
+    fn cyclic_example(&self, row: &CyclicRow, example: &CipExampleRow) -> Result<(), Wrong> {
+        let span = example.value.span();
+        let scaling = self.cip.example_scaling(example)?;
+        let none = || (span.clone(), "the row cannot be compiled for this example".to_owned());
+        let program = self.cip_program(&scaling).ok_or_else(none)?;
+        let signal = Signal::parse(row.signal.get_ref()).ok_or_else(none)?;
+        let element = self.cip.cyclic.iter().find(|element| element.signal == signal).ok_or_else(none)?;
+        let data_type = match &example.data_type {
+            Some(name) => CipType::NAMED.iter().find(|(known, _)| known == name.get_ref()).map(|(_, kind)| *kind),
+            None => Some(element.data_type),
+        };
+        let bytes = hex(&example.bytes)?;
+        let (value, float) = data_type.and_then(|kind| cip_value(&bytes, kind)).ok_or_else(|| {
+            (example.bytes.span(), format!("the bytes are no value of type {}", element.data_type.name()))
+        })?;
+        expect(span.clone(), "value of the bytes", &number(*example.value.get_ref()), &float)?;
+        let ratio = scaling.convert(element.unit, element.turns).ok_or_else(none)?;
+        let generic = *example.generic.get_ref();
+        if element.to_generic {
+            let mut values = CyclicValues([None; ELEMENTS]);
+            values.0[usize::from(element.bit)] = Some(value);
+            let mut command = AxisCommand::default();
+            program.decode(&values, &mut program.trackers(), &mut command);
+            expect(example.generic.span(), "generic value", &Some(generic), &command.get(signal))?;
+            let back = ratio.inverse().ok_or_else(none)?.to_f64(generic);
+            expect(span, "value on the way back", &example.back.map_or(float, number), &back)
+        } else {
+            let mut feedback = AxisFeedback::default();
+            feedback.set(signal, generic);
+            let mut values = CyclicValues::default();
+            program.encode(&feedback, 1 << element.bit, &mut values);
+            let sent = values.0[usize::from(element.bit)].map(cip_bytes);
+            expect(example.bytes.span(), "bytes", &Some(bytes), &sent)
+        }
+    }
+
+    fn attribute_example(&self, row: &CipAttributeRow, example: &CipExampleRow) -> Result<(), Wrong> {
+        let span = example.value.span();
+        let scaling = self.cip.example_scaling(example)?;
+        let none = || (span.clone(), "the attribute has no generic value".to_owned());
+        let table = self.attribute_table(&scaling).ok_or_else(none)?;
+        let id = self.dictionaries.cip.attribute(row.attribute.get_ref()).map(|attribute| attribute.id);
+        let entry = id.and_then(|id| table.get(id)).ok_or_else(none)?;
+        let bytes = hex(&example.bytes)?;
+        let (_, float) = cip_value(&bytes, entry.data_type).ok_or_else(|| {
+            (example.bytes.span(), format!("the bytes are no value of type {}", entry.data_type.name()))
+        })?;
+        expect(span.clone(), "value of the bytes", &number(*example.value.get_ref()), &float)?;
+        let generic = *example.generic.get_ref();
+        if row.parameter.is_some() {
+            expect(example.generic.span(), "generic value", &Ok(generic), &entry.to_generic(&bytes))?;
+        }
+        let mut out = [0; 8];
+        let written = entry.from_generic(generic, &mut out).map(|(length, _)| out[..length].to_vec());
+        match example.back {
+            None => expect(example.bytes.span(), "bytes on the way back", &Ok(bytes), &written),
+            Some(back) => {
+                let got = written.ok().and_then(|bytes| cip_value(&bytes, entry.data_type)).map(|(_, float)| float);
+                expect(span, "value on the way back", &Some(number(back)), &got)
+            }
+        }
+    }
+
+    /// `parameter` for the example of a [[parameter]] row, `None` for that of a [[scaling]] row.
+    fn drive_example(&self, parameter: Option<Parameter>, example: &ScalingExampleRow) -> Result<(), Wrong> {
+        let sercos = &self.dictionaries.sercos;
+        let wrong = |message: String| (example.idn.span(), message);
+        let kind = UnitKind::parse(example.kind.get_ref())
+            .ok_or_else(|| (example.kind.span(), "expected rotary or linear".to_owned()))?;
+        let mut facts = DriveFacts::new();
+        for (name, value) in &example.drive {
+            let idn: Idn = name.parse().map_err(|error| wrong(format!("{name}: {error}")))?;
+            let width = facts.width(idn, sercos).ok_or_else(|| wrong(format!("{idn} is not in the dictionary")))?;
+            facts.note_data(idn, value.to_le_bytes().get(..width.bytes()).unwrap_or_default());
+        }
+        let units = AxisUnits { kind, reference: Reference::Load, rated_torque: example.rated };
+        let idn: Idn = example.idn.get_ref().parse().map_err(|error| wrong(format!("{error}")))?;
+        let axis = SercosAxis { units, modes: [OperatingMode::Position].into_iter().collect(), ..SercosAxis::default() };
+        let generic = *example.generic.get_ref();
+        let compiler = Compiler { tables: &self.sercos, dictionary: sercos, axis: &axis, facts: &facts };
+        let rule = match parameter {
+            Some(parameter) => {
+                let rule = self.sercos.parameters.iter().find(|rule| rule.parameter == parameter);
+                *rule.filter(|rule| rule.idn == idn).ok_or_else(|| wrong(format!("the row does not map {idn}")))?
+            }
+            None => self.sercos.plain_rule(idn, &self.dictionaries).ok_or_else(|| wrong(format!("{idn} has no unit")))?,
+        };
+        unit_of(&self.sercos, sercos, units, &facts, idn, rule.quantity).map_err(|error| wrong(error.to_string()))?;
+        let entry = compiler.parameter(&rule).map_err(|error| wrong(error.to_string()))?;
+        let entry = entry.ok_or_else(|| wrong(format!("{idn} has no length or unit")))?;
+        let bytes = hex(&example.bytes)?;
+        if rule.to_drive {
+            let sent = entry.encode(generic).map(|(bytes, length, _)| bytes[..length].to_vec());
+            expect(example.bytes.span(), "bytes", &Some(bytes.clone()), &sent)?;
+        }
+        let back = *example.back.get_ref();
+        expect(example.back.span(), "generic value on the way back", &Some(back), &entry.decode(&bytes))
+    }
+}

@@ -1,0 +1,140 @@
+//! The mapping tables: what corresponds between CIP Motion, the generic model and SERCOS.
+//!
+//! ```text
+//! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
+//!  format                dictionary,                                  Telegram, CommissioningPlan, SercosProgram
+//!                        cip_tables, sercos_tables
+//! ```
+//!
+//! Loading finds unknown keys and wrong types, resolving finds names that nothing has and units that do not convert;
+//! both tell file, line, column and key. Compiling makes flat programs for one axis; what can still go wrong then lies
+//! with the axis or the drive. No translation of an attribute, IDN, state, mode or fault is code.
+
+mod attributes;
+mod cip_scaling;
+mod cip_tables;
+mod commissioning;
+mod compile_cip;
+mod compile_sercos;
+mod dictionary;
+mod examples;
+mod format;
+mod load;
+mod resolver;
+mod scaling;
+mod sercos_tables;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
+pub use cip_scaling::{CipScaling, CipScalingError};
+pub use cip_tables::{CipTables, CipUnit, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times};
+pub use commissioning::{CommissioningPlan, Refused, Step};
+pub use compile_cip::{
+    CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
+    CyclicValues, ELEMENTS, MissingValue,
+};
+pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
+pub use dictionary::{
+    Access, CipAttribute, CipDictionary, CipType, DataElement, Dictionaries, Enumeration, GenericDictionary,
+    IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word,
+};
+pub use examples::ExampleFailure;
+pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};
+pub use scaling::{AxisUnits, DriveFacts, Lsb, Reference, ScalingError, ScalingRule};
+pub use sercos_tables::{FaultRule, SercosTables};
+
+use load::Tables;
+
+/// All tables, read and resolved.
+#[derive(Debug, Clone)]
+pub struct Mapping {
+    /// What the profiles have.
+    pub dictionaries: Dictionaries,
+    /// CIP Motion and the generic model.
+    pub cip: CipTables,
+    /// The generic model and SERCOS.
+    pub sercos: SercosTables,
+    tables: Tables,
+}
+
+impl Mapping {
+    /// The tables built into the binary.
+    ///
+    /// # Errors
+    /// None with the tables that are shipped; a test holds that.
+    pub fn embedded() -> Result<Self, TableErrors> {
+        Self::from_texts(TableTexts::embedded())
+    }
+
+    /// The tables in a folder; files that are not there come from the binary.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the files.
+    pub fn from_folder(folder: &Path) -> Result<Self, TableErrors> {
+        Self::from_texts(TableTexts::from_folder(folder)?)
+    }
+
+    /// The tables in these texts.
+    ///
+    /// # Errors
+    /// Everything that is wrong with them.
+    pub fn from_texts(texts: TableTexts) -> Result<Self, TableErrors> {
+        let tables = texts.parse()?;
+        let mut errors = TableErrors::default();
+        let dictionaries = Dictionaries::resolve(&tables, &mut errors);
+        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut errors);
+        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &mut errors);
+        errors.into_result(Self { dictionaries, cip, sercos, tables })
+    }
+
+    /// The program of an axis on the CIP side. `None` when a ratio of the scaling does not fit 64 bits.
+    pub fn cip_program(&self, scaling: &CipScaling) -> Option<CipProgram> {
+        CipProgram::compile(&self.cip, scaling)
+    }
+
+    /// The attributes of an axis. `None` when a ratio of the scaling does not fit 64 bits.
+    pub fn attribute_table(&self, scaling: &CipScaling) -> Option<AttributeTable> {
+        AttributeTable::compile(&self.cip, scaling)
+    }
+
+    /// What the telegrams of an axis carry, as far as `facts` are known.
+    ///
+    /// # Errors
+    /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
+    pub fn telegram(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<Telegram, SercosError> {
+        Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by then.
+    ///
+    /// # Errors
+    /// A mode has no row, or a value does not fit the drive.
+    pub fn commissioning(
+        &self,
+        axis: &SercosAxis,
+        phase: u8,
+        facts: &DriveFacts,
+    ) -> Result<CommissioningPlan, SercosError> {
+        CommissioningPlan::compile(&self.sercos, &self.dictionaries.sercos, axis, phase, facts)
+    }
+
+    /// The program of an axis on the SERCOS side, once its drive has told its scaling.
+    ///
+    /// # Errors
+    /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
+    pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<SercosProgram, SercosError> {
+        SercosProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// Runs every worked example of the tables.
+    ///
+    /// # Errors
+    /// Each example whose numbers do not come out, with its place.
+    pub fn run_examples(&self) -> Result<usize, Vec<ExampleFailure>> {
+        examples::run(self, &self.tables)
+    }
+}
