@@ -530,7 +530,7 @@ impl Master {
             self.latched_time = self.system_time.map(|time| (time, !toggle));
         }
         let (SystemTime(nanos), toggle) = self.latched_time?;
-        let seconds = u32::try_from(nanos / 1_000_000_000 & u64::from(u32::MAX)).unwrap_or(u32::MAX);
+        let seconds = u32::try_from(nanos / 1_000_000_000 % (1 << 32)).unwrap_or(u32::MAX);
         let nanos = u32::try_from(nanos % 1_000_000_000).unwrap_or(0);
         let word = if self.cycle_count < 4 { seconds } else { nanos };
         let [a, b, c, d] = word.to_le_bytes();

@@ -110,6 +110,8 @@ impl Peer {
             (Idn::CP3_CHECK, word(0)),
             (Idn::CP4_CHECK, word(0)),
             (Idn::DELAY_MEASURING, word(0)),
+            (Idn::RESET_C1D, word(0)),
+            (Idn::standard(32), word(0)),
         ] {
             parameters.insert(idn, parameter);
         }
@@ -192,13 +194,15 @@ impl Peer {
             self.open = Some(Idn(mdt.info));
             self.position = 0;
         }
+        let idn = self.open.unwrap_or_default();
         if element == Element::Close {
             self.open = None;
             self.info = 0;
+        }
+        self.steps.push(SeenStep { phase: self.phase, idn, element, write, last, info: mdt.info });
+        if element == Element::Close {
             return;
         }
-        let idn = self.open.unwrap_or_default();
-        self.steps.push(SeenStep { phase: self.phase, idn, element, write, last, info: mdt.info });
         if self.faults.busy_at == Some(idn) {
             self.status |= SvcStatus::BUSY;
         }
@@ -237,9 +241,7 @@ impl Peer {
             (Element::Data, _) if self.faults.error_at.is_some_and(|(at, _)| at == idn) => {
                 Err(self.faults.error_at.unwrap().1)
             }
-            (Element::Data, true)
-                if [Idn::CP3_CHECK, Idn::CP4_CHECK, Idn::DELAY_MEASURING].contains(&idn) =>
-            {
+            (Element::Data, true) if COMMANDS.contains(&idn) => {
                 let mut status = u16::try_from(info & 3).unwrap();
                 if status == 3 {
                     if let Some((check, invalid)) = &self.faults.invalid
@@ -366,6 +368,9 @@ fn part(bytes: &[u8], at: usize) -> u32 {
     }
     u32::from_le_bytes(info)
 }
+
+/// The procedure commands.
+const COMMANDS: [Idn; 4] = [Idn::CP3_CHECK, Idn::CP4_CHECK, Idn::DELAY_MEASURING, Idn::RESET_C1D];
 
 /// Slaves in a line.
 pub struct Line {
