@@ -1,6 +1,8 @@
 //! The device role: the explicit side ([`adapter`]) and the motion device behind it.
 
 pub mod adapter;
+#[cfg(test)]
+mod adapter_tests;
 pub mod config;
 mod connection_manager;
 mod connection_path;
@@ -29,3 +31,12 @@ mod status_report;
 mod event_channel;
 pub mod attribute_worker;
 mod cyclic_list;
+pub mod axis_object;
+pub mod service_channel;
+pub mod io_counters;
+pub mod motion_class;
+pub mod io_connection;
+pub mod motion_device;
+pub mod motion_service;
+pub mod explicit_queue;
+pub mod motion_transmit;

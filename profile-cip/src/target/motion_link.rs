@@ -15,7 +15,8 @@ use core::net::{Ipv4Addr, SocketAddrV4};
 
 pub use crate::wire::ConnectionTriad;
 
-/// Most bytes of service data in a handed-on explicit request or its reply: what an unconnected message holds.
+/// Most bytes of service data in a handed-on explicit request or its reply: what an unconnected message
+/// holds.
 pub const EXPLICIT_DATA_MAX: usize = 504;
 
 /// Most 16-bit words of extended status the device may add to a reply.
@@ -141,8 +142,8 @@ pub enum MotionReply {
     },
     /// Answer to [`MotionRequest::Explicit`].
     Explicit(ExplicitReply),
-    /// The connection ended without a Forward_Close: the controller was silent for too long. The connection is
-    /// free for the next owner from here on.
+    /// The connection ended without a Forward_Close: the controller was silent for too long. The connection
+    /// is free for the next owner from here on.
     ConnectionLost {
         /// Which connection.
         o_to_t_id: u32,

@@ -1,9 +1,9 @@
 //! Bodies of Get_Attribute_List (0x03) and Set_Attribute_List (0x04).
 //!
-//! | | request | reply |
+//! | | request: count u16, then each | reply: count u16, then each |
 //! |---|---|---|
-//! | Get_Attribute_List | count u16, then attribute u16 each | count u16, then attribute u16, status u16, value if 0 |
-//! | Set_Attribute_List | count u16, then attribute u16 and value each | count u16, then attribute u16, status u16 |
+//! | Get_Attribute_List | attribute u16 | attribute u16, status u16, value if the status is 0 |
+//! | Set_Attribute_List | attribute u16, value | attribute u16, status u16 |
 //!
 //! Values have no length of their own: only the object knows where one ends. Get_Attribute_Single and
 //! Set_Attribute_Single have nothing but the value, Get_Attributes_All the values of all attributes in order.

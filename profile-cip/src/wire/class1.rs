@@ -79,8 +79,8 @@ impl<'a> Class1Datagram<'a> {
         Ok(w.written())
     }
 
-    /// Writes only the header for `data_len` bytes of connection data, which the caller has put or will put at
-    /// [`CLASS1_HEADER_LEN`].
+    /// Writes only the header for `data_len` bytes of connection data, which the caller has put or will put
+    /// at [`CLASS1_HEADER_LEN`].
     ///
     /// # Errors
     /// As [`Class1Datagram::emit`].
@@ -143,7 +143,8 @@ mod tests {
 
     #[rustfmt::skip]
     const INITIAL_BYTES: &[u8] = &[
-        2, 0, 0x02, 0x80, 8, 0, 0x44, 0x33, 0x22, 0x11, 7, 0, 0, 0, 0xB1, 0, 10, 0, 3, 0, 6, 2, 0, 1, 0, 0, 0, 0,
+        2, 0, 0x02, 0x80, 8, 0, 0x44, 0x33, 0x22, 0x11, 7, 0, 0, 0, 0xB1, 0, 10, 0, 3, 0,
+        6, 2, 0, 1, 0, 0, 0, 0,
     ];
 
     #[test]

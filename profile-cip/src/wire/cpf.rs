@@ -14,7 +14,8 @@ use arrayvec::ArrayVec;
 use core::fmt;
 use profile_generic::open_code;
 
-/// Most items kept. A Forward_Open has four (address, data, two sockaddr items); no packet of ours needs more.
+/// Most items kept. A Forward_Open has four (address, data, two sockaddr items); no packet of ours needs
+/// more.
 pub const ITEMS_MAX: usize = 8;
 
 /// Type and length in front of each item's data.
@@ -239,8 +240,8 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn round_trip(interface_handle: u32, timeout_s: u16,
-                      parts in prop::collection::vec((any::<u16>(), prop::collection::vec(any::<u8>(), 0..20)),
-                                                     0..=ITEMS_MAX)) {
+                      parts in prop::collection::vec(
+                          (any::<u16>(), prop::collection::vec(any::<u8>(), 0..20)), 0..=ITEMS_MAX)) {
             let items = parts.iter().map(|(t, d)| Item { item_type: ItemType(*t), data: d }).collect();
             let value = EncapsulatedPacket { interface_handle, timeout_s, packet: CommonPacket { items } };
             let mut buffer = vec![0xA5; value.buffer_len()];
@@ -249,7 +250,9 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_that_parse_emit_themselves(bytes in prop::collection::vec(any::<u8>(), 0..40), count in 0u8..4) {
+        fn any_bytes_that_parse_emit_themselves(
+            bytes in prop::collection::vec(any::<u8>(), 0..40), count in 0u8..4,
+        ) {
             let mut bytes = bytes;
             if bytes.len() > 1 { bytes[0] = count; bytes[1] = 0; }
             if let Ok(value) = CommonPacket::parse(&bytes) {

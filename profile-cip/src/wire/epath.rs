@@ -11,8 +11,8 @@
 //! | 100 | data | 0x80 simple (word count, words), 0x91 ANSI extended symbol (byte count, text) |
 //!
 //! In the padded form, which every explicit message and connection path uses, each segment has an even
-//! length: 16 and 32-bit logical values have a zero byte before them, odd texts and link addresses one behind.
-//! The packed form leaves these bytes out.
+//! length: 16 and 32-bit logical values have a zero byte before them, odd texts and link addresses one
+//! behind. The packed form leaves these bytes out.
 
 use super::encapsulation::words_u8;
 use super::{Error, Reader, Writer};
@@ -166,7 +166,8 @@ impl<'a> Segment<'a> {
     /// Reads one segment where `r` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::Invalid`] naming the field for segments that are reserved or not supported.
+    /// [`Error::Truncated`]; [`Error::Invalid`] naming the field for segments that are reserved or not
+    /// supported.
     pub fn read(r: &mut Reader<'a>, encoding: Encoding) -> Result<Self, Error> {
         let start = r.offset();
         let first = r.u8("segment")?;
@@ -288,7 +289,8 @@ impl<'a> Segment<'a> {
     /// Writes the segment where `w` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a value its segment cannot carry.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a value its segment cannot
+    /// carry.
     pub fn write(&self, w: &mut Writer<'_>, encoding: Encoding) -> Result<(), Error> {
         let start = w.written();
         match *self {

@@ -54,7 +54,8 @@ impl<'a> ForwardClose<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd length.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u8("priority and time tick", self.priority_tick)?;
@@ -105,7 +106,8 @@ impl<'a> ForwardCloseReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long or odd.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         self.triad.write(&mut w)?;
@@ -149,7 +151,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn round_trip(priority_tick: u8, timeout_ticks: u8, path in prop::collection::vec(any::<[u8; 2]>(), 0..30)) {
+        fn round_trip(priority_tick: u8, timeout_ticks: u8,
+                      path in prop::collection::vec(any::<[u8; 2]>(), 0..30)) {
             let path = path.concat();
             let value = ForwardClose { priority_tick, timeout_ticks, triad: TRIAD, path: &path };
             let mut buffer = vec![0xA5; value.buffer_len()];

@@ -17,9 +17,9 @@
 //! | 35 (39) | 1 | connection path length in words |
 //! | 36 (40) | | connection path, padded EPATH |
 //!
-//! Offsets in brackets are those of the large form. The success reply: both connection IDs, triad, both actual
-//! packet intervals, reply length in words u8, reserved u8, application reply. The failure reply: triad, words of
-//! the path not processed u8, reserved u8.
+//! Offsets in brackets are those of the large form. The success reply: both connection IDs, triad, both
+//! actual packet intervals, reply length in words u8, reserved u8, application reply. The failure reply:
+//! triad, words of the path not processed u8, reserved u8.
 
 use super::encapsulation::words_u8;
 use super::network_parameters::NetworkParameters;
@@ -257,7 +257,8 @@ impl<'a> ForwardOpenReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long or odd.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u32("O->T connection ID", self.o_to_t_id)?;
@@ -359,12 +360,15 @@ mod tests {
 
     #[rustfmt::skip]
     const SMALL: &[u8] = &[
-        0x0A, 0x0E, 0, 0, 0, 0, 0x02, 0x00, 0x01, 0x80, 0x34, 0x12, 0x01, 0x00, 0x0D, 0xF0, 0xFE, 0xCA, 1, 0, 0, 0,
-        0xA0, 0x0F, 0, 0, 0xDC, 0x4E, 0xA0, 0x0F, 0, 0, 0xDC, 0x4E, 0x01, 3, 0x20, 0x42, 0x2C, 0x51, 0x2C, 0x02,
+        0x0A, 0x0E, 0, 0, 0, 0, 0x02, 0x00, 0x01, 0x80, 0x34, 0x12, 0x01, 0x00, 0x0D, 0xF0, 0xFE, 0xCA,
+        1, 0, 0, 0,
+        0xA0, 0x0F, 0, 0, 0xDC, 0x4E, 0xA0, 0x0F, 0, 0, 0xDC, 0x4E, 0x01, 3,
+        0x20, 0x42, 0x2C, 0x51, 0x2C, 0x02,
     ];
     #[rustfmt::skip]
     const LARGE: &[u8] = &[
-        0x0A, 0x0E, 0, 0, 0, 0, 0x02, 0x00, 0x01, 0x80, 0x34, 0x12, 0x01, 0x00, 0x0D, 0xF0, 0xFE, 0xCA, 1, 0, 0, 0,
+        0x0A, 0x0E, 0, 0, 0, 0, 0x02, 0x00, 0x01, 0x80, 0x34, 0x12, 0x01, 0x00, 0x0D, 0xF0, 0xFE, 0xCA,
+        1, 0, 0, 0,
         0xA0, 0x0F, 0, 0, 0xDC, 0, 0, 0x4E, 0xA0, 0x0F, 0, 0, 0xDC, 0, 0, 0x4E, 0x01, 3,
         0x20, 0x42, 0x2C, 0x51, 0x2C, 0x02,
     ];
@@ -435,8 +439,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn round_trip(large: bool, head: [u8; 2], ids: [u32; 2], triad: (u16, u16, u32), timeout_multiplier: u8,
-                      rpis: [u32; 2], parameters: [u32; 2], transport: u8,
+        fn round_trip(large: bool, head: [u8; 2], ids: [u32; 2], triad: (u16, u16, u32),
+                      timeout_multiplier: u8, rpis: [u32; 2], parameters: [u32; 2], transport: u8,
                       path in prop::collection::vec(any::<[u8; 2]>(), 0..30)) {
             let parameter = |word: u32| if large { NetworkParameters::from_u32(word) } else {
                 let [low, high, ..] = word.to_le_bytes();
@@ -458,11 +462,12 @@ mod tests {
         }
 
         #[test]
-        fn reply_round_trip(ids: [u32; 2], apis: [u32; 2], reply in prop::collection::vec(any::<[u8; 2]>(), 0..9)) {
+        fn reply_round_trip(ids: [u32; 2], apis: [u32; 2],
+                            reply in prop::collection::vec(any::<[u8; 2]>(), 0..9)) {
             let reply = reply.concat();
             let value = ForwardOpenReply {
-                o_to_t_id: ids[0], t_to_o_id: ids[1], triad: TRIAD, o_to_t_api_us: apis[0], t_to_o_api_us: apis[1],
-                application_reply: &reply,
+                o_to_t_id: ids[0], t_to_o_id: ids[1], triad: TRIAD, o_to_t_api_us: apis[0],
+                t_to_o_api_us: apis[1], application_reply: &reply,
             };
             let mut buffer = vec![0xA5; value.buffer_len()];
             prop_assert_eq!(value.emit(&mut buffer), Ok(value.buffer_len()));

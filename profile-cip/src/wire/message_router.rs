@@ -53,7 +53,8 @@ impl<'a> Request<'a> {
     /// Writes the request and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd length.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u8("service", self.service.0 & !REPLY_BIT)?;

@@ -6,8 +6,8 @@
 //! | 2 | 2n | offset of each embedded message from the start of the count |
 //! | 2 + 2n | | the messages |
 //!
-//! A message ends where the next one begins, the last one at the end of the data. Messages start behind the offsets
-//! and follow each other in the order of the list.
+//! A message ends where the next one begins, the last one at the end of the data. Messages start behind the
+//! offsets and follow each other in the order of the list.
 
 use super::encapsulation::length_u16;
 use super::{Error, Reader, Writer};
@@ -23,8 +23,8 @@ impl<'a> MultipleService<'a> {
     /// Checks count and offsets.
     ///
     /// # Errors
-    /// [`Error::Truncated`] if the list does not fit the data; [`Error::Invalid`] for an offset into the list, before
-    /// its predecessor, or past the end.
+    /// [`Error::Truncated`] if the list does not fit the data; [`Error::Invalid`] for an offset into the
+    /// list, before its predecessor, or past the end.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let count = r.u16("service count")?;

@@ -129,7 +129,8 @@ mod tests {
 
     #[test]
     fn vectors_both_ways() {
-        // Point to point, urgent, variable, 220 bytes: 0100_1110 and the size (Volume 9 clause 7-1.1's example).
+        // Point to point, urgent, variable, 220 bytes: 0100_1110 and the size (Volume 9 clause 7-1.1's
+        // example).
         assert_eq!(NetworkParameters::from_u16(0x4EDC), MOTION);
         assert_eq!(MOTION.to_u16(), Ok(0x4EDC));
         assert_eq!(NetworkParameters::from_u32(0x4E00_00DC), MOTION);

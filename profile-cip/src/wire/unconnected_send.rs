@@ -57,8 +57,8 @@ impl<'a> UnconnectedSend<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a message or route too long, or a
-    /// route of odd length.
+    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a message or route too long, or
+    /// a route of odd length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u8("priority and time tick", self.priority_tick)?;

@@ -1,0 +1,109 @@
+//! What the adapter tells the application, for its log and its duties.
+
+use super::config::QosConfig;
+use super::motion_link::ConnectionTriad;
+use core::fmt;
+use core::net::SocketAddrV4;
+
+/// Kind of an Identity object reset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResetKind {
+    /// Type 0: as if the power had been cycled.
+    PowerCycle,
+    /// Type 1: back to the values of the factory, then as type 0.
+    FactoryDefaults,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// The motion connection is open.
+    MotionOpened {
+        /// Which one.
+        triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// Packet interval of both directions in microseconds.
+        rpi_us: u32,
+    },
+    /// The motion connection was closed by its originator.
+    MotionClosed {
+        /// Which one.
+        triad: ConnectionTriad,
+    },
+    /// The motion connection timed out: no controller-to-device datagram for too long.
+    MotionLost {
+        /// Which one.
+        triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// Silence in microseconds.
+        silent_us: u64,
+        /// Permitted silence in microseconds.
+        timeout_us: u64,
+    },
+    /// A Forward_Open was refused.
+    OpenRefused {
+        /// Which one; zeros if the request was too short to tell.
+        triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// General status of the refusal.
+        general: u8,
+        /// Extended status of the refusal.
+        extended: u16,
+        /// The value found, where the refusal is about one.
+        found: Option<u32>,
+        /// The value that would be taken, where the refusal is about one.
+        expected: Option<u32>,
+    },
+    /// An explicit connection timed out: no request for too long.
+    ExplicitLost {
+        /// Which one.
+        triad: ConnectionTriad,
+    },
+    /// The Identity object was reset; the reply is on its way. The application restarts the device.
+    Reset {
+        /// How.
+        kind: ResetKind,
+        /// By whom.
+        originator: SocketAddrV4,
+    },
+    /// DSCP values were changed. The application keeps them and uses them after its next start.
+    QosChanged(QosConfig),
+    /// The inactivity time-out of sessions was changed. The application keeps it.
+    InactivityTimeoutChanged {
+        /// New value in seconds, 0 is never.
+        seconds: u16,
+    },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::MotionOpened { triad, originator, rpi_us } => {
+                write!(f, "motion {triad} opened by {originator}, interval {rpi_us} us")
+            }
+            Self::MotionClosed { triad } => write!(f, "motion {triad} closed by its originator"),
+            Self::MotionLost { triad, originator, silent_us, timeout_us } => write!(
+                f,
+                "motion {triad} of {originator} timed out: nothing O->T for {silent_us} us, expected within \
+                 {timeout_us} us"
+            ),
+            Self::OpenRefused { triad, originator, general, extended, found, expected } => {
+                write!(f, "{triad} of {originator} refused with {general:#04x}/{extended:#06x}")?;
+                match (expected, found) {
+                    (Some(expected), Some(found)) => write!(f, ": expected {expected:#x}, found {found:#x}"),
+                    (_, Some(found)) => write!(f, ": found {found:#x}"),
+                    _ => Ok(()),
+                }
+            }
+            Self::ExplicitLost { triad } => write!(f, "explicit {triad} timed out"),
+            Self::Reset { kind, originator } => write!(f, "reset ({kind:?}) asked for by {originator}"),
+            Self::QosChanged(qos) => write!(f, "DSCP values for the next start: {qos:?}"),
+            Self::InactivityTimeoutChanged { seconds } => {
+                write!(f, "session inactivity time-out {seconds} s")
+            }
+        }
+    }
+}
