@@ -5,7 +5,7 @@ use core::fmt;
 use super::failure::Failure;
 use super::status;
 use crate::wire;
-use crate::wire::motion::codes::{AxisStateCode, NodeAlarm, NodeFault, SyncStatus};
+use crate::wire::motion::codes::{AxisStateCode, ClearingEvent, FaultType, NodeAlarm, NodeFault, SyncStatus};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
 
 /// Who the device says it is.
@@ -155,6 +155,9 @@ pub(super) struct FaultText(pub FaultRecord);
 impl fmt::Display for FaultText {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let r = self.0;
+        if r.fault_type == FaultType::CLEARED {
+            return write!(f, "{} by {} at {} ns", r.fault_type, ClearingEvent(r.code), r.time_stamp);
+        }
         write!(
             f,
             "{} code {} sub code {} action {:#04x} at {} ns",

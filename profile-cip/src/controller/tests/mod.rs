@@ -1,5 +1,6 @@
 //! Whole runs of the controller in virtual time.
 
+mod against_target;
 mod failures;
 mod peer;
 mod rig;
