@@ -100,7 +100,7 @@ impl Master {
                 (now >= self.next_cycle).then_some(PhaseEvent::Elapsed)
             }
             State::Settle => (now - self.since >= self.config.settle).then_some(PhaseEvent::Elapsed),
-            State::Scan => self.scan_ready.then_some(PhaseEvent::Ready),
+            State::Scan => self.scan_ready.map(|_| PhaseEvent::Ready),
             State::Cp0 if self.condition => Some(PhaseEvent::Failed),
             State::Cp0 => {
                 let known = self.found > 0;
@@ -217,10 +217,7 @@ impl Master {
                     self.emit(Event::TooManySlaves { found: slaves, max: self.config.slaves_max });
                     self.scan.start();
                 }
-                ScanResult::Stable(slaves) => {
-                    self.found = usize::from(slaves);
-                    self.scan_ready = true;
-                }
+                ScanResult::Stable(slaves) => self.scan_ready = Some(slaves),
             },
             State::Cp0 => self.condition = self.scan.has_changed(at.as_ref()),
             State::Leave0 | State::Down => self.condition = at.as_ref().is_some_and(scan::is_untouched),
@@ -353,7 +350,7 @@ impl Master {
             State::Settle => self.start_phase(Phase::CP0),
             State::Scan => {
                 self.scan.start();
-                self.scan_ready = false;
+                self.scan_ready = None;
             }
             State::Cp0 => self.take_scan(),
             State::Identify => {
@@ -417,6 +414,7 @@ impl Master {
 
     /// Makes the slaves of the finished scan known.
     fn take_scan(&mut self) {
+        self.found = usize::from(self.scan_ready.take().unwrap_or(0));
         for index in 0..self.found {
             let address = self.scan.address(index);
             let config = self.config.slaves.iter().find(|slave| slave.address == address);

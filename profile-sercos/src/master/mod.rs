@@ -108,7 +108,8 @@ pub struct Master {
     /// The frames that are out have been evaluated.
     evaluated: bool,
     scan: Scan,
-    scan_ready: bool,
+    /// Slaves in a stable scan that has not been taken over yet.
+    scan_ready: Option<u16>,
     stations: Vec<Station>,
     /// Slaves found by the last scan.
     found: usize,
@@ -142,7 +143,7 @@ impl Master {
             frames: Frames::new(config.mac),
             evaluated: true,
             scan: Scan::new(config.stable_cycles, config.scan_timeout_cycles),
-            scan_ready: false,
+            scan_ready: None,
             stations: (0..slaves).map(|_| Station::new(&config)).collect(),
             found: 0,
             layout: CyclicLayout::with_capacity(slaves),

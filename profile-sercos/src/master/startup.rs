@@ -31,6 +31,10 @@ impl Master {
         let state = self.state;
         for index in 0..self.found {
             let station = &mut self.stations[index];
+            // A request that was cut off by a switch of the phase gives the list buffer back.
+            if let Some(SvcOutcome { data: SvcData::Buffer(buffer), .. }) = station.channel.take_own() {
+                station.list = buffer;
+            }
             station.work = Work::Free;
             station.cursor = Cursor::default();
             station.check_failed = false;

@@ -144,9 +144,9 @@ impl ServiceChannel {
         }
     }
 
-    /// Takes a request of the master itself, which goes before all others; one at a time.
+    /// Takes a request of the master itself, which goes before all others. The one before must have been
+    /// taken back with [`ServiceChannel::take_own`].
     pub fn submit_own(&mut self, request: SvcRequest) {
-        debug_assert!(matches!(self.slots[OWN].place, Place::Free));
         self.occupy(OWN, request);
     }
 

@@ -37,8 +37,8 @@ fn config(addresses: &[u16]) -> MasterConfig {
     }
 }
 
-/// What happens to a frame on its way back.
-type Cable = fn(&mut Vec<u8>) -> bool;
+/// What happens to a frame on its way back; false when it does not arrive.
+type Cable = Box<dyn FnMut(&mut Vec<u8>) -> bool>;
 
 struct Rig {
     now: MonotonicTime,
@@ -61,7 +61,7 @@ impl Rig {
             now: MonotonicTime::ZERO,
             master: Master::new(config).unwrap(),
             line: Line::new(addresses),
-            cable: |_| true,
+            cable: Box::new(|_| true),
             log: Vec::new(),
             cycles: Vec::new(),
             auto_proceed: true,
@@ -141,6 +141,7 @@ impl Rig {
     }
 }
 
+mod disturbance;
 mod faults;
 mod phase_up;
 mod recording;

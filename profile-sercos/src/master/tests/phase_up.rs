@@ -138,6 +138,24 @@ fn down_and_up_again() {
     }
 }
 
+#[test]
+fn a_reading_that_was_cut_off_is_made_again() {
+    for state in [State::Read2, State::Connect2, State::Write2, State::Check2] {
+        let mut rig = Rig::new(&[1, 2]);
+        rig.master.set_target_phase(Phase::CP4);
+        rig.state(state);
+        // S-0-1000 is under way in the fourth cycle of the reading.
+        rig.cycles(4);
+        rig.master.set_target_phase(Phase::CP0);
+        rig.state(State::Cp0);
+        rig.log.clear();
+        rig.up_to(Phase::CP4);
+        let info = rig.master.slave(SlaveId(0)).unwrap();
+        assert_eq!(info.facts.version(ScpClass::SYNC), Some(1), "{state:?}");
+        assert!(!rig.log.iter().any(|event| matches!(event, Event::StepFailed { .. })), "{:?}", rig.log);
+    }
+}
+
 /// First cycle of each stretch of the same CPS and phase.
 fn stretches(rig: &Rig) -> Vec<(u8, MonotonicTime, MonotonicTime)> {
     let mut list: Vec<(u8, MonotonicTime, MonotonicTime)> = Vec::new();
