@@ -1,1 +1,576 @@
 //! The slave role: phases, service channel server, parameters, cyclic data, and the simulated drive behind it.
+//!
+//! A [`Slave`] sits between two ports. Every frame that comes in goes through [`Slave::handle_frame`], which takes
+//! what is for this slave, puts in what is from it, and says where the frame goes on. [`Line`] joins slaves. The
+//! function-specific profile behind the communication is an [`Application`]; `drive::Drive` is one.
+//!
+//! Nothing is allocated after a slave is built.
+
+pub mod application;
+pub mod communication;
+pub mod configuration;
+pub mod connection;
+mod core;
+mod cyclic;
+mod line;
+pub mod parameter;
+pub mod phase;
+mod scan;
+pub mod service_channel;
+
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+pub use self::application::{Application, Cycle, Diagnosis};
+pub use self::core::Core;
+pub use self::line::Line;
+
+use self::communication::{Identity, idn};
+use self::core::Access;
+use self::parameter::Store;
+use self::phase::{Event, Fault, State};
+use self::service_channel::Server;
+use crate::wire::cp0::CommunicationVersion;
+use crate::wire::cp12;
+use crate::wire::device_control::{DeviceControl, Topology};
+use crate::wire::device_status::{DeviceStatus, InactivePort};
+use crate::wire::header::{Channel, HEADER_LEN, Header, Kind, Phase};
+use crate::wire::idn::Idn;
+use crate::wire::svc::MdtSvc;
+
+/// Silence after which a slave leaves CP0 to CP2, and CP3 or CP4 while a switch down is announced. No public
+/// figure is known; it has to be longer than the 120 ms pause of a phase switch.
+pub const MST_TIMEOUT: DurationNs = DurationNs::from_millis(500);
+
+/// How often the application is called without communication.
+pub const NRT_PERIOD: DurationNs = DurationNs::from_millis(10);
+
+/// One of the two ports of a slave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Port {
+    /// Port 1; nearer to the master's first port in a line.
+    One,
+    /// Port 2.
+    Two,
+}
+
+impl Port {
+    /// The other port.
+    #[must_use]
+    pub const fn other(self) -> Port {
+        match self {
+            Port::One => Port::Two,
+            Port::Two => Port::One,
+        }
+    }
+
+    const fn index(self) -> usize {
+        match self {
+            Port::One => 0,
+            Port::Two => 1,
+        }
+    }
+}
+
+/// Where a frame goes after a slave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Forward {
+    /// Out of the other port.
+    Through,
+    /// Back out of the port it came from: this slave is the end of the line.
+    Back,
+    /// Both: back, and a copy out of the port where the line ends.
+    BackAndThrough,
+}
+
+/// What a slave is built with.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// SERCOS address, 0..=511; 0 = none set.
+    pub address: u16,
+    /// Hardware address.
+    pub mac: [u8; 6],
+    /// Connections, S-0-1050.0 upwards; 1..=8.
+    pub connections: u8,
+    /// Serial number.
+    pub serial: u32,
+    /// What the slave says about itself.
+    pub identity: Identity,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Config {
+            address: 1,
+            mac: [2, 0, 0, 0, 0, 1],
+            connections: 4,
+            serial: 1,
+            identity: Identity::default(),
+        }
+    }
+}
+
+/// The cycle that is going on, to tell the second copy of a telegram (ring) from the first.
+#[derive(Debug, Clone, Copy, Default)]
+struct Round {
+    /// Phase byte of its MST.
+    phase: u8,
+    /// MDTs taken, one bit each.
+    mdts: u8,
+    /// The application has had its cycle.
+    acted: bool,
+}
+
+/// A SERCOS III slave with its application.
+#[derive(Debug)]
+pub struct Slave<A> {
+    core: Core,
+    svc: Server,
+    app: A,
+    links: [bool; 2],
+    /// Port on which telegrams of the P and the S channel come in first; the other one sees the way back.
+    entry: [Option<Port>; 2],
+    topology: Topology,
+    topology_toggle: bool,
+    version: CommunicationVersion,
+    topology_address: u16,
+    round: Round,
+    last_cycle: MonotonicTime,
+    /// Losses in a row before the last MST came.
+    losses: u32,
+    shown: u32,
+}
+
+impl<A: Application> Slave<A> {
+    /// A slave in NRT with both ports unconnected.
+    pub fn new(config: &Config, mut app: A) -> Self {
+        let mut store = Store::new();
+        let connections = config.connections.clamp(1, 8);
+        let address = config.address.min(511);
+        communication::define(&mut store, address, config.mac, connections, &config.identity, config.serial);
+        app.define(&mut store);
+        communication::define_lists(&mut store);
+        let svc = Server::new(&store);
+        let mut slave = Slave {
+            core: Core::new(store),
+            svc,
+            app,
+            links: [false; 2],
+            entry: [None; 2],
+            topology: Topology::StoreAndForward,
+            topology_toggle: false,
+            version: CommunicationVersion::empty(),
+            topology_address: 0,
+            round: Round::default(),
+            last_cycle: MonotonicTime::ZERO,
+            losses: 0,
+            shown: 0,
+        };
+        slave.show_diagnosis();
+        slave
+    }
+
+    /// The parameters.
+    pub fn store(&self) -> &Store {
+        &self.core.store
+    }
+
+    /// The parameters, to change them from inside the slave.
+    pub fn store_mut(&mut self) -> &mut Store {
+        &mut self.core.store
+    }
+
+    /// The application.
+    pub fn application(&self) -> &A {
+        &self.app
+    }
+
+    /// The application, to act on it from outside.
+    pub fn application_mut(&mut self) -> &mut A {
+        &mut self.app
+    }
+
+    /// Where the slave stands.
+    pub fn state(&self) -> State {
+        self.core.state
+    }
+
+    /// Why SERCOS communication ended last; `None` once it has been reset by S-0-0099.
+    pub fn fault(&self) -> Option<Fault> {
+        self.core.fault
+    }
+
+    /// Topology address of the last scan; 0 before the first one.
+    pub fn topology_address(&self) -> u16 {
+        self.topology_address
+    }
+
+    /// Plugs or pulls a cable.
+    pub fn set_link(&mut self, port: Port, up: bool) {
+        self.links[port.index()] = up;
+    }
+
+    /// When [`handle_time`](Self::handle_time) has something to do unless a frame comes before.
+    pub fn wake_at(&self) -> MonotonicTime {
+        match self.core.state {
+            State::Nrt => self.last_cycle + NRT_PERIOD,
+            _ => self.core.last_mst + self.silence_max() + DurationNs(1),
+        }
+    }
+
+    /// Looks after time-outs, and after the application where there are no cycles.
+    pub fn handle_time(&mut self, now: MonotonicTime) {
+        let idle = now.since(self.last_cycle);
+        if self.core.state == State::Nrt && idle >= NRT_PERIOD {
+            self.act(now, idle, false);
+        } else if self.core.state != State::Nrt && now.since(self.core.last_mst) > self.silence_max() {
+            self.advance(Event::MstTimeout);
+            let elapsed = now.since(self.last_cycle);
+            self.act(now, elapsed, false);
+        }
+    }
+
+    /// Takes a frame that came in on `port` and changes it as it passes.
+    pub fn handle_frame(&mut self, now: MonotonicTime, port: Port, frame: &mut [u8]) -> Forward {
+        self.handle_time(now);
+        if let Some(header) = self.accept(port, frame) {
+            let channel = channel_index(header.telegram.channel());
+            let entry = match self.entry[channel] {
+                Some(entry) => entry,
+                None if self.core.state == State::Nrt && header.phase.phase() != Phase::CP0 => {
+                    return self.forward(port, None);
+                }
+                None => *self.entry[channel].insert(port),
+            };
+            let data = &mut frame[HEADER_LEN..];
+            match header.telegram.kind() {
+                Kind::Mdt if entry == port => self.handle_mdt(now, &header, data),
+                Kind::Mdt => {}
+                Kind::At => self.handle_at(now, &header, entry == port, data),
+            }
+            return self.forward(port, Some(header.telegram.channel()));
+        }
+        self.forward(port, None)
+    }
+
+    /// The header of a SERCOS frame, or `None` for a frame that is only passed on.
+    fn accept(&mut self, port: Port, frame: &[u8]) -> Option<Header> {
+        // Another EtherType is no error: it belongs to the unified communication channel.
+        Header::parse_unchecked(frame).ok()?;
+        match Header::parse(frame) {
+            Ok(header) => Some(header),
+            Err(_) => {
+                self.count_port_error(port);
+                None
+            }
+        }
+    }
+
+    fn forward(&self, port: Port, channel: Option<Channel>) -> Forward {
+        if !self.links[port.other().index()] {
+            return Forward::Back;
+        }
+        match (self.topology, channel) {
+            (Topology::LoopbackForwardPrimary, Some(Channel::Primary))
+            | (Topology::LoopbackForwardSecondary, Some(Channel::Secondary)) => Forward::BackAndThrough,
+            (Topology::LoopbackForwardPrimary | Topology::LoopbackForwardSecondary, Some(_)) => Forward::Back,
+            _ => Forward::Through,
+        }
+    }
+
+    /// Permitted silence of the master.
+    fn silence_max(&self) -> DurationNs {
+        match (self.core.state, &self.core.configuration) {
+            (
+                State::In(Phase::CP3 | Phase::CP4) | State::Switching(Phase::CP3, Phase::CP4),
+                Some(configuration),
+            ) => {
+                let cycle = i64::from(configuration.cycle_ns);
+                // Half a cycle more than the permitted losses need: jitter is no loss.
+                DurationNs(cycle * (i64::from(configuration.mst_losses) + 1) + cycle / 2)
+            }
+            _ => MST_TIMEOUT,
+        }
+    }
+
+    fn count_port_error(&mut self, port: Port) {
+        if let Some(handle) = self.core.store.find(idn::PORT_ERRORS) {
+            let data = self.core.store.get(handle).data();
+            let mut counts = [0; 4];
+            counts.copy_from_slice(&data[..4]);
+            let at = 2 * port.index();
+            let count = u16::from_le_bytes([counts[at], counts[at + 1]]).saturating_add(1);
+            counts[at..at + 2].copy_from_slice(&count.to_le_bytes());
+            self.core.store.set_data(handle, &counts);
+        }
+    }
+
+    fn handle_mdt(&mut self, now: MonotonicTime, header: &Header, data: &[u8]) {
+        let number = header.telegram.number();
+        if header.telegram.is_mst() {
+            let copy = self.core.state != State::Nrt
+                && self.round.phase == header.phase.0
+                && self.round.mdts & 1 != 0
+                && now.since(self.core.last_mst) < self.cycle_time();
+            if !copy {
+                self.handle_mst(now, header);
+            }
+        }
+        if number > 3 || self.round.phase != header.phase.0 || self.round.mdts & 1 << number != 0 {
+            return;
+        }
+        self.round.mdts |= 1 << number;
+        match self.core.state.phase() {
+            Some(Phase::CP0) => self.scan_mdt(number, data),
+            Some(Phase::CP1 | Phase::CP2) => self.slots_mdt(number, data),
+            Some(Phase::CP3 | Phase::CP4) => self.cyclic_mdt(number, data),
+            _ => {}
+        }
+    }
+
+    fn handle_at(&mut self, now: MonotonicTime, header: &Header, outward: bool, data: &mut [u8]) {
+        let number = header.telegram.number();
+        if self.round.phase != header.phase.0 || number > 3 {
+            return;
+        }
+        if outward && !self.round.acted {
+            self.round.acted = true;
+            let elapsed = match self.core.state.phase() {
+                Some(Phase::CP3 | Phase::CP4) => {
+                    DurationNs(self.cycle_time().0.saturating_mul(1 + i64::from(self.losses)))
+                }
+                _ => now.since(self.last_cycle),
+            };
+            self.act(now, elapsed, true);
+        }
+        match self.core.state {
+            State::Nrt => {}
+            State::In(Phase::CP0) => self.scan_at(number, outward, data),
+            State::In(Phase::CP1 | Phase::CP2) if outward => self.slots_at(number, data),
+            State::In(Phase::CP3 | Phase::CP4) | State::Switching(Phase::CP3, _) => {
+                self.cyclic_at(number, outward, data);
+            }
+            State::Switching(Phase::CP4, _) if outward => self.cyclic_at(number, outward, data),
+            _ => {}
+        }
+    }
+
+    /// A new cycle begins: losses, phase.
+    fn handle_mst(&mut self, now: MonotonicTime, header: &Header) {
+        let silence = now.since(self.core.last_mst);
+        let cyclic = matches!(self.core.state, State::In(Phase::CP3 | Phase::CP4));
+        self.losses = 0;
+        if cyclic {
+            let cycle = self.cycle_time().0.max(1);
+            self.losses = u32::try_from((silence.0 - cycle / 2) / cycle).unwrap_or(0);
+            let total = self.core.store.number_of(idn::MST_ERRORS) + i64::from(self.losses);
+            self.core.store.set_number_of(idn::MST_ERRORS, total);
+        }
+        self.core.last_mst = now;
+        self.round = Round { phase: header.phase.0, mdts: 0, acted: false };
+        self.advance(Event::Mst(header.phase));
+    }
+
+    fn cycle_time(&self) -> DurationNs {
+        match &self.core.configuration {
+            Some(configuration) if self.core.state.phase() >= Some(Phase::CP3) => {
+                DurationNs(i64::from(configuration.cycle_ns))
+            }
+            // Shortest cycle of CP0 to CP2.
+            _ => DurationNs::from_millis(1),
+        }
+    }
+
+    /// Applies a phase event.
+    fn advance(&mut self, event: Event) {
+        let before = self.core.state;
+        let transition = before.next(event, self.core.conditions);
+        self.core.state = transition.next;
+        if let Some(fault) = transition.fault {
+            let phase = i64::from(before.phase().map_or(0, |phase| phase.0));
+            let status = phase | i64::from(fault.interface_status().0);
+            self.core.fault = Some(fault);
+            self.core.store.set_number_of(idn::INTERFACE_STATUS, status);
+        }
+        match (before, transition.next) {
+            (before, after) if before == after => {}
+            (_, State::Nrt) => self.enter_nrt(),
+            (_, State::In(phase)) if before.phase() != Some(phase) => self.enter(phase),
+            _ => {}
+        }
+    }
+
+    fn enter_nrt(&mut self) {
+        self.svc.reset();
+        self.core.clear_commands();
+        self.core.configuration = None;
+        self.entry = [None; 2];
+        self.topology = Topology::StoreAndForward;
+        self.round = Round::default();
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.topology_toggle = false;
+        match phase {
+            Phase::CP0 => {
+                self.svc.reset();
+                self.core.clear_commands();
+                self.core.configuration = None;
+                self.core.device_control = DeviceControl::empty();
+                self.topology = Topology::FastForward;
+                self.topology_address = 0;
+            }
+            Phase::CP2 => self.core.conditions.cp3_checked = false,
+            Phase::CP3 => self.core.conditions.cp4_checked = false,
+            Phase::CP4 => self.start_connections(),
+            _ => {}
+        }
+    }
+
+    /// Lets the application and the procedure commands act, and brings the diagnosis up to date.
+    fn act(&mut self, now: MonotonicTime, elapsed: DurationNs, telegram: bool) {
+        let fresh = telegram && self.consume();
+        let connected = self.core.state == State::In(Phase::CP4) && self.consumers_deliver();
+        self.last_cycle = now;
+        let cycle = Cycle { now, elapsed, state: self.core.state, connected, fresh };
+        self.app.cycle(cycle, &mut self.core.store);
+        self.core.poll_commands(&mut self.app);
+        self.show_diagnosis();
+    }
+
+    /// C-DEV of this cycle.
+    fn handle_device_control(&mut self, word: u16) {
+        let control = DeviceControl::from_bits_retain(word);
+        let toggle = control.contains(DeviceControl::TOPOLOGY_CHANGE);
+        if toggle != self.topology_toggle {
+            self.topology_toggle = toggle;
+            if control.topology() != Topology::StoreAndForward {
+                self.topology = control.topology();
+            }
+        }
+        self.core.device_control = control;
+        self.core.store.set_number_of(Idn::DEVICE_CONTROL, i64::from(word));
+        if control.contains(DeviceControl::MASTER_VALID) {
+            self.svc.set_valid();
+        }
+    }
+
+    /// S-DEV of this cycle.
+    fn device_status(&mut self) -> DeviceStatus {
+        let end = self.links.iter().any(|&up| !up);
+        let topology = match self.topology {
+            Topology::FastForward if end => Topology::LoopbackForwardPrimary,
+            topology => topology,
+        };
+        let diagnosis = self.app.diagnosis();
+        let mut status = DeviceStatus::empty().with_topology(topology);
+        if topology != Topology::FastForward && !end {
+            status = status.with_inactive_port(InactivePort::Link);
+        }
+        status.set(DeviceStatus::SLAVE_VALID, !self.core.state.is_switching());
+        status.set(DeviceStatus::TOPOLOGY_CHANGE, self.topology_toggle);
+        status.set(DeviceStatus::COMMAND_CHANGE, self.core.command_changed());
+        status.set(DeviceStatus::CONNECTION_ERROR, self.core.connection_failed);
+        status.set(DeviceStatus::DEVICE_ERROR, diagnosis.errors != 0 || self.communication_error());
+        status.set(DeviceStatus::DEVICE_WARNING, diagnosis.warnings != 0 || self.loss_warning());
+        status.set(DeviceStatus::COMMUNICATION_WARNING, self.loss_warning());
+        self.core.store.set_number_of(Idn::DEVICE_STATUS, i64::from(status.bits()));
+        status
+    }
+
+    fn communication_error(&self) -> bool {
+        self.core.fault.is_some() || self.core.connection_failed
+    }
+
+    /// More than half of the permitted MST losses came in a row.
+    fn loss_warning(&self) -> bool {
+        let permitted = self.core.configuration.as_ref().map_or(0, |configuration| configuration.mst_losses);
+        self.losses > permitted / 2
+    }
+
+    /// S-0-0011, S-0-0012, S-0-0390 and S-0-0095.
+    fn show_diagnosis(&mut self) {
+        const COMMUNICATION_ERROR: u16 = 1 << 12;
+        let own = self.app.diagnosis();
+        let communication = if self.communication_error() { COMMUNICATION_ERROR } else { 0 };
+        let store = &mut self.core.store;
+        store.set_number_of(idn::ERRORS, i64::from(own.errors | communication));
+        store.set_number_of(idn::WARNINGS, i64::from(own.warnings));
+        let (number, text) = self.diagnosis_shown(&own);
+        if number != self.shown {
+            self.shown = number;
+            let store = &mut self.core.store;
+            store.set_number_of(idn::DIAGNOSIS_NUMBER, i64::from(number));
+            store.set_data_of(idn::DIAGNOSIS_TEXT, text.as_bytes());
+        }
+    }
+
+    /// The most important of the application's and the communication's diagnosis: error, warning, command, state.
+    fn diagnosis_shown(&self, own: &Diagnosis) -> (u32, &'static str) {
+        if own.errors != 0 {
+            return (own.number, own.text);
+        }
+        if let Some(fault) = self.core.fault {
+            let (bit, text) = fault.interface_status();
+            return (0xC30F_0000 | u32::from(bit), text);
+        }
+        if self.core.connection_failed {
+            return (0xC30F_0001, "connection lost");
+        }
+        if self.loss_warning() {
+            return (0xC30E_4001, "MST losses");
+        }
+        if own.warnings != 0 {
+            return (own.number, own.text);
+        }
+        match self.core.failed_check() {
+            Some(Idn::CP3_CHECK) => return (0xC30C_0101, "invalid parameters for CP3, see S-0-0021"),
+            Some(_) => return (0xC30C_0111, "invalid parameters for CP4, see S-0-0022"),
+            None => {}
+        }
+        match self.core.state {
+            State::In(Phase::CP4) if own.number != 0 => (own.number, own.text),
+            State::In(Phase::CP4) => (0xC30A_0040, "CP4"),
+            State::Nrt => (0xC30A_0008, "NRT"),
+            State::In(phase) | State::Switching(phase, _) => {
+                let texts = ["CP0", "CP1", "CP2", "CP3", "CP4"];
+                let text = texts[usize::from(phase.0.min(4))];
+                (if phase == Phase::CP4 { 0xC30A_0040 } else { 0xC30A_0000 | u32::from(phase.0) }, text)
+            }
+        }
+    }
+
+    /// MDT of CP1 and CP2.
+    fn slots_mdt(&mut self, number: u8, data: &[u8]) {
+        let Some(place) = cp12::place(self.topology_address) else { return };
+        if place.telegram != number || data.len() < cp12::LEN {
+            return;
+        }
+        self.handle_device_control(u16::from_le_bytes([data[place.device], data[place.device + 1]]));
+        self.handle_svc(&data[place.svc..]);
+    }
+
+    /// AT of CP1 and CP2.
+    fn slots_at(&mut self, number: u8, data: &mut [u8]) {
+        let Some(place) = cp12::place(self.topology_address) else { return };
+        if place.telegram != number || data.len() < cp12::LEN {
+            return;
+        }
+        let status = self.device_status();
+        data[place.device..place.device + 2].copy_from_slice(&status.bits().to_le_bytes());
+        // The slot is inside the telegram, so that writing it cannot fail.
+        let _ = self.svc.answer().emit(&mut data[place.svc..]);
+    }
+
+    fn handle_svc(&mut self, slot: &[u8]) {
+        if let Ok(slot) = MdtSvc::parse(slot) {
+            self.svc.handle(slot, &mut Access { core: &mut self.core, app: &mut self.app });
+        }
+    }
+}
+
+const fn channel_index(channel: Channel) -> usize {
+    match channel {
+        Channel::Primary => 0,
+        Channel::Secondary => 1,
+    }
+}
