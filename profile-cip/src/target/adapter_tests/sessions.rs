@@ -226,6 +226,17 @@ fn a_silent_session_is_closed_after_the_inactivity_time_out() {
 }
 
 #[test]
+fn a_request_under_way_is_not_silence() {
+    let mut rig = Rig::with(|config| config.interface.inactivity_timeout_s = 1);
+    let client = rig.client(1);
+    rig.send_unconnected(client, &[0x0E, 4, 0x20, 0x42, 0x24, 1, 0x31, 0, 0xB9, 1]);
+    rig.pass(DurationNs::from_secs(2));
+    assert!(!rig.adapter.is_done(client.slot));
+    rig.device_answers(&[1]);
+    assert_eq!(rig.unconnected_reply(client).0.data, [1]);
+}
+
+#[test]
 fn a_peer_that_does_not_read_is_not_read_from() {
     let mut rig = Rig::new();
     let client = rig.client(1);
