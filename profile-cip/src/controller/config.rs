@@ -331,8 +331,8 @@ mod tests {
             (|c| c.timeout_multiplier = 8, "timeout_multiplier: expected 0 to 7, found 8"),
             (
                 |c| c.connection_size = 133,
-                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at most \
-                 1400, found 133",
+                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at \
+                 most 1400, found 133",
             ),
             (|c| c.command_target = CommandTarget(3), "command_target: expected 0 to 2, found 3"),
             (|c| c.key.major_revision = 128, "major_revision: expected 0 to 127, found 128"),

@@ -399,7 +399,8 @@ mod tests {
         );
         assert_eq!(
             fail(0, &statuses(&[(610, 0)])),
-            "axis 3: answer to Set_Axis_Attributes_List: number of attributes at byte 0: expected 0x2, found 0x1"
+            "axis 3: answer to Set_Axis_Attributes_List: number of attributes at byte 0: \
+             expected 0x2, found 0x1"
         );
         let cut = &statuses(&[(610, 0), (611, 0)])[..8];
         assert!(

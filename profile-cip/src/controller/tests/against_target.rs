@@ -22,6 +22,7 @@ use crate::target::drive_link::{AxisCommandImage, Command, DriveAction, DriveFau
 use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use crate::target::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
+use crate::wire::encapsulation::IO_PORT;
 use crate::wire::motion::CommandPosition;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{AxisStateCode, ControlMode, FaultType, NodeFault};
@@ -130,7 +131,7 @@ impl Plant {
     }
 }
 
-fn adapter() -> Adapter {
+fn adapter(io_port: u16) -> Adapter {
     let address = Ipv4Addr::new(10, 0, 0, 9);
     Adapter::new(AdapterConfig {
         identity: IdentityConfig {
@@ -142,7 +143,10 @@ fn adapter() -> Adapter {
             serial_number: 0xDEAD_BEEF,
             product_name: ArrayString::from("Axisbridge").unwrap(),
         },
-        interface: InterfaceConfig::new(address, Ipv4Addr::new(255, 255, 255, 0)),
+        interface: InterfaceConfig {
+            io_port,
+            ..InterfaceConfig::new(address, Ipv4Addr::new(255, 255, 255, 0))
+        },
         link: LinkConfig {
             mac: [2, 0, 0, 0, 0, 9],
             speed_mbit: 100,
@@ -205,7 +209,7 @@ struct Pair {
 
 impl Pair {
     fn new(config: ControllerConfig, positions: &[f64], program: Vec<Step>) -> Self {
-        let mut adapter = adapter();
+        let mut adapter = adapter(IO_PORT);
         let start = 5_000_000;
         let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000);
         let slot = adapter.open(MonotonicTime(start), peer).unwrap();
@@ -230,6 +234,14 @@ impl Pair {
             events: Vec::new(),
             script: Box::new(|_, _| {}),
         }
+    }
+
+    /// The device takes its I/O at another port.
+    fn with_io_port(mut self, port: u16) -> Self {
+        self.adapter = adapter(port);
+        let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000);
+        self.slot = self.adapter.open(MonotonicTime(self.now), peer).unwrap();
+        self
     }
 
     fn is_dead(&self) -> bool {
@@ -573,4 +585,24 @@ fn one_millisecond_and_sixteen_axes() {
     }
     assert!(pair.events.len() < 200);
     assert_eq!(report.missed_cycles, 0);
+}
+
+#[test]
+fn other_ports_than_2222_are_agreed_in_the_forward_open() {
+    let mut config = configured(1);
+    config.t_to_o_port = Some(40_000);
+    let mut pair = Pair::new(config, &[0.0], vec![]).with_io_port(2300);
+    pair.controller.tcp_connected(MonotonicTime(pair.now));
+    pair.exchange();
+    let destination = pair.device.connection().unwrap().t_to_o_destination;
+    assert_eq!(destination, SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 40_000));
+    assert_eq!(pair.controller.datagram_destination().map(|address| address.port()), Some(2300));
+    let report = pair.run(10);
+    assert_good(&report, &pair);
+
+    let mut pair = Pair::new(configured(1), &[0.0], vec![]);
+    pair.controller.tcp_connected(MonotonicTime(pair.now));
+    pair.exchange();
+    assert_eq!(pair.device.connection().unwrap().t_to_o_destination.port(), IO_PORT);
+    assert_eq!(pair.controller.datagram_destination(), None);
 }

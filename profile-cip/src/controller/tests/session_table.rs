@@ -91,7 +91,7 @@ fn the_whole_table() {
     let mut table = String::new();
     for (index, state_name) in states.iter().enumerate() {
         for input in ["start", "close", "answer", "refusal", "old answer", "time-out", "stream closed"] {
-            // Open is what follows the answer to the Forward_Open, Closed what follows that to the Forward_Close.
+            // Open follows the answer to the Forward_Open, Closed that to the Forward_Close.
             let requests = if index == 7 { 7 } else { index };
             let (mut session, mut peer, request) = state(requests);
             match (input, &request) {
