@@ -14,5 +14,6 @@ pub mod program;
 pub mod quantity;
 pub mod ratio;
 pub mod scaling;
+pub mod servo;
 pub mod state;
 pub mod time;
