@@ -333,6 +333,11 @@ mod tests {
             Err(ConfigError::ProducerCycles { address: 1, instance: 3, cycles: 0 })
         );
         assert_eq!(connected(&[connection(0), connection(1)]), Ok(()));
+        // A telegram type of the profile, S-0-0015, needs no list.
+        let mut profile = ConnectionConfig::new(0, true, &[]).unwrap();
+        profile.configuration = ConfigurationType::Profile;
+        assert_eq!(profile.setup().bits(), 0xC020);
+        assert_eq!(connected(&[profile]), Ok(()));
         assert_eq!(ConnectionConfig::new(0, true, &[Idn(1); 17]), None);
         let short = MasterConfig { pause: DurationNs::from_millis(119), ..base.clone() };
         assert_eq!(short.check(), Err(ConfigError::Pause(DurationNs::from_millis(119))));

@@ -148,7 +148,10 @@ impl Master {
             return None;
         }
         let to = self.state.announces().unwrap_or(Phase::CP0);
-        self.emit(Event::SwitchFailed { from: self.layout_phase, to });
+        let laggard =
+            (0..self.found).find(|&index| self.stations[index].is_active() && !self.has_left(index));
+        let slave = laggard.filter(|_| self.layout_phase > Phase::CP0).map(SlaveId::from_index);
+        self.emit(Event::SwitchFailed { from: self.layout_phase, to, slave });
         if self.state == State::Down {
             return Some(PhaseEvent::Elapsed);
         }

@@ -140,6 +140,8 @@ pub enum Event {
         from: Phase,
         /// The phase wanted.
         to: Phase,
+        /// The first slave that kept on inserting data; `None` in CP0.
+        slave: Option<SlaveId>,
     },
     /// A slave is not valid any more. It takes no part until the next scan.
     SlaveLost {
@@ -173,6 +175,51 @@ pub enum Event {
         /// What came out.
         outcome: SvcOutcome,
     },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Event::Phase(phase) => write!(f, "{phase}"),
+            Event::Stopped => f.write_str("no SERCOS telegrams any more"),
+            Event::Scanned { slaves } => write!(f, "{slaves} slaves found"),
+            Event::NoSlaves => f.write_str("no slave answers"),
+            Event::ScanUnstable => f.write_str("topology or address list do not become stable"),
+            Event::TooManySlaves { found, max } => write!(f, "{found} slaves found, room for {max}"),
+            Event::Missing { address } => write!(f, "the slave with address {address} was not found"),
+            Event::Unknown { slave, address } => {
+                write!(f, "{slave} with address {address} is not configured")
+            }
+            Event::DoubleAddress { address, first, second } => {
+                write!(f, "{first} and {second} both have address {address}")
+            }
+            Event::AddressConflict { slave } => write!(f, "{slave} has no address of its own: CP3 refused"),
+            Event::AwaitingApplication { phase } => write!(f, "{phase}: the application may work"),
+            Event::StepFailed { slave, idn, failure } => write!(f, "{slave}: {idn}: {failure}"),
+            Event::ClassMismatch { slave } => {
+                write!(f, "{slave}: exactly one of SCP_FixCFG and SCP_VarCFG is needed")
+            }
+            Event::CheckFailed { slave, phase } => {
+                write!(f, "{slave}: the check to leave {phase} failed, parameters are invalid")
+            }
+            Event::LayoutRefused(error) => write!(f, "telegrams of CP3 and CP4: {error}"),
+            Event::SwitchFailed { from, to, slave: Some(slave) } => {
+                write!(f, "{from} to {to}: {slave} did not stop inserting data in time")
+            }
+            Event::SwitchFailed { from, to, slave: None } => write!(f, "{from} to {to}: not in time"),
+            Event::SlaveLost { slave, address, phase } => {
+                write!(f, "{slave} with address {address} was lost in {phase}")
+            }
+            Event::SlaveReturned { slave } => {
+                write!(f, "{slave} is valid again and stays out until the next scan")
+            }
+            Event::AllSlavesLost => f.write_str("all slaves are lost"),
+            Event::Connection { slave, instance, state } => {
+                write!(f, "{slave}: connection {instance} is in state {state}")
+            }
+            Event::Svc { ticket, outcome } => write!(f, "{}: {outcome}", ticket.slave),
+        }
+    }
 }
 
 /// Why a received frame was refused. It changed nothing.

@@ -284,7 +284,12 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
         rig.master.set_target_phase(Phase::CP4);
         rig.state(if state == State::Leave2 { State::Await2 } else { State::Await3 });
         rig.line.peers[0].faults.stubborn = true;
-        rig.run_until("failed", |rig| rig.log.contains(&Event::SwitchFailed { from, to }));
+        let failed = Event::SwitchFailed { from, to, slave: Some(SlaveId(0)) };
+        rig.run_until("failed", |rig| rig.log.contains(&failed));
+        assert_eq!(
+            failed.to_string(),
+            format!("{from} to {to}: slave at position 1 did not stop inserting data in time")
+        );
         rig.line.peers[0].faults.stubborn = false;
         // Back in CP0, where the master stays.
         rig.state(State::Cp0);

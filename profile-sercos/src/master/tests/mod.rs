@@ -143,5 +143,6 @@ impl Rig {
 
 mod disturbance;
 mod faults;
+mod full_slaves;
 mod phase_up;
 mod recording;

@@ -195,7 +195,7 @@ fn switches_of_the_reference_master() {
         .into_iter()
         .filter(|(_, frame)| frame[14] == 0x20)
         .map(|(at, frame)| (at, frame[15]))
-        .filter(|&(_, byte)| core::mem::replace(&mut last, Some(byte)) != Some(byte))
+        .filter(|&(_, byte)| last.replace(byte) != Some(byte))
         .collect();
     let rig = rig();
     let ours: Vec<(u64, u8)> = rig.cycles.iter().map(|&(at, byte)| (at.as_nanos() / 1000, byte)).collect();
