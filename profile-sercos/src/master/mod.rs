@@ -12,9 +12,12 @@
 //! }
 //! ```
 //!
-//! All storage is set aside in [`Master::new`]; nothing is allocated or freed afterwards. Every ATs' content is
-//! evaluated as soon as the last AT of the cycle is back, and at the start of the next cycle if one stays away.
+//! All storage is set aside in [`Master::new`]; nothing is allocated or freed afterwards. The ATs are evaluated as
+//! soon as the last one of the cycle is back, and at the start of the next cycle if one stays away. All frames of
+//! a cycle are given at its start, MDTs before ATs: a soft master cannot keep t1 to the nanosecond, and slaves
+//! learn of that by S-0-1023 and S-0-1032.
 
+mod build;
 pub mod config;
 pub mod connection;
 mod cycle;

@@ -1,0 +1,165 @@
+//! The telegrams of the next cycle.
+
+use profile_generic::time::SystemTime;
+
+use super::Master;
+use super::event::SlaveId;
+use super::layout::CyclicLayout;
+use super::scan;
+use super::station::{End, Station};
+use crate::wire::cp0::{self, CommunicationVersion, MdtRepr};
+use crate::wire::cp12;
+use crate::wire::device_control::DeviceControl;
+use crate::wire::error::put_u16;
+use crate::wire::extended::{EXTENDED_LEN, EXTENDED_OFFSET, Extended};
+use crate::wire::header::{Kind, Phase, PhaseField, TELEGRAMS_MAX};
+use crate::wire::layout::DEVICE_WORD_LEN;
+use crate::wire::svc::SVC_LEN;
+
+/// Telegram and offsets of a slave's service channel and device word.
+#[derive(Clone, Copy)]
+pub(super) struct Slot {
+    pub svc: (u8, usize),
+    pub device: (u8, usize),
+}
+
+/// Where a slave's part is in the telegrams of `kind`.
+pub(super) fn slot(phase: Phase, layout: &CyclicLayout, index: usize, kind: Kind) -> Option<Slot> {
+    if phase < Phase::CP3 {
+        let place = cp12::place(SlaveId::from_index(index).topology_address())?;
+        return Some(Slot { svc: (place.telegram, place.svc), device: (place.telegram, place.device) });
+    }
+    let places = layout.slaves.get(index)?.as_ref()?;
+    let (svc, device) = match kind {
+        Kind::Mdt => (places.svc_mdt, places.control),
+        Kind::At => (places.svc_at, places.status),
+    };
+    let pair = |offset: crate::wire::layout::Offset| (offset.telegram, usize::from(offset.offset));
+    Some(Slot { svc: pair(svc), device: pair(device) })
+}
+
+impl Master {
+    /// Builds the telegrams of the next cycle.
+    pub(super) fn build(&mut self) {
+        if self.state.serves() {
+            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
+                station.channel.kick();
+            }
+        }
+        let switching = self.state.announces();
+        let phase = switching.unwrap_or(self.layout_phase);
+        self.frames.begin(PhaseField::new(switching.is_some(), self.cycle_count, phase));
+        match self.layout_phase {
+            Phase::CP0 => self.build_scan(),
+            Phase::CP1 | Phase::CP2 => {
+                let telegrams = self.config.setup_telegrams();
+                let lengths =
+                    core::array::from_fn(
+                        |number| {
+                            if number < usize::from(telegrams) { cp12::LEN } else { 0 }
+                        },
+                    );
+                self.build_telegrams(lengths, lengths, None);
+            }
+            _ => {
+                let extended = self.extended().filter(|_| switching.is_none());
+                let lengths = |lengths: [u16; TELEGRAMS_MAX]| lengths.map(usize::from);
+                self.build_telegrams(lengths(self.layout.mdt_len), lengths(self.layout.at_len), extended);
+            }
+        }
+        self.cycle_count = (self.cycle_count + 1) & 7;
+        self.cycles = self.cycles.saturating_add(1);
+        self.evaluated = false;
+        self.statistics.cycles += 1;
+    }
+
+    fn build_scan(&mut self) {
+        let mut version = CommunicationVersion::ADDRESS_ALLOCATION;
+        if self.config.setup_telegrams() == 4 {
+            version |= CommunicationVersion::FOUR_TELEGRAMS;
+        }
+        let mdt = MdtRepr { version, ..MdtRepr::default() };
+        self.frames.add(Kind::Mdt, 0, cp0::MDT_LEN, |data| {
+            // The length is the one of the telegram.
+            let _ = mdt.emit(data);
+        });
+        self.frames.add(Kind::At, 0, cp0::AT_LEN, |data| {
+            let _ = scan::empty().emit(data);
+        });
+    }
+
+    fn build_telegrams(
+        &mut self,
+        mdt: [usize; TELEGRAMS_MAX],
+        at: [usize; TELEGRAMS_MAX],
+        extended: Option<Extended>,
+    ) {
+        let (stations, layout, phase) = (&self.stations[..self.found], &self.layout, self.layout_phase);
+        let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
+        for (number, len) in used(mdt) {
+            self.frames.add(Kind::Mdt, number, len, |data| {
+                if let (0, Some(extended)) = (number, extended) {
+                    let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
+                    let _ = field.map(|field| extended.emit(field));
+                }
+                for (index, station) in stations.iter().enumerate().filter(|(_, station)| station.is_active())
+                {
+                    if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
+                        fill_station(data, number, slot, station);
+                    }
+                    if phase == Phase::CP4 {
+                        fill_connections(data, number, layout, index, station);
+                    }
+                }
+            });
+        }
+        for (number, len) in used(at) {
+            self.frames.add(Kind::At, number, len, |_| {});
+        }
+    }
+
+    /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
+    /// in four halves, each sent in two cycles, latched for all eight.
+    fn extended(&mut self) -> Option<Extended> {
+        if self.cycle_count == 0 {
+            let toggle = self.latched_time.is_some_and(|(_, toggle)| toggle);
+            self.latched_time = self.system_time.map(|time| (time, !toggle));
+        }
+        let (SystemTime(nanos), toggle) = self.latched_time?;
+        let seconds = u32::try_from(nanos / 1_000_000_000 % (1 << 32)).unwrap_or(u32::MAX);
+        let nanos = u32::try_from(nanos % 1_000_000_000).unwrap_or(0);
+        let word = if self.cycle_count < 4 { seconds } else { nanos };
+        let [a, b, c, d] = word.to_le_bytes();
+        let half = if self.cycle_count & 2 == 0 { [c, d] } else { [a, b] };
+        let toggle = if toggle { Extended::TIME_TOGGLE } else { 0 };
+        Some(Extended { word: Extended::TIME_VALID | toggle, time_fragment: u16::from_le_bytes(half) })
+    }
+}
+
+/// Writes a slave's service channel and C-DEV into the MDT that has them.
+fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station) {
+    if slot.svc.0 == number
+        && let Some(bytes) = data.get_mut(slot.svc.1..slot.svc.1 + SVC_LEN)
+    {
+        let _ = station.channel.outgoing().emit(bytes);
+    }
+    if slot.device.0 == number
+        && let Some(bytes) = data.get_mut(slot.device.1..slot.device.1 + DEVICE_WORD_LEN)
+    {
+        put_u16(bytes, 0, DeviceControl::MASTER_VALID.bits());
+    }
+}
+
+/// Writes what a slave consumes into the MDT that has it.
+fn fill_connections(data: &mut [u8], number: u8, layout: &CyclicLayout, index: usize, station: &Station) {
+    let Some(Some(places)) = layout.slaves.get(index) else { return };
+    for (connection, end) in station.connections.iter().zip(&station.ends) {
+        let End::Producer(producer) = end else { continue };
+        let place = places.connections.iter().find(|place| place.instance == connection.instance);
+        if let Some(place) = place.filter(|place| place.at.telegram == number)
+            && let Some(bytes) = data.get_mut(place.at.range(usize::from(place.len)))
+        {
+            producer.emit(bytes);
+        }
+    }
+}
