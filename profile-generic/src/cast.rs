@@ -1,7 +1,7 @@
 //! The one place where integers and floating point numbers turn into each other.
 //!
-//! Every `as` of the crate that could lose something stands here, with the reason why it does not, or with what it
-//! loses stated.
+//! Every `as` of the crate that could lose something stands here, with the reason why it does not, or with
+//! what it loses stated.
 
 /// The nearest double; ties to even. Exact up to 53 bits.
 #[expect(clippy::cast_precision_loss, reason = "rounding to nearest is what this function is for")]
@@ -21,7 +21,8 @@ pub const fn f32_from_u128(value: u128) -> f32 {
     value as f32
 }
 
-/// The nearest integer, ties away from zero, held at the ends of the range; 0 for a value that is not a number.
+/// The nearest integer, ties away from zero, held at the ends of the range; 0 for a value that is not a
+/// number.
 #[expect(clippy::cast_possible_truncation, reason = "a cast from float saturates and takes NaN to 0")]
 pub fn i64_from_f64(value: f64) -> i64 {
     value.round() as i64
@@ -97,7 +98,8 @@ mod tests {
         #[test]
         fn parts_make_up_the_double_again(value in -1e200_f64..1e200) {
             let parts = parts(value).unwrap();
-            let magnitude = f64_from_i64(i64::try_from(parts.mantissa).unwrap()) * exp2(parts.exponent.max(-1022));
+            let digits = f64_from_i64(i64::try_from(parts.mantissa).unwrap());
+            let magnitude = digits * exp2(parts.exponent.max(-1022));
             let again = if parts.negative { -magnitude } else { magnitude };
             if parts.exponent >= -1022 {
                 prop_assert_eq!(again.to_bits(), value.to_bits());

@@ -2,8 +2,9 @@
 
 /// Writes an open code: a newtype over an unsigned integer with named constants.
 ///
-/// A gateway forwards what it does not know and names what it does, so a code read from a wire or a file is never
-/// refused for being unknown. The name of a value is the text after `=>`, or the constant's own name without one.
+/// A gateway forwards what it does not know and names what it does, so a code read from a wire or a file is
+/// never refused for being unknown. The name of a value is the text after `=>`, or the constant's own name
+/// without one.
 ///
 /// ```
 /// profile_generic::open_code! {
@@ -58,7 +59,10 @@ macro_rules! open_code {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
                 match self.name() {
                     Some(name) => f.pad(name),
-                    None => write!(f, "{:#0width$x}", self.0, width = 2 + 2 * ::core::mem::size_of::<$repr>()),
+                    None => {
+                        let width = 2 + 2 * ::core::mem::size_of::<$repr>();
+                        write!(f, "{:#0width$x}", self.0)
+                    }
                 }
             }
         }

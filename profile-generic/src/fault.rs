@@ -50,9 +50,11 @@ impl Reaction {
     }
 }
 
-/// One row per cause: constant, code, name, class, reaction the cause requires when nobody configured another.
+/// One row per cause: constant, code, name, class, reaction the cause requires when nobody configured
+/// another.
 macro_rules! fault_catalogue {
-    ($( $(#[$doc:meta])* $constant:ident = $value:literal, $name:literal, $class:ident, $reaction:ident; )*) => {
+    ($( $(#[$doc:meta])*
+        $constant:ident = $value:literal, $name:literal, $class:ident, $reaction:ident; )*) => {
         open_code! {
             /// The cause of a fault: the generic catalogue that each profile's codes are mapped to.
             pub struct FaultCause(u16) {
@@ -69,7 +71,8 @@ macro_rules! fault_catalogue {
                 }
             }
 
-            /// The reaction this cause requires unless another is configured; an unknown cause stops the axis.
+            /// The reaction this cause requires unless another is configured; an unknown cause stops the
+            /// axis.
             pub const fn default_reaction(self) -> Reaction {
                 match self {
                     $( Self::$constant => Reaction::$reaction, )*
@@ -95,7 +98,8 @@ fault_catalogue! {
     /// The motor is hotter than it may be, or its thermal switch opened.
     MOTOR_OVER_TEMPERATURE = 0x0105, "motor_over_temperature", Axis, CoastAndDisable;
     /// The motor is hotter than the user's limit.
-    MOTOR_OVER_TEMPERATURE_USER_LIMIT = 0x0106, "motor_over_temperature_user_limit", Axis, DecelerateAndDisable;
+    MOTOR_OVER_TEMPERATURE_USER_LIMIT =
+        0x0106, "motor_over_temperature_user_limit", Axis, DecelerateAndDisable;
     /// The thermal model of the motor reached its capacity.
     MOTOR_OVERLOAD = 0x0107, "motor_overload", Axis, DecelerateAndDisable;
     /// The thermal model of the motor reached the user's limit.
@@ -116,7 +120,8 @@ fault_catalogue! {
     /// The inverter is hotter than it may be.
     DRIVE_OVER_TEMPERATURE = 0x0202, "drive_over_temperature", Axis, CoastAndDisable;
     /// The inverter is hotter than the user's limit.
-    DRIVE_OVER_TEMPERATURE_USER_LIMIT = 0x0203, "drive_over_temperature_user_limit", Axis, DecelerateAndDisable;
+    DRIVE_OVER_TEMPERATURE_USER_LIMIT =
+        0x0203, "drive_over_temperature_user_limit", Axis, DecelerateAndDisable;
     /// The thermal model of the inverter reached its capacity.
     DRIVE_OVERLOAD = 0x0204, "drive_overload", Axis, DecelerateAndDisable;
     /// The thermal model of the inverter reached the user's limit.

@@ -3,7 +3,8 @@
 use crate::code::named_enum;
 
 named_enum! {
-    /// A part of the drive with an interface of its own (IEC 61800-7-202, 3.1.26), as IEC 61800-7-1 divides it.
+    /// A part of the drive with an interface of its own (IEC 61800-7-202, 3.1.26), as IEC 61800-7-1 divides
+    /// it.
     pub enum FunctionalElement {
         /// Who the device is: vendor, type, serial number, versions.
         DeviceIdentification = "device_identification",

@@ -1,7 +1,8 @@
 //! The process image of one axis: set-points going to the drive, actual values coming from it.
 //!
-//! Both images are `Copy` values of fixed size. A set-point or actual value counts only when its bit in `present`
-//! is set, so that a profile that does not deliver a value cannot be mistaken for one that delivers zero.
+//! Both images are `Copy` values of fixed size. A set-point or actual value counts only when its bit in
+//! `present` is set, so that a profile that does not deliver a value cannot be mistaken for one that delivers
+//! zero.
 
 use crate::code::named_enum;
 use crate::fault::Fault;
@@ -98,7 +99,8 @@ pub trait SignalImage {
     /// The value of the signal, or `None` when it is not present in this image.
     fn get(&self, signal: Signal) -> Option<i64>;
 
-    /// Sets the value and marks it present. Returns whether the signal belongs to this image and holds the value.
+    /// Sets the value and marks it present. Returns whether the signal belongs to this image and holds the
+    /// value.
     fn set(&mut self, signal: Signal, value: i64) -> bool;
 }
 
@@ -289,8 +291,8 @@ impl AxisCommand {
         self.present.contains(bit).then_some(value)
     }
 
-    /// Sets a command signal and marks it present. Returns `false`, and changes nothing, when the signal belongs to
-    /// the feedback or the value does not fit (digital outputs are 32 bits).
+    /// Sets a command signal and marks it present. Returns `false`, and changes nothing, when the signal
+    /// belongs to the feedback or the value does not fit (digital outputs are 32 bits).
     pub fn set(&mut self, signal: Signal, value: i64) -> bool {
         let bit = match signal {
             Signal::PositionCommand => {
@@ -412,8 +414,8 @@ impl AxisFeedback {
         self.present.contains(bit).then_some(value)
     }
 
-    /// Sets a feedback signal and marks it present. Returns `false`, and changes nothing, when the signal belongs
-    /// to the command or the value does not fit (digital inputs are 32 bits).
+    /// Sets a feedback signal and marks it present. Returns `false`, and changes nothing, when the signal
+    /// belongs to the command or the value does not fit (digital inputs are 32 bits).
     pub fn set(&mut self, signal: Signal, value: i64) -> bool {
         let bit = match signal {
             Signal::PositionActual => {

@@ -5,8 +5,8 @@ use bitflags::bitflags;
 bitflags! {
     /// The set of conditions that keep the axis from starting.
     ///
-    /// An inhibit is not a fault: it clears itself when its condition goes away. Some of them also take the torque
-    /// away when they appear while the axis runs, see [`Inhibits::REMOVE_TORQUE`].
+    /// An inhibit is not a fault: it clears itself when its condition goes away. Some of them also take the
+    /// torque away when they appear while the axis runs, see [`Inhibits::REMOVE_TORQUE`].
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub struct Inhibits: u32 {
         /// A safety function (safe torque off, safe stop) holds the torque off.

@@ -1,13 +1,13 @@
 //! Fine interpolation: from the controller's updates to the cycle of the drive.
 //!
 //! Each update carries set-points and the system time at which they shall be reached. Between two targets a
-//! polynomial is followed whose coefficients are those of CIP Motion (Volume 9, 5-2.6.5.2): third order for the
-//! position, second for the velocity, first for acceleration and torque. The same polynomial goes on beyond its
-//! target when an update is late, for a stated number of periods and no longer: then the axis is held, and the
-//! interpolator says so until it is started again.
+//! polynomial is followed whose coefficients are those of CIP Motion (Volume 9, 5-2.6.5.2): third order for
+//! the position, second for the velocity, first for acceleration and torque. The same polynomial goes on
+//! beyond its target when an update is late, for a stated number of periods and no longer: then the axis is
+//! held, and the interpolator says so until it is started again.
 //!
-//! All arithmetic is in integers. At each target the set-point is met exactly; between targets the error of the
-//! arithmetic is below one nanounit as long as the axis moves less than 2000 units in a period.
+//! All arithmetic is in integers. At each target the set-point is met exactly; between targets the error of
+//! the arithmetic is below one nanounit as long as the axis moves less than 2000 units in a period.
 
 use crate::code::named_enum;
 use crate::image::{AxisCommand, CommandSet};
@@ -20,8 +20,8 @@ mod polynomial;
 use polynomial::{Channel, Polynomial};
 
 named_enum! {
-    /// How far ahead of its time stamp an update is meant: CIP Motion's Command Target Update (Volume 9, table
-    /// 6-2.24).
+    /// How far ahead of its time stamp an update is meant: CIP Motion's Command Target Update (Volume 9,
+    /// table 6-2.24).
     #[derive(Default)]
     pub enum TargetUpdate {
         /// For the instant of the stamp: taken as it comes, without any curve.
@@ -44,8 +44,8 @@ impl TargetUpdate {
         }
     }
 
-    /// The periods beyond its target that an update is in use when nothing is late. An update can be on its way for
-    /// one period and is then in use for one, so two periods after the stamp the next one is there.
+    /// The periods beyond its target that an update is in use when nothing is late. An update can be on its
+    /// way for one period and is then in use for one, so two periods after the stamp the next one is there.
     const fn usual_overrun(self) -> u32 {
         2 - self.periods()
     }
@@ -94,7 +94,8 @@ impl From<&AxisCommand> for SetPoints {
 }
 
 impl SetPoints {
-    /// Puts these set-points into a command: those that are there are set, those that are not are marked absent.
+    /// Puts these set-points into a command: those that are there are set, those that are not are marked
+    /// absent.
     pub fn write_to(&self, command: &mut AxisCommand) {
         command.position = self.position.unwrap_or(command.position);
         command.velocity = self.velocity.unwrap_or(command.velocity);
@@ -119,8 +120,8 @@ pub enum Quality {
         /// Overdue periods, from 1.
         periods: u32,
     },
-    /// Updates stopped coming; position is held, velocity, acceleration and torque are zero. Stays until the next
-    /// [`FineInterpolator::start`].
+    /// Updates stopped coming; position is held, velocity, acceleration and torque are zero. Stays until the
+    /// next [`FineInterpolator::start`].
     Lost,
 }
 
@@ -223,7 +224,8 @@ impl FineInterpolator {
         &self.config
     }
 
-    /// Forgets everything and holds `position` until the first update: when the axis is enabled, and after a loss.
+    /// Forgets everything and holds `position` until the first update: when the axis is enabled, and after a
+    /// loss.
     pub fn start(&mut self, position: Option<Position>) {
         self.segments.clear();
         self.last_target = None;
@@ -303,7 +305,8 @@ impl FineInterpolator {
         self.lost
     }
 
-    /// Moves everything by a step of the system time, so that targets and the present time keep one reference.
+    /// Moves everything by a step of the system time, so that targets and the present time keep one
+    /// reference.
     pub fn shift(&mut self, step: DurationNs) {
         for segment in &mut self.segments {
             segment.start = segment.start + step;

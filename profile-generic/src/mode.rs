@@ -5,8 +5,8 @@ use crate::code::named_enum;
 named_enum! {
     /// What the drive controls.
     ///
-    /// Position control implies velocity control, velocity control implies acceleration control, and so on down to
-    /// torque (IEC 61800-7-202, 4.2.1).
+    /// Position control implies velocity control, velocity control implies acceleration control, and so on
+    /// down to torque (IEC 61800-7-202, 4.2.1).
     #[derive(Default)]
     pub enum OperatingMode {
         /// Feedback only: nothing is controlled, the power stage stays off.

@@ -1,7 +1,7 @@
 //! Parameters: the catalogue of what can be read from and written to a drive, and the access to it.
 //!
-//! A parameter is a data element with a name, a type and an access direction (IEC 61800-7-202, 3.1.37). Each profile
-//! binds its attributes, IDNs or objects to the parameters of this catalogue.
+//! A parameter is a data element with a name, a type and an access direction (IEC 61800-7-202, 3.1.37). Each
+//! profile binds its attributes, IDNs or objects to the parameters of this catalogue.
 
 use crate::cast;
 use crate::code::named_enum;

@@ -1,7 +1,7 @@
 //! Physical quantities as integers in fixed, fine units.
 //!
-//! The units are chosen so that every conversion to and from a profile's units is an exact ratio and so that 64
-//! bits hold any machine: a position reaches 9.2 thousand million revolutions or millimetres.
+//! The units are chosen so that every conversion to and from a profile's units is an exact ratio and so that
+//! 64 bits hold any machine: a position reaches 9.2 thousand million revolutions or millimetres.
 
 use crate::code::named_enum;
 use core::fmt;

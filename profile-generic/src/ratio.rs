@@ -1,7 +1,7 @@
 //! Exact rational conversion.
 //!
-//! A ratio of two 64-bit integers is applied in 128-bit arithmetic and rounded once, at the end, in a stated way.
-//! What cannot be held is clamped and reported, never wrapped.
+//! A ratio of two 64-bit integers is applied in 128-bit arithmetic and rounded once, at the end, in a stated
+//! way. What cannot be held is clamped and reported, never wrapped.
 
 use crate::cast;
 use core::fmt;
@@ -84,8 +84,8 @@ impl Ratio {
     /// One to one.
     pub const ONE: Self = Self { num: 1, den: 1 };
 
-    /// The ratio in lowest terms, or `None` when the denominator is zero or the reduced ratio needs more than 64
-    /// bits (which only a term of -2^63 can cause).
+    /// The ratio in lowest terms, or `None` when the denominator is zero or the reduced ratio needs more than
+    /// 64 bits (which only a term of -2^63 can cause).
     pub const fn new(num: i64, den: i64) -> Option<Self> {
         Self::reduce(num as i128, den as i128)
     }
@@ -95,7 +95,8 @@ impl Ratio {
             return None;
         }
         let divisor = gcd(num.unsigned_abs(), den.unsigned_abs());
-        // The divisor is at most 2^126 for products of 64-bit terms and never zero, as the denominator is not.
+        // The divisor is at most 2^126 for products of 64-bit terms and never zero, as the denominator is
+        // not.
         let divisor = divisor.cast_signed();
         let (num, den) = (num / divisor, den / divisor);
         let (num, den) = if den < 0 { (-num, -den) } else { (num, den) };
@@ -131,14 +132,14 @@ impl Ratio {
         if outcome.saturated { Err(Saturated { value: outcome.value }) } else { Ok(outcome.value) }
     }
 
-    /// A double times this ratio, and whether it was rounded or clamped; `None` when it is not finite. The double is
-    /// taken at its exact binary value, and nothing is rounded before the end.
+    /// A double times this ratio, and whether it was rounded or clamped; `None` when it is not finite. The
+    /// double is taken at its exact binary value, and nothing is rounded before the end.
     pub fn convert_f64(self, value: f64, rounding: Rounding) -> Option<Outcome> {
         self.quotient_f64(value, rounding).map(clamp)
     }
 
-    /// As [`Ratio::quotient`] for a double. What is beyond 64 bits comes back as some value beyond 64 bits and
-    /// within 2^127.
+    /// As [`Ratio::quotient`] for a double. What is beyond 64 bits comes back as some value beyond 64 bits
+    /// and within 2^127.
     pub(crate) fn quotient_f64(self, value: f64, rounding: Rounding) -> Option<(i128, bool)> {
         let parts = cast::parts(value)?;
         // 53 bits times 64 bits: 117 bits at most.
@@ -153,7 +154,8 @@ impl Ratio {
             if shift + 1 < product.unsigned_abs().leading_zeros() {
                 return Some(divide(product << shift, den, rounding));
             }
-            // At least 2^126 over less than 2^63 is beyond any 64-bit integer, also with an offset of 63 bits.
+            // At least 2^126 over less than 2^63 is beyond any 64-bit integer, also with an offset of 63
+            // bits.
             return Some((product.signum() << 100, true));
         }
         if shift + 1 < den.unsigned_abs().leading_zeros() {
@@ -248,7 +250,8 @@ const fn divide(num: i128, den: i128, rounding: Rounding) -> (i128, bool) {
     (rounded, true)
 }
 
-/// The quotient as `quotient * 2^-shift` with at least 64 bits, so that a sticky last bit decides every rounding.
+/// The quotient as `quotient * 2^-shift` with at least 64 bits, so that a sticky last bit decides every
+/// rounding.
 struct LongQuotient {
     quotient: u128,
     shift: i32,
@@ -428,7 +431,8 @@ mod tests {
             if let Ok(far) = there.apply(value, Rounding::Nearest) {
                 let again = back.apply(far, Rounding::Nearest).unwrap();
                 let coarse = i128::from(den).max(i128::from(num));
-                // One step of the far side, seen from the near side, is den/num; the coarser side has at least 1.
+                // One step of the far side, seen from the near side, is den/num; the coarser side has at
+                // least 1.
                 let loss = i128::from(value.abs_diff(again)) * i128::from(num);
                 prop_assert!(loss <= coarse, "{value} -> {far} -> {again}");
             }
@@ -446,7 +450,8 @@ mod tests {
         /// Fractions as doubles: m/2^k times n/d is m*n over d*2^k, checked by multiplication.
         #[test]
         fn fractions_are_exact(
-            num in -(1_i64 << 40)..1 << 40, den in 1..1_i64 << 30, mantissa in -(1_i64 << 53)..1 << 53, shift in 0..30_i32,
+            num in -(1_i64 << 40)..1 << 40, den in 1..1_i64 << 30,
+            mantissa in -(1_i64 << 53)..1 << 53, shift in 0..30_i32,
         ) {
             let value = cast::f64_from_i64(mantissa) * cast::exp2(-shift);
             if let Ok(result) = ratio(num, den).apply_f64(value, Rounding::Nearest) {
@@ -458,7 +463,9 @@ mod tests {
 
         /// No double is nearer to the quotient than the one returned: it comes back to the same integer.
         #[test]
-        fn doubles_bring_back_what_fits_them(num in 1..1_i64 << 20, den in 1..1_i64 << 20, value in -(1_i64 << 32)..1 << 32) {
+        fn doubles_bring_back_what_fits_them(
+            num in 1..1_i64 << 20, den in 1..1_i64 << 20, value in -(1_i64 << 32)..1 << 32,
+        ) {
             let there = ratio(num, den);
             let back = there.inverse().unwrap();
             prop_assert_eq!(back.apply_f64(there.to_f64(value), Rounding::Nearest), Ok(value));

@@ -25,12 +25,14 @@ pub struct AxisScaling {
     pub kind: UnitKind,
     /// Counts in `units` axis units, above zero.
     counts: i64,
-    /// Axis units, above zero. With `counts` it allows counts that are not whole per unit, as behind a gearbox.
+    /// Axis units, above zero. With `counts` it allows counts that are not whole per unit, as behind a
+    /// gearbox.
     units: i64,
 }
 
 impl AxisScaling {
-    /// `counts` counts in `units` axis units, or `None` unless both are above zero and the conversion fits 64 bits.
+    /// `counts` counts in `units` axis units, or `None` unless both are above zero and the conversion fits 64
+    /// bits.
     pub fn new(kind: UnitKind, counts: i64, units: i64) -> Option<Self> {
         let scaling = Self { kind, counts, units };
         (counts > 0 && units > 0).then_some(())?;
@@ -62,8 +64,8 @@ pub const fn fold(value: i64, modulus: i64) -> i64 {
 
 /// Unrolls a counter that wraps into one that does not, without drift.
 ///
-/// Between two updates the counter may move by less than half its modulus; exactly half counts as backward. The
-/// sum of all steps is a pure integer, so no number of wraps loses a count.
+/// Between two updates the counter may move by less than half its modulus; exactly half counts as backward.
+/// The sum of all steps is a pure integer, so no number of wraps loses a count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WrapTracker {
     /// Above one; at most 2^64.
@@ -108,8 +110,8 @@ impl WrapTracker {
         self.total = total;
     }
 
-    /// Forgets where the counter was; the next value is taken as it is. After a loss of communication in which the
-    /// counter may have moved by more than half its modulus.
+    /// Forgets where the counter was; the next value is taken as it is. After a loss of communication in
+    /// which the counter may have moved by more than half its modulus.
     pub fn restart(&mut self) {
         self.last = None;
     }
@@ -172,7 +174,8 @@ mod tests {
         );
     }
 
-    /// Ten million steps of any size below half the modulus, with about a million wraps: not one count is lost.
+    /// Ten million steps of any size below half the modulus, with about a million wraps: not one count is
+    /// lost.
     #[test]
     fn ten_million_steps_do_not_drift() {
         let modulus = 1_000_003_i64;
@@ -196,7 +199,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_modulus_unrolls(modulus in 3..i64::MAX, start in 0..i64::MAX, steps in prop::collection::vec(-1.0..1.0_f64, 1..50)) {
+        fn any_modulus_unrolls(
+            modulus in 3..i64::MAX, start in 0..i64::MAX,
+            steps in prop::collection::vec(-1.0..1.0_f64, 1..50),
+        ) {
             let mut tracker = WrapTracker::new(modulus).unwrap();
             let start = fold(start, modulus);
             let mut truth = i128::from(tracker.update(start));

@@ -1,11 +1,11 @@
 //! A simulated servo axis: the drive, its motor and its load.
 //!
-//! It is what stands behind the simulated slaves and nodes: a cascade of position, velocity and torque loops on an
-//! inertia with friction, seen through a quantised encoder that wraps. It lags and overshoots as a drive does. Time
-//! is told to it, and the same commands always give the same motion.
+//! It is what stands behind the simulated slaves and nodes: a cascade of position, velocity and torque loops
+//! on an inertia with friction, seen through a quantised encoder that wraps. It lags and overshoots as a
+//! drive does. Time is told to it, and the same commands always give the same motion.
 //!
-//! Inside it computes in floating point; at its edges stand the integer quantities of the generic model. The actual
-//! position is an integer with a fraction, so that it does not lose resolution far from zero.
+//! Inside it computes in floating point; at its edges stand the integer quantities of the generic model. The
+//! actual position is an integer with a fraction, so that it does not lose resolution far from zero.
 
 use crate::fault::FaultCause;
 use crate::image::StatusBits;

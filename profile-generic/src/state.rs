@@ -1,7 +1,7 @@
 //! The generic drive state machine (basic drive functional element).
 //!
-//! [`DriveState::next`] is the whole machine as a pure function; [`BasicDrive`] keeps the state and the conditions
-//! together so that neither can be forgotten.
+//! [`DriveState::next`] is the whole machine as a pure function; [`BasicDrive`] keeps the state and the
+//! conditions together so that neither can be forgotten.
 //!
 //! ```text
 //!                  no torque                                     torque possible
@@ -15,10 +15,10 @@
 //!   +---------------------------------------------+   +----------------------------------+
 //! ```
 //!
-//! "Standby" below is the first of these that applies: Faulted while a fault is active, Shutdown while the shutdown
-//! is latched, NotReady while the drive is not initialised, AwaitingPower without power, Inhibited with any inhibit,
-//! else Ready. "Idle" states are NotReady, Inhibited, AwaitingPower and Ready; "running" states are Starting,
-//! Operating and Testing. A fault raised by the machine itself is written in brackets.
+//! "Standby" below is the first of these that applies: Faulted while a fault is active, Shutdown while the
+//! shutdown is latched, NotReady while the drive is not initialised, AwaitingPower without power, Inhibited
+//! with any inhibit, else Ready. "Idle" states are NotReady, Inhibited, AwaitingPower and Ready; "running"
+//! states are Starting, Operating and Testing. A fault raised by the machine itself is written in brackets.
 //!
 //! ```text
 //! state           event                        condition               next           action
@@ -47,38 +47,44 @@
 //! Starting        InhibitRaised                any other               Stopping       Disable
 //! Stopping, FaultReaction  InhibitRaised       takes torque away       same           TorqueOff
 //! idle            InhibitRaised, InhibitCleared                        standby        None
-//! Starting        Timeout                                              FaultReaction  Disable    [start_time_out]
-//! Stopping        Timeout                                              FaultReaction  TorqueOff  [stop_time_out]
+//! Starting        Timeout                      [start_time_out]        FaultReaction  Disable
+//! Stopping        Timeout                      [stop_time_out]         FaultReaction  TorqueOff
 //! FaultReaction   Timeout                                              Faulted        TorqueOff
 //! ```
 //!
-//! What the drive reports:
+//! What the drive reports. F is Faulted with the action TorqueOff, R is FaultReaction with the action
+//! Disable:
 //!
 //! ```text
-//! report              idle            Shutdown        Starting        Operating,Testing  Stopping        FaultReaction   Faulted
-//! NotReady            standby         same            Faulted [left]  Faulted [left]     standby         Faulted         same
-//! AwaitingPower       standby (1)     same            Faulted [power] Faulted [power]    standby         Faulted         same
-//! Ready               standby         same            same            Faulted [left]     standby         Faulted         same
-//! Enabling            Faulted (2)     Faulted (2)     same            FaultReaction (3)  same            same            TorqueOff (2)
-//! Operating           Faulted (2)     Faulted (2)     Operating (4)   same               same            same            TorqueOff (2)
-//! Halted              Faulted (2)     Faulted (2)     Operating (4)   same               same            same            TorqueOff (2)
-//! Stopping            FaultReaction(5) FaultReaction(5) FaultReaction(3) FaultReaction(3) same           same            same
-//! FaultReaction       FaultReaction(7) FaultReaction(7) FaultReaction(7) FaultReaction(7) FaultReaction(7) same         same
-//! Faulted             Faulted         Faulted         Faulted         Faulted            Faulted         Faulted         same
-//! Silent              Faulted (6)     Faulted [south] FaultReaction [south]              FaultReaction [south] same      same
+//! report         idle       Shutdown  Starting    Operating,  Stopping  Fault-    Faulted
+//!                                                 Testing               Reaction
+//! NotReady       standby    same      F left      F left      standby   F         same
+//! AwaitingPower  standby 1  same      F power     F power     standby   F         same
+//! Ready          standby    same      same        F left      standby   F         same
+//! Enabling       F torque   F torque  same        R left      same      same      same 2
+//! Operating      F torque   F torque  Operating 3 same        same      same      same 2
+//! Halted         F torque   F torque  Operating 3 same        same      same      same 2
+//! Stopping       R torque   R torque  R left      R left      same      same      same
+//! FaultReaction  R          R         R           R           R         same      same
+//! Faulted        F          F         F           F           F         F         same
+//! Silent         F south 4  F south   R south     R south     R south   same      same
+//!
+//! left:   left_operation        power:  power_loss
+//! torque: unexpected_torque     south:  south_silence
 //! ```
 //!
 //! 1. With the action Energize, repeated while the drive waits.
-//! 2. Torque that nobody asked for: TorqueOff, [unexpected_torque].
-//! 3. The drive left operation by itself: Disable, [left_operation].
-//! 4. Testing when a test is active.
-//! 5. The drive decelerates unasked: it is left to its controlled stop (Disable), [unexpected_torque].
-//! 6. \[south_silence\]; but NotReady stays: a drive that was never heard is not lost.
-//! 7. With the action Disable, so that the drive does not find itself enabled when its reaction ends.
+//! 2. With the action TorqueOff, \[unexpected_torque\].
+//! 3. Testing when a test is active.
+//! 4. But NotReady stays: a drive that was never heard is not lost.
 //!
-//! "same" for a drive that is running means: unless a fault is active or the shutdown is latched, in which case the
-//! machine catches up with the stop that should have come. A request that changes nothing because its aim is
-//! reached already (Disable while idle) is no error and gives None; one that is not allowed gives Reject.
+//! A drive that decelerates unasked is left to its controlled stop. One in its own fault reaction is told to
+//! disable all the same, so that it does not find itself enabled when the reaction ends.
+//!
+//! "same" for a drive that is running means: unless a fault is active or the shutdown is latched, in which
+//! case the machine catches up with the stop that should have come. A request that changes nothing because
+//! its aim is reached already (Disable while idle) is no error and gives None; one that is not allowed gives
+//! Reject.
 
 use crate::code::named_enum;
 use crate::fault::{FaultCause, Reaction};
@@ -90,7 +96,8 @@ mod transition;
 pub use basic_drive::BasicDrive;
 
 named_enum! {
-    /// The state of one drive. Each CIP Motion axis state, CiA 402 state and SERCOS ready state maps to one of them.
+    /// The state of one drive. Each CIP Motion axis state, CiA 402 state and SERCOS ready state maps to one
+    /// of them.
     #[derive(Default)]
     pub enum DriveState {
         /// The drive is not initialised, not configured, or was not heard yet.
@@ -195,7 +202,8 @@ named_enum! {
         Halt = "halt",
         /// Switch the torque off at once.
         TorqueOff = "torque_off",
-        /// Clear the faults of the drive; no torque. A pulse: afterwards what [`Action::TorqueOff`] writes stands again.
+        /// Clear the faults of the drive; no torque. A pulse: afterwards what [`Action::TorqueOff`] writes
+        /// stands again.
         ResetFault = "reset_fault",
         /// The request is refused; nothing is done.
         Reject = "reject",

@@ -1,8 +1,8 @@
 //! Points in time and spans of time, in nanoseconds.
 //!
 //! Two clocks meet in a gateway: the monotonic clock of the host, which engines are driven by, and the system
-//! time of CIP Sync and IEEE 1588, which commands and captures are stamped with. They are different types and do
-//! not subtract from each other.
+//! time of CIP Sync and IEEE 1588, which commands and captures are stamped with. They are different types and
+//! do not subtract from each other.
 
 use core::fmt;
 use core::ops::{Add, Mul, Neg, Sub};
@@ -171,13 +171,14 @@ macro_rules! point_in_time {
 }
 
 point_in_time! {
-    /// An instant of the host's monotonic clock, in nanoseconds since an origin that has no meaning of its own.
+    /// An instant of the host's monotonic clock, in nanoseconds since an origin that has no meaning of its
+    /// own.
     MonotonicTime
 }
 
 point_in_time! {
-    /// An instant of the system time of CIP Sync (IEC 61800-7-202, 3.1.46) and IEEE 1588, in nanoseconds since
-    /// 1970-01-01.
+    /// An instant of the system time of CIP Sync (IEC 61800-7-202, 3.1.46) and IEEE 1588, in nanoseconds
+    /// since 1970-01-01.
     SystemTime
 }
 

@@ -1,8 +1,8 @@
 //! The polynomials of fine interpolation (CIP Volume 9, 5-2.6.5.2), in fixed point.
 //!
 //! With `s` the part of the segment that has passed, and the differences `d1`, `d2`, `d3` of the last values,
-//! all of them are `base + (d1 - d2/2 - d3/6) s + (d2/2) s^2 + (d3/6) s^3`, of which lower orders leave out the
-//! higher differences. The coefficients are held times six, so that they are whole.
+//! all of them are `base + (d1 - d2/2 - d3/6) s + (d2/2) s^2 + (d3/6) s^3`, of which lower orders leave out
+//! the higher differences. The coefficients are held times six, so that they are whole.
 
 use super::UpdateError;
 use crate::time::DurationNs;
@@ -40,7 +40,8 @@ impl Polynomial {
     /// The value `elapsed` after the start of the segment, saturated; before the start, that at the start.
     pub(super) fn value(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
         let part = part(elapsed, length);
-        // Below 2^49 with 20 places; the part of at most 8 with 40 places takes that below 2^116 in the last step.
+        // Below 2^49 with 20 places; the part of at most 8 with 40 places takes that below 2^116 in the last
+        // step.
         let sum = times(self.third << VALUE_PLACES, part) + (self.second << VALUE_PLACES);
         let sum = times(sum, part) + (self.first << VALUE_PLACES);
         saturate(i128::from(self.base) + rounded(times(sum, part), 6 << VALUE_PLACES))
@@ -93,8 +94,8 @@ impl<const ORDER: usize> Channel<ORDER> {
         channel
     }
 
-    /// Takes a value that nobody sent: the start, or an estimate for an update that was lost. An estimate is held
-    /// within the largest step, so that the bounds of the polynomials hold whatever is lost.
+    /// Takes a value that nobody sent: the start, or an estimate for an update that was lost. An estimate is
+    /// held within the largest step, so that the bounds of the polynomials hold whatever is lost.
     pub(super) fn fill(&mut self, value: Option<i64>) {
         if let Some(value) = value {
             let last = self.values[0];
@@ -106,8 +107,8 @@ impl<const ORDER: usize> Channel<ORDER> {
         }
     }
 
-    /// Takes a value that was sent and returns the polynomial that leads to it. A value that is absent makes the
-    /// channel forget its past.
+    /// Takes a value that was sent and returns the polynomial that leads to it. A value that is absent makes
+    /// the channel forget its past.
     pub(super) fn push(
         &mut self,
         value: Option<i64>,

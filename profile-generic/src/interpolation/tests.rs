@@ -262,7 +262,9 @@ proptest! {
 
     /// The fixed point stays within a nanounit of the polynomial in doubles where doubles are good enough.
     #[test]
-    fn the_fixed_point_is_accurate(values in prop::array::uniform4(-(1_i64 << 34)..1 << 34), part in 0..1_000_i64) {
+    fn the_fixed_point_is_accurate(
+        values in prop::array::uniform4(-(1_i64 << 34)..1 << 34), part in 0..1_000_i64,
+    ) {
         let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
         interpolator.start(Some(Position(values[0])));
         for (target, value) in (1..).zip(&values[1..]) {
@@ -279,7 +281,8 @@ proptest! {
     /// Nothing that comes off a wire makes it panic.
     #[test]
     fn any_input_is_survived(
-        updates in prop::collection::vec((any::<u64>(), any::<i64>(), any::<i64>()), 1..40), spread in 0..64_u32,
+        updates in prop::collection::vec((any::<u64>(), any::<i64>(), any::<i64>()), 1..40),
+        spread in 0..64_u32,
     ) {
         let mut interpolator = interpolator(TargetUpdate::Extrapolate, MAX_EXTRAPOLATION);
         interpolator.start(Some(Position(0)));

@@ -30,11 +30,11 @@ impl Parameter {
     }
 }
 
-/// One row per parameter: constant, number, name, functional element, quantity, type, access, description. Numbers
-/// rise; the high byte groups them.
+/// One row per parameter: constant, number, name, functional element, quantity, type, access, description.
+/// Numbers rise; the high byte groups them.
 macro_rules! catalogue {
-    ($( $constant:ident = $number:literal, $name:literal, $element:ident, $quantity:ident, $kind:ident, $access:ident,
-        $description:literal; )*) => {
+    ($( $constant:ident = $number:literal, $name:literal, $element:ident, $quantity:ident, $kind:ident,
+        $access:ident, $description:literal; )*) => {
         open_code! {
             /// A generic parameter.
             pub struct Parameter(u16) {
@@ -172,7 +172,8 @@ catalogue! {
         "Integral action time of the velocity loop, 0 for none.";
     VELOCITY_FEED_FORWARD_GAIN = 0x0505, "velocity_feed_forward_gain", BasicDrive, Fraction, Integer, Write,
         "Part of the velocity set-point that is fed forward.";
-    ACCELERATION_FEED_FORWARD_GAIN = 0x0506, "acceleration_feed_forward_gain", BasicDrive, Fraction, Integer, Write,
+    ACCELERATION_FEED_FORWARD_GAIN = 0x0506, "acceleration_feed_forward_gain",
+        BasicDrive, Fraction, Integer, Write,
         "Part of the acceleration set-point that is fed forward.";
     TORQUE_FILTER_FREQUENCY = 0x0507, "torque_filter_frequency", BasicDrive, Frequency, Integer, Write,
         "Corner of the low pass of the torque set-point.";
@@ -209,11 +210,12 @@ catalogue! {
         "Position of the machine's zero point.";
 
     MOTOR_TYPE = 0x0701, "motor_type", BasicDrive, None, Integer, WriteWhileDisabled,
-        "Kind of motor: 0 none, 1 rotary synchronous, 2 rotary induction, 3 linear synchronous, 4 linear induction.";
+        "Kind of motor: 0 none, 1 synchronous, 2 induction, 3 linear synchronous, 4 linear induction.";
     MOTOR_NAME = 0x0702, "motor_name", BasicDrive, None, Text, Read, "Type designation of the motor.";
     MOTOR_SERIAL_NUMBER = 0x0703, "motor_serial_number", BasicDrive, None, Text, Read,
         "Serial number of the motor.";
-    MOTOR_RATED_TORQUE = 0x0704, "motor_rated_torque", BasicDrive, TorqueAbsolute, Integer, WriteWhileDisabled,
+    MOTOR_RATED_TORQUE = 0x0704, "motor_rated_torque",
+        BasicDrive, TorqueAbsolute, Integer, WriteWhileDisabled,
         "Rated torque or force: the whole that torque is told in parts of.";
     MOTOR_PEAK_TORQUE = 0x0705, "motor_peak_torque", BasicDrive, Torque, Integer, WriteWhileDisabled,
         "Peak torque or force.";
@@ -237,7 +239,8 @@ catalogue! {
         "Resistance of the winding.";
     MOTOR_INDUCTANCE = 0x070F, "motor_inductance", BasicDrive, Inductance, Integer, WriteWhileDisabled,
         "Inductance of the winding.";
-    MOTOR_MAX_TEMPERATURE = 0x0710, "motor_max_temperature", BasicDrive, Temperature, Integer, WriteWhileDisabled,
+    MOTOR_MAX_TEMPERATURE = 0x0710, "motor_max_temperature",
+        BasicDrive, Temperature, Integer, WriteWhileDisabled,
         "Highest temperature of the winding.";
     MOTOR_OVERLOAD_LIMIT = 0x0711, "motor_overload_limit", BasicDrive, Fraction, Integer, Write,
         "Use of the thermal capacity of the motor at which the drive faults.";
@@ -262,7 +265,8 @@ catalogue! {
         "Direction of the motor feedback: 0 as built, 1 reversed.";
     LOAD_FEEDBACK_TYPE = 0x0807, "load_feedback_type", BasicDrive, None, Integer, WriteWhileDisabled,
         "Kind of the load feedback, as its profile numbers it.";
-    LOAD_FEEDBACK_RESOLUTION = 0x0808, "load_feedback_resolution", BasicDrive, None, Integer, WriteWhileDisabled,
+    LOAD_FEEDBACK_RESOLUTION = 0x0808, "load_feedback_resolution",
+        BasicDrive, None, Integer, WriteWhileDisabled,
         "Counts of the load feedback in one revolution or millimetre.";
     LOAD_FEEDBACK_POLARITY = 0x0809, "load_feedback_polarity", BasicDrive, None, Integer, WriteWhileDisabled,
         "Direction of the load feedback: 0 as built, 1 reversed.";
@@ -359,21 +363,29 @@ catalogue! {
         "Distance from the home place to the zero point.";
     HOMED = 0x0C07, "homed", ApplicationFunction, None, Integer, Read,
         "Whether a homing procedure has ended well: 0 or 1.";
-    REGISTRATION_1_POSITIVE_POSITION = 0x0C08, "registration_1_positive_position", ApplicationFunction, Position, Integer, Read,
+    REGISTRATION_1_POSITIVE_POSITION = 0x0C08, "registration_1_positive_position",
+        ApplicationFunction, Position, Integer, Read,
         "Position at the last positive edge of registration input 1.";
-    REGISTRATION_1_NEGATIVE_POSITION = 0x0C09, "registration_1_negative_position", ApplicationFunction, Position, Integer, Read,
+    REGISTRATION_1_NEGATIVE_POSITION = 0x0C09, "registration_1_negative_position",
+        ApplicationFunction, Position, Integer, Read,
         "Position at the last negative edge of registration input 1.";
-    REGISTRATION_1_POSITIVE_TIME = 0x0C0A, "registration_1_positive_time", ApplicationFunction, Time, Integer, Read,
+    REGISTRATION_1_POSITIVE_TIME = 0x0C0A, "registration_1_positive_time",
+        ApplicationFunction, Time, Integer, Read,
         "System time of the last positive edge of registration input 1.";
-    REGISTRATION_1_NEGATIVE_TIME = 0x0C0B, "registration_1_negative_time", ApplicationFunction, Time, Integer, Read,
+    REGISTRATION_1_NEGATIVE_TIME = 0x0C0B, "registration_1_negative_time",
+        ApplicationFunction, Time, Integer, Read,
         "System time of the last negative edge of registration input 1.";
-    REGISTRATION_2_POSITIVE_POSITION = 0x0C0C, "registration_2_positive_position", ApplicationFunction, Position, Integer, Read,
+    REGISTRATION_2_POSITIVE_POSITION = 0x0C0C, "registration_2_positive_position",
+        ApplicationFunction, Position, Integer, Read,
         "Position at the last positive edge of registration input 2.";
-    REGISTRATION_2_NEGATIVE_POSITION = 0x0C0D, "registration_2_negative_position", ApplicationFunction, Position, Integer, Read,
+    REGISTRATION_2_NEGATIVE_POSITION = 0x0C0D, "registration_2_negative_position",
+        ApplicationFunction, Position, Integer, Read,
         "Position at the last negative edge of registration input 2.";
-    REGISTRATION_2_POSITIVE_TIME = 0x0C0E, "registration_2_positive_time", ApplicationFunction, Time, Integer, Read,
+    REGISTRATION_2_POSITIVE_TIME = 0x0C0E, "registration_2_positive_time",
+        ApplicationFunction, Time, Integer, Read,
         "System time of the last positive edge of registration input 2.";
-    REGISTRATION_2_NEGATIVE_TIME = 0x0C0F, "registration_2_negative_time", ApplicationFunction, Time, Integer, Read,
+    REGISTRATION_2_NEGATIVE_TIME = 0x0C0F, "registration_2_negative_time",
+        ApplicationFunction, Time, Integer, Read,
         "System time of the last negative edge of registration input 2.";
     MARKER_POSITION = 0x0C10, "marker_position", ApplicationFunction, Position, Integer, Read,
         "Position at the last marker of the feedback.";

@@ -54,20 +54,22 @@ impl Conversion {
         self.ratio.quotient_f64(value, self.rounding).map(|quotient| self.finish(quotient))
     }
 
-    /// Converts to a double without rounding to an integer first; the second value tells whether it was clamped.
+    /// Converts to a double without rounding to an integer first; the second value tells whether it was
+    /// clamped.
     pub fn convert_to_f64(&self, value: i64) -> (FloatOutcome<f64>, bool) {
         let (num, saturated) = self.numerator(value);
         (ratio::f64_quotient(num, self.ratio.den()), saturated)
     }
 
-    /// Converts to a single without rounding to an integer first; the second value tells whether it was clamped.
+    /// Converts to a single without rounding to an integer first; the second value tells whether it was
+    /// clamped.
     pub fn convert_to_f32(&self, value: i64) -> (FloatOutcome<f32>, bool) {
         let (num, saturated) = self.numerator(value);
         (ratio::f32_quotient(num, self.ratio.den()), saturated)
     }
 
-    /// The conversion back, without limits: from `value * ratio + offset` to `value`. `None` when the ratio is zero
-    /// or the offset does not convert to a whole number.
+    /// The conversion back, without limits: from `value * ratio + offset` to `value`. `None` when the ratio
+    /// is zero or the offset does not convert to a whole number.
     pub fn inverse(&self) -> Option<Self> {
         let ratio = self.ratio.inverse()?;
         let offset = ratio.convert(self.offset, self.rounding);
@@ -167,7 +169,8 @@ mod tests {
     proptest! {
         #[test]
         fn results_keep_the_limits_and_admit_it(
-            num in any::<i64>(), den in 1..i64::MAX, offset in any::<i64>(), min in any::<i64>(), max in any::<i64>(),
+            num in any::<i64>(), den in 1..i64::MAX, offset in any::<i64>(),
+            min in any::<i64>(), max in any::<i64>(),
             value in any::<i64>(),
         ) {
             let Some(ratio) = Ratio::new(num, den) else { return Ok(()) };

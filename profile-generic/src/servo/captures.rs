@@ -24,8 +24,8 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// Whether the stretch passes the mark, and if so in which direction. Standing on a mark is not passing it; the
-    /// side from the mark upward belongs to the mark.
+    /// Whether the stretch passes the mark, and if so in which direction. Standing on a mark is not passing
+    /// it; the side from the mark upward belongs to the mark.
     const fn passes(&self, mark: i64) -> Option<CaptureEdge> {
         match (self.from.0 >= mark, self.to.0 >= mark) {
             (false, true) => Some(CaptureEdge::Positive),
@@ -58,8 +58,8 @@ impl Stretch {
 #[derive(Clone, Debug)]
 pub(super) struct Captures {
     armed: [Option<CaptureRequest>; SLOTS],
-    /// Where the home switch was passed; the next marker beyond counts for [`CaptureSource::HomeSwitchMarker`] with
-    /// this edge.
+    /// Where the home switch was passed; the next marker beyond counts for
+    /// [`CaptureSource::HomeSwitchMarker`] with this edge.
     awaiting_marker: [Option<Position>; 2],
     results: ArrayVec<CaptureResult, MAX_RESULTS>,
     marker_distance: Position,
@@ -148,7 +148,8 @@ impl Captures {
     fn pass_home_switch(&mut self, stretch: &Stretch) {
         let Some(window) = self.home_switch else { return };
         let forward = stretch.to > stretch.from;
-        // Upward the switch closes at its lower end and opens just beyond its upper one; downward the other way.
+        // Upward the switch closes at its lower end and opens just beyond its upper one; downward the other
+        // way.
         let (first, second) = (window.from.0, window.to.0.saturating_add(1));
         let ends = if forward { [first, second] } else { [second, first] };
         for mark in ends {
@@ -164,7 +165,8 @@ impl Captures {
         }
     }
 
-    /// A sub-step passes one marker at most, or several of which the last is taken: no drive tells them apart.
+    /// A sub-step passes one marker at most, or several of which the last is taken: no drive tells them
+    /// apart.
     fn pass_marker(&mut self, stretch: &Stretch) {
         let mark = mark_below(stretch.from.max(stretch.to), self.marker_distance);
         let Some(direction) = stretch.passes(mark) else { return };

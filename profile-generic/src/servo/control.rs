@@ -5,8 +5,8 @@ use super::{SUB_STEP, ServoError, ServoParameters};
 use crate::cast;
 use crate::quantity::Position;
 
-/// The most that velocity gain times the lag of the torque loop may be. At 0.5 the loop still has a phase margin
-/// above 60 degrees without its integral part.
+/// The most that velocity gain times the lag of the torque loop may be. At 0.5 the loop still has a phase
+/// margin above 60 degrees without its integral part.
 const MAX_GAIN_TIMES_LAG: f64 = 0.5;
 
 /// What the loops follow during a sub-step.

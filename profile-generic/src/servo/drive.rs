@@ -106,8 +106,8 @@ impl Servo {
     /// Changes the parameters while the axis goes on as it is.
     ///
     /// # Errors
-    /// As [`Servo::new`]; the servo is then unchanged. The start position and the parameters of the encoder and the
-    /// motor have no effect any more: they are refused when they differ.
+    /// As [`Servo::new`]; the servo is then unchanged. The start position and the parameters of the encoder
+    /// and the motor have no effect any more: they are refused when they differ.
     pub fn set_parameters(&mut self, parameters: ServoParameters) -> Result<(), ServoError> {
         let fixed = |of: &ServoParameters| {
             (of.kind, of.encoder_counts, of.encoder_bits, of.rated_torque, of.inertia, of.start_position)
@@ -128,8 +128,8 @@ impl Servo {
         self.now = now;
     }
 
-    /// Gives the place where the axis is a new position, as homing does. The set-point of position control moves
-    /// along, so that nothing jumps.
+    /// Gives the place where the axis is a new position, as homing does. The set-point of position control
+    /// moves along, so that nothing jumps.
     pub fn set_position(&mut self, position: Position) {
         let shift = position.saturating_sub(self.plant.position());
         self.plant.set_position(position);
@@ -201,8 +201,8 @@ impl Servo {
         self.active.retain(|active| *active != cause);
     }
 
-    /// Lets `dt_ns` nanoseconds pass with these inputs. Longer steps than [`MAX_STEP`] and such below one nanosecond
-    /// are held at these ends.
+    /// Lets `dt_ns` nanoseconds pass with these inputs. Longer steps than [`MAX_STEP`] and such below one
+    /// nanosecond are held at these ends.
     pub fn step(&mut self, dt_ns: i64, command: &ServoCommand) -> ServoActual {
         let whole = dt_ns.clamp(1, MAX_STEP.0);
         let count = (whole + SUB_STEP.0 - 1) / SUB_STEP.0;
@@ -241,7 +241,8 @@ impl Servo {
         if reset && self.latched.is_some() && self.active.is_empty() {
             match self.stage {
                 Stage::Off => self.latched = None,
-                // An enable that still stands must not move the axis when the fault goes, so the hold ends in a stop.
+                // An enable that still stands must not move the axis when the fault goes, so the hold ends in
+                // a stop.
                 Stage::Holding(_) => {
                     self.latched = None;
                     self.begin_stop(Afterwards::Off);
@@ -317,7 +318,8 @@ impl Servo {
         self.set_point = None;
     }
 
-    /// Latches a fault and begins its reaction; a fault that is latched already gives way only to a stronger one.
+    /// Latches a fault and begins its reaction; a fault that is latched already gives way only to a stronger
+    /// one.
     fn latch(&mut self, cause: FaultCause, reaction: Reaction) {
         if !reaction.stops() || self.latched.is_some_and(|(_, latched)| latched >= reaction) {
             return;

@@ -218,7 +218,8 @@ pub(super) fn check(parameters: &ServoParameters) -> Result<(), ServoError> {
     if !(8..=62).contains(&parameters.encoder_bits) {
         return Err(ServoError::OutOfRange("encoder_bits"));
     }
-    // Faster than a hundredth of what 64 bits hold is no axis; it would leave the position range within seconds.
+    // Faster than a hundredth of what 64 bits hold is no axis; it would leave the position range within
+    // seconds.
     if parameters.velocity_limit.0 > 1_000_000 * NANO {
         return Err(ServoError::OutOfRange("velocity_limit"));
     }

@@ -74,7 +74,8 @@ fn a_position_step_lags_and_settles_without_much_overshoot() {
     assert!(last.status.contains(StatusBits::IN_POSITION | StatusBits::STANDSTILL | StatusBits::TRACKING));
 }
 
-/// In steady motion the position error is the velocity over the gain: 10 per second over 50 per second is 0.2.
+/// In steady motion the position error is the velocity over the gain: 10 per second over 50 per second is
+/// 0.2.
 #[test]
 fn the_following_error_is_velocity_over_gain() {
     let run_ramp = |parameters: ServoParameters| {
@@ -476,7 +477,8 @@ fn any_step_length_gives_nearly_the_same_motion() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Any commands: always the same motion for the same commands, torque and velocity within bounds, no panic.
+    /// Any commands: always the same motion for the same commands, torque and velocity within bounds, no
+    /// panic.
     #[test]
     fn it_is_deterministic_and_bounded(
         steps in prop::collection::vec(

@@ -6,8 +6,8 @@ use crate::inhibit::Inhibits;
 
 /// The basic drive functional element: the state and everything its transitions depend on.
 ///
-/// It folds each event into the conditions before the transition and the latches of the transition after it, so
-/// that a shutdown, a pending reset or a fault of the drive cannot be forgotten between the two.
+/// It folds each event into the conditions before the transition and the latches of the transition after it,
+/// so that a shutdown, a pending reset or a fault of the drive cannot be forgotten between the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BasicDrive {
     state: DriveState,
@@ -61,8 +61,8 @@ impl BasicDrive {
         }
     }
 
-    /// Raises a fault. Of several active faults the strongest reaction counts. A reaction that does not stop the
-    /// axis changes nothing.
+    /// Raises a fault. Of several active faults the strongest reaction counts. A reaction that does not stop
+    /// the axis changes nothing.
     pub fn raise_fault(&mut self, reaction: Reaction) -> Transition {
         if reaction.stops() {
             let known = if self.conditions.fault_active { self.conditions.reaction } else { reaction };

@@ -44,7 +44,8 @@ fn everywhere(mut visit: impl FnMut(DriveState, Event, Conditions, Transition)) 
     }
 }
 
-/// The transitions of one state and event as a tree over the variables, a variable left out where it does not matter.
+/// The transitions of one state and event as a tree over the variables, a variable left out where it does not
+/// matter.
 fn rows(state: DriveState, event: Event) -> Vec<(String, Transition)> {
     fn grow(
         from: usize,
@@ -230,7 +231,8 @@ fn reports_repeat_without_effect() {
                 ..conditions
             };
             let again = transition.next.next(event, &conditions);
-            // What is still moving may pass one more state, such as from a reaction to the fault, but not two.
+            // What is still moving may pass one more state, such as from a reaction to the fault, but not
+            // two.
             let third = again.next.next(event, &conditions);
             assert_eq!(again.next, third.next, "{state} {event:?} {conditions:?}");
         }

@@ -19,7 +19,8 @@ impl Transition {
 }
 
 impl Conditions {
-    /// The state of a drive without torque: by precedence of fault, shutdown, initialisation, power and inhibits.
+    /// The state of a drive without torque: by precedence of fault, shutdown, initialisation, power and
+    /// inhibits.
     pub const fn standby(&self) -> DriveState {
         if self.fault_active {
             DriveState::Faulted
@@ -36,8 +37,8 @@ impl Conditions {
         }
     }
 
-    /// These conditions with what a report says. A report can only take the supply away: that there is one has to be
-    /// known already.
+    /// These conditions with what a report says. A report can only take the supply away: that there is one
+    /// has to be known already.
     const fn with_report(self, report: Report) -> Self {
         let initialised = !matches!(report, Report::NotReady | Report::Silent);
         let power = self.power && !matches!(report, Report::AwaitingPower);
