@@ -142,7 +142,9 @@ impl AttributeEntry {
     /// # Errors
     /// The bytes do not hold a value of the type, or the value is out of range, or no parameter stands behind it.
     pub fn to_generic(&self, bytes: &[u8]) -> Result<i64, ValueError> {
-        let Backing::Parameter { to_generic, .. } = &self.backing else { return Err(ValueError::NotConvertible) };
+        let Backing::Parameter { to_generic, .. } = &self.backing else {
+            return Err(ValueError::NotConvertible);
+        };
         let width = self.number_width()?;
         if bytes.len() != width.bytes() {
             return Err(ValueError::Length { expected: width.bytes(), got: bytes.len() });
@@ -167,7 +169,8 @@ impl AttributeEntry {
     /// # Errors
     /// The attribute is no number, or neither a parameter nor a signal stands behind it.
     pub fn from_generic(&self, generic: i64, out: &mut [u8; 8]) -> Result<(usize, bool), ValueError> {
-        let (Backing::Parameter { from_generic, .. } | Backing::Signal { from_generic, .. }) = &self.backing else {
+        let (Backing::Parameter { from_generic, .. } | Backing::Signal { from_generic, .. }) = &self.backing
+        else {
             return Err(ValueError::NotConvertible);
         };
         let width = self.number_width()?;

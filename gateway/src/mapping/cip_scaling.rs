@@ -52,21 +52,29 @@ impl CipScaling {
     pub fn from_attributes(tables: &CipTables, get: impl Fn(u16) -> i64) -> Result<Self, CipScalingError> {
         let rows = &tables.scaling;
         let drive_scaling = get(rows.configuration) == i64::from(rows.drive_scaling);
-        let (unit_attribute, units) =
-            if drive_scaling { (rows.unit, &tables.motion_units) } else { (rows.feedback_unit, &tables.feedback_units) };
+        let (unit_attribute, units) = if drive_scaling {
+            (rows.unit, &tables.motion_units)
+        } else {
+            (rows.feedback_unit, &tables.feedback_units)
+        };
         let code = get(unit_attribute);
-        let unit = units.iter().find(|unit| i64::from(unit.code) == code).ok_or(CipScalingError::Attribute {
-            attribute: unit_attribute,
-            expected: "the code of a displacement unit",
-            value: code,
-        })?;
+        let unit =
+            units.iter().find(|unit| i64::from(unit.code) == code).ok_or(CipScalingError::Attribute {
+                attribute: unit_attribute,
+                expected: "the code of a displacement unit",
+                value: code,
+            })?;
         let mut counts_per_unit: i64 = 1;
         let resolution = if drive_scaling { &rows.resolution[..] } else { &rows.feedback_resolution[..] };
         for &attribute in resolution {
             let value = get(attribute);
-            let product = Some(value).filter(|value| *value > 0).and_then(|value| counts_per_unit.checked_mul(value));
-            counts_per_unit =
-                product.ok_or(CipScalingError::Attribute { attribute, expected: "a number above 0", value })?;
+            let product =
+                Some(value).filter(|value| *value > 0).and_then(|value| counts_per_unit.checked_mul(value));
+            counts_per_unit = product.ok_or(CipScalingError::Attribute {
+                attribute,
+                expected: "a number above 0",
+                value,
+            })?;
         }
         let unwind = (drive_scaling && get(rows.unwind) != 0).then(|| get(rows.unwind_position));
         if let Some(value) = unwind

@@ -1,5 +1,6 @@
 //! CIP Motion <-> generic: the mapping file with every name resolved.
 
+use profile_cip::target::drive_link::DriveAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
@@ -11,9 +12,10 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, DriveState, Request};
 
 use super::compile_cip::{
-    CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS, MAX_REQUESTS,
-    MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
+    CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
+    MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
 };
+use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::{CipAttribute, CipType, Dictionaries, quantity};
 use super::format::{CipAttributeRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name};
 use super::load::{Parsed, TableErrors};
@@ -88,7 +90,10 @@ impl ScalingAttributes {
             self.unwind_position,
             self.feedback_unit,
         ];
-        single.into_iter().chain(self.resolution.iter().copied()).chain(self.feedback_resolution.iter().copied())
+        single
+            .into_iter()
+            .chain(self.resolution.iter().copied())
+            .chain(self.feedback_resolution.iter().copied())
     }
 }
 
@@ -158,6 +163,7 @@ pub struct CipTables {
     pub(super) cyclic: Vec<CyclicElement>,
     pub(super) modes: [Option<OperatingMode>; 16],
     pub(super) requests: Vec<CipRequest>,
+    pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
     pub(super) states: [CipState; DriveState::ALL.len()],
     pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<(FaultCause, CipFault)>,
@@ -172,11 +178,8 @@ impl CipTables {
         dictionaries: &Dictionaries,
         errors: &mut TableErrors,
     ) -> Self {
-        let mut builder = Builder {
-            resolver: Resolver::new(&file.text, errors),
-            dictionaries,
-            tables: Self::default(),
-        };
+        let mut builder =
+            Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
         let rows = &file.rows;
         builder.resolver.head(&rows.format, "mapping", &rows.mapping, "cip-motion to generic");
         builder.units(rows);
@@ -189,6 +192,7 @@ impl CipTables {
         }
         builder.modes(rows);
         builder.requests(rows);
+        builder.drive_actions(rows);
         builder.states(rows);
         builder.status(rows);
         for row in &rows.fault {
@@ -228,7 +232,9 @@ impl Builder<'_> {
     fn units(&mut self, rows: &CipGenericFile) {
         for row in &rows.unit {
             let Some(quantity) = quantity(&mut self.resolver, &row.quantity) else { continue };
-            let Some(ratio) = self.resolver.ratio("generic_per_unit", &row.generic_per_unit) else { continue };
+            let Some(ratio) = self.resolver.ratio("generic_per_unit", &row.generic_per_unit) else {
+                continue;
+            };
             let times = match &row.times {
                 None => Times::One,
                 Some(name) => {
@@ -308,8 +314,7 @@ impl Builder<'_> {
         }
         let (Some(code), Some(kind)) = (code, kind) else { return };
         let unit = DisplacementUnit { name: row.code.get_ref().clone(), code, kind, nanounits };
-        let units =
-            if is_motion { &mut self.tables.motion_units } else { &mut self.tables.feedback_units };
+        let units = if is_motion { &mut self.tables.motion_units } else { &mut self.tables.feedback_units };
         units.push(unit);
     }
 
@@ -335,7 +340,8 @@ impl Builder<'_> {
             self.resolver.word("direction", &row.direction, &[("to_generic", true), ("from_generic", false)]);
         let missing = [("absent", MissingValue::Absent), ("zero", MissingValue::Zero)];
         let missing = self.resolver.word("missing", &row.missing, &missing);
-        let (Some(element), Some(signal), Some(to_generic), Some(missing)) = (element, signal, to_generic, missing)
+        let (Some(element), Some(signal), Some(to_generic), Some(missing)) =
+            (element, signal, to_generic, missing)
         else {
             return;
         };
@@ -382,14 +388,10 @@ impl Builder<'_> {
             let axis_response = self.byte_code("Axis Response", "axis_response", &row.axis_response);
             let request = match &row.request {
                 None => None,
-                Some(name) => {
-                    let known = Request::ALL.iter().map(|request| request.name());
-                    let what = "a request of the generic model";
-                    match self.resolver.name("request", name, what, Request::parse, known) {
-                        Some(request) => Some(request),
-                        None => continue,
-                    }
-                }
+                Some(name) => match self.request(name) {
+                    Some(request) => Some(request),
+                    None => continue,
+                },
             };
             if let (Some(axis_control), Some(axis_response)) = (axis_control, axis_response) {
                 self.tables.requests.push(CipRequest { axis_control, request, axis_response });
@@ -455,7 +457,8 @@ impl Builder<'_> {
         let mut given = 0;
         if let Some(name) = &row.exception {
             given += 1;
-            faults.extend(self.bit("Axis Exceptions", "exception", name).map(CipFault::Exception));
+            let bit = self.bit("Axis Exceptions", "exception", name);
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "Axis Fault", Some("Axis Alarm"), code)));
         }
         if let Some(bit) = &row.manufacturer {
             given += 1;
@@ -464,7 +467,9 @@ impl Builder<'_> {
                 let message = format!("expected a bit from 1 to 63, got {}", bit.get_ref());
                 self.resolver.error(bit.span(), "manufacturer", message);
             }
-            faults.extend(number.map(CipFault::Manufacturer));
+            let fault = number
+                .and_then(|code| self.axis_fault(row, "Axis Fault - Mfg", Some("Axis Alarm - Mfg"), code));
+            faults.extend(fault);
         }
         if let Some(name) = &row.node_fault {
             given += 1;
@@ -473,11 +478,12 @@ impl Builder<'_> {
         if let Some(name) = &row.initialization {
             given += 1;
             let bit = self.bit("Initialization Faults", "initialization", name);
-            faults.extend(bit.map(CipFault::Initialization));
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "Initialization Fault", None, code)));
         }
         if let Some(name) = &row.apr {
             given += 1;
-            faults.extend(self.bit("APR Faults", "apr", name).map(CipFault::AbsolutePosition));
+            let bit = self.bit("APR Faults", "apr", name);
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "APR Fault", None, code)));
         }
         if given != 1 {
             let message = format!(
@@ -491,6 +497,52 @@ impl Builder<'_> {
             }
             self.tables.faults.push((cause, *fault));
         }
+    }
+
+    /// A fault of the axis whose types have these names in the dictionary.
+    fn axis_fault(
+        &mut self,
+        row: &CipFaultRow,
+        fault: &str,
+        alarm: Option<&str>,
+        code: u8,
+    ) -> Option<CipFault> {
+        let cip = &self.dictionaries.cip;
+        let find = |set: &str, name: &str| {
+            let codes = &cip.enumeration(set)?.codes;
+            codes.iter().find(|(_, known)| known == name).and_then(|(code, _)| u8::try_from(*code).ok())
+        };
+        let Some(fault_type) = find("Axis Fault Type", fault) else {
+            let message = format!("the dictionary has no Axis Fault Type `{fault}`");
+            self.resolver.error(row.cause.span(), "cause", message);
+            return None;
+        };
+        let alarm_type = alarm.and_then(|name| find("Axis Alarm Type", name));
+        Some(CipFault::Axis { fault_type, alarm_type, code })
+    }
+
+    fn drive_actions(&mut self, rows: &CipGenericFile) {
+        self.tables.drive_actions = DRIVE_ACTIONS.map(|(_, action)| (action, None));
+        for row in &rows.drive_action {
+            let Some(action) = self.resolver.word("drive_action", &row.drive_action, &DRIVE_ACTIONS) else {
+                continue;
+            };
+            let request = match &row.request {
+                None => None,
+                Some(name) => match self.request(name) {
+                    Some(request) => Some(request),
+                    None => continue,
+                },
+            };
+            for (_, slot) in self.tables.drive_actions.iter_mut().filter(|(known, _)| *known == action) {
+                *slot = request;
+            }
+        }
+    }
+
+    fn request(&mut self, name: &Name) -> Option<Request> {
+        let known = Request::ALL.iter().map(|request| request.name());
+        self.resolver.name("request", name, "a request of the generic model", Request::parse, known)
     }
 
     fn reactions(&mut self, rows: &CipGenericFile) {
@@ -576,13 +628,8 @@ impl Builder<'_> {
     fn parameter(&mut self, row: &CipAttributeRow, attribute: &CipAttribute, name: &Name) -> Option<Served> {
         let generic = &self.dictionaries.generic;
         let what = "a parameter of the generic model";
-        let parameter = self.resolver.name(
-            "parameter",
-            name,
-            what,
-            |text| generic.parameter(text),
-            generic.names(),
-        )?;
+        let parameter =
+            self.resolver.name("parameter", name, what, |text| generic.parameter(text), generic.names())?;
         if parameter.kind != ParameterType::Integer {
             let message = format!("expected a whole number, {} is a {}", name.get_ref(), parameter.kind);
             self.resolver.error(name.span(), "parameter", message);

@@ -110,7 +110,9 @@ impl Compiler<'_> {
                     steps.push(Step::Write { idn: slot.idn, candidates, refused });
                 }
             }
-            StepKind::Read { idn, attribute, data } => steps.push(Step::Read { idn, attribute, data, refused }),
+            StepKind::Read { idn, attribute, data } => {
+                steps.push(Step::Read { idn, attribute, data, refused })
+            }
             StepKind::ReadScaling => {
                 let mut idns: Vec<Idn> = Vec::new();
                 for idn in self.tables.scalings.iter().flat_map(|rule| rule.idns()) {

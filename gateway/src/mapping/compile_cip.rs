@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 use bitflags::bitflags;
+use profile_cip::target::drive_link::DriveAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
@@ -13,6 +14,7 @@ use profile_generic::state::{Action, DriveState, Request};
 
 use super::cip_scaling::CipScaling;
 use super::cip_tables::CipTables;
+use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::CipType;
 
 /// Elements of a data set: one per bit.
@@ -114,16 +116,17 @@ pub struct CipRequest {
 /// How CIP reports a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CipFault {
-    /// Bit of Axis Exceptions; Axis Fault Type 3.
-    Exception(u8),
-    /// Bit of Axis Exceptions - Mfg; Axis Fault Type 4.
-    Manufacturer(u8),
-    /// Node Fault Code.
+    /// A fault of the axis.
+    Axis {
+        /// Axis Fault Type (attribute 662).
+        fault_type: u8,
+        /// Axis Alarm Type (attribute 665), when the condition can also be an alarm.
+        alarm_type: Option<u8>,
+        /// Bit number in the table of that type: Axis Fault Code or Axis Alarm Code.
+        code: u8,
+    },
+    /// Node Fault Code: a fault of all axes of the device.
     Node(u8),
-    /// Bit of Initialization Faults; Axis Fault Type 1.
-    Initialization(u8),
-    /// Bit of APR Faults; Axis Fault Type 5.
-    AbsolutePosition(u8),
 }
 
 /// A stopping action.
@@ -232,6 +235,7 @@ pub struct CipProgram {
     reactions: [u8; Reaction::ALL.len()],
     inhibits: ArrayVec<InhibitRule, MAX_INHIBITS>,
     stoppings: ArrayVec<CipStopping, MAX_STOPPINGS>,
+    pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
 }
 
 impl CipProgram {
@@ -255,6 +259,7 @@ impl CipProgram {
             reactions: tables.reactions,
             inhibits: tables.inhibits.iter().copied().collect(),
             stoppings: tables.stoppings.iter().copied().collect(),
+            drive_actions: tables.drive_actions,
         };
         for row in &tables.cyclic {
             let to_generic = scaling.convert(row.unit, row.turns)?;
@@ -277,8 +282,15 @@ impl CipProgram {
         CipTrackers { position: self.tracker }
     }
 
-    /// Puts the values of a Command Data Set into a command. Values that are not there become absent.
-    pub fn decode(&self, values: &CyclicValues, trackers: &mut CipTrackers, command: &mut AxisCommand) -> CipReport {
+    /// Puts the values of a Command Data Set into a command. Values that are not there become absent. `reference` is
+    /// subtracted from positions, in counts: what the controller has moved its reference system by.
+    pub fn decode(
+        &self,
+        values: &CyclicValues,
+        reference: i64,
+        trackers: &mut CipTrackers,
+        command: &mut AxisCommand,
+    ) -> CipReport {
         let mut report = CipReport::default();
         command.present = profile_generic::image::CommandSet::empty();
         for (value, element) in values.0.iter().zip(&self.commands) {
@@ -290,7 +302,7 @@ impl CipProgram {
                     continue;
                 }
             };
-            let Some(outcome) = element.to_generic(value, &mut trackers.position) else {
+            let Some(outcome) = element.decode(value, reference, &mut trackers.position) else {
                 report.not_finite += 1;
                 continue;
             };
@@ -323,13 +335,42 @@ impl CipProgram {
                     0
                 }
             };
-            let (encoded, saturated) = element.from_generic(generic, self.unwind);
+            let (encoded, saturated) = element.encode(generic, self.unwind);
             *value = Some(encoded);
             if saturated {
                 report.saturated(element.signal);
             }
         }
         report
+    }
+
+    /// The whole counts of an actual value, not wrapped; 0 when it is not there.
+    pub(super) fn actual_counts(&self, bit: usize, feedback: &AxisFeedback, report: &mut CipReport) -> i64 {
+        let Some((element, generic)) = self.actual(bit, feedback, report) else { return 0 };
+        let outcome = element.conversion.convert(generic);
+        if outcome.saturated {
+            report.saturated(element.signal);
+        }
+        outcome.value
+    }
+
+    /// An actual value as a REAL; 0 when it is not there.
+    pub(super) fn actual_real(&self, bit: usize, feedback: &AxisFeedback, report: &mut CipReport) -> f32 {
+        let Some((element, generic)) = self.actual(bit, feedback, report) else { return 0.0 };
+        let (outcome, saturated) = element.conversion.convert_to_f32(generic);
+        if saturated {
+            report.saturated(element.signal);
+        }
+        outcome.value
+    }
+
+    fn actual(&self, bit: usize, feedback: &AxisFeedback, report: &mut CipReport) -> Option<(&Element, i64)> {
+        let element = self.actuals.get(bit)?.as_ref()?;
+        let value = feedback.get(element.signal);
+        if value.is_none() {
+            report.missing += 1;
+        }
+        Some((element, value?))
     }
 
     /// Counts of the controller in a generic position.
@@ -398,7 +439,7 @@ impl CipProgram {
 }
 
 impl Element {
-    fn to_generic(&self, value: CipValue, tracker: &mut WrapTracker) -> Option<Outcome> {
+    fn decode(&self, value: CipValue, reference: i64, tracker: &mut WrapTracker) -> Option<Outcome> {
         if !self.wraps {
             return match value {
                 CipValue::Dint(value) => Some(self.conversion.convert(i64::from(value))),
@@ -411,7 +452,7 @@ impl Element {
             CipValue::Real(value) => split(f64::from(value))?,
             CipValue::Lreal(value) => split(value)?,
         };
-        let counts = self.conversion.convert(tracker.update(whole));
+        let counts = self.conversion.convert(tracker.update(whole).saturating_sub(reference));
         if fraction == 0.0 {
             return Some(counts);
         }
@@ -424,7 +465,7 @@ impl Element {
         Some(Outcome { value: sum.unwrap_or(counts.value), saturated, inexact })
     }
 
-    fn from_generic(&self, generic: i64, unwind: Option<i64>) -> (CipValue, bool) {
+    fn encode(&self, generic: i64, unwind: Option<i64>) -> (CipValue, bool) {
         match self.data_type {
             CipType::Real => {
                 let (outcome, saturated) = self.conversion.convert_to_f32(generic);

@@ -6,8 +6,8 @@ use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
-    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field, StateTable,
-    Trackers, Width,
+    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
+    StateTable, Trackers, Width,
 };
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
@@ -206,7 +206,11 @@ impl Telegram {
 type Signals = Vec<(Signal, Idn)>;
 
 /// The signals of all modes, each once, in the order of the modes.
-fn signals(tables: &SercosTables, axis: &SercosAxis, facts: &DriveFacts) -> Result<(Signals, Signals), SercosError> {
+fn signals(
+    tables: &SercosTables,
+    axis: &SercosAxis,
+    facts: &DriveFacts,
+) -> Result<(Signals, Signals), SercosError> {
     let (mut command, mut actual) = (Signals::new(), Signals::new());
     for rule in mode_rules(tables, axis)? {
         for (wanted, list) in [(&rule.command, &mut command), (&rule.actual, &mut actual)] {
@@ -227,7 +231,10 @@ fn signals(tables: &SercosTables, axis: &SercosAxis, facts: &DriveFacts) -> Resu
 }
 
 /// The rows of the modes of an axis.
-pub(super) fn mode_rules<'t>(tables: &'t SercosTables, axis: &SercosAxis) -> Result<Vec<&'t ModeRule>, SercosError> {
+pub(super) fn mode_rules<'t>(
+    tables: &'t SercosTables,
+    axis: &SercosAxis,
+) -> Result<Vec<&'t ModeRule>, SercosError> {
     if axis.modes.is_empty() {
         return Err(SercosError::NoMode);
     }
@@ -474,7 +481,8 @@ impl Compiler<'_> {
             Err(error) => return Err(error),
         };
         let overflow = || ScalingError::Overflow(rule.idn);
-        let from_drive = lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
+        let from_drive =
+            lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
         let to_drive = from_drive.inverse().ok_or_else(overflow)?;
         Ok(Some(ParameterEntry {
             parameter: rule.parameter,

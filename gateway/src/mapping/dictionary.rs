@@ -27,7 +27,9 @@ impl GenericDictionary {
         for row in &rows.signal {
             let signals = Signal::ALL.iter().map(|signal| signal.name());
             let what = "a signal of the generic model";
-            let Some(signal) = resolver.name("name", &row.name, what, Signal::parse, signals) else { continue };
+            let Some(signal) = resolver.name("name", &row.name, what, Signal::parse, signals) else {
+                continue;
+            };
             let access = if signal.is_command() { "command" } else { "feedback" };
             same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
             same(&mut resolver, "access", &row.access, access);
@@ -409,7 +411,8 @@ fn resolve_attributes(rows: &[AttributeRow], needs: usize, resolver: &mut Resolv
         let (Some(data_type), Some(access)) = (data_type, access) else { continue };
         let step = row.channel_step.unwrap_or(0);
         for channel in 0..row.channels.unwrap_or(1) {
-            let Some(id) = step.checked_mul(channel).and_then(|above| row.id.get_ref().checked_add(above)) else {
+            let Some(id) = step.checked_mul(channel).and_then(|above| row.id.get_ref().checked_add(above))
+            else {
                 resolver.error(row.id.span(), "id", "the number of the last channel is above 65535");
                 break;
             };

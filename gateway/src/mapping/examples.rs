@@ -14,7 +14,8 @@ use super::compile_sercos::{Compiler, unit_of};
 use super::format::{CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow};
 use super::load::{TableText, Tables};
 use super::{
-    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Reference, SercosAxis,
+    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Reference,
+    SercosAxis,
 };
 
 /// An example whose numbers do not come out.
@@ -87,15 +88,26 @@ impl Runner<'_> {
     }
 }
 
-fn expect<T: PartialEq + fmt::Debug>(span: Range<usize>, what: &str, expected: &T, got: &T) -> Result<(), Wrong> {
-    if expected == got { Ok(()) } else { Err((span, format!("{what}: the table says {expected:?}, got {got:?}"))) }
+fn expect<T: PartialEq + fmt::Debug>(
+    span: Range<usize>,
+    what: &str,
+    expected: &T,
+    got: &T,
+) -> Result<(), Wrong> {
+    if expected == got {
+        Ok(())
+    } else {
+        Err((span, format!("{what}: the table says {expected:?}, got {got:?}")))
+    }
 }
 
 /// The bytes of a text such as `90 D0 03 00`.
 fn hex(name: &Name) -> Result<Vec<u8>, Wrong> {
     let parse = |text: &str| u8::from_str_radix(text, 16).ok().filter(|_| text.len() == 2);
     let bytes: Option<Vec<u8>> = name.get_ref().split_whitespace().map(parse).collect();
-    bytes.ok_or_else(|| (name.span(), format!("expected pairs of hexadecimal digits, got `{}`", name.get_ref())))
+    bytes.ok_or_else(|| {
+        (name.span(), format!("expected pairs of hexadecimal digits, got `{}`", name.get_ref()))
+    })
 }
 
 /// The value in the bytes, and the same as a double.
@@ -161,7 +173,9 @@ impl Mapping {
         let signal = Signal::parse(row.signal.get_ref()).ok_or_else(none)?;
         let element = self.cip.cyclic.iter().find(|element| element.signal == signal).ok_or_else(none)?;
         let data_type = match &example.data_type {
-            Some(name) => CipType::NAMED.iter().find(|(known, _)| known == name.get_ref()).map(|(_, kind)| *kind),
+            Some(name) => {
+                CipType::NAMED.iter().find(|(known, _)| known == name.get_ref()).map(|(_, kind)| *kind)
+            }
             None => Some(element.data_type),
         };
         let bytes = hex(&example.bytes)?;
@@ -175,7 +189,7 @@ impl Mapping {
             let mut values = CyclicValues([None; ELEMENTS]);
             values.0[usize::from(element.bit)] = Some(value);
             let mut command = AxisCommand::default();
-            program.decode(&values, &mut program.trackers(), &mut command);
+            program.decode(&values, 0, &mut program.trackers(), &mut command);
             expect(example.generic.span(), "generic value", &Some(generic), &command.get(signal))?;
             let back = ratio.inverse().ok_or_else(none)?.to_f64(generic);
             expect(span, "value on the way back", &example.back.map_or(float, number), &back)
@@ -210,7 +224,8 @@ impl Mapping {
         match example.back {
             None => expect(example.bytes.span(), "bytes on the way back", &Ok(bytes), &written),
             Some(back) => {
-                let got = written.ok().and_then(|bytes| cip_value(&bytes, entry.data_type)).map(|(_, float)| float);
+                let got =
+                    written.ok().and_then(|bytes| cip_value(&bytes, entry.data_type)).map(|(_, float)| float);
                 expect(span, "value on the way back", &Some(number(back)), &got)
             }
         }
@@ -225,22 +240,33 @@ impl Mapping {
         let mut facts = DriveFacts::new();
         for (name, value) in &example.drive {
             let idn: Idn = name.parse().map_err(|error| wrong(format!("{name}: {error}")))?;
-            let width = facts.width(idn, sercos).ok_or_else(|| wrong(format!("{idn} is not in the dictionary")))?;
+            let width =
+                facts.width(idn, sercos).ok_or_else(|| wrong(format!("{idn} is not in the dictionary")))?;
             facts.note_data(idn, value.to_le_bytes().get(..width.bytes()).unwrap_or_default());
         }
         let units = AxisUnits { kind, reference: Reference::Load, rated_torque: example.rated };
         let idn: Idn = example.idn.get_ref().parse().map_err(|error| wrong(format!("{error}")))?;
-        let axis = SercosAxis { units, modes: [OperatingMode::Position].into_iter().collect(), ..SercosAxis::default() };
+        let axis = SercosAxis {
+            units,
+            modes: [OperatingMode::Position].into_iter().collect(),
+            ..SercosAxis::default()
+        };
         let generic = *example.generic.get_ref();
         let compiler = Compiler { tables: &self.sercos, dictionary: sercos, axis: &axis, facts: &facts };
         let rule = match parameter {
             Some(parameter) => {
                 let rule = self.sercos.parameters.iter().find(|rule| rule.parameter == parameter);
-                *rule.filter(|rule| rule.idn == idn).ok_or_else(|| wrong(format!("the row does not map {idn}")))?
+                *rule
+                    .filter(|rule| rule.idn == idn)
+                    .ok_or_else(|| wrong(format!("the row does not map {idn}")))?
             }
-            None => self.sercos.plain_rule(idn, &self.dictionaries).ok_or_else(|| wrong(format!("{idn} has no unit")))?,
+            None => self
+                .sercos
+                .plain_rule(idn, &self.dictionaries)
+                .ok_or_else(|| wrong(format!("{idn} has no unit")))?,
         };
-        unit_of(&self.sercos, sercos, units, &facts, idn, rule.quantity).map_err(|error| wrong(error.to_string()))?;
+        unit_of(&self.sercos, sercos, units, &facts, idn, rule.quantity)
+            .map_err(|error| wrong(error.to_string()))?;
         let entry = compiler.parameter(&rule).map_err(|error| wrong(error.to_string()))?;
         let entry = entry.ok_or_else(|| wrong(format!("{idn} has no length or unit")))?;
         let bytes = hex(&example.bytes)?;

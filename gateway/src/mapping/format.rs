@@ -301,6 +301,8 @@ pub struct CipGenericFile {
     pub mode: Vec<CipModeRow>,
     /// Axis control requests.
     pub request: Vec<RequestRow>,
+    /// What the device asks of a drive.
+    pub drive_action: Vec<DriveActionRow>,
     /// Drive states.
     pub state: Vec<CipStateRow>,
     /// Status bits.
@@ -441,6 +443,18 @@ pub struct RequestRow {
     pub request: Option<Name>,
     /// Axis Response code of success.
     pub axis_response: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What the device asks of a drive and the generic request it makes.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveActionRow {
+    /// `none`, `power_up`, `enable`, `disable`, `shutdown` or `abort`.
+    pub drive_action: Name,
+    /// Generic request; absent when it asks for nothing.
+    pub request: Option<Name>,
     /// Where it comes from.
     pub source: Source,
 }

@@ -120,7 +120,13 @@ impl TableErrors {
     }
 
     /// Notes that the value of `key`, which stands at `span`, is wrong.
-    pub(super) fn push(&mut self, file: &TableText, span: Range<usize>, key: &str, message: impl Into<String>) {
+    pub(super) fn push(
+        &mut self,
+        file: &TableText,
+        span: Range<usize>,
+        key: &str,
+        message: impl Into<String>,
+    ) {
         let message = message.into();
         let (line, column) = file.place(span.start);
         let title = if key.is_empty() { message.clone() } else { format!("`{key}`: {message}") };
@@ -132,7 +138,14 @@ impl TableErrors {
                 .annotation(AnnotationKind::Primary.span(span)),
         )];
         let rendered = Renderer::plain().decor_style(DecorStyle::Ascii).render(&report);
-        self.0.push(TableError { file: file.path.clone(), line, column, key: key.to_owned(), message, rendered });
+        self.0.push(TableError {
+            file: file.path.clone(),
+            line,
+            column,
+            key: key.to_owned(),
+            message,
+            rendered,
+        });
     }
 
     fn unreadable(path: &Path, message: String) -> Self {

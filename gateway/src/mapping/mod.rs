@@ -16,6 +16,7 @@ mod cip_tables;
 mod commissioning;
 mod compile_cip;
 mod compile_sercos;
+mod device_link;
 mod dictionary;
 mod examples;
 mod format;
@@ -31,7 +32,9 @@ use std::path::Path;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use cip_scaling::{CipScaling, CipScalingError};
-pub use cip_tables::{CipTables, CipUnit, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times};
+pub use cip_tables::{
+    CipTables, CipUnit, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times,
+};
 pub use commissioning::{CommissioningPlan, Refused, Step};
 pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
@@ -126,7 +129,11 @@ impl Mapping {
     ///
     /// # Errors
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
-    pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<SercosProgram, SercosError> {
+    pub fn sercos_program(
+        &self,
+        axis: &SercosAxis,
+        facts: &DriveFacts,
+    ) -> Result<SercosProgram, SercosError> {
         SercosProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
     }
 

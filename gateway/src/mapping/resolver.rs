@@ -28,7 +28,11 @@ impl<'a> Resolver<'a> {
     /// Checks the head of a file.
     pub fn head(&mut self, format: &Spanned<u32>, key: &str, title: &Name, expected: &str) {
         if *format.get_ref() != FORMAT {
-            self.error(format.span(), "format", format!("expected format {FORMAT}, got {}", format.get_ref()));
+            self.error(
+                format.span(),
+                "format",
+                format!("expected format {FORMAT}, got {}", format.get_ref()),
+            );
         }
         if title.get_ref() != expected {
             self.error(title.span(), key, format!("expected `{expected}`, got `{}`", title.get_ref()));
@@ -69,7 +73,11 @@ impl<'a> Resolver<'a> {
         let [num, den] = *row.get_ref();
         let ratio = Ratio::new(num, den).filter(|ratio| ratio.num() != 0);
         if ratio.is_none() {
-            self.error(row.span(), key, format!("expected two whole numbers other than 0, got [{num}, {den}]"));
+            self.error(
+                row.span(),
+                key,
+                format!("expected two whole numbers other than 0, got [{num}, {den}]"),
+            );
         }
         ratio
     }
@@ -102,7 +110,10 @@ impl<'a> Resolver<'a> {
 fn closest<'n>(text: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let limit = (text.chars().count() / 3).max(1);
     let distances = known.into_iter().map(|word| (distance(text, word), word));
-    distances.filter(|(distance, _)| *distance <= limit).min_by_key(|(distance, _)| *distance).map(|(_, word)| word)
+    distances
+        .filter(|(distance, _)| *distance <= limit)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, word)| word)
 }
 
 /// Letters to insert, delete or replace to turn one word into the other; case does not count.

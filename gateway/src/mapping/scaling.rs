@@ -219,9 +219,11 @@ impl ScalingRule {
             }
         }
         let mut seen = Vec::with_capacity(idns.len());
-        idns.retain(|idn| !seen.contains(idn) && {
-            seen.push(*idn);
-            true
+        idns.retain(|idn| {
+            !seen.contains(idn) && {
+                seen.push(*idn);
+                true
+            }
         });
         idns
     }
@@ -245,7 +247,8 @@ impl ScalingRule {
         let value = read(self.word)?;
         let unknown = ScalingError::Type { idn: self.word, kind: axis.kind, value };
         let word = u32::try_from(value).map_err(|_| unknown.clone())?;
-        let mut fitting = self.methods.iter().filter(|method| method.kind.is_none_or(|kind| kind == axis.kind));
+        let mut fitting =
+            self.methods.iter().filter(|method| method.kind.is_none_or(|kind| kind == axis.kind));
         let method = fitting.find(|method| method.pattern.matches(word)).ok_or(unknown)?;
 
         let (idn, factor) = term(method.factor)?;
@@ -299,6 +302,7 @@ fn above_one(idn: Idn, value: i64) -> Result<i64, ScalingError> {
 pub(super) fn power_of_ten(idn: Idn, exponent: i64) -> Result<Ratio, ScalingError> {
     let magnitude = u32::try_from(exponent.unsigned_abs()).ok().filter(|power| *power <= MAX_EXPONENT);
     let magnitude = magnitude.and_then(|power| 10_i64.checked_pow(power));
-    let power = magnitude.and_then(|power| if exponent < 0 { Ratio::new(1, power) } else { Ratio::new(power, 1) });
+    let power =
+        magnitude.and_then(|power| if exponent < 0 { Ratio::new(1, power) } else { Ratio::new(power, 1) });
     power.ok_or(ScalingError::Value { idn, expected: "an exponent from -18 to 18", value: exponent })
 }

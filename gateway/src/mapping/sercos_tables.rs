@@ -117,11 +117,8 @@ impl SercosTables {
         errors: &mut TableErrors,
     ) -> Self {
         let rows = &file.rows;
-        let mut builder = Builder {
-            resolver: Resolver::new(&file.text, errors),
-            dictionaries,
-            tables: Self::default(),
-        };
+        let mut builder =
+            Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
         builder.resolver.head(&rows.format, "mapping", &rows.mapping, "generic to sercos");
         builder.units(rows);
         for row in &rows.scaling {
@@ -247,7 +244,15 @@ impl<'a> Builder<'a> {
         let exponent = self.term("exponent_idn", exponent, row.exponent_idn.as_ref(), 0)?;
         let divisor = self.term("divisor_idn", row.divisor, row.divisor_idn.as_ref(), 1)?;
         let [mask, value] = row.pattern;
-        Some(Method { pattern: BitPattern::new(mask, value), kind, quantity, base, factor, exponent, divisor })
+        Some(Method {
+            pattern: BitPattern::new(mask, value),
+            kind,
+            quantity,
+            base,
+            factor,
+            exponent,
+            divisor,
+        })
     }
 
     fn term(&mut self, key: &str, fixed: Option<i64>, idn: Option<&Name>, otherwise: i64) -> Option<Term> {
@@ -265,9 +270,12 @@ impl<'a> Builder<'a> {
     fn signal(&mut self, row: &SercosSignalRow) {
         let signal = signal(&mut self.resolver, "signal", &row.signal);
         let idn = self.idn("idn", &row.idn);
-        let to_drive = self.resolver.word("direction", &row.direction, &[("to_drive", true), ("from_drive", false)]);
+        let to_drive =
+            self.resolver.word("direction", &row.direction, &[("to_drive", true), ("from_drive", false)]);
         let refuse = self.resolver.word("missing", &row.missing, &[("refuse", true), ("omit", false)]);
-        let (Some(signal), Some(idn), Some(to_drive), Some(refuse)) = (signal, idn, to_drive, refuse) else { return };
+        let (Some(signal), Some(idn), Some(to_drive), Some(refuse)) = (signal, idn, to_drive, refuse) else {
+            return;
+        };
         if signal.is_command() != to_drive {
             let message = format!("{signal} cannot go {}", row.direction.get_ref());
             return self.resolver.error(row.direction.span(), "direction", message);
@@ -294,7 +302,8 @@ impl<'a> Builder<'a> {
                 self.tables.units.iter().any(|(known, of, _)| known == unit && *of == quantity)
             }
             IdnUnit::Scaled(scaling) => self.tables.scalings.iter().any(|rule| {
-                let converts = |of| of == quantity || of == Quantity::TorqueAbsolute && quantity == Quantity::Torque;
+                let converts =
+                    |of| of == quantity || of == Quantity::TorqueAbsolute && quantity == Quantity::Torque;
                 rule.scaling == *scaling && rule.methods.iter().any(|method| converts(method.quantity))
             }),
         }
@@ -304,7 +313,8 @@ impl<'a> Builder<'a> {
         let mode = operating_mode(&mut self.resolver, &row.mode);
         let mut codes = Vec::with_capacity(row.codes.len());
         for name in &row.codes {
-            let code = self.dictionaries.sercos.code_or_error("Operation mode", "codes", name, &mut self.resolver);
+            let code =
+                self.dictionaries.sercos.code_or_error("Operation mode", "codes", name, &mut self.resolver);
             codes.extend(code.and_then(|code| u16::try_from(code).ok()));
         }
         if codes.is_empty() {
@@ -383,13 +393,15 @@ impl<'a> Builder<'a> {
         }
         for row in &rows.report {
             let known = Report::ALL.iter().map(|report| report.name());
-            let report = self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
+            let report =
+                self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
                 self.tables.reports.push((pattern, report));
             }
         }
         if self.tables.reports.len() > MAX_STATE_ROWS {
-            let message = format!("expected at most {MAX_STATE_ROWS} rows, got {}", self.tables.reports.len());
+            let message =
+                format!("expected at most {MAX_STATE_ROWS} rows, got {}", self.tables.reports.len());
             self.resolver.error(rows.mapping.span(), "report", message);
         }
         for row in &rows.status {
@@ -441,8 +453,13 @@ impl<'a> Builder<'a> {
             None => Some(Ratio::ONE),
             Some(factor) => self.resolver.ratio("factor", factor),
         };
-        let (Some((parameter, quantity)), Some(idn), Some((to_drive, from_drive)), Some(reject), Some(factor)) =
-            (parameter, idn, direction, reject, factor)
+        let (
+            Some((parameter, quantity)),
+            Some(idn),
+            Some((to_drive, from_drive)),
+            Some(reject),
+            Some(factor),
+        ) = (parameter, idn, direction, reject, factor)
         else {
             return;
         };

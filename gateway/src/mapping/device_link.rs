@@ -1,0 +1,146 @@
+//! Between the compiled tables and the CIP Motion device: its images and its attribute definitions.
+
+use profile_cip::target::attribute::{self, AttributeDefinition, DataType, DefaultValue, Scope};
+use profile_cip::target::drive_link::{DriveAction, DriveAlarm, DriveFault, DriveImage};
+use profile_cip::wire::motion::codes::{AlarmType, AxisStatus, FaultType};
+use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_generic::fault::Reaction;
+use profile_generic::image::{AxisFeedback, StatusBits};
+use profile_generic::state::Request;
+
+use super::attributes::{AttributeEntry, AttributeTable, Backing};
+use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue, CyclicValues};
+use super::compile_sercos::SercosProgram;
+use super::dictionary::{Access, CipDictionary};
+
+/// What the device asks of a drive, with its name in the tables.
+pub(super) const DRIVE_ACTIONS: [(&str, DriveAction); 6] = [
+    ("none", DriveAction::None),
+    ("power_up", DriveAction::PowerUp),
+    ("enable", DriveAction::Enable),
+    ("disable", DriveAction::Disable),
+    ("shutdown", DriveAction::Shutdown),
+    ("abort", DriveAction::Abort),
+];
+
+/// Bits of the data sets that the device's images have a place for (Tables 6-2.19 and 6-2.21).
+mod bit {
+    pub const POSITION: usize = 0;
+    pub const VELOCITY: usize = 1;
+    pub const ACCELERATION: usize = 2;
+    pub const TORQUE: usize = 3;
+    pub const UNWIND_COUNT: usize = 6;
+    pub const DISPLACEMENT: usize = 7;
+}
+
+impl From<&CommandValues> for CyclicValues {
+    fn from(values: &CommandValues) -> Self {
+        let mut cyclic = CyclicValues::default();
+        cyclic.0[bit::POSITION] = values.position.map(|position| match position {
+            CommandPosition::Float(value) => CipValue::Lreal(value),
+            CommandPosition::Integer(value) => CipValue::Dint(value),
+        });
+        cyclic.0[bit::VELOCITY] = values.velocity.map(CipValue::Real);
+        cyclic.0[bit::ACCELERATION] = values.acceleration.map(CipValue::Real);
+        cyclic.0[bit::TORQUE] = values.torque.map(CipValue::Real);
+        cyclic.0[bit::UNWIND_COUNT] = values.unwind_count.map(CipValue::Dint);
+        cyclic.0[bit::DISPLACEMENT] = values.position_displacement.map(CipValue::Dint);
+        cyclic
+    }
+}
+
+impl CipProgram {
+    /// The request that an action of the device makes; `None` when it asks for nothing.
+    pub fn drive_request(&self, action: DriveAction) -> Option<Request> {
+        self.drive_actions.iter().find(|(known, _)| *known == action).and_then(|(_, request)| *request)
+    }
+
+    /// Puts what is known of an axis into the image for the device: actual values, conditions, status, inhibits and
+    /// fault. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay as they are.
+    pub fn drive_image(&self, feedback: &AxisFeedback, image: &mut DriveImage) -> CipReport {
+        let mut report = CipReport::default();
+        image.position = self.actual_counts(bit::POSITION, feedback, &mut report);
+        image.velocity = self.actual_real(bit::VELOCITY, feedback, &mut report);
+        image.acceleration = self.actual_real(bit::ACCELERATION, feedback, &mut report);
+        let conditions = self.state(feedback.state).conditions;
+        image.bus_up = conditions.contains(CipConditions::BUS_UP);
+        image.start_complete = conditions.contains(CipConditions::START_COMPLETE);
+        image.stop_complete = conditions.contains(CipConditions::STOP_COMPLETE);
+        image.power_enabled = feedback.status.contains(StatusBits::ENABLED);
+        image.tracking = feedback.status.contains(StatusBits::TRACKING);
+        image.axis_status = AxisStatus::from_bits_retain(self.axis_status(feedback));
+        (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
+        (image.fault, image.alarm) = self.fault_or_alarm(feedback);
+        image.captured_at = feedback.at.0;
+        report
+    }
+
+    fn fault_or_alarm(&self, feedback: &AxisFeedback) -> (Option<DriveFault>, Option<DriveAlarm>) {
+        let Some(fault) = feedback.fault else { return (None, None) };
+        let Some(CipFault::Axis { fault_type, alarm_type, code }) = self.fault(fault.cause) else {
+            return (None, None);
+        };
+        // The vendor's code does not fit a byte; its low byte is what a controller can be shown.
+        let sub_code = fault.vendor_code.to_le_bytes()[0];
+        match fault.reaction {
+            Reaction::Ignore => (None, None),
+            Reaction::Alarm => {
+                let alarm_type = alarm_type.map(AlarmType);
+                (None, alarm_type.map(|alarm_type| DriveAlarm { alarm_type, code, sub_code }))
+            }
+            reaction => {
+                let fault_type = FaultType(fault_type);
+                (Some(DriveFault { fault_type, code, sub_code, action: self.fault_action(reaction) }), None)
+            }
+        }
+    }
+}
+
+impl AttributeTable {
+    /// The definitions for the device. What the drive of `south` holds is drive-backed; a parameter that it lacks is
+    /// stored in the device, or left out where the tables reject it. Without `south` nothing is drive-backed.
+    ///
+    /// Strings are left out: the device keeps numbers only.
+    pub fn definitions(
+        &self,
+        dictionary: &CipDictionary,
+        south: Option<&SercosProgram>,
+    ) -> Vec<AttributeDefinition> {
+        self.entries().iter().filter_map(|entry| definition(entry, dictionary, south)).collect()
+    }
+}
+
+fn definition(
+    entry: &AttributeEntry,
+    dictionary: &CipDictionary,
+    south: Option<&SercosProgram>,
+) -> Option<AttributeDefinition> {
+    let data_type = DataType::from_name(entry.data_type.name())?;
+    let access = match entry.access {
+        Access::Get => attribute::Access::Get,
+        Access::Set => attribute::Access::Set,
+        Access::SetCyclic => attribute::Access::Cyclic,
+    };
+    let name = dictionary.attribute_by_id(entry.id).map(|attribute| attribute.name.as_str())?;
+    let mut definition = AttributeDefinition::new(Scope::Instance, entry.id, data_type, access, name);
+    definition.elements = entry.length;
+    definition.settable_in_running = entry.running;
+    definition.default = DefaultValue::Integer(entry.default);
+    match entry.backing {
+        Backing::Device | Backing::Connection | Backing::Shadow | Backing::Signal { .. } => {}
+        Backing::Constant(value) => definition.default = DefaultValue::Integer(value),
+        Backing::Parameter { parameter, reject, .. } => {
+            let Some(south) = south else { return (!reject).then_some(definition) };
+            match south.parameter(parameter) {
+                Some(held) if held.to_drive.is_some() || entry.access == Access::Get => {
+                    definition.backing = attribute::Backing::Drive;
+                }
+                // The drive lets the parameter only be read: what the controller sets is kept beside it.
+                Some(_) => {}
+                None if reject || south.rejects(parameter) => return None,
+                None => {}
+            }
+        }
+    }
+    Some(definition)
+}
