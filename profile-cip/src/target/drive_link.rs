@@ -74,7 +74,7 @@ pub struct SetPoints {
     pub position_reference: i64,
     /// Changes with every update that brought values; equal numbers are the same set-points.
     pub sequence: u32,
-    /// Update periods since these values came; 0 is the newest that could be.
+    /// Updates missed since these values came; 0 is the newest that could be.
     pub age_updates: u32,
 }
 

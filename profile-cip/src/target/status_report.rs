@@ -25,6 +25,11 @@ impl<T: Copy + PartialEq> Reported<T> {
         Self { arrived: None, in_flight: None }
     }
 
+    /// A value that the other side knows already.
+    pub const fn known(value: T) -> Self {
+        Self { arrived: Some(value), in_flight: None }
+    }
+
     /// The value if it is to be put into update `update_id`.
     pub fn due(&mut self, value: T, update_id: u8) -> Option<T> {
         if self.arrived == Some(value) {
@@ -88,11 +93,6 @@ impl<T: Copy> RecordLog<T> {
     /// Records lost because the log was full.
     pub fn dropped(&self) -> u32 {
         self.dropped
-    }
-
-    /// Forgets what is under way, so that it is sent again from the start.
-    pub fn restart(&mut self) {
-        self.in_flight = None;
     }
 }
 

@@ -1,0 +1,837 @@
+//! The motion device: the I/O connection, the communications node and up to 16 axes.
+//!
+//! ```text
+//! handle_io(C-to-D packet) -->  check all of it --> judge order and age --> axes, services, events
+//! set_drive(axis, image)   -->  axes
+//! poll(now)                -->  time-outs, state machines
+//! command(axis)            <--  what the drive has to do
+//! poll_transmit            <--  D-to-C packet
+//! request / poll_reply     <->  Forward_Open, Forward_Close, explicit services
+//! poll_attribute_access / complete_attribute  <->  attributes that live in the drive
+//! ```
+//!
+//! An update that is wrong in any way is refused as a whole and counted ([`MotionCounters`]); a wrong form raises node
+//! fault 4. See [`super::drive_link`] for the rules that keep an axis from moving on a doubtful command.
+//!
+//! Nothing is allocated after construction.
+
+use arrayvec::ArrayVec;
+use profile_generic::time::{MonotonicTime, SystemTime};
+
+use super::attribute::{AttributeDefinition, AttributeStore, AttributeTable, Scope, TableError, id};
+use super::attribute_worker::{AttributeAccess, AttributeSpace};
+use super::axis_object::{Axis, AxisConfig, Context, UpdateTimes};
+use super::axis_state::AxisState;
+use super::cyclic_list::{CyclicLists, Direction};
+use super::drive_link::{AxisCommandImage, DriveImage};
+use super::explicit_queue::ExplicitQueue;
+use super::io_connection::{Age, IoConnection, Mode, Packet, Update};
+use super::io_counters::MotionCounters;
+use super::motion_class::NodeHealth;
+use super::motion_link::{CloseParameters, MotionReply, MotionRequest, OpenParameters, OpenRefusal};
+use super::service_channel::ServiceChannel;
+use super::status_report::Reported;
+use super::time_offset::{OffsetCompensation, Offsets};
+use crate::wire::Error;
+use crate::wire::motion::codes::{EventChecking, EventType, NodeAlarm, NodeControl, NodeFault};
+use crate::wire::motion::event::ExtendedEventData;
+use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, FORMAT_REVISION, WriteBlock};
+use crate::wire::status::GeneralStatus;
+
+/// Most axes of a device: what the EtherNet/IP part of the standard allows.
+pub const AXES_MAX: usize = 16;
+/// Instances of an update: the class and the axes.
+pub(super) const INSTANCES_MAX: usize = AXES_MAX + 1;
+/// Replies that wait to be taken; requests are refused before this overflows.
+const REPLIES_MAX: usize = 16;
+/// Octets of the class-1 sequence count.
+pub(super) const SEQUENCE_LEN: usize = 2;
+
+/// Extended status of a refused Forward_Open: the connection has an owner.
+const OWNERSHIP_CONFLICT: u16 = 0x0106;
+/// Extended status of a refused Forward_Open: the interval is not acceptable.
+const INTERVAL_NOT_ACCEPTABLE: u16 = 0x0111;
+/// Extended status of a refused Forward_Open: the connection point is not one of ours.
+const INVALID_CONNECTION_POINT: u16 = 0x012F;
+
+/// What the device is made of.
+#[derive(Debug, Clone)]
+pub struct DeviceConfig {
+    /// The axes in the order of their instance numbers, at most [`AXES_MAX`].
+    pub axes: Vec<AxisConfig>,
+    /// Attributes of class and instances beside those of the engine.
+    pub attributes: Vec<AttributeDefinition>,
+    /// Drive Power Structure Class ID, class attribute 34.
+    pub power_structure_class_id: u32,
+    /// Whether the device has a synchronized system time (CIP Sync).
+    pub supports_sync: bool,
+    /// Time to produce a D-to-C update before its cycle starts, ns (Transmission Processing Time, clause 7-1.3).
+    pub transmission_processing_ns: u64,
+}
+
+/// Why a device cannot be built.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DeviceError {
+    /// There are no axes, or more than [`AXES_MAX`].
+    AxisCount(usize),
+    /// The attribute definitions are not usable.
+    Attributes(TableError),
+}
+
+impl core::fmt::Display for DeviceError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::AxisCount(count) => write!(f, "expected 1 to {AXES_MAX} axes, found {count}"),
+            Self::Attributes(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for DeviceError {}
+
+impl From<TableError> for DeviceError {
+    fn from(error: TableError) -> Self {
+        Self::Attributes(error)
+    }
+}
+
+/// State of the device's clock, from its Time Sync object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SyncState {
+    /// Clock identity of the grand master that the device follows, if it follows one.
+    pub grandmaster: Option<[u8; 8]>,
+    /// The clock is within the sync threshold.
+    pub synchronized: bool,
+    /// System Time Offset, ns: system time less local clock.
+    pub offset: i64,
+}
+
+/// What the last C-to-D update asked to hear about one instance.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Echo {
+    pub number: u8,
+    pub cyclic: bool,
+    /// Write block ID, read block ID and status of the write data.
+    pub lists: Option<(u8, u8, GeneralStatus)>,
+}
+
+/// An axis with its attributes and channels.
+pub(super) struct Slot {
+    pub axis: Axis,
+    pub store: AttributeStore,
+    pub service: ServiceChannel,
+    pub write_lists: CyclicLists,
+    pub read_lists: CyclicLists,
+}
+
+/// The class with its attributes and channel.
+pub(super) struct Class {
+    pub store: AttributeStore,
+    pub service: ServiceChannel,
+}
+
+/// A CIP Motion device.
+pub struct MotionDevice {
+    pub(super) config: DeviceConfig,
+    pub(super) class_table: AttributeTable,
+    pub(super) axis_table: AttributeTable,
+    pub(super) class: Class,
+    pub(super) slots: Vec<Slot>,
+    pub(super) connection: Option<IoConnection>,
+    pub(super) node: NodeHealth,
+    pub(super) compensation: OffsetCompensation,
+    pub(super) sync: SyncState,
+    pub(super) counters: MotionCounters,
+    pub(super) last_error: Option<Error>,
+    /// Lost and late updates of this connection, modulo 256.
+    pub(super) diagnostics: (u8, u8),
+    pub(super) reported_diagnostics: Reported<(u8, u8)>,
+    pub(super) reported_offset: Reported<i64>,
+    pub(super) echo: ArrayVec<Echo, INSTANCES_MAX>,
+    pub(super) explicit: ExplicitQueue,
+    pub(super) replies: ArrayVec<MotionReply, REPLIES_MAX>,
+    pub(super) tickets: u32,
+    pub(super) idle_header: Option<[u8; 8]>,
+}
+
+/// How an update with data goes on.
+enum Verdict {
+    /// Applied as the newest command.
+    Fresh(UpdateTimes),
+    /// Its services and acknowledgements count, its commands do not.
+    CommandsRefused,
+}
+
+impl MotionDevice {
+    /// Builds a device; its axes are Initializing.
+    ///
+    /// # Errors
+    /// See [`DeviceError`].
+    pub fn new(config: DeviceConfig) -> Result<Self, DeviceError> {
+        if config.axes.is_empty() || config.axes.len() > AXES_MAX {
+            return Err(DeviceError::AxisCount(config.axes.len()));
+        }
+        let class_table = AttributeTable::new(Scope::Class, &config.attributes)?;
+        let axis_table = AttributeTable::new(Scope::Instance, &config.attributes)?;
+        let class = Class { store: AttributeStore::new(&class_table), service: ServiceChannel::default() };
+        let slots = config
+            .axes
+            .iter()
+            .map(|axis| Slot {
+                axis: Axis::new(*axis),
+                store: AttributeStore::new(&axis_table),
+                service: ServiceChannel::default(),
+                write_lists: CyclicLists::default(),
+                read_lists: CyclicLists::default(),
+            })
+            .collect();
+        Ok(Self {
+            config,
+            class_table,
+            axis_table,
+            class,
+            slots,
+            connection: None,
+            node: NodeHealth::default(),
+            compensation: OffsetCompensation::default(),
+            sync: SyncState::default(),
+            counters: MotionCounters::default(),
+            last_error: None,
+            diagnostics: (0, 0),
+            reported_diagnostics: Reported::known((0, 0)),
+            reported_offset: Reported::new(),
+            echo: ArrayVec::new(),
+            explicit: ExplicitQueue::default(),
+            replies: ArrayVec::new(),
+            tickets: 0,
+            idle_header: None,
+        })
+    }
+
+    // -- getters ------------------------------------------------------------------------------------------------
+
+    /// Number of axes; `axis` arguments count from 0, instance numbers from 1.
+    #[must_use]
+    pub fn axis_count(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// State of an axis, or `None` if there is no such axis.
+    #[must_use]
+    pub fn axis_state(&self, axis: usize) -> Option<AxisState> {
+        self.slots.get(axis).map(|slot| slot.axis.state())
+    }
+
+    /// Axis Faults (attribute 657) of an axis.
+    #[must_use]
+    pub fn axis_faults(&self, axis: usize) -> Option<u64> {
+        self.slots.get(axis).map(|slot| slot.axis.faults())
+    }
+
+    /// Fault and alarm records of an axis that were lost because the controller did not take them.
+    #[must_use]
+    pub fn dropped_records(&self, axis: usize) -> Option<u32> {
+        self.slots.get(axis).map(|slot| slot.axis.dropped_records())
+    }
+
+    /// Active node fault.
+    #[must_use]
+    pub fn node_fault(&self) -> NodeFault {
+        self.node.fault()
+    }
+
+    /// Active node alarm.
+    #[must_use]
+    pub fn node_alarm(&self) -> NodeAlarm {
+        self.node.alarm()
+    }
+
+    /// What the connection has seen.
+    #[must_use]
+    pub fn counters(&self) -> &MotionCounters {
+        &self.counters
+    }
+
+    /// Why the last malformed update was refused.
+    #[must_use]
+    pub fn last_error(&self) -> Option<Error> {
+        self.last_error
+    }
+
+    /// The open connection.
+    #[must_use]
+    pub fn connection(&self) -> Option<&OpenParameters> {
+        self.connection.as_ref().map(|c| &c.parameters)
+    }
+
+    /// Whether the device produces its updates synchronously.
+    #[must_use]
+    pub fn is_synchronous(&self) -> bool {
+        self.connection.as_ref().is_some_and(|c| c.mode == Mode::Synchronous)
+    }
+
+    /// The attributes of a scope in the order of their IDs.
+    pub fn attributes(&self, scope: Scope) -> impl Iterator<Item = &AttributeDefinition> {
+        let table = match scope {
+            Scope::Class => &self.class_table,
+            Scope::Instance => &self.axis_table,
+        };
+        table.iter()
+    }
+
+    /// When to call [`MotionDevice::poll`] or [`MotionDevice::poll_transmit`] again at the latest; `None` while
+    /// nothing is connected.
+    #[must_use]
+    pub fn wake_at(&self) -> Option<MonotonicTime> {
+        self.connection.as_ref().map(IoConnection::wake_at)
+    }
+
+    /// Events that the drive of an axis has to look for now, with the parameters of extended checking.
+    #[must_use]
+    pub fn armed_events(&self, axis: usize) -> Option<(EventChecking, &ExtendedEventData)> {
+        self.slots.get(axis).map(|slot| (slot.axis.events.armed(), slot.axis.events.parameters()))
+    }
+
+    pub(super) fn high_limit(&self) -> u64 {
+        self.class.store.unsigned(&self.class_table, id::UPDATE_DELAY_HIGH_LIMIT).unwrap_or(0)
+    }
+
+    fn low_limit(&self) -> u64 {
+        self.class.store.unsigned(&self.class_table, id::UPDATE_DELAY_LOW_LIMIT).unwrap_or(0)
+    }
+
+    fn step_threshold(&self) -> i64 {
+        let threshold = self.class.store.unsigned(&self.class_table, id::STEP_THRESHOLD).unwrap_or(0);
+        i64::try_from(threshold).unwrap_or(i64::MAX)
+    }
+
+    pub(super) fn context(&self, system_time: Option<SystemTime>) -> Context {
+        let control = self.connection.as_ref().map_or(NodeControl::empty(), IoConnection::node_control);
+        Context {
+            connected: self.connection.is_some(),
+            remote: control.contains(NodeControl::REMOTE_CONTROL),
+            node_fault: self.node.is_faulted(),
+            system_time: system_time.map_or(0, |t| t.0),
+        }
+    }
+
+    /// What the drive of an axis has to do at `now`; `None` if there is no such axis.
+    #[must_use]
+    pub fn command(&self, axis: usize, now: MonotonicTime) -> Option<AxisCommandImage> {
+        let slot = self.slots.get(axis)?;
+        let period = self.connection.as_ref().map_or(0, IoConnection::period);
+        let limit = u32::try_from(self.high_limit()).unwrap_or(u32::MAX);
+        Some(slot.axis.command(now, &self.context(None), period, limit))
+    }
+
+    // -- drive side ---------------------------------------------------------------------------------------------
+
+    /// Takes what the drive of an axis reports; to be followed by [`MotionDevice::poll`] in the same cycle.
+    pub fn set_drive(&mut self, axis: usize, image: DriveImage) {
+        if let Some(slot) = self.slots.get_mut(axis) {
+            slot.axis.set_drive(image);
+        }
+    }
+
+    /// Tells the state of the device's clock.
+    pub fn set_sync(&mut self, sync: SyncState) {
+        self.sync = sync;
+    }
+
+    /// An event that the drive was armed for has occurred. Returns whether it is on its way to the controller.
+    pub fn notify_event(
+        &mut self,
+        axis: usize,
+        event: EventType,
+        status: u8,
+        position: i32,
+        time_stamp: u64,
+    ) -> bool {
+        self.slots
+            .get_mut(axis)
+            .is_some_and(|slot| slot.axis.events.notify(event, status, position, time_stamp))
+    }
+
+    /// Publishes the value of a stored attribute of an axis, for example a signal. Access and range do not count.
+    ///
+    /// # Errors
+    /// There is no such axis or attribute, or the octets are not those of the whole value.
+    pub fn put_attribute(&mut self, axis: usize, id: u16, value: &[u8]) -> Result<(), GeneralStatus> {
+        let slot = self.slots.get_mut(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        slot.store.put(entry, entry.whole(), value)
+    }
+
+    /// The value of an attribute of an axis as it is stored in the device.
+    ///
+    /// # Errors
+    /// There is no such axis or attribute.
+    pub fn attribute(&self, axis: usize, id: u16) -> Result<&[u8], GeneralStatus> {
+        let slot = self.slots.get(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        slot.store.get(entry, entry.whole())
+    }
+
+    /// The next access to an attribute that lives in the drive.
+    pub fn poll_attribute_access(&mut self) -> Option<AttributeAccess> {
+        let channels = self.slots.iter_mut().map(|slot| &mut slot.service.worker);
+        let mut workers = channels.chain([&mut self.class.service.worker, &mut self.explicit.worker]);
+        workers.find_map(super::attribute_worker::AttributeWorker::take_access)
+    }
+
+    /// Answers an access: the octets of a Read, no octets for a Write, or why it failed.
+    ///
+    /// Answers to accesses that nobody waits for any more are ignored.
+    pub fn complete_attribute(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) {
+        for number in 0..self.slots.len() {
+            let slot = &mut self.slots[number];
+            let mut space = AttributeSpace {
+                table: &self.axis_table,
+                store: &mut slot.store,
+                instance: u8::try_from(number + 1).unwrap_or(u8::MAX),
+                running: slot.axis.is_running(),
+                tickets: &mut self.tickets,
+            };
+            if slot.service.worker.complete(ticket, answer, &mut space) {
+                self.run_service(number + 1);
+                return;
+            }
+        }
+        self.complete_explicit(ticket, answer);
+    }
+
+    // -- connection ---------------------------------------------------------------------------------------------
+
+    /// Takes a request of the explicit side; its reply comes out of [`MotionDevice::poll_reply`].
+    pub fn request(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, request: MotionRequest) {
+        match request {
+            MotionRequest::Open(parameters) => {
+                let outcome = self.open(now, system_time, parameters);
+                self.reply(MotionReply::Opened { token: parameters.token, outcome });
+            }
+            MotionRequest::Close(parameters) => {
+                self.close(&parameters);
+                self.reply(MotionReply::Closed { token: parameters.token });
+            }
+            MotionRequest::Explicit(request) => self.queue_explicit(request),
+        }
+        self.run_explicit();
+    }
+
+    /// The next reply to the explicit side.
+    pub fn poll_reply(&mut self) -> Option<MotionReply> {
+        (!self.replies.is_empty()).then(|| self.replies.remove(0))
+    }
+
+    pub(super) fn reply(&mut self, reply: MotionReply) {
+        // Open, Close and loss alternate and explicit requests are limited, so there is room unless nobody takes the
+        // replies; the oldest then has nobody waiting for it.
+        if self.replies.is_full() {
+            self.replies.remove(0);
+        }
+        self.replies.push(reply);
+    }
+
+    fn open(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        parameters: OpenParameters,
+    ) -> Result<(), OpenRefusal> {
+        let refuse = |extended_status| {
+            Err(OpenRefusal { general_status: GeneralStatus::CONNECTION_FAILURE.0, extended_status })
+        };
+        if self.connection.is_some() {
+            return refuse(OWNERSHIP_CONFLICT);
+        }
+        if parameters.format_revision != FORMAT_REVISION {
+            return refuse(INVALID_CONNECTION_POINT);
+        }
+        if parameters.rpi_us == 0 || parameters.timeout_us == 0 {
+            return refuse(INTERVAL_NOT_ACCEPTABLE);
+        }
+        self.connection = Some(IoConnection::new(parameters, now));
+        self.start_over();
+        let system_time = system_time.map_or(0, |t| t.0);
+        self.slots.iter_mut().for_each(|slot| slot.axis.open(system_time));
+        Ok(())
+    }
+
+    fn close(&mut self, parameters: &CloseParameters) {
+        let same = self.connection.as_ref().is_some_and(|c| {
+            c.parameters.triad == parameters.triad && c.parameters.o_to_t_id == parameters.o_to_t_id
+        });
+        if same {
+            self.connection = None;
+            self.start_over();
+            self.slots.iter_mut().for_each(|slot| slot.axis.close());
+        }
+    }
+
+    /// Factory defaults and idle channels: a connection begins or ends.
+    fn start_over(&mut self) {
+        self.node.clear();
+        self.compensation.reset();
+        self.diagnostics = (0, 0);
+        self.reported_diagnostics = Reported::known((0, 0));
+        self.reported_offset = Reported::new();
+        self.echo.clear();
+        self.idle_header = None;
+        self.class.store.reset(&self.class_table);
+        self.class.service.reset();
+        for slot in &mut self.slots {
+            slot.store.reset(&self.axis_table);
+            slot.service.reset();
+            slot.write_lists = CyclicLists::default();
+            slot.read_lists = CyclicLists::default();
+        }
+    }
+
+    fn lose(&mut self, now: MonotonicTime) {
+        let Some(connection) = self.connection.take() else { return };
+        self.counters.connection_losses += 1;
+        self.node.raise(NodeFault::CONNECTION_LOSS);
+        self.echo.clear();
+        self.class.service.reset();
+        for slot in &mut self.slots {
+            slot.axis.lose();
+            slot.service.reset();
+        }
+        self.reply(MotionReply::ConnectionLost {
+            o_to_t_id: connection.parameters.o_to_t_id,
+            silent_us: connection.silence(now) / 1000,
+        });
+    }
+
+    // -- time ---------------------------------------------------------------------------------------------------
+
+    /// Lets time pass: time-outs, missed updates, alarms, state machines.
+    pub fn poll(&mut self, now: MonotonicTime, system_time: Option<SystemTime>) {
+        self.node.tick(now);
+        if self.connection.as_ref().is_some_and(|c| c.is_timed_out(now)) {
+            self.lose(now);
+        }
+        if let Some(connection) = &self.connection {
+            let missed = connection.missed(now);
+            let synchronous = connection.mode == Mode::Synchronous;
+            if missed > self.high_limit() {
+                self.node.raise(NodeFault::CONNECTION_UPDATE);
+            } else if missed > self.low_limit() {
+                self.node.post(NodeAlarm::CONNECTION_UPDATE, now);
+            }
+            if synchronous {
+                self.node.synchronization(self.sync.synchronized, now);
+            }
+        }
+        self.step(system_time);
+        self.run_explicit();
+    }
+
+    fn step(&mut self, system_time: Option<SystemTime>) {
+        let context = self.context(system_time);
+        self.slots.iter_mut().for_each(|slot| slot.axis.step(&context));
+    }
+
+    // -- C-to-D -------------------------------------------------------------------------------------------------
+
+    /// Takes the data of a C-to-D packet: the class-1 sequence count and the update.
+    ///
+    /// `system_time` is `None` if the device has no synchronized time. The packet must be of this connection; whose it
+    /// is stands in the datagram around it.
+    pub fn handle_io(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, packet: &[u8]) {
+        let Some(connection) = &mut self.connection else {
+            self.counters.unconnected += 1;
+            return;
+        };
+        if packet.len() > usize::from(connection.parameters.o_to_t_size) {
+            self.counters.oversize += 1;
+            self.node.raise(NodeFault::DATA_FORMAT);
+            return;
+        }
+        let Some((sequence, update)) = packet.split_first_chunk::<SEQUENCE_LEN>() else {
+            self.counters.malformed += 1;
+            self.node.raise(NodeFault::DATA_FORMAT);
+            return;
+        };
+        let sequence = u16::from_le_bytes(*sequence);
+        match connection.packet(sequence) {
+            Packet::Old => self.counters.out_of_order += 1,
+            Packet::Refresh => {
+                self.counters.refreshes += 1;
+                connection.heard(sequence, now);
+            }
+            Packet::New => {
+                if let Some(frame) = self.check(update) {
+                    self.handle_update(now, system_time, sequence, &frame);
+                }
+            }
+        }
+        self.step(system_time);
+    }
+
+    /// Checks the form of a whole update. A wrong one is counted and raises node fault 4; nothing else changes.
+    fn check<'p>(&mut self, update: &'p [u8]) -> Option<CommandFrame<'p>> {
+        let frame = match CommandFrame::parse(update) {
+            Ok(frame) => frame,
+            Err(error) => {
+                self.last_error = Some(error);
+                self.counters.malformed += 1;
+                self.node.raise(NodeFault::DATA_FORMAT);
+                return None;
+            }
+        };
+        if frame.instances().any(|i| usize::from(i.number) > self.slots.len()) {
+            self.counters.unknown_instance += 1;
+        } else if frame.instances().any(|i| i.cyclic.is_some_and(|c| !c.values.is_finite())) {
+            self.counters.not_finite += 1;
+        } else {
+            return Some(frame);
+        }
+        self.node.raise(NodeFault::DATA_FORMAT);
+        None
+    }
+
+    fn handle_update(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        sequence: u16,
+        frame: &CommandFrame<'_>,
+    ) {
+        let header = *frame.header();
+        let Some(connection) = &mut self.connection else { return };
+        let before = connection.node_control();
+        if !header.node_control.contains(NodeControl::DATA_VALID) {
+            connection.heard(sequence, now);
+            connection.header = Some(header);
+            connection.answer(header.update_id, now);
+            self.counters.not_valid += 1;
+            self.echo.clear();
+            self.node_control(before, header.node_control);
+            return;
+        }
+        let lost = match connection.update(header.update_id) {
+            Update::Repeated => {
+                connection.heard(sequence, now);
+                self.counters.repeated += 1;
+                return;
+            }
+            Update::Old => {
+                self.counters.out_of_order += 1;
+                return;
+            }
+            Update::New(lost) => lost,
+        };
+        connection.heard(sequence, now);
+        connection.header = Some(header);
+        connection.received_at = system_time.map_or(0, |t| t.0);
+        self.node_control(before, header.node_control);
+        self.counters.lost_updates += u64::from(lost);
+        self.diagnostics.0 = self.diagnostics.0.wrapping_add(lost);
+        if u64::from(lost) > self.high_limit() {
+            self.node.raise(NodeFault::CONNECTION_UPDATE);
+        }
+        let verdict = self.judge(now, system_time, &header);
+        self.apply(now, system_time, frame, &verdict);
+        let fresh = matches!(verdict, Verdict::Fresh(_));
+        if fresh {
+            self.counters.applied += 1;
+            self.node.fresh_update();
+        }
+        if let Some(connection) = &mut self.connection {
+            connection.answer(header.update_id, now);
+            connection.accepted(header.update_id, now, fresh);
+        }
+    }
+
+    /// Node Control bits that act on the node itself.
+    fn node_control(&mut self, before: NodeControl, after: NodeControl) {
+        let reset = NodeControl::FAULT_RESET;
+        if after.contains(reset) && !before.contains(reset) {
+            self.node.reset();
+        }
+        if !after.contains(NodeControl::SYNC_CONTROL)
+            && let Some(connection) = &mut self.connection
+        {
+            connection.desynchronize();
+        }
+    }
+
+    /// Judges the age of an update and moves between asynchronous and synchronous operation.
+    fn judge(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        header: &CommandHeader,
+    ) -> Verdict {
+        let (low, high, threshold) = (self.low_limit(), self.high_limit(), self.step_threshold());
+        let Some(connection) = &mut self.connection else { return Verdict::CommandsRefused };
+        let period = connection.period();
+        if let Some(controller) = header.time_offset {
+            self.class.store.publish(
+                &self.class_table,
+                id::CONTROLLER_TIME_OFFSET,
+                controller.cast_unsigned(),
+            );
+        }
+        let controller =
+            self.class.store.unsigned(&self.class_table, id::CONTROLLER_TIME_OFFSET).unwrap_or(0);
+        let offsets = Offsets { device: self.sync.offset, controller: controller.cast_signed() };
+        if header.time_stamp.is_some() {
+            self.compensation.update(offsets, threshold, i64::try_from(period).unwrap_or(i64::MAX));
+        }
+        let synchronous =
+            self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
+        if !synchronous {
+            return Verdict::Fresh(UpdateTimes { time_stamp: None, period });
+        }
+        let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
+            self.counters.untimed += 1;
+            return Verdict::CommandsRefused;
+        };
+        let time_stamp = self.compensation.compensate(received);
+        let age = connection.age(time_stamp, system_time, low, high);
+        if connection.mode == Mode::Asynchronous {
+            let skewed = time_stamp.saturating_add(period).abs_diff(system_time) > period;
+            self.node.skew(skewed, now);
+            if !skewed && self.sync.synchronized {
+                let start = time_stamp.saturating_add(period.saturating_mul(2));
+                let in_ns =
+                    start.saturating_sub(system_time).saturating_sub(self.config.transmission_processing_ns);
+                connection.synchronize(header.update_id, in_ns, now);
+            }
+            // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
+            return Verdict::Fresh(UpdateTimes { time_stamp: None, period });
+        }
+        let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
+        let cycle = if time_stamp >= system_time { cycle } else { -cycle };
+        let processing = i64::try_from(self.config.transmission_processing_ns).unwrap_or(0);
+        match age {
+            Age::OnTime => {}
+            Age::Late | Age::Alarming => {
+                self.counters.late_updates += 1;
+                self.diagnostics.1 = self.diagnostics.1.wrapping_add(1);
+                if age == Age::Alarming {
+                    self.node.post(NodeAlarm::CONNECTION_UPDATE, now);
+                }
+            }
+            Age::TooLate => {
+                self.counters.late_updates += 1;
+                self.counters.too_late += 1;
+                self.diagnostics.1 = self.diagnostics.1.wrapping_add(1);
+                self.node.raise(NodeFault::CONNECTION_UPDATE);
+                return Verdict::CommandsRefused;
+            }
+            Age::Ahead => {
+                self.counters.ahead_of_time += 1;
+                self.node.post(NodeAlarm::CLOCK_SKEW, now);
+                return Verdict::CommandsRefused;
+            }
+        }
+        connection.align(cycle.saturating_sub(processing), now);
+        Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period })
+    }
+
+    /// Distributes a checked update to class and axes.
+    fn apply(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        frame: &CommandFrame<'_>,
+        verdict: &Verdict,
+    ) {
+        let received = frame.header().last_received_id;
+        self.reported_diagnostics.acknowledge(received);
+        self.reported_offset.acknowledge(received);
+        self.echo.clear();
+        let context = self.context(system_time);
+        let mut asked = [false; INSTANCES_MAX];
+        for instance in frame.instances() {
+            let number = usize::from(instance.number);
+            asked[number] = true;
+            let mut echo = Echo { number: instance.number, cyclic: false, lists: None };
+            if let Some(slot) = number.checked_sub(1).and_then(|axis| self.slots.get_mut(axis)) {
+                slot.axis.acknowledge(received);
+                echo.cyclic = instance.cyclic.is_some();
+                // Without remote control the device acts on nothing in the cyclic and service channels.
+                if context.remote {
+                    let refused = context.node_fault || matches!(verdict, Verdict::CommandsRefused);
+                    echo.lists =
+                        instance.write.map(|block| slot.cyclic_write(&self.axis_table, &block, refused));
+                    slot.axis.events.handle(instance.events.as_ref());
+                    if let Some(block) = &instance.cyclic {
+                        match verdict {
+                            Verdict::Fresh(times) => slot.axis.handle_block(block, *times, now, &context),
+                            Verdict::CommandsRefused => slot.axis.handle_status_request(block),
+                        }
+                    }
+                }
+            }
+            if context.remote {
+                self.handle_service(&instance, system_time);
+            }
+            self.echo.push(echo);
+        }
+        // An instance that the update does not mention has no request standing.
+        for (number, _) in asked.iter().enumerate().filter(|(_, asked)| !**asked) {
+            match number.checked_sub(1) {
+                None => {
+                    self.class.service.handle(None);
+                }
+                Some(axis) => {
+                    if let Some(slot) = self.slots.get_mut(axis) {
+                        slot.service.handle(None);
+                    }
+                }
+            }
+        }
+    }
+
+    fn handle_service(&mut self, instance: &CommandInstance<'_>, system_time: Option<SystemTime>) {
+        let number = usize::from(instance.number);
+        let channel = match number.checked_sub(1) {
+            None => &mut self.class.service,
+            Some(axis) => match self.slots.get_mut(axis) {
+                Some(slot) => &mut slot.service,
+                None => return,
+            },
+        };
+        if channel.handle(instance.service.as_ref())
+            && let Some(request) = &instance.service
+        {
+            self.execute_service(number, request, system_time);
+        }
+    }
+}
+
+impl Slot {
+    /// Applies cyclic write data and says what to tell about it.
+    fn cyclic_write(
+        &mut self,
+        table: &AttributeTable,
+        block: &WriteBlock<'_>,
+        refused: bool,
+    ) -> (u8, u8, GeneralStatus) {
+        let status = if refused {
+            GeneralStatus::OBJECT_STATE_CONFLICT
+        } else {
+            let running = self.axis.is_running();
+            self.write_lists.write(table, &mut self.store, block.write_block_id, block.data, running)
+        };
+        (block.write_block_id, block.read_block_id, status)
+    }
+
+    /// Carries out a Set_Cyclic_Write_List or Set_Cyclic_Read_List.
+    pub(super) fn configure_list(
+        &mut self,
+        table: &AttributeTable,
+        direction: Direction,
+        body: &[u8],
+        response: &mut [u8],
+    ) -> (GeneralStatus, usize) {
+        match direction {
+            Direction::Write => self.write_lists.configure(table, direction, body, response),
+            Direction::Read => self.read_lists.configure(table, direction, body, response),
+        }
+    }
+}

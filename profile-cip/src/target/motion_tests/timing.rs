@@ -1,0 +1,295 @@
+//! Lost and late updates, asynchronous and synchronous production.
+
+use super::super::axis_state::AxisState;
+use super::super::drive_link::{DriveAction, Withheld};
+use super::*;
+use crate::wire::motion::UpdateDiagnostics;
+use crate::wire::motion::codes::{NodeAlarm, NodeFault, NodeStatus};
+
+/// A running rig in synchronous operation.
+fn synchronous() -> Rig {
+    let mut rig = Rig::running();
+    rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::UPDATE_DIAGNOSTICS;
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.cycles(4);
+    assert!(rig.device.is_synchronous());
+    rig
+}
+
+#[test]
+fn lost_updates_are_counted_and_ridden_through_up_to_the_limit() {
+    let mut rig = Rig::running();
+    rig.time = TimeDataSet::UPDATE_DIAGNOSTICS;
+    let position = rig.follow(0).values.position;
+    for age in 0..4 {
+        assert_eq!(rig.follow(0).age_updates, age);
+        rig.silence();
+    }
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::CONNECTION_UPDATE, "beyond the low limit of 2");
+    assert_eq!((rig.state(0), rig.follow(0).values.position), (AxisState::Running, position));
+    rig.update_id += 4;
+    rig.cycle();
+    assert_eq!(rig.device.counters().lost_updates, 4);
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::NONE, "a fresh update ends the alarm");
+    let diagnostics = rig.header().update_diagnostics;
+    assert_eq!(diagnostics, Some(UpdateDiagnostics { lost_updates: 4, late_updates: 0 }));
+    rig.cycles(2);
+    assert_eq!(rig.header().update_diagnostics, None, "only when changed");
+    assert_eq!(rig.state(0), AxisState::Running);
+}
+
+#[test]
+fn beyond_the_high_limit_the_axes_stop_until_another_connection() {
+    let mut rig = Rig::running();
+    rig.cycle();
+    for _ in 0..5 {
+        assert_eq!(rig.withheld(0), None);
+        rig.silence();
+    }
+    // The fifth update is overdue: the command is withheld even before anybody polls.
+    assert_eq!(rig.withheld(0), Some(Withheld::Stale));
+    rig.run_device();
+    assert_eq!(rig.device.node_fault(), NodeFault::CONNECTION_UPDATE);
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Aborting, DriveAction::Abort));
+    assert!(rig.header().node_status.contains(NodeStatus::FAULT));
+    // Updates come again, the controller resets everything: it stays.
+    rig.control |= NodeControl::FAULT_RESET;
+    rig.request_all(AxisControl::FAULT_RESET);
+    rig.cycles(5);
+    rig.request_all(AxisControl::ENABLE);
+    rig.cycles(5);
+    assert_eq!(rig.device.node_fault(), NodeFault::CONNECTION_UPDATE);
+    assert_eq!(rig.state(0), AxisState::MajorFaulted);
+    assert_eq!(rig.actual(0).response_status, 0x0C);
+    rig.control -= NodeControl::FAULT_RESET;
+    rig.close();
+    rig.request_all(AxisControl::NONE);
+    rig.packet.clear();
+    rig.open();
+    rig.cycles(4);
+    assert_eq!(rig.state(0), AxisState::Stopped);
+}
+
+#[test]
+fn a_jump_over_the_limit_is_a_fault_although_updates_come() {
+    let mut rig = Rig::running();
+    rig.update_id += 5;
+    rig.cycle();
+    assert_eq!(rig.device.node_fault(), NodeFault::CONNECTION_UPDATE);
+    assert_eq!(rig.withheld(0), Some(Withheld::NodeFault));
+}
+
+#[test]
+fn asynchronous_updates_follow_the_controller_and_then_the_timer() {
+    let mut rig = Rig::running();
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    assert!(rig.run_device(), "at once");
+    assert_eq!(rig.header().update_id, rig.update_id);
+    assert!(!rig.run_device(), "and once");
+    // The next one is lost: the device goes on a period later with the next ID.
+    rig.now += PERIOD - 1;
+    assert!(!rig.run_device());
+    rig.now += 1;
+    assert!(rig.run_device());
+    assert_eq!(rig.header().update_id, rig.update_id.wrapping_add(1));
+    assert_eq!(rig.header().last_received_id, rig.update_id);
+    // It comes half a period late: the ID was sent, so nothing is sent twice; the schedule follows the controller.
+    rig.now += PERIOD / 2;
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    assert!(!rig.run_device());
+    rig.now += PERIOD;
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    assert!(rig.run_device());
+    assert_eq!(rig.header().update_id, rig.update_id);
+}
+
+#[test]
+fn the_first_synchronous_update_is_two_periods_after_the_time_stamp() {
+    let mut rig = Rig::running();
+    rig.time = TimeDataSet::TIME_STAMP;
+    rig.control |= NodeControl::SYNC_CONTROL;
+    // The update arrives two thirds into its cycle, stamped with the start of the cycle.
+    let start = rig.now;
+    let mut header = {
+        rig.command_packet();
+        rig.command_header()
+    };
+    header.time_stamp = Some(EPOCH + start);
+    let asked = rig.update_id;
+    rig.now = start + 2 * PERIOD / 3;
+    let packet = rig.packet_with(&header);
+    rig.send(&packet);
+    assert!(rig.run_device(), "still answered at once");
+    assert!(!rig.header().node_status.contains(NodeStatus::SYNC_MODE));
+    rig.now = start + 5 * PERIOD / 3;
+    let mut header = {
+        rig.command_packet();
+        rig.command_header()
+    };
+    header.time_stamp = Some(EPOCH + start + PERIOD);
+    let packet = rig.packet_with(&header);
+    rig.send(&packet);
+    assert!(rig.run_device(), "and the next one too");
+    let first = start + 2 * PERIOD - 100_000;
+    assert_eq!(rig.device.wake_at(), Some(MonotonicTime(first)));
+    rig.now = first - 1;
+    assert!(!rig.run_device());
+    rig.now = first;
+    assert!(rig.run_device());
+    let header = rig.header();
+    assert_eq!(header.update_id, asked.wrapping_add(2), "the ID of the cycle that starts");
+    assert!(header.node_status.contains(NodeStatus::SYNC_MODE));
+    assert_eq!(header.time_stamp, Some(EPOCH + first));
+    // From here one update per period, whether or not the controller's comes.
+    for cycle in 1..4 {
+        rig.now = first + cycle * PERIOD - 1;
+        assert!(!rig.run_device());
+        rig.now += 1;
+        assert!(rig.run_device());
+        let ahead = u8::try_from(2 + cycle).expect("small");
+        assert_eq!(rig.header().update_id, asked.wrapping_add(ahead));
+    }
+}
+
+#[test]
+fn synchronous_production_stays_aligned_with_the_controllers_cycle() {
+    let mut rig = synchronous();
+    // The controller's clock as seen here runs 10 us per period slow: cycles start later and later.
+    for _ in 0..50 {
+        rig.now += 10_000;
+        let packet = rig.command_packet();
+        rig.send(&packet);
+        let until = rig.now + PERIOD;
+        while rig.now < until {
+            let wake = rig.device.wake_at().expect("connected").0.clamp(rig.now, until);
+            rig.now = wake;
+            let sent = rig.run_device();
+            if !sent {
+                rig.now = until;
+            }
+        }
+        rig.now = until;
+    }
+    let wake = rig.device.wake_at().expect("connected").0;
+    let phase = (wake + 100_000).abs_diff(rig.now) % PERIOD;
+    assert!(phase <= 20_000 || phase >= PERIOD - 20_000, "phase {phase}");
+    assert_eq!(rig.device.counters().late_updates, 0);
+    assert_eq!(rig.device.node_fault(), NodeFault::NONE);
+}
+
+/// Sends an update whose time stamp is `age` ns old; negative is ahead.
+fn send_aged(rig: &mut Rig, age: i64) {
+    rig.command_packet();
+    let mut header = rig.command_header();
+    header.time_stamp = Some((EPOCH + rig.now).saturating_add_signed(-age));
+    let packet = rig.packet_with(&header);
+    rig.send(&packet);
+}
+
+#[test]
+fn late_updates_are_applied_within_the_limit_and_never_beyond() {
+    let period = i64::try_from(PERIOD).expect("fits");
+    let rows = [
+        (0, true, 0, NodeAlarm::NONE, NodeFault::NONE),
+        (period, true, 0, NodeAlarm::NONE, NodeFault::NONE),
+        (period + 1, true, 1, NodeAlarm::NONE, NodeFault::NONE),
+        // The alarm is posted and ended again by the same update being fresh.
+        (2 * period + 1, true, 1, NodeAlarm::NONE, NodeFault::NONE),
+        (4 * period, true, 1, NodeAlarm::NONE, NodeFault::NONE),
+        (4 * period + 1, false, 1, NodeAlarm::NONE, NodeFault::CONNECTION_UPDATE),
+        (-4 * period, true, 0, NodeAlarm::NONE, NodeFault::NONE),
+        (-4 * period - 1, false, 0, NodeAlarm::CLOCK_SKEW, NodeFault::NONE),
+    ];
+    for (age, applied, late, alarm, fault) in rows {
+        let mut rig = synchronous();
+        let before = rig.follow(0).sequence;
+        send_aged(&mut rig, age);
+        let fresh = matches!(rig.command(0).command, Command::Follow(s) if s.sequence != before);
+        let seen =
+            (fresh, rig.device.counters().late_updates, rig.device.node_alarm(), rig.device.node_fault());
+        assert_eq!(seen, (applied, late, alarm, fault), "age {age}");
+    }
+}
+
+#[test]
+fn set_points_carry_their_target_time() {
+    let mut rig = synchronous();
+    rig.blocks[0].target = crate::wire::motion::codes::CommandTarget::INTERPOLATE;
+    send_aged(&mut rig, 5);
+    let stamp = EPOCH + rig.now - 5;
+    let set_points = rig.follow(0);
+    assert_eq!((set_points.time_stamp, set_points.target_time), (Some(stamp), Some(stamp + 2 * PERIOD)));
+}
+
+#[test]
+fn synchronous_updates_without_a_time_are_not_applied() {
+    let mut rig = synchronous();
+    rig.time = TimeDataSet::empty();
+    let before = rig.follow(0).sequence;
+    rig.cycle();
+    assert_eq!(rig.device.counters().untimed, 1);
+    assert_eq!(rig.follow(0).sequence, before);
+    rig.cycles(5);
+    assert_eq!(rig.device.node_fault(), NodeFault::CONNECTION_UPDATE, "as if nothing came");
+}
+
+#[test]
+fn skewed_clocks_keep_the_device_asynchronous_and_fault_after_a_minute() {
+    let mut rig = Rig::running();
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::TIME_STAMP;
+    let skew = 3 * i64::try_from(PERIOD).expect("fits");
+    for _ in 0..(60_000_000_000 / PERIOD) {
+        send_aged(&mut rig, skew);
+        rig.run_device();
+        rig.now += PERIOD;
+        assert_eq!(rig.device.node_fault(), NodeFault::NONE);
+    }
+    assert_eq!(rig.header().node_alarm, NodeAlarm::CLOCK_SKEW);
+    assert!(!rig.device.is_synchronous());
+    assert_eq!(rig.follow(0).time_stamp, None, "the time stamp is not trusted");
+    send_aged(&mut rig, skew);
+    rig.now += PERIOD;
+    send_aged(&mut rig, skew);
+    assert_eq!(rig.device.node_fault(), NodeFault::CLOCK_SKEW);
+}
+
+#[test]
+fn sync_control_needs_a_synchronized_clock_and_its_loss_is_reported() {
+    let mut rig = Rig::running();
+    rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: false, offset: 0 });
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::TIME_STAMP;
+    rig.cycles(5);
+    assert!(!rig.device.is_synchronous());
+
+    let mut rig = synchronous();
+    rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: false, offset: 0 });
+    rig.cycles(usize::try_from(10_100_000_000 / PERIOD).expect("fits"));
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::CLOCK_SYNC);
+    rig.control -= NodeControl::SYNC_CONTROL;
+    rig.cycle();
+    assert!(!rig.device.is_synchronous());
+    assert!(!rig.header().node_status.contains(NodeStatus::SYNC_MODE));
+}
+
+#[test]
+fn a_step_of_the_controllers_time_is_compensated() {
+    let mut rig = synchronous();
+    // The controller jumps an hour ahead and says so in its offset; the device has not followed yet.
+    let hour = 3_600_000_000_000_u64;
+    rig.command_packet();
+    let mut header = rig.command_header();
+    header.time_stamp = Some(EPOCH + rig.now + hour);
+    header.time_offset = Some(hour.cast_signed());
+    let packet = rig.packet_with(&header);
+    let before = rig.follow(0).sequence;
+    rig.send(&packet);
+    let set_points = rig.follow(0);
+    assert_ne!(set_points.sequence, before);
+    assert_eq!(set_points.time_stamp, Some(EPOCH + rig.now));
+    assert_eq!(rig.device.counters().ahead_of_time, 0);
+}
