@@ -113,8 +113,14 @@ fn down_and_up_again() {
     rig.up_to(Phase::CP4);
     rig.master.set_target_phase(Phase::CP0);
     rig.state(State::Cp0);
+    // Another slave in the same place: nothing is known of it from before.
+    assert!(rig.master.slave(SlaveId(0)).unwrap().facts.gap);
+    rig.line.peers[0].parameters.remove(&Idn::INTER_FRAME_GAP);
+    rig.line.peers[0].parameters.remove(&Idn::FSP_TYPE);
     rig.log.clear();
     rig.up_to(Phase::CP4);
+    let facts = rig.master.slave(SlaveId(0)).unwrap().facts;
+    assert_eq!((facts.gap, facts.fsp_type), (false, None));
     rig.cycles(5);
     assert_eq!(rig.master.consumer(SlaveId(0), 1).unwrap().state, ConsumerState::Consuming);
     rig.master.stop();
