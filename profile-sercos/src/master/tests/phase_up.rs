@@ -111,10 +111,10 @@ fn lower_targets_are_kept() {
 fn down_and_up_again() {
     let mut rig = Rig::new(&[1, 2]);
     rig.up_to(Phase::CP4);
+    assert!(rig.master.slave(SlaveId(0)).unwrap().facts.gap);
     rig.master.set_target_phase(Phase::CP0);
     rig.state(State::Cp0);
     // Another slave in the same place: nothing is known of it from before.
-    assert!(rig.master.slave(SlaveId(0)).unwrap().facts.gap);
     rig.line.peers[0].parameters.remove(&Idn::INTER_FRAME_GAP);
     rig.line.peers[0].parameters.remove(&Idn::FSP_TYPE);
     rig.log.clear();
