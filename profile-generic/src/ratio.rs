@@ -379,6 +379,21 @@ mod tests {
         assert_eq!(ratio(5, 1).convert_to_f32(0), FloatOutcome { value: 0.0, inexact: false });
     }
 
+    /// A quotient just above a tie, by less than the digits that are computed can show, still rounds up.
+    #[test]
+    fn what_is_beyond_the_digits_decides_a_tie() {
+        let den = (1_i64 << 62) - 1;
+        let tie = |digits: u32| ((1_i128 << digits) + 1) * i128::from(den);
+        assert_eq!(f64_quotient(tie(53), den).value, 9_007_199_254_740_992.0);
+        assert_eq!(f64_quotient(tie(53) + 1, den).value, 9_007_199_254_740_994.0);
+        assert_eq!(f64_quotient(-tie(53) - 1, den).value, -9_007_199_254_740_994.0);
+        assert_eq!(f32_quotient(tie(24), den).value, 16_777_216.0);
+        assert_eq!(f32_quotient(tie(24) + 1, den).value, 16_777_218.0);
+        // The last of the digits alone, with no rest after it.
+        let last_digit = (((1_i128 << 24) + 1) << 41 | 1) << 60;
+        assert_eq!(f32_quotient(last_digit, 1 << 62).value, 16_777_218.0 * cast::exp2_f32(39));
+    }
+
     #[test]
     fn inverse_and_chain() {
         assert_eq!(ratio(3, 4).inverse(), Some(ratio(4, 3)));

@@ -308,6 +308,18 @@ fn the_encoder_wraps_and_is_quantised() {
     assert!(wraps >= 9, "{wraps}");
 }
 
+/// A third of a nanounit in each sub-step still adds up.
+#[test]
+fn the_slowest_motion_is_not_lost() {
+    let target = ServoCommand { velocity: Velocity(10_000), ..command(OperatingMode::Velocity) };
+    let parameters = ServoParameters { coulomb_friction: Torque(0), ..ServoParameters::default() };
+    let mut servo = enabled(parameters, &target);
+    run(&mut servo, 500, &target);
+    let before = servo.position().0;
+    run(&mut servo, 1_000, &target);
+    assert!((servo.position().0 - before - 10_000).abs() < 20, "{}", servo.position().0 - before);
+}
+
 #[test]
 fn captures_are_exact_in_place_and_time() {
     let (mut servo, follow) = turning(Velocity(10 * UNIT));
