@@ -413,8 +413,13 @@ impl AttributeTable {
         let mut all: Vec<AttributeDefinition> =
             definitions.iter().filter(|d| d.scope == scope).cloned().collect();
         for (_, id, data_type, access, default, name) in ENGINE.iter().filter(|row| row.0 == scope) {
-            match all.iter().find(|d| d.id == *id) {
-                Some(d) if d.data_type.size() == data_type.size() && d.elements.is_none() => {}
+            match all.iter_mut().find(|d| d.id == *id) {
+                Some(d) if d.data_type.size() == data_type.size() && d.elements.is_none() => {
+                    // A definition that leaves the default open must not turn a limit into 0.
+                    if d.default == DefaultValue::Integer(0) {
+                        d.default = DefaultValue::Integer(*default);
+                    }
+                }
                 Some(_) => return Err(TableError::EngineType { scope, id: *id, expected: *data_type }),
                 None => {
                     let mut definition = AttributeDefinition::new(scope, *id, *data_type, *access, name);
@@ -649,6 +654,9 @@ mod tests {
         assert_eq!(build(&twice), Err(TableError::Duplicate(Scope::Instance, 5)));
         let default = AttributeDefinition { default: DefaultValue::Integer(256), ..new(7, DataType::Usint) };
         assert_eq!(build(&[default]), Err(TableError::Default(Scope::Instance, 7)));
+        let limit = AttributeDefinition::new(Scope::Class, 21, DataType::Usint, Access::Set, "a limit");
+        let class = AttributeTable::new(Scope::Class, &[limit]).expect("a table");
+        assert_eq!(AttributeStore::new(&class).unsigned(&class, 21), Some(4), "the engine's default stands");
         let engine = ENGINE.iter().filter(|row| row.0 == Scope::Instance).count();
         assert_eq!(build(&[new(5, DataType::Int)]), Ok(engine + 1));
     }

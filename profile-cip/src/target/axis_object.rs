@@ -8,21 +8,15 @@ use profile_generic::time::MonotonicTime;
 
 use super::axis_control::AxisControlHandshake;
 use super::axis_state::{AxisConditions, AxisEvent, AxisState, ControlKind};
-use super::drive_link::{
-    AxisCommandImage, Command, DriveAction, DriveFault, DriveImage, SetPoints, Withheld,
-};
+use super::drive_link::{DriveAction, DriveAlarm, DriveFault, DriveImage, SetPoints};
 use super::event_channel::EventChannel;
-use super::io_connection::missed_updates;
 use super::status_report::{RecordLog, Reported};
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    ActualDataSet, AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, ControlStatus,
-    EventChecking, FaultType, StatusDataSet,
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, ControlStatus, EventChecking,
+    FaultType,
 };
-use crate::wire::motion::{
-    ActualBlock, ActualPosition, ActualValues, AlarmRecord, CommandBlock, CommandValues, FaultRecord,
-    StatusValues,
-};
+use crate::wire::motion::{AlarmRecord, CommandBlock, CommandValues, FaultRecord};
 use crate::wire::status::GeneralStatus;
 
 /// Bit numbers of the axis faults that this module raises itself, Table 5-2.65.
@@ -87,9 +81,9 @@ pub(super) struct Context {
 
 /// The newest good cyclic block.
 #[derive(Debug, Clone, Copy)]
-struct Held {
-    set_points: SetPoints,
-    at: MonotonicTime,
+pub(super) struct Held {
+    pub set_points: SetPoints,
+    pub at: MonotonicTime,
 }
 
 /// Time stamps of an update, in this device's system time, ns.
@@ -101,33 +95,33 @@ pub(super) struct UpdateTimes {
 
 /// An instance of the Motion Device Axis Object.
 pub(super) struct Axis {
-    config: AxisConfig,
-    state: AxisState,
-    shutdown: bool,
+    pub(super) config: AxisConfig,
+    pub(super) state: AxisState,
+    pub(super) shutdown: bool,
     faults: u64,
-    drive: DriveImage,
+    pub(super) drive: DriveImage,
     seen_fault: Option<DriveFault>,
-    handshake: AxisControlHandshake,
-    block: CommandBlock,
-    held: Option<Held>,
+    pub(super) handshake: AxisControlHandshake,
+    pub(super) block: CommandBlock,
+    pub(super) held: Option<Held>,
     sequence: u32,
-    action: DriveAction,
-    action_id: u32,
-    reset_id: u32,
+    pub(super) action: DriveAction,
+    pub(super) action_id: u32,
+    pub(super) reset_id: u32,
     /// Fault Reset or Shutdown Reset that waits for the drive.
     reset: Option<AxisControl>,
     /// The axis left an energized state without a stop of its own and has not stopped yet.
     winding_down: bool,
-    actual_reference: i64,
-    command_reference: i64,
-    displacement: i32,
-    alarm: Option<super::drive_link::DriveAlarm>,
-    fault_log: RecordLog<FaultRecord>,
-    alarm_log: RecordLog<AlarmRecord>,
-    axis_status: Reported<(AxisStatus, u32)>,
-    io_status: Reported<(AxisIoStatus, u32)>,
-    safety: Reported<SafetyStatus>,
-    pub events: EventChannel,
+    pub(super) actual_reference: i64,
+    pub(super) command_reference: i64,
+    pub(super) displacement: i32,
+    alarm: Option<DriveAlarm>,
+    pub(super) fault_log: RecordLog<FaultRecord>,
+    pub(super) alarm_log: RecordLog<AlarmRecord>,
+    pub(super) axis_status: Reported<(AxisStatus, u32)>,
+    pub(super) io_status: Reported<(AxisIoStatus, u32)>,
+    pub(super) safety: Reported<SafetyStatus>,
+    pub(super) events: EventChannel,
 }
 
 /// Whether the command values hold the one that the mode needs.
@@ -233,13 +227,14 @@ impl Axis {
         let Some(next) = self.state.next(self.config.kind, event, &self.conditions()) else { return false };
         // Close and loss take an axis out of motion without a Stopping state of its own.
         let unconnected = matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss);
-        self.winding_down |= unconnected && self.state.is_energized();
+        let moves = self.config.kind == ControlKind::Active && self.state.is_energized();
+        self.winding_down |= unconnected && moves;
         self.state = next;
         true
     }
 
     /// Whether the drive speaks of the action that is in force.
-    fn answers(&self) -> bool {
+    pub(super) fn answers(&self) -> bool {
         self.drive.online && self.drive.action_id == self.action_id
     }
 
@@ -316,7 +311,7 @@ impl Axis {
                 age_updates: 0,
             };
             self.held = Some(Held { set_points, at: now });
-        } else if self.state == AxisState::Running {
+        } else if self.state == AxisState::Running && self.config.kind == ControlKind::Active {
             self.raise_illegal_mode(sub_code::SET_POINT_MISSING, context);
         }
         let controls = matches!(self.state, AxisState::Starting | AxisState::Running);
@@ -411,12 +406,15 @@ impl Axis {
     }
 
     fn begin_enable(&mut self, context: &Context) -> Option<GeneralStatus> {
+        if self.config.kind != ControlKind::Active {
+            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+        }
         if matches!(self.state, AxisState::Starting | AxisState::Running) {
             return None;
         }
         let ready = context.remote && !context.node_fault && self.drive.online && !self.inhibited();
         let mode = ControlMode(self.block.control_mode.0 & 0x0F);
-        if self.config.kind == ControlKind::Active && !self.config.supports(mode) {
+        if !self.config.supports(mode) {
             return Some(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
         if ready && self.fire(AxisEvent::Enable) { None } else { Some(GeneralStatus::OBJECT_STATE_CONFLICT) }
@@ -541,6 +539,7 @@ impl Axis {
                 self.handshake.complete(GeneralStatus::SUCCESS);
             }
         }
+        // An axis that already stops for a fault does not get another one for going silent.
         if self.state.is_energized() && !self.drive.online && self.state != AxisState::Aborting {
             let fault = DriveFault {
                 fault_type: FaultType::AXIS,
@@ -621,6 +620,8 @@ impl Axis {
             AxisState::Initializing if self.winding_down => DriveAction::Disable,
             AxisState::Initializing => DriveAction::None,
             AxisState::PreCharge | AxisState::Stopped | AxisState::StartInhibited => DriveAction::PowerUp,
+            // Only an axis that controls motion is energized by Running.
+            AxisState::Running if self.config.kind != ControlKind::Active => DriveAction::PowerUp,
             AxisState::Starting | AxisState::Running | AxisState::Testing => DriveAction::Enable,
             AxisState::Stopping if self.shutdown => DriveAction::Shutdown,
             AxisState::Stopping => DriveAction::Disable,
@@ -632,157 +633,4 @@ impl Axis {
             self.action_id = self.action_id.wrapping_add(1);
         }
     }
-
-    // -- outputs ------------------------------------------------------------------------------------------------
-
-    /// What the drive has to do at `now`. `period_ns` and `limit` judge the age of the set-points.
-    pub fn command(
-        &self,
-        now: MonotonicTime,
-        context: &Context,
-        period_ns: u64,
-        limit: u32,
-    ) -> AxisCommandImage {
-        let command = match self.held {
-            _ if !context.connected => Command::Withheld(Withheld::NotConnected),
-            _ if context.node_fault => Command::Withheld(Withheld::NodeFault),
-            _ if !context.remote => Command::Withheld(Withheld::LocalControl),
-            _ if self.state != AxisState::Running || self.config.kind != ControlKind::Active => {
-                Command::Withheld(Withheld::NotRunning)
-            }
-            None => Command::Withheld(Withheld::NoSetPoint),
-            Some(held) => {
-                let age = missed_updates(now.0.saturating_sub(held.at.0), period_ns);
-                let age_updates = u32::try_from(age).unwrap_or(u32::MAX);
-                if age_updates > limit {
-                    Command::Withheld(Withheld::Stale)
-                } else {
-                    let position_reference = self.command_reference;
-                    Command::Follow(SetPoints { age_updates, position_reference, ..held.set_points })
-                }
-            }
-        };
-        AxisCommandImage {
-            state: self.state,
-            action: self.action,
-            action_id: self.action_id,
-            reset_id: self.reset_id,
-            command,
-        }
-    }
-
-    /// Axis Status, attribute 651: the drive's bits, masked and completed by Table 5-2.61.
-    pub fn status(&self, context: &Context) -> AxisStatus {
-        let loops = AxisStatus::POSITION_LOCK
-            | AxisStatus::VELOCITY_LOCK
-            | AxisStatus::VELOCITY_LIMIT
-            | AxisStatus::ACCELERATION_LIMIT
-            | AxisStatus::DECELERATION_LIMIT
-            | AxisStatus::TORQUE_THRESHOLD
-            | AxisStatus::TORQUE_LIMIT
-            | AxisStatus::CURRENT_LIMIT
-            | AxisStatus::MOTOR_FLUX_UP;
-        let owned = AxisStatus::LOCAL_CONTROL
-            | AxisStatus::ALARM
-            | AxisStatus::DC_BUS_UP
-            | AxisStatus::POWER_STRUCTURE_ENABLED
-            | AxisStatus::TRACKING_COMMAND
-            | AxisStatus::SHUTDOWN
-            | AxisStatus::IN_PROCESS
-            | AxisStatus::POSITION_CONTROL_MODE
-            | AxisStatus::VELOCITY_CONTROL_MODE
-            | AxisStatus::TORQUE_CONTROL_MODE;
-        let mut status = self.drive.axis_status - owned;
-        let standby = matches!(
-            self.state,
-            AxisState::Off
-                | AxisState::SelfTest
-                | AxisState::Initializing
-                | AxisState::PreCharge
-                | AxisState::Shutdown
-                | AxisState::StartInhibited
-        );
-        if standby {
-            status -= loops;
-        }
-        if self.state == AxisState::Initializing {
-            status -= AxisStatus::VELOCITY_STANDSTILL | AxisStatus::VELOCITY_THRESHOLD;
-        }
-        let powered = !standby && self.drive.power_enabled;
-        let active = powered && self.config.kind == ControlKind::Active;
-        let mode = self.block.control_mode.0 & 0x0F;
-        status.set(AxisStatus::LOCAL_CONTROL, !context.remote);
-        status.set(AxisStatus::ALARM, self.drive.alarm.is_some());
-        status.set(AxisStatus::DC_BUS_UP, self.drive.bus_up && self.state != AxisState::PreCharge);
-        status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
-        status.set(
-            AxisStatus::TRACKING_COMMAND,
-            self.state == AxisState::Running && self.answers() && self.drive.tracking,
-        );
-        status.set(AxisStatus::SHUTDOWN, self.shutdown);
-        status.set(AxisStatus::POSITION_CONTROL_MODE, active && mode == ControlMode::POSITION.0);
-        status.set(AxisStatus::VELOCITY_CONTROL_MODE, active && mode == ControlMode::VELOCITY.0);
-        status.set(AxisStatus::TORQUE_CONTROL_MODE, active && mode == ControlMode::TORQUE.0);
-        status
-    }
-
-    /// The cyclic actual block of D-to-C update `update_id`.
-    pub fn actual_block(&mut self, update_id: u8, context: &Context) -> ActualBlock {
-        let asked = self.block.actual_data_set;
-        let (axis_response, response_status) = self.handshake.response();
-        let position = self.drive.position.wrapping_add(self.actual_reference);
-        let lint = self.config.lint_position && self.block.feedback_mode.position_is_lint();
-        let position =
-            if lint { ActualPosition::Lint(position) } else { ActualPosition::Dint(low_32(position)) };
-        let displaced = axis_response == AxisControl::CHANGE_ACTUAL_POSITION && response_status == 0;
-        let displacement = if displaced { self.displacement } else { 0 };
-        ActualBlock {
-            control_mode: self.block.control_mode,
-            feedback_mode: self.block.feedback_mode.with_lint(lint),
-            axis_response,
-            response_status,
-            axis_state: self.state.code(),
-            actual: ActualValues {
-                position: asked.contains(ActualDataSet::POSITION).then_some(position),
-                velocity: asked.contains(ActualDataSet::VELOCITY).then_some(self.drive.velocity),
-                acceleration: asked.contains(ActualDataSet::ACCELERATION).then_some(self.drive.acceleration),
-                unwind_count: None,
-                position_displacement: asked
-                    .contains(ActualDataSet::POSITION_DISPLACEMENT)
-                    .then_some(displacement),
-            },
-            status: self.status_values(update_id, context),
-        }
-    }
-
-    fn status_values(&mut self, update_id: u8, context: &Context) -> StatusValues {
-        let asked = self.block.status_data_set;
-        let mut values = StatusValues::default();
-        if asked.contains(StatusDataSet::FAULT) {
-            values.fault = self.fault_log.due(update_id);
-        }
-        if asked.contains(StatusDataSet::ALARM) {
-            values.alarm = self.alarm_log.due(update_id);
-        }
-        if asked.contains(StatusDataSet::AXIS_STATUS) {
-            let status = (self.status(context), self.drive.axis_status_mfg);
-            values.axis_status = self.axis_status.due(status, update_id);
-        }
-        if asked.contains(StatusDataSet::IO_STATUS) {
-            values.io_status =
-                self.io_status.due((self.drive.io_status, self.drive.io_status_mfg), update_id);
-        }
-        if asked.contains(StatusDataSet::SAFETY_STATUS)
-            && let Some(safety) = self.drive.safety
-        {
-            values.safety = self.safety.due(safety, update_id);
-        }
-        values
-    }
-}
-
-/// The low 32 bits of a position: a DINT position rolls over.
-fn low_32(position: i64) -> i32 {
-    let [a, b, c, d, ..] = position.to_le_bytes();
-    i32::from_le_bytes([a, b, c, d])
 }

@@ -1,0 +1,163 @@
+//! What an axis tells: the command image for its drive and the cyclic actual block for the controller.
+
+use profile_generic::time::MonotonicTime;
+
+use super::axis_object::{Axis, Context};
+use super::axis_state::{AxisState, ControlKind};
+use super::drive_link::{AxisCommandImage, Command, SetPoints, Withheld};
+use super::io_connection::missed_updates;
+use crate::wire::motion::codes::{ActualDataSet, AxisControl, AxisStatus, ControlMode, StatusDataSet};
+use crate::wire::motion::{ActualBlock, ActualPosition, ActualValues, StatusValues};
+
+impl Axis {
+    /// What the drive has to do at `now`. `period_ns` and `limit` judge the age of the set-points.
+    pub fn command(
+        &self,
+        now: MonotonicTime,
+        context: &Context,
+        period_ns: u64,
+        limit: u32,
+    ) -> AxisCommandImage {
+        let command = match self.held {
+            _ if !context.connected => Command::Withheld(Withheld::NotConnected),
+            _ if context.node_fault => Command::Withheld(Withheld::NodeFault),
+            _ if !context.remote => Command::Withheld(Withheld::LocalControl),
+            _ if self.state != AxisState::Running || self.config.kind != ControlKind::Active => {
+                Command::Withheld(Withheld::NotRunning)
+            }
+            None => Command::Withheld(Withheld::NoSetPoint),
+            Some(held) => {
+                let age = missed_updates(now.0.saturating_sub(held.at.0), period_ns);
+                let age_updates = u32::try_from(age).unwrap_or(u32::MAX);
+                if age_updates > limit {
+                    Command::Withheld(Withheld::Stale)
+                } else {
+                    let position_reference = self.command_reference;
+                    Command::Follow(SetPoints { age_updates, position_reference, ..held.set_points })
+                }
+            }
+        };
+        AxisCommandImage {
+            state: self.state,
+            action: self.action,
+            action_id: self.action_id,
+            reset_id: self.reset_id,
+            command,
+        }
+    }
+
+    /// Axis Status, attribute 651: the drive's bits, masked and completed by Table 5-2.61.
+    pub fn status(&self, context: &Context) -> AxisStatus {
+        let loops = AxisStatus::POSITION_LOCK
+            | AxisStatus::VELOCITY_LOCK
+            | AxisStatus::VELOCITY_LIMIT
+            | AxisStatus::ACCELERATION_LIMIT
+            | AxisStatus::DECELERATION_LIMIT
+            | AxisStatus::TORQUE_THRESHOLD
+            | AxisStatus::TORQUE_LIMIT
+            | AxisStatus::CURRENT_LIMIT
+            | AxisStatus::MOTOR_FLUX_UP;
+        let owned = AxisStatus::LOCAL_CONTROL
+            | AxisStatus::ALARM
+            | AxisStatus::DC_BUS_UP
+            | AxisStatus::POWER_STRUCTURE_ENABLED
+            | AxisStatus::TRACKING_COMMAND
+            | AxisStatus::SHUTDOWN
+            | AxisStatus::IN_PROCESS
+            | AxisStatus::POSITION_CONTROL_MODE
+            | AxisStatus::VELOCITY_CONTROL_MODE
+            | AxisStatus::TORQUE_CONTROL_MODE;
+        let mut status = self.drive.axis_status - owned;
+        let standby = matches!(
+            self.state,
+            AxisState::Off
+                | AxisState::SelfTest
+                | AxisState::Initializing
+                | AxisState::PreCharge
+                | AxisState::Shutdown
+                | AxisState::StartInhibited
+        );
+        if standby {
+            status -= loops;
+        }
+        if self.state == AxisState::Initializing {
+            status -= AxisStatus::VELOCITY_STANDSTILL | AxisStatus::VELOCITY_THRESHOLD;
+        }
+        let powered = !standby && self.drive.power_enabled;
+        let active = powered && self.config.kind == ControlKind::Active;
+        let mode = self.block.control_mode.0 & 0x0F;
+        status.set(AxisStatus::LOCAL_CONTROL, !context.remote);
+        status.set(AxisStatus::ALARM, self.drive.alarm.is_some());
+        status.set(AxisStatus::DC_BUS_UP, self.drive.bus_up && self.state != AxisState::PreCharge);
+        status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
+        status.set(
+            AxisStatus::TRACKING_COMMAND,
+            self.state == AxisState::Running && self.answers() && self.drive.tracking,
+        );
+        status.set(AxisStatus::SHUTDOWN, self.shutdown);
+        status.set(AxisStatus::POSITION_CONTROL_MODE, active && mode == ControlMode::POSITION.0);
+        status.set(AxisStatus::VELOCITY_CONTROL_MODE, active && mode == ControlMode::VELOCITY.0);
+        status.set(AxisStatus::TORQUE_CONTROL_MODE, active && mode == ControlMode::TORQUE.0);
+        status
+    }
+
+    /// The cyclic actual block of D-to-C update `update_id`.
+    pub fn actual_block(&mut self, update_id: u8, context: &Context) -> ActualBlock {
+        let asked = self.block.actual_data_set;
+        let (axis_response, response_status) = self.handshake.response();
+        let position = self.drive.position.wrapping_add(self.actual_reference);
+        let lint = self.config.lint_position && self.block.feedback_mode.position_is_lint();
+        let position =
+            if lint { ActualPosition::Lint(position) } else { ActualPosition::Dint(low_32(position)) };
+        let displaced = axis_response == AxisControl::CHANGE_ACTUAL_POSITION && response_status == 0;
+        let displacement = if displaced { self.displacement } else { 0 };
+        ActualBlock {
+            control_mode: self.block.control_mode,
+            feedback_mode: self.block.feedback_mode.with_lint(lint),
+            axis_response,
+            response_status,
+            axis_state: self.state.code(),
+            actual: ActualValues {
+                position: asked.contains(ActualDataSet::POSITION).then_some(position),
+                velocity: asked.contains(ActualDataSet::VELOCITY).then_some(self.drive.velocity),
+                acceleration: asked.contains(ActualDataSet::ACCELERATION).then_some(self.drive.acceleration),
+                unwind_count: None,
+                position_displacement: asked
+                    .contains(ActualDataSet::POSITION_DISPLACEMENT)
+                    .then_some(displacement),
+            },
+            status: self.status_values(update_id, context),
+        }
+    }
+
+    fn status_values(&mut self, update_id: u8, context: &Context) -> StatusValues {
+        let asked = self.block.status_data_set;
+        let mut values = StatusValues::default();
+        if asked.contains(StatusDataSet::FAULT) {
+            values.fault = self.fault_log.due(update_id);
+        }
+        if asked.contains(StatusDataSet::ALARM) {
+            values.alarm = self.alarm_log.due(update_id);
+        }
+        if asked.contains(StatusDataSet::AXIS_STATUS) {
+            let status = (self.status(context), self.drive.axis_status_mfg);
+            values.axis_status = self.axis_status.due(status, update_id);
+        }
+        if asked.contains(StatusDataSet::IO_STATUS) {
+            values.io_status =
+                self.io_status.due((self.drive.io_status, self.drive.io_status_mfg), update_id);
+        }
+        if asked.contains(StatusDataSet::SAFETY_STATUS)
+            && let Some(safety) = self.drive.safety
+        {
+            values.safety = self.safety.due(safety, update_id);
+        }
+        values
+    }
+}
+
+/// The low 32 bits of a position: a DINT position rolls over.
+fn low_32(position: i64) -> i32 {
+    let [a, b, c, d, ..] = position.to_le_bytes();
+    i32::from_le_bytes([a, b, c, d])
+}
