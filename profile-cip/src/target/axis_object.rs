@@ -1,6 +1,6 @@
 //! One axis: an instance of the Motion Device Axis Object, clauses 5-2.6.1 to 5-2.6.4.
 //!
-//! The state machine runs in [`Axis::step`]: it turns what the drive reports and what the controller asks for into
+//! The state machine runs once per step of the device: it turns what the drive reports and what the controller asks for into
 //! events, follows [`AxisState::next`], and derives the level the drive has to keep. Nothing but an Enable request that
 //! begins in Stopped (or, with flying start, in Stopping) ever leads to Starting.
 

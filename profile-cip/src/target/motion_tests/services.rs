@@ -253,6 +253,25 @@ fn events_travel_with_the_axis() {
     assert_eq!(block, None);
 }
 
+/// Sends the rig's next update with a cyclic write block for the first axis.
+fn send_write(rig: &mut Rig, data: &[u8]) {
+    let packet = rig.command_packet();
+    let frame = CommandFrame::parse(&packet[2..]).expect("a good update");
+    let mut buffer = [0; 500];
+    let mut writer = CommandWriter::new(&mut buffer, frame.header()).expect("room");
+    for mut instance in frame.instances() {
+        if instance.number == 1 {
+            instance.write = Some(WriteBlock { write_block_id: 1, read_block_id: 1, data });
+        }
+        writer.instance(&instance).expect("room");
+    }
+    let len = writer.finish();
+    let packet = [&packet[..2], &buffer[..len]].concat();
+    rig.send(&packet);
+    rig.run_device();
+    rig.now += PERIOD;
+}
+
 #[test]
 fn cyclic_lists_are_written_and_read_in_every_update() {
     let mut rig = Rig::stopped();
@@ -266,22 +285,8 @@ fn cyclic_lists_are_written_and_read_in_every_update() {
     rig.cycle();
     assert_eq!(rig.response(1).map(|r| r.1), Some(0));
     rig.services[1] = None;
-    // The rig has no write blocks of its own: put one into the update.
-    let packet = rig.command_packet();
-    let frame = CommandFrame::parse(&packet[2..]).expect("a good update");
-    let mut buffer = [0; 500];
-    let mut writer = CommandWriter::new(&mut buffer, frame.header()).expect("room");
     let data = 1.5_f32.to_le_bytes();
-    for mut instance in frame.instances() {
-        if instance.number == 1 {
-            instance.write = Some(WriteBlock { write_block_id: 1, read_block_id: 1, data: &data });
-        }
-        writer.instance(&instance).expect("room");
-    }
-    let len = writer.finish();
-    let packet = [&packet[..2], &buffer[..len]].concat();
-    rig.send(&packet);
-    rig.run_device();
+    send_write(&mut rig, &data);
     assert_eq!(rig.device.attribute(0, 461), Ok(&data[..]));
     let read = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.read).expect("a block");
     let expected = ReadBlock {
@@ -292,4 +297,12 @@ fn cyclic_lists_are_written_and_read_in_every_update() {
         data: &[2, 0, 0, 0, 0x00, 0x00, 0xC0, 0x3F],
     };
     assert_eq!(read, expected);
+    // Under a node fault nothing is written, and the answer says so.
+    let mut malformed = rig.command_packet();
+    malformed[2] = 9;
+    rig.send(&malformed);
+    send_write(&mut rig, &2.5_f32.to_le_bytes());
+    assert_eq!(rig.device.attribute(0, 461), Ok(&data[..]));
+    let read = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.read).expect("a block");
+    assert_eq!((read.write_block_id, read.write_status), (1, GeneralStatus::OBJECT_STATE_CONFLICT.0));
 }

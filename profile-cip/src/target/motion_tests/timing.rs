@@ -206,7 +206,9 @@ fn late_updates_are_applied_within_the_limit_and_never_beyond() {
     for (age, applied, late, alarm, fault) in rows {
         let mut rig = synchronous();
         let before = rig.follow(0).sequence;
+        let counted = rig.device.counters().applied;
         send_aged(&mut rig, age);
+        assert_eq!(rig.device.counters().applied - counted, u64::from(applied), "age {age}");
         let fresh = matches!(rig.command(0).command, Command::Follow(s) if s.sequence != before);
         let seen =
             (fresh, rig.device.counters().late_updates, rig.device.node_alarm(), rig.device.node_fault());
