@@ -140,7 +140,8 @@ impl AttributeEntry {
     /// The generic value of the bytes of the attribute.
     ///
     /// # Errors
-    /// The bytes do not hold a value of the type, or the value is out of range, or no parameter stands behind it.
+    /// The bytes do not hold a value of the type, or the value is out of range, or no parameter stands
+    /// behind it.
     pub fn to_generic(&self, bytes: &[u8]) -> Result<i64, ValueError> {
         let Backing::Parameter { to_generic, .. } = &self.backing else {
             return Err(ValueError::NotConvertible);
@@ -163,8 +164,8 @@ impl AttributeEntry {
         if outcome.saturated { Err(ValueError::Range) } else { Ok(outcome.value) }
     }
 
-    /// Writes a generic value as the attribute into `out` and returns the bytes that count and whether the value
-    /// was clamped.
+    /// Writes a generic value as the attribute into `out` and returns the bytes that count and whether the
+    /// value was clamped.
     ///
     /// # Errors
     /// The attribute is no number, or neither a parameter nor a signal stands behind it.

@@ -44,8 +44,8 @@ pub enum CipScalingError {
 }
 
 impl CipScaling {
-    /// The scaling that the attributes of an axis describe; `get` returns the value of an attribute, 0 where it was
-    /// never set.
+    /// The scaling that the attributes of an axis describe; `get` returns the value of an attribute, 0
+    /// where it was never set.
     ///
     /// # Errors
     /// A code, a resolution or an unwind position cannot be used; the error names the attribute.

@@ -282,8 +282,9 @@ impl CipProgram {
         CipTrackers { position: self.tracker }
     }
 
-    /// Puts the values of a Command Data Set into a command. Values that are not there become absent. `reference` is
-    /// subtracted from positions, in counts: what the controller has moved its reference system by.
+    /// Puts the values of a Command Data Set into a command. Values that are not there become absent.
+    /// `reference` is subtracted from positions, in counts: what the controller has moved its reference
+    /// system by.
     pub fn decode(
         &self,
         values: &CyclicValues,
@@ -313,7 +314,8 @@ impl CipProgram {
         report
     }
 
-    /// Puts the actual values of an axis into the elements of an Actual Data Set whose bits are in `wanted`.
+    /// Puts the actual values of an axis into the elements of an Actual Data Set whose bits are in
+    /// `wanted`.
     pub fn encode(&self, feedback: &AxisFeedback, wanted: u8, values: &mut CyclicValues) -> CipReport {
         let mut report = CipReport::default();
         for (bit, (value, element)) in values.0.iter_mut().zip(&self.actuals).enumerate() {
@@ -456,8 +458,8 @@ impl Element {
         if fraction == 0.0 {
             return Some(counts);
         }
-        // The fraction of a count is converted by itself: less than one nanounit is lost, and nothing adds up, as
-        // the count stays an integer.
+        // The fraction of a count is converted by itself: less than one nanounit is lost, and nothing adds
+        // up, as the count stays an integer.
         let rest = self.conversion.convert_f64(fraction)?;
         let sum = counts.value.checked_add(rest.value);
         let saturated = counts.saturated || rest.saturated || sum.is_none();

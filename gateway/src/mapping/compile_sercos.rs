@@ -123,8 +123,8 @@ pub struct ParameterEntry {
 }
 
 impl ParameterEntry {
-    /// The bytes for element 7; the bytes that count, and whether the value was clamped. `None` when the parameter
-    /// cannot be written.
+    /// The bytes for element 7; the bytes that count, and whether the value was clamped. `None` when the
+    /// parameter cannot be written.
     pub fn encode(&self, generic: i64) -> Option<([u8; 8], usize, bool)> {
         let outcome = self.to_drive?.convert(generic);
         let (min, max) = self.width.range();
@@ -132,7 +132,8 @@ impl ParameterEntry {
         Some((value.to_le_bytes(), self.width.bytes(), outcome.saturated || value != outcome.value))
     }
 
-    /// The generic value of the bytes of element 7. `None` when the parameter cannot be read or has another length.
+    /// The generic value of the bytes of element 7. `None` when the parameter cannot be read or has another
+    /// length.
     pub fn decode(&self, data: &[u8]) -> Option<i64> {
         let conversion = self.from_drive?;
         if data.len() != self.width.bytes() {
@@ -175,7 +176,8 @@ pub struct SercosProgram {
 }
 
 impl Telegram {
-    /// The telegrams of an axis. Values that the drive is known to lack and that the table lets go are left out.
+    /// The telegrams of an axis. Values that the drive is known to lack and that the table lets go are left
+    /// out.
     ///
     /// # Errors
     /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
@@ -345,8 +347,9 @@ impl SercosProgram {
         Ok(program)
     }
 
-    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last; the new
-    /// one comes back. An action without bits leaves the word alone, and so does a mode without a slot.
+    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last;
+    /// the new one comes back. An action without bits leaves the word alone, and so does a mode without a
+    /// slot.
     pub fn encode(
         &self,
         command: &AxisCommand,
@@ -373,8 +376,8 @@ impl SercosProgram {
         u16::from_le_bytes([bytes[0], bytes[1]])
     }
 
-    /// Takes the drive's telegram apart into report, mode, status bits and actual values. Returns the status word, or
-    /// `None` when the telegram is too short to hold one.
+    /// Takes the drive's telegram apart into report, mode, status bits and actual values. Returns the
+    /// status word, or `None` when the telegram is too short to hold one.
     pub fn decode(
         &self,
         telegram: &[u8],
@@ -476,7 +479,8 @@ impl Compiler<'_> {
         let Some(width) = self.facts.width(rule.idn, self.dictionary) else { return Ok(None) };
         let lsb = match self.unit(rule.idn, rule.quantity) {
             Ok(lsb) => lsb,
-            // A quantity that no mode needs may well be unscaled: the parameter is served as if it were missing.
+            // A quantity that no mode needs may well be unscaled: the parameter is served as if it were
+            // missing.
             Err(SercosError::Scaling(_)) => return Ok(None),
             Err(error) => return Err(error),
         };

@@ -55,8 +55,9 @@ impl CipProgram {
         self.drive_actions.iter().find(|(known, _)| *known == action).and_then(|(_, request)| *request)
     }
 
-    /// Puts what is known of an axis into the image for the device: actual values, conditions, status, inhibits and
-    /// fault. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay as they are.
+    /// Puts what is known of an axis into the image for the device: actual values, conditions, status,
+    /// inhibits and fault. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay as
+    /// they are.
     pub fn drive_image(&self, feedback: &AxisFeedback, image: &mut DriveImage) -> CipReport {
         let mut report = CipReport::default();
         image.position = self.actual_counts(bit::POSITION, feedback, &mut report);
@@ -97,8 +98,9 @@ impl CipProgram {
 }
 
 impl AttributeTable {
-    /// The definitions for the device. What the drive of `south` holds is drive-backed; a parameter that it lacks is
-    /// stored in the device, or left out where the tables reject it. Without `south` nothing is drive-backed.
+    /// The definitions for the device. What the drive of `south` holds is drive-backed; a parameter that it
+    /// lacks is stored in the device, or left out where the tables reject it. Without `south` nothing is
+    /// drive-backed.
     ///
     /// Strings are left out: the device keeps numbers only.
     pub fn definitions(

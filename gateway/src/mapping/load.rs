@@ -186,8 +186,8 @@ impl TableTexts {
     /// The tables in `folder`; a file that is not there is taken from the binary.
     ///
     /// # Errors
-    /// The folder cannot be read, a file is too large or not UTF-8, or there is a `.toml` file that is none of the
-    /// five: a misspelt name would otherwise be ignored without a word.
+    /// The folder cannot be read, a file is too large or not UTF-8, or there is a `.toml` file that is none
+    /// of the five: a misspelt name would otherwise be ignored without a word.
     pub fn from_folder(folder: &Path) -> Result<Self, TableErrors> {
         for below in [PathBuf::new(), PathBuf::from("dictionary")] {
             refuse_strangers(folder, &below)?;

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
-//!  format                dictionary,                                  Telegram, CommissioningPlan, SercosProgram
+//!  format                dictionary,              Telegram, CommissioningPlan, SercosProgram
 //!                        cip_tables, sercos_tables
 //! ```
 //!
-//! Loading finds unknown keys and wrong types, resolving finds names that nothing has and units that do not convert;
-//! both tell file, line, column and key. Compiling makes flat programs for one axis; what can still go wrong then lies
-//! with the axis or the drive. No translation of an attribute, IDN, state, mode or fault is code.
+//! Loading finds unknown keys and wrong types, resolving finds names that nothing has and units that do not
+//! convert; both tell file, line, column and key. Compiling makes flat programs for one axis; what can
+//! still go wrong then lies with the axis or the drive. No translation of an attribute, IDN, state, mode or
+//! fault is code.
 
 mod attributes;
 mod cip_scaling;
@@ -112,7 +113,8 @@ impl Mapping {
         Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
     }
 
-    /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by then.
+    /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by
+    /// then.
     ///
     /// # Errors
     /// A mode has no row, or a value does not fit the drive.

@@ -80,8 +80,8 @@ impl DriveFacts {
         }
     }
 
-    /// How the value of an IDN lies in a telegram; the drive's word counts more than the dictionary's. `None` for
-    /// lists and when nobody knows the length.
+    /// How the value of an IDN lies in a telegram; the drive's word counts more than the dictionary's.
+    /// `None` for lists and when nobody knows the length.
     pub fn width(&self, idn: Idn, dictionary: &SercosDictionary) -> Option<Width> {
         let row = dictionary.idn(idn);
         let length = match self.attribute(idn) {

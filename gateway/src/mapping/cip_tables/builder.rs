@@ -1,0 +1,520 @@
+//! CIP Motion <-> generic: from rows to the resolved mapping.
+
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::image::StatusBits;
+use profile_generic::inhibit::Inhibits;
+use profile_generic::parameter::ParameterType;
+use profile_generic::quantity::Quantity;
+use profile_generic::state::{DriveState, Request};
+
+use super::{
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times,
+    action, has_direction, operating_mode, signal, unit_kind,
+};
+use crate::mapping::compile_cip::{
+    CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
+    MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
+};
+use crate::mapping::device_link::DRIVE_ACTIONS;
+use crate::mapping::dictionary::{CipAttribute, Dictionaries, quantity};
+use crate::mapping::format::{
+    CipAttributeRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
+};
+use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::resolver::Resolver;
+
+impl CipTables {
+    pub(in crate::mapping) fn resolve(
+        file: &Parsed<CipGenericFile>,
+        dictionaries: &Dictionaries,
+        errors: &mut TableErrors,
+    ) -> Self {
+        let mut builder =
+            Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
+        let rows = &file.rows;
+        builder.resolver.head(&rows.format, "mapping", &rows.mapping, "cip-motion to generic");
+        builder.units(rows);
+        builder.scaling(rows);
+        for row in &rows.displacement_unit {
+            builder.displacement_unit(row);
+        }
+        for row in &rows.cyclic {
+            builder.cyclic(row);
+        }
+        builder.modes(rows);
+        builder.requests(rows);
+        builder.drive_actions(rows);
+        builder.states(rows);
+        builder.status(rows);
+        for row in &rows.fault {
+            builder.fault(row);
+        }
+        builder.reactions(rows);
+        builder.inhibits(rows);
+        builder.stoppings(rows);
+        for row in &rows.attribute {
+            builder.attribute(row);
+        }
+        builder.finish(file)
+    }
+}
+
+struct Builder<'a> {
+    resolver: Resolver<'a>,
+    dictionaries: &'a Dictionaries,
+    tables: CipTables,
+}
+
+impl Builder<'_> {
+    fn units(&mut self, rows: &CipGenericFile) {
+        for row in &rows.unit {
+            let Some(quantity) = quantity(&mut self.resolver, &row.quantity) else { continue };
+            let Some(ratio) = self.resolver.ratio("generic_per_unit", &row.generic_per_unit) else {
+                continue;
+            };
+            let times = match &row.times {
+                None => Times::One,
+                Some(name) => {
+                    let words = [("motion_count", Times::MotionCount), ("motion_unit", Times::MotionUnit)];
+                    match self.resolver.word("times", name, &words) {
+                        Some(times) => times,
+                        None => continue,
+                    }
+                }
+            };
+            self.tables.units.push((row.unit.get_ref().clone(), quantity, CipUnit { ratio, times }));
+        }
+    }
+
+    fn attribute_id(&mut self, key: &str, name: &Name) -> u16 {
+        let found = self.dictionaries.cip.attribute_or_error(key, name, &mut self.resolver);
+        found.map(|attribute| attribute.id).unwrap_or_default()
+    }
+
+    fn code(&mut self, set: &str, key: &str, name: &Name) -> Option<u32> {
+        self.dictionaries.cip.code_or_error(set, key, name, &mut self.resolver)
+    }
+
+    /// A code that fits a byte.
+    fn byte_code(&mut self, set: &str, key: &str, name: &Name) -> Option<u8> {
+        let code = self.code(set, key, name)?;
+        let byte = u8::try_from(code).ok();
+        if byte.is_none() {
+            self.resolver.error(name.span(), key, format!("expected a code of one byte, got {code}"));
+        }
+        byte
+    }
+
+    fn bit(&mut self, set: &str, key: &str, name: &Name) -> Option<u8> {
+        let bit = self.dictionaries.cip.bit_or_error(set, key, name, &mut self.resolver)?;
+        u8::try_from(bit).ok()
+    }
+
+    fn scaling(&mut self, rows: &CipGenericFile) {
+        let row = &rows.scaling;
+        let configuration = self.attribute_id("configuration", &row.configuration);
+        let drive_scaling = self.code(row.configuration.get_ref(), "drive_scaling", &row.drive_scaling);
+        let inverted = self.code(row.polarity.get_ref(), "inverted", &row.inverted);
+        let mut feedback_resolution = Vec::new();
+        for name in &row.feedback_resolution {
+            feedback_resolution.push(self.attribute_id("feedback_resolution", name));
+        }
+        self.tables.scaling = ScalingAttributes {
+            configuration,
+            drive_scaling: drive_scaling.unwrap_or_default(),
+            unit: self.attribute_id("unit", &row.unit),
+            resolution: vec![self.attribute_id("resolution", &row.resolution)],
+            polarity: self.attribute_id("polarity", &row.polarity),
+            inverted: inverted.unwrap_or_default(),
+            unwind: self.attribute_id("unwind", &row.unwind),
+            unwind_position: self.attribute_id("unwind_position", &row.unwind_position),
+            feedback_unit: self.attribute_id("feedback_unit", &row.feedback_unit),
+            feedback_resolution,
+        };
+    }
+
+    fn displacement_unit(&mut self, row: &DisplacementUnitRow) {
+        let set = row.enumeration.get_ref().as_str();
+        let is_motion = match set {
+            "Motion Unit" => true,
+            "Feedback Unit" => false,
+            other => {
+                let message = format!("expected `Motion Unit` or `Feedback Unit`, got `{other}`");
+                return self.resolver.error(row.enumeration.span(), "enumeration", message);
+            }
+        };
+        let code = self.code(set, "code", &row.code);
+        let kind = unit_kind(&mut self.resolver, &row.kind);
+        let nanounits = *row.nanounits.get_ref();
+        if nanounits <= 0 {
+            self.resolver.error(row.nanounits.span(), "nanounits", "expected a number above 0");
+        }
+        let (Some(code), Some(kind)) = (code, kind) else { return };
+        let unit = DisplacementUnit { name: row.code.get_ref().clone(), code, kind, nanounits };
+        let units = if is_motion { &mut self.tables.motion_units } else { &mut self.tables.feedback_units };
+        units.push(unit);
+    }
+
+    fn cyclic(&mut self, row: &CyclicRow) {
+        let names = self.dictionaries.cip.data_set_names();
+        let elements = self.resolver.name(
+            "set",
+            &row.set,
+            "a data set of the cyclic data block",
+            |text| self.dictionaries.cip.data_set(text),
+            names,
+        );
+        let Some(elements) = elements else { return };
+        let element = self.resolver.name(
+            "element",
+            &row.element,
+            &format!("an element of {}", row.set.get_ref()),
+            |text| elements.iter().find(|element| element.name == text),
+            elements.iter().map(|element| element.name.as_str()),
+        );
+        let signal = signal(&mut self.resolver, "signal", &row.signal);
+        let to_generic =
+            self.resolver.word("direction", &row.direction, &[("to_generic", true), ("from_generic", false)]);
+        let missing = [("absent", MissingValue::Absent), ("zero", MissingValue::Zero)];
+        let missing = self.resolver.word("missing", &row.missing, &missing);
+        let (Some(element), Some(signal), Some(to_generic), Some(missing)) =
+            (element, signal, to_generic, missing)
+        else {
+            return;
+        };
+        if signal.is_command() != to_generic {
+            let message = format!("{signal} cannot go {}", row.direction.get_ref());
+            return self.resolver.error(row.direction.span(), "direction", message);
+        }
+        let carried = element.attributes.first().and_then(|id| self.dictionaries.cip.attribute_by_id(*id));
+        let Some(attribute) = carried else {
+            let message = format!("element {} carries no attribute", element.name);
+            return self.resolver.error(row.element.span(), "element", message);
+        };
+        let Some(unit) = self.tables.unit(&attribute.unit, signal.quantity()) else {
+            let message = no_unit(attribute, signal.quantity());
+            return self.resolver.error(row.element.span(), "element", message);
+        };
+        self.tables.cyclic.push(CyclicElement {
+            bit: element.bit,
+            signal,
+            to_generic,
+            unit,
+            turns: has_direction(signal.quantity()),
+            wraps: row.wraps,
+            data_type: attribute.data_type,
+            missing,
+        });
+    }
+
+    fn modes(&mut self, rows: &CipGenericFile) {
+        for row in &rows.mode {
+            let code = self.byte_code("Control Mode", "control_mode", &row.control_mode);
+            let mode = operating_mode(&mut self.resolver, &row.mode);
+            if let (Some(code), Some(mode)) = (code, mode)
+                && let Some(slot) = self.tables.modes.get_mut(usize::from(code))
+            {
+                *slot = Some(mode);
+            }
+        }
+    }
+
+    fn requests(&mut self, rows: &CipGenericFile) {
+        for row in &rows.request {
+            let axis_control = self.byte_code("Axis Control", "axis_control", &row.axis_control);
+            let axis_response = self.byte_code("Axis Response", "axis_response", &row.axis_response);
+            let request = match &row.request {
+                None => None,
+                Some(name) => match self.request(name) {
+                    Some(request) => Some(request),
+                    None => continue,
+                },
+            };
+            if let (Some(axis_control), Some(axis_response)) = (axis_control, axis_response) {
+                self.tables.requests.push(CipRequest { axis_control, request, axis_response });
+            }
+        }
+    }
+
+    fn states(&mut self, rows: &CipGenericFile) {
+        let mut seen = [false; DriveState::ALL.len()];
+        for row in &rows.state {
+            let known = DriveState::ALL.iter().map(|state| state.name());
+            let find = |text: &str| DriveState::ALL.iter().position(|state| state.name() == text);
+            let at = self.resolver.name("state", &row.state, "a drive state", find, known);
+            let axis_state = self.byte_code("Axis State", "axis_state", &row.axis_state);
+            let mut conditions = CipConditions::empty();
+            for name in &row.conditions {
+                if let Some(condition) = self.resolver.word("conditions", name, CipConditions::NAMED) {
+                    conditions |= condition;
+                }
+            }
+            if let (Some(at), Some(axis_state)) = (at, axis_state) {
+                if seen[at] {
+                    self.resolver.error(row.state.span(), "state", "the state is there twice");
+                }
+                seen[at] = true;
+                self.tables.states[at] = CipState { axis_state, conditions };
+            }
+        }
+        for (state, _) in DriveState::ALL.iter().zip(seen).filter(|(_, seen)| !seen) {
+            let span = rows.mapping.span();
+            self.resolver.error(span, "state", format!("expected a row for state {state}, got none"));
+        }
+    }
+
+    fn status(&mut self, rows: &CipGenericFile) {
+        for row in &rows.status {
+            let mut status = StatusBits::empty();
+            for name in &row.status {
+                let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
+                match self.resolver.name("status", name, "a status bit", StatusBits::parse, known) {
+                    Some(bit) => status |= bit,
+                    None => return,
+                }
+            }
+            let mode = match &row.mode {
+                None => None,
+                Some(name) => match operating_mode(&mut self.resolver, name) {
+                    Some(mode) => Some(mode),
+                    None => continue,
+                },
+            };
+            if let Some(bit) = self.bit("Axis Status", "axis_status", &row.axis_status) {
+                self.tables.status.push(StatusRule { status, mode, axis_status: 1 << bit });
+            }
+        }
+    }
+
+    fn fault(&mut self, row: &CipFaultRow) {
+        let known = FaultCause::NAMED.iter().map(|(_, name)| *name);
+        let what = "a cause of the fault catalogue";
+        let cause = self.resolver.name("cause", &row.cause, what, FaultCause::from_name, known);
+        let mut faults = Vec::new();
+        let mut given = 0;
+        if let Some(name) = &row.exception {
+            given += 1;
+            let bit = self.bit("Axis Exceptions", "exception", name);
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "Axis Fault", Some("Axis Alarm"), code)));
+        }
+        if let Some(bit) = &row.manufacturer {
+            given += 1;
+            let number = u8::try_from(*bit.get_ref()).ok().filter(|number| (1..=63).contains(number));
+            if number.is_none() {
+                let message = format!("expected a bit from 1 to 63, got {}", bit.get_ref());
+                self.resolver.error(bit.span(), "manufacturer", message);
+            }
+            let fault = number
+                .and_then(|code| self.axis_fault(row, "Axis Fault - Mfg", Some("Axis Alarm - Mfg"), code));
+            faults.extend(fault);
+        }
+        if let Some(name) = &row.node_fault {
+            given += 1;
+            faults.extend(self.byte_code("Node Fault Code", "node_fault", name).map(CipFault::Node));
+        }
+        if let Some(name) = &row.initialization {
+            given += 1;
+            let bit = self.bit("Initialization Faults", "initialization", name);
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "Initialization Fault", None, code)));
+        }
+        if let Some(name) = &row.apr {
+            given += 1;
+            let bit = self.bit("APR Faults", "apr", name);
+            faults.extend(bit.and_then(|code| self.axis_fault(row, "APR Fault", None, code)));
+        }
+        if given != 1 {
+            let message = format!(
+                "expected one of exception, manufacturer, node_fault, initialization and apr, got {given}"
+            );
+            return self.resolver.error(row.cause.span(), "cause", message);
+        }
+        if let (Some(cause), [fault]) = (cause, faults.as_slice()) {
+            if self.tables.faults.iter().any(|(known, _)| *known == cause) {
+                self.resolver.error(row.cause.span(), "cause", "the cause is there twice");
+            }
+            self.tables.faults.push((cause, *fault));
+        }
+    }
+
+    /// A fault of the axis whose types have these names in the dictionary.
+    fn axis_fault(
+        &mut self,
+        row: &CipFaultRow,
+        fault: &str,
+        alarm: Option<&str>,
+        code: u8,
+    ) -> Option<CipFault> {
+        let cip = &self.dictionaries.cip;
+        let find = |set: &str, name: &str| {
+            let codes = &cip.enumeration(set)?.codes;
+            codes.iter().find(|(_, known)| known == name).and_then(|(code, _)| u8::try_from(*code).ok())
+        };
+        let Some(fault_type) = find("Axis Fault Type", fault) else {
+            let message = format!("the dictionary has no Axis Fault Type `{fault}`");
+            self.resolver.error(row.cause.span(), "cause", message);
+            return None;
+        };
+        let alarm_type = alarm.and_then(|name| find("Axis Alarm Type", name));
+        Some(CipFault::Axis { fault_type, alarm_type, code })
+    }
+
+    fn drive_actions(&mut self, rows: &CipGenericFile) {
+        self.tables.drive_actions = DRIVE_ACTIONS.map(|(_, action)| (action, None));
+        for row in &rows.drive_action {
+            let Some(action) = self.resolver.word("drive_action", &row.drive_action, &DRIVE_ACTIONS) else {
+                continue;
+            };
+            let request = match &row.request {
+                None => None,
+                Some(name) => match self.request(name) {
+                    Some(request) => Some(request),
+                    None => continue,
+                },
+            };
+            for (_, slot) in self.tables.drive_actions.iter_mut().filter(|(known, _)| *known == action) {
+                *slot = request;
+            }
+        }
+    }
+
+    fn request(&mut self, name: &Name) -> Option<Request> {
+        let known = Request::ALL.iter().map(|request| request.name());
+        self.resolver.name("request", name, "a request of the generic model", Request::parse, known)
+    }
+
+    fn reactions(&mut self, rows: &CipGenericFile) {
+        for row in &rows.reaction {
+            let known = Reaction::ALL.iter().map(|reaction| reaction.name());
+            let find = |text: &str| Reaction::ALL.iter().position(|reaction| reaction.name() == text);
+            let at = self.resolver.name("reaction", &row.reaction, "a reaction", find, known);
+            let stop = self.code("Axis Fault Action - Stop", "stop", &row.stop);
+            let change = self.code("Axis Fault Action - State Change", "state_change", &row.state_change);
+            if let (Some(at), Some(stop), Some(change)) = (at, stop, change) {
+                // Two nibbles (attribute 668).
+                self.tables.reactions[at] = u8::try_from(change << 4 | stop).unwrap_or(0);
+            }
+        }
+    }
+
+    fn inhibits(&mut self, rows: &CipGenericFile) {
+        for row in &rows.inhibit {
+            let known = Inhibits::NAMED.iter().map(|(_, name)| *name);
+            let inhibit = self.resolver.name("inhibit", &row.inhibit, "an inhibit", Inhibits::parse, known);
+            let standard = match &row.start_inhibit {
+                None => 0,
+                Some(name) => match self.bit("Start Inhibits", "start_inhibit", name) {
+                    Some(bit) => 1 << bit,
+                    None => continue,
+                },
+            };
+            let manufacturer = match &row.manufacturer {
+                None => 0,
+                Some(bit) if (1..=15).contains(bit.get_ref()) => 1 << *bit.get_ref(),
+                Some(bit) => {
+                    let message = format!("expected a bit from 1 to 15, got {}", bit.get_ref());
+                    self.resolver.error(bit.span(), "manufacturer", message);
+                    continue;
+                }
+            };
+            if let Some(inhibit) = inhibit {
+                self.tables.inhibits.push(InhibitRule { inhibit, standard, manufacturer });
+            }
+        }
+    }
+
+    fn stoppings(&mut self, rows: &CipGenericFile) {
+        for row in &rows.stopping {
+            let code = self.byte_code("Stopping Action", "stopping_action", &row.stopping_action);
+            let action = action(&mut self.resolver, &row.action);
+            if let (Some(code), Some(action)) = (code, action) {
+                self.tables.stoppings.push(CipStopping { code, action, holds: row.holds });
+            }
+        }
+    }
+
+    fn attribute(&mut self, row: &CipAttributeRow) {
+        let dictionaries = self.dictionaries;
+        let found = dictionaries.cip.attribute_or_error("attribute", &row.attribute, &mut self.resolver);
+        let Some(attribute) = found else { return };
+        let served = match (&row.parameter, &row.signal, &row.served_by) {
+            (Some(name), None, None) => self.parameter(row, attribute, name),
+            (None, Some(name), None) => self.signal_attribute(attribute, name),
+            (None, None, Some(name)) => {
+                let value = row.value.unwrap_or(attribute.default);
+                let words = [
+                    ("device", Served::Device),
+                    ("connection", Served::Connection),
+                    ("shadow", Served::Shadow),
+                    ("constant", Served::Constant(value)),
+                ];
+                self.resolver.word("served_by", name, &words)
+            }
+            _ => {
+                let message = "expected one of parameter, signal and served_by";
+                self.resolver.error(row.attribute.span(), "attribute", message);
+                None
+            }
+        };
+        let Some(served) = served else { return };
+        if self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id) {
+            self.resolver.error(row.attribute.span(), "attribute", "the attribute is there twice");
+        }
+        self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served });
+    }
+
+    fn parameter(&mut self, row: &CipAttributeRow, attribute: &CipAttribute, name: &Name) -> Option<Served> {
+        let generic = &self.dictionaries.generic;
+        let what = "a parameter of the generic model";
+        let parameter =
+            self.resolver.name("parameter", name, what, |text| generic.parameter(text), generic.names())?;
+        if parameter.kind != ParameterType::Integer {
+            let message = format!("expected a whole number, {} is a {}", name.get_ref(), parameter.kind);
+            self.resolver.error(name.span(), "parameter", message);
+            return None;
+        }
+        let Some(missing) = &row.missing else {
+            self.resolver.error(name.span(), "missing", "expected `shadow` or `reject`, got nothing");
+            return None;
+        };
+        let reject = self.resolver.word("missing", missing, &[("shadow", false), ("reject", true)])?;
+        let Some(unit) = self.tables.unit(&attribute.unit, parameter.quantity) else {
+            self.resolver.error(name.span(), "parameter", no_unit(attribute, parameter.quantity));
+            return None;
+        };
+        Some(Served::Parameter { parameter: parameter.parameter, unit, reject })
+    }
+
+    fn signal_attribute(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {
+        let signal = signal(&mut self.resolver, "signal", name)?;
+        let Some(unit) = self.tables.unit(&attribute.unit, signal.quantity()) else {
+            self.resolver.error(name.span(), "signal", no_unit(attribute, signal.quantity()));
+            return None;
+        };
+        Some(Served::Signal { signal, unit })
+    }
+
+    fn finish(mut self, file: &Parsed<CipGenericFile>) -> CipTables {
+        let tables = &mut self.tables;
+        tables.attributes.sort_by_key(|row| row.attribute.id);
+        tables.faults.sort_by_key(|(cause, _)| *cause);
+        let limits = [
+            ("request", tables.requests.len(), MAX_REQUESTS),
+            ("status", tables.status.len(), MAX_STATUS_RULES),
+            ("fault", tables.faults.len(), MAX_FAULTS),
+            ("inhibit", tables.inhibits.len(), MAX_INHIBITS),
+            ("stopping", tables.stoppings.len(), MAX_STOPPINGS),
+        ];
+        for (key, rows, limit) in limits {
+            if rows > limit {
+                let message = format!("expected at most {limit} rows, got {rows}");
+                self.resolver.error(file.rows.mapping.span(), key, message);
+            }
+        }
+        self.tables
+    }
+}
+
+fn no_unit(attribute: &CipAttribute, quantity: Quantity) -> String {
+    let unit = if attribute.unit.is_empty() { "no unit" } else { attribute.unit.as_str() };
+    format!("{} is in {unit}, and no [[unit]] row turns that into {quantity}", attribute.name)
+}

@@ -1,0 +1,315 @@
+//! Rows of the mapping between the generic model and SERCOS.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Name, RatioRow, Source, UnitRow};
+
+/// `mappings/generic-sercos.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GenericSercosFile {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `generic to sercos`.
+    pub mapping: Name,
+    /// Fixed units of IDNs.
+    pub unit: Vec<UnitRow>,
+    /// Units that the drive's scaling parameters define.
+    pub scaling: Vec<SercosScalingRow>,
+    /// The control and the status word.
+    pub words: WordsRow,
+    /// Signals.
+    pub signal: Vec<SercosSignalRow>,
+    /// Operating modes.
+    pub mode: Vec<SercosModeRow>,
+    /// Places where the drive keeps its operation modes.
+    pub mode_slot: Vec<ModeSlotRow>,
+    /// Control word of each action.
+    pub action: Vec<ActionRow>,
+    /// What a status word says.
+    pub report: Vec<ReportRow>,
+    /// Status bits in the status word.
+    pub status: Vec<SercosStatusRow>,
+    /// Faults and warnings in the diagnostic words.
+    pub fault: Vec<SercosFaultRow>,
+    /// Parameters.
+    pub parameter: Vec<SercosParameterRow>,
+    /// What is written and read at start.
+    pub commission: Vec<CommissionRow>,
+}
+
+/// The words that every telegram begins with.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WordsRow {
+    /// Control word.
+    pub control: Name,
+    /// Status word.
+    pub status: Name,
+    /// Field of the control word that selects the operation mode.
+    pub mode_control: Name,
+    /// Field of the status word that reports the operation mode.
+    pub mode_status: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A field that has a value.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FieldValueRow {
+    /// Name of the field.
+    pub field: Name,
+    /// Its value.
+    pub is: Spanned<u32>,
+}
+
+/// How the unit of a quantity follows from the drive's scaling parameters.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosScalingRow {
+    /// The `scaling` of the dictionary rows it applies to.
+    pub scaling: Name,
+    /// IDN with the scaling type.
+    pub word: Name,
+    /// Where the scaling type says that the values refer to the load, and what lies between motor and load.
+    pub load: Option<LoadRow>,
+    /// Bits of the scaling type that say that positions wrap, and the IDN with the range.
+    pub modulo: Option<ModuloRow>,
+    /// What the scaling types mean; the first that matches wins.
+    pub methods: Vec<ScalingMethodRow>,
+    /// Where it comes from.
+    pub source: Source,
+    /// Worked examples.
+    #[serde(default)]
+    pub examples: Vec<ScalingExampleRow>,
+}
+
+/// Values that refer to the load.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadRow {
+    /// Mask and value in the scaling type.
+    pub pattern: [u32; 2],
+    /// IDNs with the turns of the motor and the turns of the load that belong to them.
+    pub gear: [Name; 2],
+}
+
+/// Modulo processing.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModuloRow {
+    /// Mask and value in the scaling type.
+    pub pattern: [u32; 2],
+    /// IDN with the range, in the unit of the scaling.
+    pub range: Name,
+}
+
+/// One scaling type.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScalingMethodRow {
+    /// Mask and value in the scaling type.
+    pub pattern: [u32; 2],
+    /// What it is called.
+    pub name: String,
+    /// `rotary`, `linear`, or absent when either will do.
+    pub kind: Option<Name>,
+    /// Generic quantity of the base unit.
+    pub quantity: Name,
+    /// Generic units in one base unit.
+    pub base: RatioRow,
+    /// Power of ten: LSB = base * factor * 10^exponent / divisor.
+    pub exponent: Option<i32>,
+    /// IDN with the exponent.
+    pub exponent_idn: Option<Name>,
+    /// IDN with the factor.
+    pub factor_idn: Option<Name>,
+    /// Divisor.
+    pub divisor: Option<i64>,
+    /// IDN with the divisor.
+    pub divisor_idn: Option<Name>,
+}
+
+/// A worked example of a scaling.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScalingExampleRow {
+    /// `rotary` or `linear`.
+    pub kind: Name,
+    /// What the drive holds: IDN and value.
+    pub drive: Vec<(String, i64)>,
+    /// Rated torque in micro newton metre, where it matters.
+    pub rated: Option<i64>,
+    /// IDN whose value is converted.
+    pub idn: Name,
+    /// The generic value.
+    pub generic: Spanned<i64>,
+    /// The bytes in the telegram.
+    pub bytes: Name,
+    /// The generic value on the way back.
+    pub back: Spanned<i64>,
+}
+
+/// A signal and its IDN.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosSignalRow {
+    /// Signal of the generic model.
+    pub signal: Name,
+    /// IDN.
+    pub idn: Name,
+    /// `to_drive` or `from_drive`.
+    pub direction: Name,
+    /// What happens when the drive has no such IDN: `refuse` or `omit`.
+    pub missing: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// An operating mode on SERCOS.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosModeRow {
+    /// Operating mode.
+    pub mode: Name,
+    /// Feedback that closes the position loop: `motor` or `load`.
+    pub feedback: Option<Name>,
+    /// Operation mode codes, the preferred one first.
+    pub codes: Vec<Name>,
+    /// Signals in the master's telegram.
+    pub command: Vec<Name>,
+    /// Signals in the drive's telegram.
+    pub actual: Vec<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A place where the drive keeps an operation mode.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeSlotRow {
+    /// Value of the mode fields of control and status word.
+    pub slot: Spanned<u32>,
+    /// IDN that holds the code.
+    pub idn: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What the control word becomes by an action.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActionRow {
+    /// Generic action.
+    pub action: Name,
+    /// Fields of the control word; none when the action leaves it alone.
+    pub pattern: Vec<FieldValueRow>,
+    /// Procedure command that belongs to the action.
+    pub command: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What a status word says.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReportRow {
+    /// Fields of the status word.
+    pub pattern: Vec<FieldValueRow>,
+    /// Report.
+    pub report: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A status bit in a word.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosStatusRow {
+    /// Word.
+    pub word: Name,
+    /// Fields of the word.
+    pub pattern: Vec<FieldValueRow>,
+    /// Generic status bit.
+    pub status: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A fault or warning in a diagnostic word.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosFaultRow {
+    /// Word.
+    pub word: Name,
+    /// Fields of the word.
+    pub pattern: Vec<FieldValueRow>,
+    /// Generic cause.
+    pub cause: Name,
+    /// Reaction, where it is not the usual one of the cause.
+    pub reaction: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A parameter and its IDN.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosParameterRow {
+    /// Generic parameter.
+    pub parameter: Name,
+    /// IDN.
+    pub idn: Name,
+    /// `both`, `to_drive` or `from_drive`.
+    pub direction: Name,
+    /// What happens when the drive has no such IDN: `shadow` or `reject`.
+    pub missing: Name,
+    /// Factor between parameter and IDN, for signs (`[-1, 1]`) and reciprocals of units.
+    pub factor: Option<RatioRow>,
+    /// Where it comes from.
+    pub source: Source,
+    /// Worked examples.
+    #[serde(default)]
+    pub examples: Vec<ScalingExampleRow>,
+}
+
+/// One step of commissioning.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommissionRow {
+    /// Communication phase, 2 to 4.
+    pub phase: Spanned<u8>,
+    /// `write`, `read`, `command`, `read_scaling`, `read_telegram` or `write_modes`.
+    #[serde(rename = "do")]
+    pub step: Name,
+    /// IDN; none for the steps that know theirs.
+    pub idn: Option<Name>,
+    /// Elements to read: `attribute` and `data`.
+    pub elements: Option<Vec<Name>>,
+    /// Value to write.
+    pub value: Option<Spanned<i64>>,
+    /// Parameter of the axis configuration to write, if it is given there.
+    pub parameter: Option<Name>,
+    /// When the step applies.
+    pub when: Option<WhenRow>,
+    /// What happens when the drive refuses: `fail` or `continue`.
+    pub refused: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// When a step of commissioning applies: all that is given must hold.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WhenRow {
+    /// `rotary` or `linear`.
+    pub kind: Option<Name>,
+    /// Whether positions wrap.
+    pub modulo: Option<bool>,
+    /// Whether the gateway sets the drive's scaling.
+    pub set_scaling: Option<bool>,
+    /// An operating mode that must be configured.
+    pub mode: Option<Name>,
+}

@@ -1,0 +1,457 @@
+//! Generic <-> SERCOS: from rows to the resolved mapping.
+
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::image::{Signal, StatusBits};
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
+use profile_generic::quantity::Quantity;
+use profile_generic::ratio::Ratio;
+use profile_generic::state::{Action, Report};
+
+use super::{FaultRule, ModeRule, ParameterRule, SercosTables, SignalRule, SlotRule, StepKind, StepRule};
+use crate::mapping::cip_tables::{action, operating_mode, signal, unit_kind};
+use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
+use crate::mapping::format::{
+    CommissionRow, FieldValueRow, GenericSercosFile, Name, ScalingMethodRow, SercosFaultRow, SercosModeRow,
+    SercosParameterRow, SercosScalingRow, SercosSignalRow,
+};
+use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::resolver::Resolver;
+use crate::mapping::scaling::{Method, ScalingRule, Term};
+
+impl SercosTables {
+    pub(in crate::mapping) fn resolve(
+        file: &Parsed<GenericSercosFile>,
+        dictionaries: &Dictionaries,
+        errors: &mut TableErrors,
+    ) -> Self {
+        let rows = &file.rows;
+        let mut builder =
+            Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
+        builder.resolver.head(&rows.format, "mapping", &rows.mapping, "generic to sercos");
+        builder.units(rows);
+        for row in &rows.scaling {
+            builder.scaling(row);
+        }
+        for row in &rows.signal {
+            builder.signal(row);
+        }
+        for row in &rows.mode {
+            builder.mode(row);
+        }
+        builder.words(rows);
+        for row in &rows.fault {
+            builder.fault(row);
+        }
+        for row in &rows.parameter {
+            builder.parameter(row);
+        }
+        for row in &rows.commission {
+            builder.step(row);
+        }
+        builder.tables
+    }
+}
+
+struct Builder<'a> {
+    resolver: Resolver<'a>,
+    dictionaries: &'a Dictionaries,
+    tables: SercosTables,
+}
+
+impl<'a> Builder<'a> {
+    fn idn(&mut self, key: &str, name: &Name) -> Option<&'a SercosIdn> {
+        self.dictionaries.sercos.idn_or_error(key, name, &mut self.resolver)
+    }
+
+    fn word(&mut self, key: &str, name: &Name) -> Option<&'a Word> {
+        let sercos = &self.dictionaries.sercos;
+        let known = sercos.words().iter().map(|word| word.name.as_str());
+        self.resolver.name(key, name, "a word of the dictionary", |text| sercos.word(text), known)
+    }
+
+    fn pattern(&mut self, word: &Word, rows: &[FieldValueRow]) -> Option<BitPattern> {
+        self.resolver.pattern(rows, |text| word.field(text), word.field_names())
+    }
+
+    fn units(&mut self, rows: &GenericSercosFile) {
+        for row in &rows.unit {
+            if let Some(times) = &row.times {
+                self.resolver.error(times.span(), "times", "expected no `times` for a fixed unit");
+            }
+            let quantity = quantity(&mut self.resolver, &row.quantity);
+            let ratio = self.resolver.ratio("generic_per_unit", &row.generic_per_unit);
+            if let (Some(quantity), Some(ratio)) = (quantity, ratio) {
+                self.tables.units.push((row.unit.get_ref().clone(), quantity, ratio));
+            }
+        }
+    }
+
+    fn scaling(&mut self, row: &SercosScalingRow) {
+        let word = self.idn("word", &row.word);
+        let load = match &row.load {
+            None => None,
+            Some(load) => {
+                let [mask, value] = load.pattern;
+                let [motor, turns] = &load.gear;
+                let gear = (self.idn("gear", motor), self.idn("gear", turns));
+                let (Some(motor), Some(turns)) = gear else { return };
+                Some((BitPattern::new(mask, value), [motor.idn, turns.idn]))
+            }
+        };
+        let modulo = match &row.modulo {
+            None => None,
+            Some(modulo) => {
+                let [mask, value] = modulo.pattern;
+                let Some(range) = self.idn("range", &modulo.range) else { return };
+                Some((BitPattern::new(mask, value), range.idn))
+            }
+        };
+        let methods: Vec<Method> = row.methods.iter().filter_map(|method| self.method(method)).collect();
+        if let Some(word) = word {
+            let scaling = row.scaling.get_ref().clone();
+            self.tables.scalings.push(ScalingRule { scaling, word: word.idn, load, modulo, methods });
+        }
+    }
+
+    fn method(&mut self, row: &ScalingMethodRow) -> Option<Method> {
+        let kind = match &row.kind {
+            Some(name) => Some(unit_kind(&mut self.resolver, name)?),
+            None => None,
+        };
+        let quantity = quantity(&mut self.resolver, &row.quantity)?;
+        let base = self.resolver.ratio("base", &row.base)?;
+        let factor = self.term("factor_idn", None, row.factor_idn.as_ref(), 1)?;
+        let exponent = row.exponent.map(i64::from);
+        let exponent = self.term("exponent_idn", exponent, row.exponent_idn.as_ref(), 0)?;
+        let divisor = self.term("divisor_idn", row.divisor, row.divisor_idn.as_ref(), 1)?;
+        let [mask, value] = row.pattern;
+        Some(Method {
+            pattern: BitPattern::new(mask, value),
+            kind,
+            quantity,
+            base,
+            factor,
+            exponent,
+            divisor,
+        })
+    }
+
+    fn term(&mut self, key: &str, fixed: Option<i64>, idn: Option<&Name>, otherwise: i64) -> Option<Term> {
+        match (fixed, idn) {
+            (None, None) => Some(Term::Fixed(otherwise)),
+            (Some(value), None) => Some(Term::Fixed(value)),
+            (None, Some(name)) => self.idn(key, name).map(|row| Term::Drive(row.idn)),
+            (Some(_), Some(name)) => {
+                self.resolver.error(name.span(), key, "expected a number or an IDN, got both");
+                None
+            }
+        }
+    }
+
+    fn signal(&mut self, row: &SercosSignalRow) {
+        let signal = signal(&mut self.resolver, "signal", &row.signal);
+        let idn = self.idn("idn", &row.idn);
+        let to_drive =
+            self.resolver.word("direction", &row.direction, &[("to_drive", true), ("from_drive", false)]);
+        let refuse = self.resolver.word("missing", &row.missing, &[("refuse", true), ("omit", false)]);
+        let (Some(signal), Some(idn), Some(to_drive), Some(refuse)) = (signal, idn, to_drive, refuse) else {
+            return;
+        };
+        if signal.is_command() != to_drive {
+            let message = format!("{signal} cannot go {}", row.direction.get_ref());
+            return self.resolver.error(row.direction.span(), "direction", message);
+        }
+        if idn.length.is_none() || idn.list {
+            let message = format!("expected an IDN of known length, {} has none in the dictionary", idn.idn);
+            return self.resolver.error(row.idn.span(), "idn", message);
+        }
+        if !self.measures(idn, signal.quantity()) {
+            let message = format!("the unit of {} is no {}", idn.idn, signal.quantity());
+            return self.resolver.error(row.idn.span(), "idn", message);
+        }
+        if self.tables.signal(signal).is_some() {
+            self.resolver.error(row.signal.span(), "signal", "the signal is there twice");
+        }
+        self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse });
+    }
+
+    /// Whether the unit of an IDN can become the quantity.
+    fn measures(&self, idn: &SercosIdn, quantity: Quantity) -> bool {
+        match &idn.unit {
+            IdnUnit::None => quantity == Quantity::None,
+            IdnUnit::Fixed { unit, .. } => {
+                self.tables.units.iter().any(|(known, of, _)| known == unit && *of == quantity)
+            }
+            IdnUnit::Scaled(scaling) => self.tables.scalings.iter().any(|rule| {
+                let converts =
+                    |of| of == quantity || of == Quantity::TorqueAbsolute && quantity == Quantity::Torque;
+                rule.scaling == *scaling && rule.methods.iter().any(|method| converts(method.quantity))
+            }),
+        }
+    }
+
+    fn mode(&mut self, row: &SercosModeRow) {
+        let mode = operating_mode(&mut self.resolver, &row.mode);
+        let mut codes = Vec::with_capacity(row.codes.len());
+        for name in &row.codes {
+            let code =
+                self.dictionaries.sercos.code_or_error("Operation mode", "codes", name, &mut self.resolver);
+            codes.extend(code.and_then(|code| u16::try_from(code).ok()));
+        }
+        if codes.is_empty() {
+            self.resolver.error(row.mode.span(), "codes", "expected at least one operation mode");
+        }
+        let command = self.mapped_signals("command", &row.command);
+        let actual = self.mapped_signals("actual", &row.actual);
+        if let Some(mode) = mode {
+            if self.tables.modes.iter().any(|known| known.mode == mode) {
+                self.resolver.error(row.mode.span(), "mode", "the mode is there twice");
+            }
+            self.tables.modes.push(ModeRule { mode, codes, command, actual });
+        }
+    }
+
+    fn mapped_signals(&mut self, key: &str, names: &[Name]) -> Vec<Signal> {
+        let mut signals = Vec::with_capacity(names.len());
+        for name in names {
+            let Some(signal) = signal(&mut self.resolver, key, name) else { continue };
+            if self.tables.signal(signal).is_none() {
+                self.resolver.error(name.span(), key, format!("no [[signal]] row for {signal}"));
+            }
+            if signal.is_command() != (key == "command") {
+                self.resolver.error(name.span(), key, format!("{signal} belongs to the other telegram"));
+            }
+            signals.push(signal);
+        }
+        signals
+    }
+
+    fn words(&mut self, rows: &GenericSercosFile) {
+        let control = self.idn("control", &rows.words.control).map(|row| row.idn);
+        let status = self.idn("status", &rows.words.status).map(|row| row.idn);
+        let (Some(control), Some(status)) = (control, status) else { return };
+        self.tables.control = control;
+        self.tables.status_word = status;
+        let sercos = &self.dictionaries.sercos;
+        let (Some(control), Some(status)) = (sercos.word_of(control), sercos.word_of(status)) else {
+            let message = "expected IDNs whose words the dictionary describes";
+            return self.resolver.error(rows.words.control.span(), "control", message);
+        };
+        for row in &rows.mode_slot {
+            let value = |field: &Name| [FieldValueRow { field: field.clone(), is: row.slot.clone() }];
+            let control = self.pattern(control, &value(&rows.words.mode_control));
+            let status = self.pattern(status, &value(&rows.words.mode_status));
+            let idn = self.idn("idn", &row.idn);
+            if let (Some(control), Some(status), Some(idn)) = (control, status, idn) {
+                self.tables.slots.push(SlotRule { control, status, idn: idn.idn });
+            }
+        }
+        for row in &rows.action {
+            let action = action(&mut self.resolver, &row.action);
+            let pattern = self.pattern(control, &row.pattern);
+            let command = match &row.command {
+                None => None,
+                Some(name) => match self.idn("command", name) {
+                    Some(idn) if idn.command => Some(idn.idn),
+                    Some(idn) => {
+                        let message = format!("expected a procedure command, {} is none", idn.idn);
+                        self.resolver.error(name.span(), "command", message);
+                        None
+                    }
+                    None => None,
+                },
+            };
+            if let (Some(action), Some(pattern)) = (action, pattern) {
+                self.tables.actions.push((action, pattern));
+                self.tables.commands.extend(command.map(|idn| (action, idn)));
+            }
+        }
+        for action in Action::ALL {
+            if !self.tables.actions.iter().any(|(known, _)| known == action) {
+                let message = format!("expected a row for action {action}, got none");
+                self.resolver.error(rows.mapping.span(), "action", message);
+            }
+        }
+        for row in &rows.report {
+            let known = Report::ALL.iter().map(|report| report.name());
+            let report =
+                self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
+            if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
+                self.tables.reports.push((pattern, report));
+            }
+        }
+        if self.tables.reports.len() > MAX_STATE_ROWS {
+            let message =
+                format!("expected at most {MAX_STATE_ROWS} rows, got {}", self.tables.reports.len());
+            self.resolver.error(rows.mapping.span(), "report", message);
+        }
+        for row in &rows.status {
+            let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
+            let bit = self.resolver.name("status", &row.status, "a status bit", StatusBits::parse, known);
+            let Some(word) = self.word("word", &row.word) else { continue };
+            if word.idn != self.tables.status_word {
+                let message = format!("expected the status word of the telegram, got {}", word.idn);
+                self.resolver.error(row.word.span(), "word", message);
+            }
+            if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
+                self.tables.status.push((pattern, bit));
+            }
+        }
+    }
+
+    fn fault(&mut self, row: &SercosFaultRow) {
+        let known = FaultCause::NAMED.iter().map(|(_, name)| *name);
+        let what = "a cause of the fault catalogue";
+        let cause = self.resolver.name("cause", &row.cause, what, FaultCause::from_name, known);
+        let reaction = match &row.reaction {
+            None => cause.map(FaultCause::default_reaction),
+            Some(name) => {
+                let known = Reaction::ALL.iter().map(|reaction| reaction.name());
+                self.resolver.name("reaction", name, "a reaction", Reaction::parse, known)
+            }
+        };
+        let Some(word) = self.word("word", &row.word) else { return };
+        let pattern = self.pattern(word, &row.pattern);
+        if let (Some(cause), Some(reaction), Some(pattern)) = (cause, reaction, pattern) {
+            self.tables.faults.push(FaultRule { word: word.idn, pattern, cause, reaction });
+        }
+    }
+
+    fn parameter_id(&mut self, name: &Name) -> Option<(Parameter, Quantity)> {
+        let generic = &self.dictionaries.generic;
+        let what = "a parameter of the generic model";
+        let find = |text: &str| generic.parameter(text).map(|row| (row.parameter, row.quantity));
+        self.resolver.name("parameter", name, what, find, generic.names())
+    }
+
+    fn parameter(&mut self, row: &SercosParameterRow) {
+        let parameter = self.parameter_id(&row.parameter);
+        let idn = self.idn("idn", &row.idn);
+        let words = [("both", (true, true)), ("to_drive", (true, false)), ("from_drive", (false, true))];
+        let direction = self.resolver.word("direction", &row.direction, &words);
+        let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
+        let factor = match &row.factor {
+            None => Some(Ratio::ONE),
+            Some(factor) => self.resolver.ratio("factor", factor),
+        };
+        let (
+            Some((parameter, quantity)),
+            Some(idn),
+            Some((to_drive, from_drive)),
+            Some(reject),
+            Some(factor),
+        ) = (parameter, idn, direction, reject, factor)
+        else {
+            return;
+        };
+        if !self.measures(idn, quantity) {
+            let message = format!("the unit of {} is no {quantity}", idn.idn);
+            return self.resolver.error(row.idn.span(), "idn", message);
+        }
+        if to_drive && idn.write.as_ref().is_some_and(Vec::is_empty) {
+            let message = format!("{} is read only", idn.idn);
+            self.resolver.error(row.direction.span(), "direction", message);
+        }
+        if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
+            self.resolver.error(row.parameter.span(), "parameter", "the parameter is there twice");
+        }
+        let idn = idn.idn;
+        let rule = ParameterRule { parameter, quantity, idn, to_drive, from_drive, reject, factor };
+        self.tables.parameters.push(rule);
+    }
+
+    fn step(&mut self, row: &CommissionRow) {
+        let phase = *row.phase.get_ref();
+        if !(2..=4).contains(&phase) {
+            let message = format!("expected a phase from 2 to 4, got {phase}");
+            self.resolver.error(row.phase.span(), "phase", message);
+        }
+        let words = [
+            ("write", Verb::Write),
+            ("read", Verb::Read),
+            ("command", Verb::Command),
+            ("read_scaling", Verb::ReadScaling),
+            ("read_telegram", Verb::ReadTelegram),
+            ("write_modes", Verb::WriteModes),
+        ];
+        let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
+        let fail = self.resolver.word("refused", &row.refused, &[("fail", true), ("continue", false)]);
+        let Some(kind) = self.step_kind(row, verb, phase) else { return };
+        let mut rule = StepRule {
+            phase,
+            kind,
+            axis: None,
+            modulo: None,
+            set_scaling: None,
+            mode: None,
+            fail: fail.unwrap_or(true),
+        };
+        if let Some(when) = &row.when {
+            rule.axis = when.kind.as_ref().and_then(|name| unit_kind(&mut self.resolver, name));
+            rule.mode = when.mode.as_ref().and_then(|name| operating_mode(&mut self.resolver, name));
+            rule.modulo = when.modulo;
+            rule.set_scaling = when.set_scaling;
+        }
+        self.tables.steps.push(rule);
+    }
+
+    fn step_kind(&mut self, row: &CommissionRow, verb: Verb, phase: u8) -> Option<StepKind> {
+        let idn = match &row.idn {
+            Some(name) => Some(self.idn("idn", name)?),
+            None => None,
+        };
+        match (verb, idn, &row.value, &row.parameter) {
+            (Verb::Write, Some(idn), Some(value), None) => {
+                if idn.write.as_ref().is_some_and(|phases| !phases.contains(&phase)) {
+                    let message = format!("{} cannot be written in CP{phase}", idn.idn);
+                    self.resolver.error(row.phase.span(), "phase", message);
+                }
+                if idn.length.is_none() || idn.list {
+                    let message = format!("expected an IDN of known length, {} has none", idn.idn);
+                    self.resolver.error(value.span(), "value", message);
+                }
+                Some(StepKind::WriteValue(idn.idn, *value.get_ref()))
+            }
+            (Verb::Write, None, None, Some(name)) => {
+                let (parameter, _) = self.parameter_id(name)?;
+                let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
+                if rule.is_none_or(|rule| !rule.to_drive) {
+                    let message = "expected a parameter with a [[parameter]] row that goes to the drive";
+                    self.resolver.error(name.span(), "parameter", message);
+                }
+                Some(StepKind::WriteParameter(parameter))
+            }
+            (Verb::Read, Some(idn), None, None) => {
+                let (mut attribute, mut data) = (false, row.elements.is_none());
+                for name in row.elements.iter().flatten() {
+                    match self.resolver.word("elements", name, &[("attribute", true), ("data", false)])? {
+                        true => attribute = true,
+                        false => data = true,
+                    }
+                }
+                Some(StepKind::Read { idn: idn.idn, attribute, data })
+            }
+            (Verb::Command, Some(idn), None, None) if idn.command => Some(StepKind::Command(idn.idn)),
+            (Verb::ReadScaling, None, None, None) => Some(StepKind::ReadScaling),
+            (Verb::ReadTelegram, None, None, None) => Some(StepKind::ReadTelegram),
+            (Verb::WriteModes, None, None, None) => Some(StepKind::WriteModes),
+            _ => {
+                let message = "expected `write` with idn and value or with parameter, `read` with idn, \
+                               `command` with the idn of a procedure command, or a step without any";
+                self.resolver.error(row.step.span(), "do", message);
+                None
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Verb {
+    Write,
+    Read,
+    Command,
+    ReadScaling,
+    ReadTelegram,
+    WriteModes,
+}

@@ -1,0 +1,131 @@
+//! Tables that are broken on purpose.
+
+use super::*;
+
+fn broken(change: impl Fn(&mut TableTexts)) -> String {
+    let mut texts = TableTexts::embedded();
+    change(&mut texts);
+    match Mapping::from_texts(texts) {
+        Ok(_) => "nothing found".to_owned(),
+        Err(errors) => errors.to_string(),
+    }
+}
+
+fn replace(table: &mut TableText, from: &str, to: &str) {
+    assert!(table.text.contains(from), "{from:?} is not in {}", table.path);
+    table.text = table.text.replacen(from, to, 1);
+}
+
+/// One of the files.
+type Table = fn(&mut TableTexts) -> &mut TableText;
+
+/// What to break, in which file, from what, to what.
+type Case = (&'static str, Table, &'static str, &'static str);
+
+const CASES: &[Case] = &[
+    ("no TOML", |t| &mut t.cip_generic, "[scaling]", "[scaling"),
+    ("unknown key", |t| &mut t.cip_generic, "wraps = true", "wrap = true"),
+    ("wrong type", |t| &mut t.sercos, "length = 2,", "length = \"two\","),
+    ("unknown signal", |t| &mut t.cip_generic, "\"position_command\"", "\"position_comand\""),
+    (
+        "unknown IDN",
+        |t| &mut t.generic_sercos,
+        "idn = \"S-0-0047\"\ndirection",
+        "idn = \"S-0-4047\"\ndirection",
+    ),
+    ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\"\ndirection", "idn = \"S-47\"\ndirection"),
+    ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
+    ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),
+    ("unknown exception", |t| &mut t.cip_generic, "exception = \"Brake Slip\"", "exception = \"Brake Slap\""),
+    (
+        "two answers",
+        |t| &mut t.cip_generic,
+        "exception = \"Brake Slip\"",
+        "exception = \"Brake Slip\"\nmanufacturer = 9",
+    ),
+    ("manufacturer bit 0", |t| &mut t.cip_generic, "manufacturer = 1\n", "manufacturer = 0\n"),
+    ("field value too large", |t| &mut t.generic_sercos, "\"Drive on\", is = 0", "\"Drive on\", is = 2"),
+    ("unknown field", |t| &mut t.generic_sercos, "field = \"Drive on\"", "field = \"Drive off\""),
+    ("wrong direction", |t| &mut t.generic_sercos, "direction = \"to_drive\"", "direction = \"from_drive\""),
+    (
+        "read only",
+        |t| &mut t.generic_sercos,
+        "idn = \"S-0-0111\"\ndirection = \"from_drive\"",
+        "idn = \"S-0-0112\"\ndirection = \"both\"",
+    ),
+    ("phase", |t| &mut t.generic_sercos, "phase = 2\ndo = \"write\"", "phase = 4\ndo = \"write\""),
+    ("ratio", |t| &mut t.generic_sercos, "generic_per_unit = [1_000, 1]", "generic_per_unit = [1_000, 0]"),
+    ("state twice", |t| &mut t.cip_generic, "state = \"shutdown\"", "state = \"faulted\""),
+    ("attribute twice", |t| &mut t.cip, "{ id = 41,", "{ id = 40,"),
+    (
+        "catalogue",
+        |t| &mut t.generic,
+        "quantity = \"torque\", access = \"command\"",
+        "quantity = \"time\", access = \"command\"",
+    ),
+    ("format", |t| &mut t.sercos, "format = 1", "format = 2"),
+];
+
+#[test]
+fn are_refused_with_place_key_and_what_was_expected() {
+    let mut text = String::new();
+    for (what, table, from, to) in CASES {
+        let errors = broken(|texts| replace(table(texts), from, to));
+        assert_ne!(errors, "nothing found", "{what}");
+        writeln!(text, "## {what}\n{errors}\n").unwrap();
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn errors_carry_their_place_as_numbers() {
+    let mut texts = TableTexts::embedded();
+    replace(&mut texts.cip_generic, "signal = \"position_command\"", "signal = \"position_comand\"");
+    let line = texts.cip_generic.text.lines().position(|line| line.contains("position_comand")).unwrap() + 1;
+    let errors = Mapping::from_texts(texts).unwrap_err();
+    let [error] = errors.0.as_slice() else { panic!("{errors}") };
+    assert_eq!((error.line, error.column, error.key.as_str()), (line, 10, "signal"));
+    assert_eq!(error.file, "mappings/cip-generic.toml");
+}
+
+/// The examples are worth their place: a row that is changed is found out.
+#[test]
+fn a_changed_ratio_makes_an_example_fail() {
+    let changes: &[(Table, &str, &str)] = &[
+        (
+            |t| &mut t.cip_generic,
+            "quantity = \"torque\"\ngeneric_per_unit = [10_000, 1]",
+            "quantity = \"torque\"\ngeneric_per_unit = [1_000, 1]",
+        ),
+        (|t| &mut t.cip_generic, "nanounits = 25_400_000_000", "nanounits = 25_000_000_000"),
+        (|t| &mut t.generic_sercos, "divisor = 3_600_000 }", "divisor = 360_000 }"),
+        (|t| &mut t.generic_sercos, "factor = [-1, 1]\n", ""),
+    ];
+    for (table, from, to) in changes {
+        let mut texts = TableTexts::embedded();
+        let before =
+            texts.cip_generic.text.matches(from).count() + texts.generic_sercos.text.matches(from).count();
+        for _ in 0..before {
+            replace(table(&mut texts), from, to);
+        }
+        let failures = Mapping::from_texts(texts).unwrap().run_examples().unwrap_err();
+        assert!(!failures.is_empty(), "{from}");
+    }
+}
+
+#[test]
+fn a_folder_replaces_files_and_may_hold_no_others() {
+    let folder = std::env::temp_dir().join(format!("axisbridge-mapping-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("dictionary")).unwrap();
+    let mut texts = TableTexts::embedded();
+    replace(&mut texts.sercos, "name = \"Position command value\"", "name = \"Position set-point\"");
+    std::fs::write(folder.join("dictionary/sercos.toml"), &texts.sercos.text).unwrap();
+    let mapping = Mapping::from_folder(&folder).unwrap();
+    let name = mapping.dictionaries.sercos.idn(Idn::standard(47)).map(|row| row.name.clone());
+    assert_eq!(name.as_deref(), Some("Position set-point"));
+    std::fs::write(folder.join("cip_generic.toml"), "").unwrap();
+    let errors = Mapping::from_folder(&folder).unwrap_err();
+    assert!(errors.0[0].message.contains("got `cip_generic.toml`"), "{errors}");
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(Mapping::from_folder(&folder).unwrap_err().0[0].message.starts_with("cannot read"));
+}

@@ -1,0 +1,159 @@
+//! Programs of the CIP side.
+
+use super::*;
+
+#[test]
+fn takes_position_as_float_and_as_integer_across_the_wrap() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    let mut trackers = program.trackers();
+    let mut command = AxisCommand::default();
+    let mut at = |position| {
+        let values = CommandValues { position: Some(position), ..CommandValues::default() };
+        let report = program.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+        (command.position.0, report.is_clean())
+    };
+    assert_eq!(at(CommandPosition::Integer(i32::MAX)), (2_147_483_647_000, true));
+    assert_eq!(at(CommandPosition::Integer(i32::MIN)), (2_147_483_648_000, true));
+    assert_eq!(at(CommandPosition::Float(-2_147_483_647.5)), (2_147_483_648_500, true));
+    assert_eq!(at(CommandPosition::Float(2_147_483_647.25)), (2_147_483_647_250, true));
+    assert_eq!(at(CommandPosition::Float(f64::NAN)), (2_147_483_647_250, false));
+    assert_eq!(at(CommandPosition::Float(3e9)), (2_147_483_647_250, false), "beyond a DINT");
+}
+
+#[test]
+fn a_value_that_is_not_there_is_absent_and_an_element_without_a_row_is_reported() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    let mut command = AxisCommand { velocity: Velocity(5), ..AxisCommand::default() };
+    let values = CommandValues { torque: Some(-12.5), unwind_count: Some(1), ..CommandValues::default() };
+    let report = program.decode(&CyclicValues::from(&values), 0, &mut program.trackers(), &mut command);
+    assert_eq!(
+        (command.get(Signal::TorqueCommand), command.get(Signal::VelocityCommand)),
+        (Some(-125_000), None)
+    );
+    assert_eq!((report.unmapped, report.is_clean()), (1, false));
+}
+
+#[test]
+fn a_reference_shift_is_taken_off_in_counts() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    let mut command = AxisCommand::default();
+    let position = Some(CommandPosition::Float(1_500.5));
+    let values = CommandValues { position, ..CommandValues::default() };
+    program.decode(&CyclicValues::from(&values), 1_000, &mut program.trackers(), &mut command);
+    assert_eq!(command.position, Position(500_500));
+}
+
+#[test]
+fn an_unwind_position_folds_actual_positions_and_unrolls_commands() {
+    let scaling = CipScaling { unwind: Some(360_000), counts_per_unit: 360_000, ..rotary_counts() };
+    let program = shipped().cip_program(&scaling).unwrap();
+    let mut trackers = program.trackers();
+    let mut command = AxisCommand::default();
+    for (counts, turns) in [(350_000, 350_000), (10_000, 370_000), (350_000, 350_000)] {
+        let position = Some(CommandPosition::Integer(counts));
+        let values = CommandValues { position, ..CommandValues::default() };
+        program.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+        let expected = turns * 1_000_000_000_i64 / 360_000;
+        assert!(command.position.0.abs_diff(expected) <= 1, "{counts}");
+    }
+    let mut feedback = AxisFeedback::default();
+    feedback.set(Signal::PositionActual, -1_000_000_000 / 4);
+    let mut values = CyclicValues::default();
+    program.encode(&feedback, 1, &mut values);
+    assert_eq!(values.0[0], Some(CipValue::Dint(270_000)));
+}
+
+#[test]
+fn fills_the_image_of_the_device() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    let mut feedback = AxisFeedback {
+        state: DriveState::Operating,
+        mode: OperatingMode::Position,
+        status: StatusBits::ENABLED | StatusBits::POWER | StatusBits::TRACKING,
+        inhibits: Inhibits::HARDWARE_ENABLE | Inhibits::NO_DRIVE,
+        at: SystemTime(42),
+        ..AxisFeedback::default()
+    };
+    feedback.set(Signal::PositionActual, 3_000_000_000_000);
+    feedback.set(Signal::VelocityActual, -500_000_000);
+    let mut image = DriveImage { action_id: 7, ..DriveImage::default() };
+    let report = program.drive_image(&feedback, &mut image);
+    assert_eq!((image.position, image.action_id, report.missing), (3_000_000_000, 7, 1));
+    assert_eq!((image.velocity.to_bits(), image.captured_at), ((-0.5_f32).to_bits(), 42));
+    assert!(image.bus_up && image.start_complete && !image.stop_complete);
+    // Bits 2, 3, 5, 17 and 22 (Table 5-2.60).
+    assert_eq!(image.axis_status.bits(), 0x0042_002C);
+    assert_eq!((image.start_inhibits, image.start_inhibits_mfg), (1 << 1, 1 << 5));
+    assert_eq!((image.fault, image.alarm), (None, None));
+}
+
+#[test]
+fn reports_faults_and_alarms_by_type_and_code() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    let report = |cause, reaction| {
+        let fault = Fault::new(cause, SystemTime(0)).with_vendor_code(0x0203).with_reaction(reaction);
+        let mut image = DriveImage::default();
+        program.drive_image(&AxisFeedback { fault: Some(fault), ..AxisFeedback::default() }, &mut image);
+        let fault = image.fault.map(|fault| (fault.fault_type.0, fault.code, fault.sub_code, fault.action));
+        (fault, image.alarm.map(|alarm| (alarm.alarm_type.0, alarm.code)))
+    };
+    // Excessive Position Error is bit 54; a current limited stop (3) and disable (2).
+    let cause = FaultCause::EXCESSIVE_POSITION_ERROR;
+    assert_eq!(report(cause, Reaction::DecelerateAndDisable), (Some((3, 54, 3, 0x23)), None));
+    assert_eq!(report(cause, Reaction::Alarm), (None, Some((3, 54))));
+    assert_eq!(report(cause, Reaction::Ignore), (None, None));
+    assert_eq!(report(FaultCause::DRIVE_SPECIFIC, Reaction::CoastAndDisable), (Some((4, 1, 3, 0x24)), None));
+    assert_eq!(report(FaultCause::MEMORY, Reaction::Shutdown), (Some((1, 3, 3, 0x34)), None));
+    assert_eq!(program.fault(FaultCause::CONNECTION_CLOSED), Some(CipFault::Node(6)));
+}
+
+#[test]
+fn scaling_attributes_make_a_scaling_or_say_why_not() {
+    let mapping = shipped();
+    let cip = &mapping.cip;
+    let from = |values: &[(u16, i64)]| {
+        let get = |id| values.iter().find(|(known, _)| *known == id).map_or(0, |(_, value)| *value);
+        CipScaling::from_attributes(cip, get)
+    };
+    // Drive Scaling, Load inch, 20000 counts, inverted, unwind after 40000 counts.
+    let inch = from(&[(45, 1), (77, 7), (78, 20_000), (79, 1), (83, 1), (84, 40_000)]).unwrap();
+    assert_eq!((inch.kind, inch.inverted, inch.unwind), (UnitKind::Linear, true, Some(40_000)));
+    assert_eq!(inch.nanounits_per_count().to_string(), "-1270000/1");
+    // Control Scaling: feedback counts, here of a 2500 line encoder with quadrature.
+    let turn = from(&[(1416, 2_500), (1417, 4)]).unwrap();
+    assert_eq!((turn.counts_per_unit, turn.nanounits_per_count().to_string().as_str()), (10_000, "100000/1"));
+    let errors: Vec<String> = [
+        &[(45, 1), (77, 99), (78, 1)][..],
+        &[(45, 1), (77, 0), (78, -5)],
+        &[(45, 1), (77, 0), (78, 5), (83, 1), (84, 1)],
+        &[(1416, 2_500)],
+    ]
+    .map(|values| from(values).unwrap_err().to_string())
+    .into();
+    insta::assert_snapshot!(errors.join("\n"), @r"
+    attribute 77: expected the code of a displacement unit, got 99
+    attribute 78: expected a number above 0, got -5
+    attribute 84: expected 2 counts to 2^31 - 1, got 1
+    attribute 1417: expected a number above 0, got 0
+    ");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+    /// Counts to nanounits and back lose nothing as long as a count is at least a nanounit.
+    #[test]
+    fn counts_come_back(counts in any::<i32>(), resolution in 1_i64..1_000_000_000, inverted: bool) {
+        let scaling = CipScaling { counts_per_unit: resolution, inverted, ..rotary_counts() };
+        let program = shipped().cip_program(&scaling).unwrap();
+        let position = Some(CommandPosition::Integer(counts));
+        let values = CommandValues { position, ..CommandValues::default() };
+        let mut command = AxisCommand::default();
+        let report = program.decode(&CyclicValues::from(&values), 0, &mut program.trackers(), &mut command);
+        prop_assert!(report.is_clean());
+        let mut feedback = AxisFeedback::default();
+        feedback.set(Signal::PositionActual, command.position.0);
+        let mut back = CyclicValues::default();
+        program.encode(&feedback, 1, &mut back);
+        prop_assert_eq!(back.0[0], Some(CipValue::Dint(counts)));
+    }
+}

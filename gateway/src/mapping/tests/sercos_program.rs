@@ -1,0 +1,264 @@
+//! Telegrams, commissioning and programs of the SERCOS side.
+
+use super::*;
+
+#[test]
+fn commissioning_of_a_rotary_modulo_axis() {
+    let mapping = shipped();
+    let axis = SercosAxis {
+        parameters: vec![
+            (Parameter::TORQUE_LIMIT_NEGATIVE, -1_500_000),
+            (Parameter::IN_POSITION_WINDOW, 1_000_000),
+        ],
+        ..rotary_axis(true)
+    };
+    let facts = obedient(mapping, &axis);
+    let mut text = String::new();
+    for phase in 2..=4 {
+        writeln!(text, "CP{phase}").unwrap();
+        for step in mapping.commissioning(&axis, phase, &facts).unwrap().steps {
+            match step {
+                Step::Write { idn, candidates, refused } => {
+                    writeln!(text, "  write   {idn} {candidates:02X?} {refused:?}").unwrap();
+                }
+                Step::Read { idn, attribute, data, refused } => {
+                    let attribute = if attribute { " attribute" } else { "" };
+                    let data = if data { " data" } else { "" };
+                    writeln!(text, "  read    {idn}{attribute}{data} {refused:?}").unwrap();
+                }
+                Step::Command { idn, refused } => writeln!(text, "  command {idn} {refused:?}").unwrap(),
+            }
+        }
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn telegrams_carry_the_values_of_every_mode_once() {
+    let mapping = shipped();
+    let telegram = mapping.telegram(&rotary_axis(false), &DriveFacts::new()).unwrap();
+    let idns = |list: &[Idn]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0036 S-0-0080");
+    assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040 S-0-0084");
+    assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (12, 12));
+}
+
+#[test]
+fn what_the_drive_lacks_is_left_out_or_refused() {
+    let mapping = shipped();
+    let mut facts = DriveFacts::new();
+    facts.note_missing(Idn::standard(84));
+    let telegram = mapping.telegram(&rotary_axis(false), &facts).unwrap();
+    assert_eq!((telegram.feedback.len(), telegram.feedback_bytes), (3, 10));
+    facts.note_missing(Idn::standard(47));
+    let error = mapping.telegram(&rotary_axis(false), &facts).unwrap_err();
+    assert_eq!(error.to_string(), "the drive has no S-0-0047, which carries position_command");
+}
+
+#[test]
+fn the_drives_own_length_counts_more_than_the_dictionarys() {
+    let mapping = shipped();
+    let axis = rotary_axis(false);
+    let mut facts = obedient(mapping, &axis);
+    facts.note_attribute(Idn::standard(84), Attribute(0x7122_0001));
+    let program = mapping.sercos_program(&axis, &facts).unwrap();
+    assert_eq!(program.telegram.feedback_bytes, 14);
+    assert_eq!(program.feedback.required_len(), 14);
+}
+
+#[test]
+fn commands_and_actions_become_a_telegram() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let mut command = AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() };
+    command.set(Signal::PositionCommand, -250_000_000);
+    command.set(Signal::VelocityCommand, 25_000_000_000);
+    command.set(Signal::TorqueCommand, -125_000);
+    let mut telegram = [0xA5; 12];
+    let mut report = ConversionReport::default();
+    let word = program.encode(&command, Action::Enable, 0, &mut telegram, &mut report);
+    // 0xE000; -90 degrees are 270 within the modulo range: 2700000; 15000000; -125.
+    let expected = [0x00, 0xE0, 0xE0, 0x32, 0x29, 0x00, 0xC0, 0xE1, 0xE4, 0x00, 0x83, 0xFF];
+    assert_eq!((word, telegram, report.is_clean()), (0xE000, expected, true));
+    command.mode = OperatingMode::Torque;
+    let word = program.encode(&command, Action::Halt, word, &mut telegram, &mut report);
+    assert_eq!(word, 0xC200, "halt, third mode");
+    assert_eq!(program.encode(&command, Action::Disable, word, &mut telegram, &mut report), 0x6200);
+    assert_eq!(program.encode(&command, Action::TorqueOff, word, &mut telegram, &mut report), 0x0200);
+    assert_eq!(program.encode(&command, Action::None, 0xE200, &mut telegram, &mut report), 0xE200);
+    assert_eq!(program.encode(&command, Action::Reject, 0xE200, &mut telegram, &mut report), 0xE200);
+    assert_eq!(program.command_of(Action::ResetFault), Some(Idn::RESET_C1D));
+    assert_eq!(program.command_of(Action::Enable), None);
+}
+
+#[test]
+fn telegrams_of_the_drive_become_feedback() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let (mut trackers, mut report) = (program.feedback.trackers(), ConversionReport::default());
+    let mut feedback =
+        AxisFeedback { status: StatusBits::IN_POSITION | StatusBits::FAULT, ..AxisFeedback::default() };
+    // In operation, following, second mode; 3599999 counts, then 1: one step over the end of the turn and
+    // on.
+    let mut telegram = [0x08, 0xC1, 0x7F, 0xEE, 0x36, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
+    assert_eq!(program.decode(&telegram, &mut feedback, &mut trackers, &mut report), Some(0xC108));
+    assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
+    assert_eq!(
+        feedback.status,
+        StatusBits::IN_POSITION | StatusBits::ENABLED | StatusBits::POWER | StatusBits::TRACKING,
+        "bits that other words carry stay, those of the status word follow it"
+    );
+    assert_eq!((feedback.position.0, feedback.torque), (999_999_722, Torque(125_000)));
+    // 0.0001 1/min backward are -1666.67 nanounits a second.
+    assert_eq!(feedback.velocity, Velocity(-1_667));
+    telegram[2..6].copy_from_slice(&1_i32.to_le_bytes());
+    program.decode(&telegram, &mut feedback, &mut trackers, &mut report);
+    assert_eq!((feedback.position.0, report.is_clean()), (1_000_000_278, true));
+    assert_eq!(program.decode(&[0], &mut feedback, &mut trackers, &mut report), None);
+}
+
+#[test]
+fn status_words_say_what_the_drive_does() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let mut text = String::new();
+    for word in (0..=0xFFFF_u16).filter(|word| word & !0xF018 == 0) {
+        let status: Vec<_> = StatusBits::NAMED
+            .iter()
+            .filter(|(bit, _)| program.status_bits(word).contains(*bit))
+            .map(|(_, name)| *name)
+            .collect();
+        writeln!(text, "{word:04X} {:<15}{}", program.report(word).name(), status.join(" ")).unwrap();
+    }
+    insta::assert_snapshot!(text);
+    assert_eq!(program.mode(0xC300), None, "fourth slot, three modes");
+}
+
+#[test]
+fn diagnostic_words_tell_causes() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let words: Vec<_> = program.diagnostic_words().collect();
+    assert_eq!(words, [Idn::standard(11), Idn::standard(12), Idn::standard(390)]);
+    let cause = |idn, word| program.fault(Idn::standard(idn), word);
+    assert_eq!(
+        cause(11, 1 << 11),
+        Some((FaultCause::EXCESSIVE_POSITION_ERROR, Reaction::DecelerateAndDisable))
+    );
+    assert_eq!(cause(11, 1 << 9 | 1 << 7), Some((FaultCause::OVER_CURRENT, Reaction::CoastAndDisable)));
+    assert_eq!(cause(11, 1 << 14), None, "reserved");
+    let warning = Some((FaultCause::MOTOR_OVER_TEMPERATURE_USER_LIMIT, Reaction::Alarm));
+    assert_eq!(cause(12, 1 << 2), warning);
+    assert_eq!(cause(390, 0xC30F_4001).map(|(cause, _)| cause), Some(FaultCause::COMMUNICATION_LOSS));
+    assert_eq!(cause(390, 0xC00A_0012), None, "class A: no error");
+}
+
+#[test]
+fn values_of_the_motor_shaft_go_through_the_gear() {
+    let mapping = shipped();
+    let axis = rotary_axis(false);
+    let mut facts = obedient(mapping, &axis);
+    // Rotary, preferential, motor shaft; 5 turns of the motor are 2 of the load.
+    facts.note_data(Idn::standard(76), &0x0002_u16.to_le_bytes());
+    let error = mapping.sercos_program(&axis, &facts).unwrap_err();
+    assert_eq!(error.to_string(), "S-0-0121 is needed for the scaling and was not read from the drive");
+    facts.note_data(Idn::standard(121), &5_u32.to_le_bytes());
+    facts.note_data(Idn::standard(122), &2_u32.to_le_bytes());
+    let program = mapping.sercos_program(&axis, &facts).unwrap();
+    let mut command = AxisCommand::default();
+    command.set(Signal::PositionCommand, 2_000_000_000);
+    let mut telegram = [0; 12];
+    program.encode(&command, Action::None, 0, &mut telegram, &mut ConversionReport::default());
+    assert_eq!(telegram[2..6], (5 * 3_600_000_i32).to_le_bytes());
+}
+
+#[test]
+fn scalings_that_cannot_be_used_say_why() {
+    let mapping = shipped();
+    let axis = rotary_axis(false);
+    let mut text = String::new();
+    for (idn, data) in [
+        (76, vec![0x00, 0x00]),
+        (76, vec![0x41, 0x00]),
+        (76, vec![0xC2, 0x00]),
+        (44, vec![0x7F, 0x00]),
+        (86, vec![0x02, 0x00]),
+    ] {
+        let mut facts = obedient(mapping, &axis);
+        facts.note_data(Idn::standard(103), &0_u32.to_le_bytes());
+        facts.note_data(Idn::standard(idn), &data);
+        let error = mapping.sercos_program(&axis, &facts).unwrap_err();
+        writeln!(text, "{idn:04} = {data:02X?}: {error}").unwrap();
+    }
+    let none = mapping.sercos_program(&axis, &DriveFacts::new()).unwrap_err();
+    writeln!(text, "nothing read: {none}").unwrap();
+    let homing = SercosAxis { modes: [OperatingMode::Homing].into_iter().collect(), ..rotary_axis(false) };
+    writeln!(text, "{}", mapping.telegram(&homing, &DriveFacts::new()).unwrap_err()).unwrap();
+    let idle = SercosAxis { modes: [].into_iter().collect(), ..rotary_axis(false) };
+    writeln!(text, "{}", mapping.telegram(&idle, &DriveFacts::new()).unwrap_err()).unwrap();
+    insta::assert_snapshot!(text, @r"
+    0076 = [00, 00]: S-0-0076: expected a scaling type of a rotary axis, got 0x0000
+    0076 = [41, 00]: S-0-0076: expected a scaling type of a rotary axis, got 0x0041
+    0076 = [C2, 00]: S-0-0103: expected a number above 1, got 0
+    0044 = [7F, 00]: S-0-0044: expected a scaling type of a rotary axis, got 0x007f
+    0086 = [02, 00]: S-0-0086: the drive gives torque in absolute units, and the axis has no rated torque
+    nothing read: S-0-0076 is needed for the scaling and was not read from the drive
+    no [[mode]] row for operating mode homing
+    expected at least one operating mode, got none
+    ");
+}
+
+#[test]
+fn parameters_know_their_place_and_their_direction() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let mut facts = obedient(mapping, &axis);
+    let program = mapping.sercos_program(&axis, &facts).unwrap();
+    let limit = program.parameter(Parameter::TORQUE_LIMIT_NEGATIVE).unwrap();
+    assert_eq!(limit.encode(-1_500_000), Some(([0xDC, 0x05, 0, 0, 0, 0, 0, 0], 2, false)));
+    assert_eq!(limit.decode(&[0xDC, 0x05]), Some(-1_500_000));
+    assert_eq!(
+        limit.encode(-70_000_000).map(|(_, _, clamped)| clamped),
+        Some(true),
+        "7000 % in 16 bits of 0.1 %"
+    );
+    assert_eq!(limit.decode(&[0xDC, 0x05, 0, 0]), None);
+    let current = program.parameter(Parameter::MOTOR_RATED_CURRENT).unwrap();
+    assert_eq!((current.encode(1), current.decode(&2_500_u32.to_le_bytes())), (None, Some(2_500_000)));
+    assert_eq!(program.parameter(Parameter::VELOCITY_LIMIT_POSITIVE), None, "nobody knows its length");
+    facts.note_attribute(Idn::standard(38), Attribute(0x0322_0001));
+    let program = mapping.sercos_program(&axis, &facts).unwrap();
+    assert!(program.parameter(Parameter::VELOCITY_LIMIT_POSITIVE).is_some());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+    /// Generic to drive to generic loses at most one step of the coarser side, whatever the drive's
+    /// resolution.
+    #[test]
+    fn positions_come_back_within_one_count(
+        counts in -(1_i64 << 31) + 1..1 << 31, fraction in 0_i64..1_000, resolution in 1_u32..1 << 30,
+    ) {
+        let position = counts.saturating_mul(1_000_000_000) / i64::from(resolution) + fraction;
+        let mapping = shipped();
+        let axis = rotary_axis(false);
+        let mut facts = obedient(mapping, &axis);
+        facts.note_data(Idn::standard(76), &0x004A_u16.to_le_bytes());
+        facts.note_data(Idn::standard(79), &resolution.to_le_bytes());
+        let program = mapping.sercos_program(&axis, &facts).unwrap();
+        let mut command = AxisCommand::default();
+        command.set(Signal::PositionCommand, position);
+        let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
+        program.encode(&command, Action::None, 0, &mut telegram, &mut report);
+        let mut feedback = AxisFeedback::default();
+        program.decode(&telegram, &mut feedback, &mut program.feedback.trackers(), &mut report);
+        let count = 1_000_000_000_u64.div_ceil(u64::from(resolution)).max(1);
+        let lost = feedback.position.0.abs_diff(position);
+        // The fraction may lead one count over the range of 32 bits, where the drive's value is held.
+        prop_assert!(lost <= count || report.saturated > 0 && lost <= 2 * count + 1_000, "{lost} of {count}");
+    }
+}

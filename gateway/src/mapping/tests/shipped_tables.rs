@@ -1,0 +1,73 @@
+//! The shipped tables are complete, and their examples come out.
+
+use super::*;
+
+#[test]
+fn load_and_their_examples_come_out() {
+    let examples = shipped().run_examples().unwrap_or_else(|failures| {
+        panic!("{}", failures.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+    });
+    assert!(examples >= 30, "{examples}");
+}
+
+#[test]
+fn repeat_the_generic_catalogue_completely() {
+    let dictionary = &shipped().dictionaries.generic;
+    assert_eq!(dictionary.signals(), Signal::ALL);
+    let listed: Vec<_> = dictionary.parameters().iter().map(|row| row.parameter).collect();
+    let catalogue: Vec<_> = CATALOGUE.iter().map(|row| row.parameter).collect();
+    assert_eq!(listed, catalogue);
+}
+
+/// Volume 9 has 377 instance attributes, "Feedback n" once each; four channels make 3 more of each of 23.
+#[test]
+fn list_every_attribute_of_the_axis_object() {
+    let cip = &shipped().dictionaries.cip;
+    assert_eq!(cip.class_attributes().len(), 24);
+    let feedback = cip.attributes().iter().filter(|row| row.name.starts_with("Feedback 4 ")).count();
+    assert_eq!(cip.attributes().len() - 3 * feedback, 377);
+    assert_eq!(cip.attribute("Feedback 2 Unit").map(|row| row.id), Some(1461));
+    assert_eq!(cip.attribute_by_id(672).and_then(|row| row.length), Some(64));
+    // Table 5-2.110 names 55 attributes that may be set while running.
+    assert_eq!(cip.attributes().iter().filter(|row| row.running).count(), 55);
+}
+
+#[test]
+fn leave_no_cause_inhibit_state_mode_or_reaction_without_a_row() {
+    let mapping = shipped();
+    let program = mapping.cip_program(&rotary_counts()).unwrap();
+    for (cause, name) in FaultCause::NAMED {
+        assert!(program.fault(*cause).is_some(), "{name}");
+    }
+    for (inhibit, name) in Inhibits::NAMED {
+        assert_ne!(program.start_inhibits(*inhibit), (0, 0), "{name}");
+    }
+    for reaction in Reaction::ALL.iter().filter(|reaction| reaction.stops()) {
+        assert_ne!(program.fault_action(*reaction), 0, "{reaction}");
+    }
+    assert_eq!((0..16).filter(|code| program.mode(*code).is_some()).count(), 5);
+    for request in Request::ALL {
+        let by_request =
+            (0..=255).any(|code| program.request(code).and_then(|row| row.request) == Some(*request));
+        let by_action =
+            [DriveAction::PowerUp, DriveAction::Enable].map(|action| program.drive_request(action));
+        let own = matches!(request, Request::Stop | Request::Test);
+        assert!(by_request || by_action.contains(&Some(*request)) || own, "{request}");
+    }
+}
+
+#[test]
+fn give_the_device_a_table_it_accepts() {
+    let mapping = shipped();
+    let axis = rotary_axis(true);
+    let south = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let table = mapping.attribute_table(&rotary_counts()).unwrap();
+    let definitions = table.definitions(&mapping.dictionaries.cip, Some(&south));
+    DeviceTable::new(Scope::Instance, &definitions).unwrap();
+    let backing = |id| definitions.iter().find(|row| row.id == id).map(|row| row.backing);
+    assert_eq!(backing(504), Some(DeviceBacking::Drive), "Torque Limit - Positive");
+    assert_eq!(backing(461), Some(DeviceBacking::Stored), "Kvp: no row on SERCOS");
+    assert_eq!(backing(1319), Some(DeviceBacking::Stored), "rated current: the drive lets it be read only");
+    assert_eq!(backing(641), None, "Inverter Temperature: rejected where the drive lacks it");
+    assert_eq!(backing(1310), None, "strings are left out");
+}
