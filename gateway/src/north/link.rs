@@ -1,0 +1,90 @@
+//! The way between the adapter (supervisor) and the motion device (cycle thread): two bounded queues.
+
+use profile_cip::target::motion_link::{MotionReply, MotionRequest};
+use rtrb::{Consumer, Producer, PushError, RingBuffer};
+
+/// Requests, and replies, that can be under way: one for each stream an adapter serves at once.
+pub const QUEUE_LEN: usize = 32;
+
+/// Both ends of a new link.
+#[must_use]
+pub fn motion_link() -> (AdapterEnd, DeviceEnd) {
+    let (request_in, request_out) = RingBuffer::new(QUEUE_LEN);
+    let (reply_in, reply_out) = RingBuffer::new(QUEUE_LEN);
+    let adapter = AdapterEnd { requests: request_in, replies: reply_out };
+    (adapter, DeviceEnd { requests: request_out, replies: reply_in })
+}
+
+/// The end beside the adapter.
+#[derive(Debug)]
+pub struct AdapterEnd {
+    requests: Producer<MotionRequest>,
+    replies: Consumer<MotionReply>,
+}
+
+impl AdapterEnd {
+    /// Sends a request to the motion device.
+    ///
+    /// # Errors
+    /// The queue is full; the request comes back.
+    #[expect(clippy::result_large_err, reason = "the request is handed back, and boxing would allocate")]
+    pub fn request(&mut self, request: MotionRequest) -> Result<(), MotionRequest> {
+        self.requests.push(request).map_err(|PushError::Full(request)| request)
+    }
+
+    /// The next reply of the motion device.
+    pub fn reply(&mut self) -> Option<MotionReply> {
+        self.replies.pop().ok()
+    }
+}
+
+/// The end in the cycle thread. Nothing here waits, allocates or calls the system.
+#[derive(Debug)]
+pub struct DeviceEnd {
+    requests: Consumer<MotionRequest>,
+    replies: Producer<MotionReply>,
+}
+
+impl DeviceEnd {
+    /// The next request of the adapter.
+    pub fn request(&mut self) -> Option<MotionRequest> {
+        self.requests.pop().ok()
+    }
+
+    /// Sends a reply.
+    ///
+    /// # Errors
+    /// The queue is full; the reply comes back, to be offered again in a later cycle.
+    #[expect(clippy::result_large_err, reason = "the reply is handed back, and boxing would allocate")]
+    pub fn reply(&mut self, reply: MotionReply) -> Result<(), MotionReply> {
+        self.replies.push(reply).map_err(|PushError::Full(reply)| reply)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use profile_cip::target::motion_link::{CloseParameters, ConnectionTriad, Token};
+
+    use super::*;
+
+    pub fn close(token: u64) -> MotionRequest {
+        let triad = ConnectionTriad { connection_serial: 1, originator_vendor: 2, originator_serial: 3 };
+        MotionRequest::Close(CloseParameters { token: Token(token), triad, o_to_t_id: 4 })
+    }
+
+    #[test]
+    fn both_directions_keep_their_order_and_hand_back_what_does_not_fit() {
+        let (mut adapter, mut device) = motion_link();
+        for token in 0..32 {
+            assert_eq!(adapter.request(close(token)), Ok(()));
+            assert_eq!(device.reply(MotionReply::Closed { token: Token(token) }), Ok(()));
+        }
+        assert_eq!(adapter.request(close(32)), Err(close(32)));
+        let reply = MotionReply::Closed { token: Token(32) };
+        assert_eq!(device.reply(reply.clone()), Err(reply));
+        let tokens: Vec<u64> = std::iter::from_fn(|| device.request()).map(|one| one.token().0).collect();
+        assert_eq!(tokens, (0..32).collect::<Vec<u64>>());
+        assert_eq!(adapter.reply(), Some(MotionReply::Closed { token: Token(0) }));
+        assert_eq!(std::iter::from_fn(|| adapter.reply()).count(), 31);
+    }
+}
