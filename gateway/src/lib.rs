@@ -6,5 +6,6 @@ pub mod decode;
 pub mod latest;
 pub mod mapping;
 pub mod modbus;
+pub mod north;
 pub mod status;
 pub mod sys;
