@@ -117,7 +117,7 @@ pub struct CipAttribute {
     pub access: Access,
     /// Whether it may be set in the Running state.
     pub running: bool,
-    /// Need for each of [`DEVICE_FUNCTIONS`]: `R`, `O`, `C` or `-`.
+    /// Need for the device functions B, E, F, P, V and T, in this order: `R`, `O`, `C` or `-`.
     pub need: String,
     /// Unit; empty when there is none.
     pub unit: String,
