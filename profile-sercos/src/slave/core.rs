@@ -6,6 +6,7 @@ use profile_generic::time::MonotonicTime;
 use super::application::{Application, Order, Progress};
 use super::communication;
 use super::configuration::{Configuration, Invalid, resolve};
+use super::connection::ConsumerState;
 use super::parameter::{Handle, Store};
 use super::phase::{Conditions, Fault, State};
 use super::service_channel::Host;
@@ -150,6 +151,11 @@ impl Core {
                     self.store.set_number_of(communication::idn::INTERFACE_STATUS, 0);
                 }
                 self.connection_failed = false;
+                for link in self.configuration.iter_mut().flat_map(|configuration| &mut configuration.links) {
+                    if link.consumer.state() == ConsumerState::Error {
+                        link.consumer.restart();
+                    }
+                }
                 let reset = app.reset(&mut self.store) && self.fault.is_none();
                 Some(if reset { Progress::Done } else { Progress::Failed })
             }

@@ -2,7 +2,7 @@
 //!
 //! A [`Slave`] sits between two ports. Every frame that comes in goes through [`Slave::handle_frame`], which takes
 //! what is for this slave, puts in what is from it, and says where the frame goes on. [`Line`] joins slaves. The
-//! function-specific profile behind the communication is an [`Application`]; `drive::Drive` is one.
+//! function-specific profile behind the communication is an [`Application`]; [`drive::Drive`] is one.
 //!
 //! Nothing is allocated after a slave is built.
 
@@ -12,6 +12,7 @@ pub mod configuration;
 pub mod connection;
 mod core;
 mod cyclic;
+pub mod drive;
 mod line;
 pub mod parameter;
 pub mod phase;
@@ -202,6 +203,11 @@ impl<A: Application> Slave<A> {
     /// Topology address of the last scan; 0 before the first one.
     pub fn topology_address(&self) -> u16 {
         self.topology_address
+    }
+
+    /// The IDN that is open in the service channel.
+    pub fn open_idn(&self) -> Option<Idn> {
+        self.svc.open_idn(&self.core.store)
     }
 
     /// Plugs or pulls a cable.

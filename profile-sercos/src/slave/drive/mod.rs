@@ -1,0 +1,496 @@
+//! A simulated drive behind a slave: the drive profile of IEC 61800-7-204 on a simulated servo axis.
+//!
+//! ```text
+//! bits 15..14 of S-0-0135                       S-0-0134
+//! 00 not ready       before CP4
+//! 01 ready for main power                       main power comes and goes outside of SERCOS
+//! 10 main power on   <-------------+            bit 14 = 0, a fault, or the end of a stop
+//!        |                         |
+//!        | bits 15 and 14 = 1, CP4 |            an edge of bit 15 or 14 is needed after each switch-off
+//!        v                         |
+//! 11 in operation  ----------------+            bit 15 = 0: stop, S-0-0207, then off
+//!    bit 3 = 1 follows                          bit 13 = 1, after S-0-0206
+//!    bit 4 = 1 halted                           bit 13 = 0
+//! ```
+//!
+//! When the connection with S-0-0134 no longer delivers the drive stops as if bit 15 had gone to 0.
+
+mod fault;
+pub mod parameters;
+pub mod scaling;
+
+use profile_generic::fault::FaultCause;
+use profile_generic::image::StatusBits;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
+use profile_generic::servo::{Servo, ServoActual, ServoCommand, ServoControl, ServoError, ServoParameters};
+use profile_generic::state::Report;
+use profile_generic::time::DurationNs;
+
+use self::parameters::{MODES, idn};
+use self::scaling::Scales;
+use super::application::{Application, Cycle, Diagnosis, Order, Progress};
+use super::communication;
+use super::configuration::Invalid;
+use super::parameter::Store;
+use super::phase::State;
+use crate::wire::drive_words::{DriveControl, DriveStatus, ReadyState};
+use crate::wire::header::Phase;
+use crate::wire::idn::Idn;
+use crate::wire::svc_error::SvcError;
+
+/// Data blocks of the operation modes that bits 10..8 of S-0-0134 select.
+const MODE_BLOCKS: [u16; 8] = [32, 33, 34, 35, 284, 285, 286, 287];
+/// Distance of motor temperature and overload to their limits at which the drive warns.
+const TEMPERATURE_MARGIN_MILLIDEGREE: i64 = 10_000;
+/// Part of the overload model, ppm, at which the drive warns.
+const OVERLOAD_WARNING_PPM: i64 = 900_000;
+
+/// The drive.
+#[derive(Debug)]
+pub struct Drive {
+    servo: Servo,
+    scales: Scales,
+    main_power: bool,
+    /// Warnings raised from outside, bits of S-0-0012.
+    warnings: u16,
+    control: DriveControl,
+    actual: ServoActual,
+    /// Operation mode code in effect, and the number that selects it.
+    mode: u16,
+    mode_number: u8,
+    /// Whole position command in counts.
+    position: i64,
+    /// Time in operation, up to the drive-on delay.
+    on_for: DurationNs,
+    /// Time at standstill since the drive was switched off by bit 15.
+    off_for: DurationNs,
+    follows: bool,
+    /// The connection was lost in operation: the enabling bits have to go away once.
+    locked: bool,
+    referenced: bool,
+}
+
+impl Drive {
+    /// A drive with this servo, with main power. Fails when the servo's parameters do.
+    pub fn new(parameters: ServoParameters) -> Result<Self, ServoError> {
+        let mut store = Store::new();
+        parameters::define(&mut store, &parameters);
+        // The preset scaling fits every servo that can be built.
+        let scales = Scales::read(&store, &parameters).map_err(|_| ServoError::OutOfRange("kind"))?;
+        Ok(Drive {
+            servo: Servo::new(parameters)?,
+            scales,
+            main_power: true,
+            warnings: 0,
+            control: DriveControl::empty(),
+            actual: ServoActual::default(),
+            mode: MODES[2],
+            mode_number: 0,
+            position: 0,
+            on_for: DurationNs::ZERO,
+            off_for: DurationNs::ZERO,
+            follows: false,
+            locked: false,
+            referenced: false,
+        })
+    }
+
+    /// The servo, to look at it.
+    pub fn servo(&self) -> &Servo {
+        &self.servo
+    }
+
+    /// The servo, to load it, to move its switches, to place it.
+    pub fn servo_mut(&mut self) -> &mut Servo {
+        &mut self.servo
+    }
+
+    /// What the servo did in the last cycle.
+    pub fn actual(&self) -> &ServoActual {
+        &self.actual
+    }
+
+    /// Switches main power.
+    pub fn set_main_power(&mut self, on: bool) {
+        self.main_power = on;
+    }
+
+    /// Raises a fault; its cause stays until [`clear_fault`](Self::clear_fault).
+    pub fn raise_fault(&mut self, cause: FaultCause) {
+        self.servo.raise_fault(cause);
+    }
+
+    /// Ends the cause of a fault. The fault itself stays until S-0-0099.
+    pub fn clear_fault(&mut self, cause: FaultCause) {
+        self.servo.clear_fault(cause);
+    }
+
+    /// Sets the warnings that come from outside, bits of S-0-0012.
+    pub fn set_warnings(&mut self, bits: u16) {
+        self.warnings = bits;
+    }
+
+    /// Says whether the position refers to the machine's zero point (S-0-0403).
+    pub fn set_referenced(&mut self, referenced: bool) {
+        self.referenced = referenced;
+    }
+
+    /// Limits and windows of the parameters, as the servo takes them.
+    fn servo_parameters(&self, scales: &Scales, store: &Store, lag_less: bool) -> ServoParameters {
+        let number = |idn| store.number_of(idn);
+        ServoParameters {
+            velocity_limit: Velocity(scales.velocity.generic(number(idn::VELOCITY_LIMIT)).max(1)),
+            torque_limit: Torque(scales.torque.generic(number(idn::TORQUE_LIMIT)).max(1)),
+            deceleration_limit: Acceleration(
+                scales.acceleration.generic(number(idn::ACCELERATION_LIMIT)).max(1),
+            ),
+            position_error_tolerance: Position(scales.position.generic(number(idn::MONITORING_WINDOW))),
+            in_position_window: Position(scales.position.generic(number(idn::POSITION_WINDOW)).max(1)),
+            standstill_window: Velocity(scales.velocity.generic(number(idn::STANDSTILL_WINDOW)).max(1)),
+            position_gain: number(idn::POSITION_GAIN).saturating_mul(1_000_000) / 6,
+            velocity_feed_forward: if lag_less { 1_000_000 } else { 0 },
+            ..*self.servo.parameters()
+        }
+    }
+
+    /// Takes scaling and limits over. What the servo refuses has been refused when it was written or checked.
+    fn adopt(&mut self, store: &Store) {
+        if let Ok(scales) = Scales::read(store, self.servo.parameters()) {
+            if scales != self.scales {
+                self.position = scales.position.counts(self.actual.position.0);
+            }
+            self.scales = scales;
+        }
+        let parameters = self.servo_parameters(&self.scales, store, self.mode & 8 != 0);
+        if parameters != *self.servo.parameters() {
+            // An unstable position gain is kept out by `check`.
+            let _ = self.servo.set_parameters(parameters);
+        }
+    }
+
+    /// Whether the servo would run with these parameters.
+    fn is_possible(&self, parameters: ServoParameters) -> bool {
+        Servo::new(parameters).is_ok()
+    }
+
+    /// The operation mode that the control word selects; `None` if there is none behind the number.
+    fn select_mode(&mut self, store: &Store) -> Option<OperatingMode> {
+        let number = self.control.mode();
+        let block = MODE_BLOCKS[usize::from(number & 7)];
+        let [low, high, ..] = store.number_of(Idn::standard(block)).to_le_bytes();
+        let code = u16::from_le_bytes([low, high]);
+        let mode = match code {
+            0x0001 => OperatingMode::Torque,
+            0x0002 => OperatingMode::Velocity,
+            0x0003 | 0x000B => OperatingMode::Position,
+            _ => return None,
+        };
+        if (code, number) != (self.mode, self.mode_number) {
+            (self.mode, self.mode_number) = (code, number);
+            self.adopt(store);
+        }
+        Some(mode)
+    }
+
+    /// The servo's control, from the bits of S-0-0134 and the delays.
+    fn servo_control(&mut self, cycle: &Cycle, store: &Store) -> ServoControl {
+        let (on, enable) =
+            (self.control.contains(DriveControl::ON), self.control.contains(DriveControl::ENABLE));
+        let torque = self.in_operation();
+        if !enable && (cycle.connected || !torque) {
+            return ServoControl::TorqueOff;
+        }
+        if !on || !cycle.connected || self.locked {
+            let stands = self.actual.status.contains(StatusBits::STANDSTILL);
+            self.off_for = if stands && torque { self.off_for + cycle.elapsed } else { DurationNs::ZERO };
+            let waits = torque
+                && cycle.connected
+                && !self.locked
+                && self.off_for < tenth_millis(store, idn::OFF_DELAY);
+            return if waits { ServoControl::Halt } else { ServoControl::Disable };
+        }
+        self.off_for = DurationNs::ZERO;
+        let halt = !self.control.contains(DriveControl::RESTART);
+        let running = matches!(self.actual.report, Report::Operating | Report::Halted);
+        if halt && running { ServoControl::Halt } else { ServoControl::Enable }
+    }
+
+    fn in_operation(&self) -> bool {
+        matches!(
+            self.actual.report,
+            Report::Operating | Report::Halted | Report::Stopping | Report::FaultReaction | Report::Enabling
+        )
+    }
+
+    /// The command of this cycle in generic units.
+    fn command(&mut self, cycle: &Cycle, mode: OperatingMode, store: &Store) -> ServoCommand {
+        let control = self.servo_control(cycle, store);
+        let running = self.actual.report == Report::Operating;
+        self.on_for = if running { self.on_for + cycle.elapsed } else { DurationNs::ZERO };
+        let delayed = self.on_for < tenth_millis(store, idn::ON_DELAY);
+        self.follows = running && !delayed && control == ServoControl::Enable;
+        let actual = self.scales.position.counts(self.actual.position.0);
+        let mut command = ServoCommand { control, power: self.main_power, mode, ..ServoCommand::default() };
+        if !self.follows {
+            // Command values do not count: the drive stands where it is.
+            self.position = actual;
+            command.position = self.actual.position;
+            if mode == OperatingMode::Torque {
+                command.mode = OperatingMode::Velocity;
+            }
+            return command;
+        }
+        let number = |idn| store.number_of(idn);
+        let sign = |idn, bit: i64| if number(idn) & 1 << bit == 0 { 1 } else { -1 };
+        let whole = self
+            .scales
+            .unfold(sign(idn::POSITION_POLARITY, 0) * number(idn::POSITION_COMMAND), self.position);
+        if mode == OperatingMode::Position {
+            self.position = whole;
+        }
+        let additive = sign(idn::POSITION_POLARITY, 1) * number(idn::POSITION_ADDITIVE);
+        command.position = Position(self.scales.position.generic(self.position.saturating_add(additive)));
+        let velocity = |value| Velocity(self.scales.velocity.generic(value));
+        command.velocity = velocity(sign(idn::VELOCITY_POLARITY, 0) * number(idn::VELOCITY_COMMAND));
+        command.velocity_offset = velocity(sign(idn::VELOCITY_POLARITY, 1) * number(idn::VELOCITY_ADDITIVE));
+        let torque = |value| Torque(self.scales.torque.generic(value));
+        command.torque = torque(sign(idn::TORQUE_POLARITY, 0) * number(idn::TORQUE_COMMAND));
+        command.torque_offset = torque(sign(idn::TORQUE_POLARITY, 1) * number(idn::TORQUE_ADDITIVE));
+        command
+    }
+
+    /// Travel limits S-0-0049 and S-0-0050, where S-0-0055 bit 4 enables them.
+    fn watch_travel(&mut self, store: &Store) {
+        const ENABLED: i64 = 1 << 4;
+        let position = self.scales.position.counts(self.actual.position.0);
+        let enabled = store.number_of(idn::POSITION_POLARITY) & ENABLED != 0;
+        let beyond = [
+            (
+                FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE,
+                position > store.number_of(idn::POSITION_LIMIT_POSITIVE),
+            ),
+            (
+                FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE,
+                position < store.number_of(idn::POSITION_LIMIT_NEGATIVE),
+            ),
+        ];
+        for (cause, beyond) in beyond {
+            if enabled && beyond { self.servo.raise_fault(cause) } else { self.servo.clear_fault(cause) }
+        }
+    }
+
+    /// Feedback values and status words into the store.
+    fn publish(&self, cycle: &Cycle, store: &mut Store) {
+        let actual = &self.actual;
+        let number = |store: &Store, idn| store.number_of(idn);
+        let sign = |store: &Store, idn, bit: i64| if number(store, idn) & 1 << bit == 0 { 1 } else { -1 };
+        let counts = self.scales.position.counts(actual.position.0);
+        for (idn, bit) in
+            [(idn::POSITION_FEEDBACK, 2), (idn::POSITION_FEEDBACK_2, 3), (idn::ACTIVE_POSITION, 2)]
+        {
+            let polarity = sign(store, idn::POSITION_POLARITY, bit);
+            store.set_number_of(idn, self.scales.fold(polarity * counts));
+        }
+        let following = self.scales.position.counts(actual.following_error.0);
+        store.set_number_of(idn::FOLLOWING_DISTANCE, following);
+        let polarity = sign(store, idn::VELOCITY_POLARITY, 2);
+        store
+            .set_number_of(idn::VELOCITY_FEEDBACK, polarity * self.scales.velocity.counts(actual.velocity.0));
+        let polarity = sign(store, idn::TORQUE_POLARITY, 2);
+        store.set_number_of(idn::TORQUE_FEEDBACK, polarity * self.scales.torque.counts(actual.torque.0));
+        store.set_number_of(idn::BUS_VOLTAGE, actual.bus_voltage.0 / 100_000);
+        store.set_number_of(idn::MOTOR_TEMPERATURE, actual.temperature.0 / 100);
+        store.set_number_of(idn::POSITION_STATUS, i64::from(self.referenced));
+        store.set_number_of(idn::STATUS, i64::from(self.class_3(store)));
+        let errors = self.diagnosis().errors;
+        let manufacturer = errors & 1 << fault::MANUFACTURER != 0;
+        store.set_number_of(idn::MANUFACTURER_ERRORS, i64::from(manufacturer));
+        if self.actual.fault == Some(FaultCause::ILLEGAL_MODE) {
+            const UNDEFINED_MODE: i64 = 1 << 9;
+            let status = store.number_of(communication::idn::INTERFACE_STATUS);
+            store.set_number_of(communication::idn::INTERFACE_STATUS, status | UNDEFINED_MODE);
+        }
+        store.set_number_of(Idn::DRIVE_STATUS, i64::from(self.status(cycle).bits()));
+    }
+
+    /// S-0-0013.
+    fn class_3(&self, store: &Store) -> u16 {
+        let status = self.actual.status;
+        let velocity = self.scales.velocity.counts(self.actual.velocity.0).abs();
+        let torque = self.scales.torque.counts(self.actual.torque.0).abs();
+        let bits = [
+            status.contains(StatusBits::AT_VELOCITY),
+            status.contains(StatusBits::STANDSTILL),
+            velocity < store.number_of(idn::VELOCITY_THRESHOLD),
+            torque >= store.number_of(idn::TORQUE_THRESHOLD),
+            status.contains(StatusBits::TORQUE_LIMIT),
+            status.contains(StatusBits::VELOCITY_LIMIT),
+            status.contains(StatusBits::IN_POSITION),
+        ];
+        bits.iter().rev().fold(0, |word, &bit| word << 1 | u16::from(bit))
+    }
+
+    /// S-0-0135.
+    fn status(&self, cycle: &Cycle) -> DriveStatus {
+        let ready = match (cycle.state, self.actual.report) {
+            (State::In(Phase::CP4), Report::Operating | Report::Halted | Report::Stopping) => {
+                ReadyState::InOperation
+            }
+            (State::In(Phase::CP4), Report::FaultReaction) => ReadyState::InOperation,
+            (State::In(Phase::CP4), Report::Ready | Report::Enabling) => ReadyState::PowerOn,
+            (State::In(Phase::CP4), Report::AwaitingPower) => ReadyState::ReadyForPower,
+            _ => ReadyState::NotReady,
+        };
+        let diagnosis = self.diagnosis();
+        let mut status = DriveStatus::empty().with_ready(ready).with_mode(self.mode_number);
+        status.set(DriveStatus::ERROR, diagnosis.errors != 0);
+        status.set(DriveStatus::WARNING, diagnosis.warnings != 0);
+        status.set(DriveStatus::REFERENCED, self.referenced);
+        status.set(DriveStatus::HALT, self.actual.report == Report::Halted);
+        status.set(DriveStatus::FOLLOWS, self.follows && self.actual.report == Report::Operating);
+        status
+    }
+
+    fn own_warnings(&self) -> u16 {
+        let parameters = self.servo.parameters();
+        let hot = self.actual.temperature.0 > parameters.max_temperature.0 - TEMPERATURE_MARGIN_MILLIDEGREE;
+        let overload = self.actual.overload > OVERLOAD_WARNING_PPM;
+        self.warnings | u16::from(overload) | u16::from(hot) << 2
+    }
+}
+
+/// A delay parameter in 0.1 ms.
+fn tenth_millis(store: &Store, idn: Idn) -> DurationNs {
+    DurationNs(store.number_of(idn).saturating_mul(100_000))
+}
+
+impl Application for Drive {
+    fn define(&mut self, store: &mut Store) {
+        parameters::define(store, self.servo.parameters());
+    }
+
+    fn refresh(&mut self, _: Idn, _: &mut Store) {}
+
+    fn check(&self, idn: Idn, data: &[u8], store: &Store) -> Result<(), SvcError> {
+        let value =
+            |len: usize| data.iter().take(len).rev().fold(0i64, |value, &b| value << 8 | i64::from(b));
+        if idn.is_product() || idn.instance() != 0 || idn.element() != 0 {
+            return Ok(());
+        }
+        if MODE_BLOCKS.contains(&idn.block()) {
+            let code = value(2);
+            let known = code == 0 || MODES.iter().any(|&mode| i64::from(mode) == code);
+            return if known { Ok(()) } else { Err(SvcError::INVALID_DATA) };
+        }
+        if idn == idn::POSITION_GAIN {
+            let gain = value(2).saturating_mul(1_000_000) / 6;
+            let parameters = ServoParameters { position_gain: gain, ..*self.servo.parameters() };
+            return if self.is_possible(parameters) { Ok(()) } else { Err(SvcError::INVALID_DATA) };
+        }
+        let preferential =
+            |factors: &[Idn], kind: Idn| factors.contains(&idn) && store.number_of(kind) & 8 == 0;
+        use self::scaling::idn as s;
+        let fixed = preferential(&[s::POSITION_FACTOR, s::POSITION_EXPONENT], s::POSITION_TYPE)
+            || preferential(&[s::VELOCITY_FACTOR, s::VELOCITY_EXPONENT], s::VELOCITY_TYPE)
+            || preferential(&[s::ACCELERATION_FACTOR, s::ACCELERATION_EXPONENT], s::ACCELERATION_TYPE)
+            || preferential(&[s::TORQUE_FACTOR, s::TORQUE_EXPONENT], s::TORQUE_TYPE);
+        let own = data != store.find(idn).map_or(&[][..], |handle| store.get(handle).data());
+        if fixed && own { Err(SvcError::OTHER_SETTINGS) } else { Ok(()) }
+    }
+
+    fn written(&mut self, idn: Idn, store: &mut Store) {
+        let kind = store.number_of(idn);
+        for &(idn, value) in scaling::preferential(idn, kind) {
+            store.set_number_of(idn, value);
+        }
+        self.adopt(store);
+    }
+
+    fn order(&mut self, _: Idn, _: Order, _: &mut Store) -> Result<Progress, SvcError> {
+        Err(SvcError::NOT_EXECUTABLE)
+    }
+
+    fn progress(&mut self, _: Idn, _: &mut Store) -> Progress {
+        Progress::Failed
+    }
+
+    fn check_phase(&self, phase: Phase, store: &Store, invalid: &mut Invalid) {
+        if phase == Phase::CP3 {
+            return;
+        }
+        match Scales::read(store, self.servo.parameters()) {
+            Err(idn) => invalid.push(idn),
+            Ok(scales) => {
+                let parameters = self.servo_parameters(&scales, store, false);
+                if !self.is_possible(parameters) {
+                    invalid.push(idn::POSITION_GAIN);
+                }
+            }
+        }
+        if store.number_of(idn::MODE) == 0 {
+            invalid.push(idn::MODE);
+        }
+        let limits =
+            [idn::POSITION_LIMIT_NEGATIVE, idn::POSITION_LIMIT_POSITIVE].map(|idn| store.number_of(idn));
+        if store.number_of(idn::POSITION_POLARITY) & 1 << 4 != 0 && limits[0] >= limits[1] {
+            invalid.push(idn::POSITION_LIMIT_POSITIVE);
+        }
+    }
+
+    fn cycle(&mut self, cycle: Cycle, store: &mut Store) {
+        let [low, high, ..] = store.number_of(Idn::DRIVE_CONTROL).to_le_bytes();
+        let received = DriveControl::from_bits_retain(u16::from_le_bytes([low, high]));
+        let enabling = DriveControl::ON.union(DriveControl::ENABLE);
+        if cycle.connected {
+            self.control = received;
+            self.locked &= received.contains(enabling);
+        } else if cycle.state != State::In(Phase::CP4) && !self.in_operation() {
+            self.control = DriveControl::empty();
+            self.locked = false;
+        } else if self.in_operation() {
+            self.locked = true;
+        }
+        let wants = self.control.contains(enabling) && cycle.connected;
+        let mode = self.select_mode(store);
+        if mode.is_none() && wants {
+            self.servo.raise_fault(FaultCause::ILLEGAL_MODE);
+        } else {
+            self.servo.clear_fault(FaultCause::ILLEGAL_MODE);
+        }
+        let command = self.command(&cycle, mode.unwrap_or(OperatingMode::Velocity), store);
+        self.actual = self.servo.step(cycle.elapsed.0, &command);
+        self.watch_travel(store);
+        self.publish(&cycle, store);
+    }
+
+    fn diagnosis(&self) -> Diagnosis {
+        let warnings = self.own_warnings();
+        let Some(cause) = self.actual.fault else {
+            let bit = warnings.trailing_zeros();
+            return match fault::CLASS_2_TEXTS.get(usize::try_from(bit).unwrap_or(usize::MAX)) {
+                Some(text) => Diagnosis { errors: 0, warnings, number: fault::number(0xE, bit), text },
+                None => Diagnosis { errors: 0, warnings, number: 0, text: "" },
+            };
+        };
+        let bit = fault::class_1_bit(cause);
+        Diagnosis {
+            errors: 1 << bit,
+            warnings,
+            number: fault::number(0xF, u32::from(bit)),
+            text: fault::CLASS_1_TEXTS[usize::from(bit & 15)],
+        }
+    }
+
+    fn reset(&mut self, _: &mut Store) -> bool {
+        // A stop that is going on goes on; the fault is not reset then.
+        let command = ServoCommand {
+            control: ServoControl::Disable,
+            power: self.main_power,
+            reset_fault: true,
+            ..ServoCommand::default()
+        };
+        self.actual = self.servo.step(1, &command);
+        self.actual.fault.is_none()
+    }
+}

@@ -1,0 +1,332 @@
+//! Scaling of the drive's data: what one count of a position, velocity, acceleration or torque is worth.
+//!
+//! | data | type | factor, exponent | preferential linear | preferential rotational |
+//! |---|---|---|---|---|
+//! | position | S-0-0076 | S-0-0077, S-0-0078; rotational S-0-0079 | 0.0001 mm | 0.0001 degree |
+//! | velocity | S-0-0044 | S-0-0045, S-0-0046 | 0.001 mm/min | 0.0001 1/min or 0.000001 1/s |
+//! | acceleration | S-0-0160 | S-0-0161, S-0-0162 | 0.001 mm/s² | 0.001 rad/s² |
+//! | torque | S-0-0086 | S-0-0093, S-0-0094 | 1 N | 0.01 Nm |
+//!
+//! Torque without scaling is in 0.1 % of S-0-0111, position without scaling in encoder counts. With a
+//! preferential type (bit 3 = 0) the drive sets factor and exponent itself. A rotary axis takes rotational
+//! scaling, a linear axis linear scaling; there is no gear between motor and load.
+
+use profile_generic::ratio::{Ratio, Rounding};
+use profile_generic::scaling::UnitKind;
+use profile_generic::servo::ServoParameters;
+
+use super::super::parameter::Store;
+use crate::wire::idn::Idn;
+
+/// IDNs of scaling.
+pub mod idn {
+    use crate::wire::idn::Idn;
+
+    /// Position scaling type.
+    pub const POSITION_TYPE: Idn = Idn::standard(76);
+    /// Linear position factor.
+    pub const POSITION_FACTOR: Idn = Idn::standard(77);
+    /// Linear position exponent.
+    pub const POSITION_EXPONENT: Idn = Idn::standard(78);
+    /// Rotational position resolution, counts a turn.
+    pub const POSITION_RESOLUTION: Idn = Idn::standard(79);
+    /// Velocity scaling type.
+    pub const VELOCITY_TYPE: Idn = Idn::standard(44);
+    /// Velocity factor.
+    pub const VELOCITY_FACTOR: Idn = Idn::standard(45);
+    /// Velocity exponent.
+    pub const VELOCITY_EXPONENT: Idn = Idn::standard(46);
+    /// Acceleration scaling type.
+    pub const ACCELERATION_TYPE: Idn = Idn::standard(160);
+    /// Acceleration factor.
+    pub const ACCELERATION_FACTOR: Idn = Idn::standard(161);
+    /// Acceleration exponent.
+    pub const ACCELERATION_EXPONENT: Idn = Idn::standard(162);
+    /// Torque scaling type.
+    pub const TORQUE_TYPE: Idn = Idn::standard(86);
+    /// Torque factor.
+    pub const TORQUE_FACTOR: Idn = Idn::standard(93);
+    /// Torque exponent.
+    pub const TORQUE_EXPONENT: Idn = Idn::standard(94);
+    /// Modulo value.
+    pub const MODULO: Idn = Idn::standard(103);
+}
+
+/// Bits of a scaling type.
+mod bits {
+    pub const METHOD: i64 = 7;
+    pub const NONE: i64 = 0;
+    pub const LINEAR: i64 = 1;
+    pub const ROTATIONAL: i64 = 2;
+    pub const PARAMETER: i64 = 1 << 3;
+    /// Inch instead of metre; reserved with rotational scaling.
+    pub const INCH: i64 = 1 << 4;
+    /// Second instead of minute, for velocity.
+    pub const SECOND: i64 = 1 << 5;
+    pub const MODULO: i64 = 1 << 7;
+}
+
+/// Nanounits in a metre (axis unit millimetre) and in a turn (axis unit revolution).
+const METRE: i64 = 1_000_000_000_000;
+const TURN: i64 = 1_000_000_000;
+/// A turn in nanoradian.
+const TURN_NANORADIAN: i64 = 6_283_185_307;
+
+/// One kind of data: counts to generic units and back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scale {
+    to_generic: Ratio,
+    to_counts: Ratio,
+}
+
+impl Scale {
+    fn new(to_generic: Option<Ratio>) -> Option<Scale> {
+        let to_generic = to_generic?;
+        Some(Scale { to_generic, to_counts: to_generic.inverse()? })
+    }
+
+    /// Generic units of so many counts.
+    pub fn generic(&self, counts: i64) -> i64 {
+        self.to_generic.convert(counts, Rounding::Nearest).value
+    }
+
+    /// Counts of so many generic units.
+    pub fn counts(&self, generic: i64) -> i64 {
+        self.to_counts.convert(generic, Rounding::Nearest).value
+    }
+}
+
+/// All scales of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scales {
+    /// Position, nanounits.
+    pub position: Scale,
+    /// Velocity, nanounits per second.
+    pub velocity: Scale,
+    /// Acceleration, nanounits per second squared.
+    pub acceleration: Scale,
+    /// Torque, parts per million of rated torque.
+    pub torque: Scale,
+    /// Counts after which a position begins anew: S-0-0103, or the 2^32 of its length.
+    pub modulo: i64,
+    /// Positions go from 0 to `modulo`; else they are centred on 0.
+    pub from_zero: bool,
+}
+
+impl Scales {
+    /// The scales that the parameters ask for; the IDN of the first parameter that makes none.
+    pub fn read(store: &Store, servo: &ServoParameters) -> Result<Scales, Idn> {
+        let rotary = servo.kind == UnitKind::Rotary;
+        let position = position(store, rotary, servo).and_then(|ratio| Scale::new(Some(ratio)));
+        let modulo = store.number_of(idn::POSITION_TYPE) & bits::MODULO != 0;
+        let value = store.number_of(idn::MODULO);
+        if modulo && value < 2 {
+            return Err(idn::MODULO);
+        }
+        Ok(Scales {
+            position: position.ok_or(idn::POSITION_TYPE)?,
+            velocity: Scale::new(velocity(store, rotary)).ok_or(idn::VELOCITY_TYPE)?,
+            acceleration: Scale::new(acceleration(store, rotary)).ok_or(idn::ACCELERATION_TYPE)?,
+            torque: Scale::new(torque(store, rotary, servo)).ok_or(idn::TORQUE_TYPE)?,
+            modulo: if modulo { value } else { 1 << 32 },
+            from_zero: modulo,
+        })
+    }
+
+    /// A position in counts as it is transmitted: within the modulo value, or within 32 bits.
+    pub fn fold(&self, counts: i64) -> i64 {
+        if self.from_zero {
+            return counts.rem_euclid(self.modulo);
+        }
+        let half = self.modulo / 2;
+        (counts.wrapping_add(half)).rem_euclid(self.modulo) - half
+    }
+
+    /// The whole position whose transmitted form is `counts`, nearest to `reference`.
+    pub fn unfold(&self, counts: i64, reference: i64) -> i64 {
+        let ahead = counts.wrapping_sub(reference).rem_euclid(self.modulo);
+        let way = if ahead > self.modulo / 2 { ahead - self.modulo } else { ahead };
+        reference.saturating_add(way)
+    }
+}
+
+/// `factor` times ten to the `exponent` of a parameter pair.
+fn factor(store: &Store, factor: Idn, exponent: Idn) -> Option<Ratio> {
+    let power = store.number_of(exponent);
+    let ten = 10i64.checked_pow(u32::try_from(power.unsigned_abs()).ok()?)?;
+    let number = store.number_of(factor);
+    if number < 1 {
+        return None;
+    }
+    if power < 0 { Ratio::new(number, ten) } else { Ratio::new(number.checked_mul(ten)?, 1) }
+}
+
+/// A length in metres or inches, as nanounits.
+fn length(kind: i64) -> Option<Ratio> {
+    if kind & bits::INCH != 0 { Ratio::new(METRE / 10_000 * 254, 1) } else { Ratio::new(METRE, 1) }
+}
+
+fn position(store: &Store, rotary: bool, servo: &ServoParameters) -> Option<Ratio> {
+    let kind = store.number_of(idn::POSITION_TYPE);
+    match (kind & bits::METHOD, rotary) {
+        (bits::NONE, _) => Ratio::new(TURN, i64::from(servo.encoder_counts)),
+        (bits::ROTATIONAL, true) => Ratio::new(TURN, store.number_of(idn::POSITION_RESOLUTION)),
+        (bits::LINEAR, false) => {
+            factor(store, idn::POSITION_FACTOR, idn::POSITION_EXPONENT)?.then(length(kind)?)
+        }
+        _ => None,
+    }
+}
+
+fn velocity(store: &Store, rotary: bool) -> Option<Ratio> {
+    let kind = store.number_of(idn::VELOCITY_TYPE);
+    let unit = match (kind & bits::METHOD, rotary) {
+        (bits::ROTATIONAL, true) => Ratio::new(TURN, 1),
+        (bits::LINEAR, false) => length(kind),
+        _ => None,
+    }?;
+    let seconds = if kind & bits::SECOND != 0 { 1 } else { 60 };
+    factor(store, idn::VELOCITY_FACTOR, idn::VELOCITY_EXPONENT)?.then(unit)?.then(Ratio::new(1, seconds)?)
+}
+
+fn acceleration(store: &Store, rotary: bool) -> Option<Ratio> {
+    let kind = store.number_of(idn::ACCELERATION_TYPE);
+    let unit = match (kind & bits::METHOD, rotary) {
+        (bits::ROTATIONAL, true) => Ratio::new(TURN, TURN_NANORADIAN)?.then(Ratio::new(TURN, 1)?),
+        (bits::LINEAR, false) => length(kind),
+        _ => None,
+    }?;
+    factor(store, idn::ACCELERATION_FACTOR, idn::ACCELERATION_EXPONENT)?.then(unit)
+}
+
+fn torque(store: &Store, rotary: bool, servo: &ServoParameters) -> Option<Ratio> {
+    let kind = store.number_of(idn::TORQUE_TYPE);
+    match (kind & bits::METHOD, rotary) {
+        (bits::NONE, _) => Ratio::new(1_000, 1),
+        (bits::ROTATIONAL, true) | (bits::LINEAR, false) if kind & bits::INCH == 0 => {
+            // Micro newton (metre), as parts per million of what the motor is rated for.
+            let micro = Ratio::new(1_000_000, 1)?;
+            let rated = Ratio::new(1_000_000, servo.rated_torque.0)?;
+            factor(store, idn::TORQUE_FACTOR, idn::TORQUE_EXPONENT)?.then(micro)?.then(rated)
+        }
+        _ => None,
+    }
+}
+
+/// What the drive sets by itself when a scaling type is preferential: pairs of IDN and value.
+pub fn preferential(type_idn: Idn, kind: i64) -> &'static [(Idn, i64)] {
+    if kind & bits::PARAMETER != 0 {
+        return &[];
+    }
+    let linear = kind & bits::METHOD == bits::LINEAR;
+    match (type_idn, linear, kind & bits::SECOND != 0) {
+        (idn::POSITION_TYPE, true, _) => &[(idn::POSITION_FACTOR, 1), (idn::POSITION_EXPONENT, -7)],
+        (idn::POSITION_TYPE, false, _) => &[(idn::POSITION_RESOLUTION, 3_600_000)],
+        (idn::VELOCITY_TYPE, true, _) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
+        (idn::VELOCITY_TYPE, false, false) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -4)],
+        (idn::VELOCITY_TYPE, false, true) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
+        (idn::ACCELERATION_TYPE, true, _) => {
+            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -6)]
+        }
+        (idn::ACCELERATION_TYPE, false, _) => {
+            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -3)]
+        }
+        (idn::TORQUE_TYPE, true, _) => &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, 0)],
+        (idn::TORQUE_TYPE, false, _) if kind & bits::METHOD == bits::ROTATIONAL => {
+            &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, -2)]
+        }
+        (idn::TORQUE_TYPE, false, _) => &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, -1)],
+        _ => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn store(kind: UnitKind) -> (Store, ServoParameters) {
+        let servo = ServoParameters { kind, ..ServoParameters::default() };
+        let mut store = Store::new();
+        parameters::define(&mut store, &servo);
+        (store, servo)
+    }
+
+    #[test]
+    fn preferential_rotational() {
+        let (store, servo) = store(UnitKind::Rotary);
+        let scales = Scales::read(&store, &servo).unwrap();
+        assert_eq!(scales.position.generic(3_600_000), TURN);
+        assert_eq!(scales.position.counts(TURN / 4), 900_000);
+        // 3000 1/min = 50 turns a second.
+        assert_eq!(scales.velocity.generic(30_000_000), 50 * TURN);
+        // 2 pi rad/s² = one turn per second squared, to the resolution of the data.
+        assert_eq!(scales.acceleration.counts(TURN), 6_283);
+        assert_eq!(scales.torque.generic(1_000), 1_000_000);
+    }
+
+    #[test]
+    fn preferential_linear() {
+        let (mut store, servo) = store(UnitKind::Linear);
+        let scales = Scales::read(&store, &servo).unwrap();
+        // 0.0001 mm, 0.001 mm/min, 0.001 mm/s².
+        assert_eq!(scales.position.generic(1), 100_000);
+        assert_eq!(scales.velocity.generic(60), 1_000_000);
+        assert_eq!(scales.acceleration.generic(1), 1_000_000);
+        store.set_number_of(idn::POSITION_TYPE, bits::LINEAR | bits::PARAMETER | bits::INCH);
+        store.set_number_of(idn::POSITION_EXPONENT, -4);
+        let scales = Scales::read(&store, &servo).unwrap();
+        assert_eq!(scales.position.generic(10_000), 25_400_000_000, "one inch");
+    }
+
+    #[test]
+    fn torque_in_newton_metre() {
+        let (mut store, servo) = store(UnitKind::Rotary);
+        store.set_number_of(idn::TORQUE_TYPE, bits::ROTATIONAL);
+        for &(idn, value) in preferential(idn::TORQUE_TYPE, bits::ROTATIONAL) {
+            store.set_number_of(idn, value);
+        }
+        // The default servo is rated for 1 Nm; one count is 0.01 Nm.
+        assert_eq!(Scales::read(&store, &servo).unwrap().torque.generic(50), 500_000);
+    }
+
+    #[test]
+    fn impossible_scalings_are_named() {
+        let cases = [
+            (idn::POSITION_TYPE, 1, idn::POSITION_TYPE),
+            (idn::POSITION_RESOLUTION, 0, idn::POSITION_TYPE),
+            (idn::VELOCITY_TYPE, 0, idn::VELOCITY_TYPE),
+            (idn::VELOCITY_EXPONENT, 30, idn::VELOCITY_TYPE),
+            (idn::ACCELERATION_FACTOR, 0, idn::ACCELERATION_TYPE),
+            (idn::TORQUE_TYPE, 0x12, idn::TORQUE_TYPE),
+            (idn::POSITION_TYPE, 0x82, idn::MODULO),
+        ];
+        for (idn, value, wanted) in cases {
+            let (mut store, servo) = store(UnitKind::Rotary);
+            store.set_number_of(super::idn::MODULO, 0);
+            store.set_number_of(idn, value);
+            assert_eq!(Scales::read(&store, &servo), Err(wanted), "{idn} = {value}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_transmitted_leads_back(
+            reference in -1_000_000_000_000i64..1_000_000_000_000,
+            step in -1_700_000i64..1_700_000,
+            modulo: bool,
+        ) {
+            let (mut store, servo) = store(UnitKind::Rotary);
+            if modulo {
+                store.set_number_of(idn::POSITION_TYPE, 0x82);
+                store.set_number_of(idn::MODULO, 3_600_000);
+            }
+            let scales = Scales::read(&store, &servo).unwrap();
+            let there = reference + step;
+            let sent = scales.fold(there);
+            prop_assert!(if modulo { (0..3_600_000).contains(&sent) } else { i32::try_from(sent).is_ok() });
+            prop_assert_eq!(scales.unfold(sent, reference), there);
+        }
+    }
+}
