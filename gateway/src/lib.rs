@@ -1,11 +1,15 @@
 //! The Axisbridge gateway.
 
 pub mod capture;
+pub mod cli;
 pub mod config;
 pub mod decode;
+pub mod engine;
 pub mod latest;
 pub mod mapping;
 pub mod modbus;
 pub mod north;
+pub mod runner;
+pub mod simulate;
 pub mod status;
 pub mod sys;

@@ -1,3 +1,7 @@
 //! The `axisbridge` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    axisbridge::cli::main()
+}

@@ -5,7 +5,9 @@
 mod decode;
 mod demo;
 mod progress;
+mod report;
 mod run;
+mod signal;
 mod simulate;
 
 use std::path::PathBuf;
@@ -107,6 +109,9 @@ struct SercosDriveArguments {
     /// SERCOS address of the first drive; the others count up from it.
     #[arg(long, value_name = "ADDRESS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
     address: u16,
+    /// Addresses of the drives that slide instead of turning, separated by commas.
+    #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
+    linear: Vec<u16>,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
@@ -127,12 +132,26 @@ struct ControllerArguments {
     /// Controller update period (the connection's RPI) in microseconds.
     #[arg(long, value_name = "US", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(250..=1_000_000))]
     update_period_us: u32,
+    /// Counts in a unit of each axis, separated by commas; the last one counts for the axes that follow.
+    #[arg(long, value_name = "COUNTS", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..))]
+    counts_per_unit: Vec<u32>,
+    /// About how fast each axis moves, in units per second, separated by commas; the last one counts for the axes that
+    /// follow.
+    #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = positive)]
+    speed: Vec<f64>,
     /// How long the axes move, in seconds.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a number above 0".to_owned()),
+    }
 }
 
 /// Reads the arguments, runs the command, and says what the process's exit status is.

@@ -1,0 +1,122 @@
+//! `axisbridge demo`: the whole chain in one process.
+//!
+//! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it a line of simulated SERCOS
+//! III drives inside the process that carries the very same frames as a wire.
+
+use std::net::Ipv4Addr;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use super::progress::Progress;
+use super::report::{AxisResult, RunResult, failure};
+use super::{CliError, DemoArguments, signal};
+use crate::config::Config;
+use crate::mapping::Mapping;
+use crate::runner::{self, RunningBox, StartError};
+use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::program::{self, AxisPlan};
+use crate::simulate::setup;
+
+/// The demonstration's configuration; only the address is chosen by the caller.
+const CONFIGURATION: &str = include_str!("demo.toml");
+
+/// The address that stands in the configuration.
+const ADDRESS: &str = "127.0.0.2";
+
+/// Update period of the controller in microseconds: two cycles of the bus.
+const UPDATE_PERIOD_US: u32 = 4_000;
+
+/// What each axis has: speed in units per second, reach in units, window in units.
+const AXES: [(f64, f64, f64); 2] = [(2.0, 600.0, 0.002), (40.0, 700.0, 0.02)];
+
+/// How long the bus may take to cyclic operation.
+const PHASE_UP_TIME_OUT: Duration = Duration::from_secs(20);
+
+/// How often the phase-up is looked at.
+const LOOK_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Cyclic operation.
+const CYCLIC_PHASE: u8 = 4;
+
+/// Runs the demonstration.
+pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
+    let stop = signal::stop_on_signals()?;
+    let mut progress = Progress::new(arguments.json);
+    let text = CONFIGURATION.replace(ADDRESS, &arguments.listen.to_string());
+    let config = Config::parse(&text, "demo.toml")?;
+    let mapping = Mapping::embedded()?;
+    let seconds = f64::from(arguments.seconds);
+    let plans: Vec<_> = (1..)
+        .zip(AXES)
+        .map(|(axis, (speed, reach, window))| AxisPlan::new(axis, speed, reach, window, seconds))
+        .collect();
+    let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
+
+    let running = runner::start(&config, Some(&arguments.capture)).map_err(|error| in_use(error, arguments.listen))?;
+    progress.step(&format!("gateway on {}, a simulated line of {} drives behind", arguments.listen, config.axes.len()));
+    wait_for_phase(&running, &mut progress)?;
+
+    let endpoints = endpoints(arguments.listen);
+    let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
+    let steps = program::standard(&plans, seconds);
+    let told: Vec<_> = steps.iter().map(ToString::to_string).collect();
+    let outcome = controller::run(endpoints, controller_config, steps, &stop, &mut |event| {
+        use profile_cip::controller::Event;
+        match event {
+            Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
+            Event::StepFinished { .. } => {}
+            event => progress.step(&event.to_string()),
+        }
+    });
+    let status = running.status();
+    let dropped = running.stop()?;
+    progress.step(&format!(
+        "{} SERCOS cycles, {} late, {} telegrams lost",
+        status.counters.cycles, status.counters.late_cycles, status.counters.lost_telegrams
+    ));
+    drop(progress);
+    if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
+        eprintln!("warning: {dropped} frames are missing in the recording");
+    }
+    let report = outcome?;
+    let capture = Some(arguments.capture.display().to_string());
+    RunResult { axes: AxisResult::all(&plans, &report), capture, failure: failure(&report) }.print(arguments.json)
+}
+
+/// The controller has an address of its own on loopback, so that both ends have UDP port 2222.
+fn endpoints(listen: Ipv4Addr) -> Endpoints {
+    let target = if listen.is_unspecified() { Ipv4Addr::new(127, 0, 0, 2) } else { listen };
+    let [.., last] = target.octets();
+    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last) }
+}
+
+fn wait_for_phase(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {
+    let end = Instant::now() + PHASE_UP_TIME_OUT;
+    let mut shown = None;
+    loop {
+        let phase = running.status().phase;
+        if shown != Some(phase) && phase <= CYCLIC_PHASE {
+            progress.step(&format!("SERCOS communication phase {phase}"));
+            shown = Some(phase);
+        }
+        if phase == CYCLIC_PHASE {
+            return Ok(());
+        }
+        if Instant::now() > end {
+            return Err(format!("expected the bus in CP4 within {PHASE_UP_TIME_OUT:?}, it is in CP{phase}").into());
+        }
+        std::thread::sleep(LOOK_INTERVAL);
+    }
+}
+
+/// Says how another address is chosen when the default one is taken.
+fn in_use(error: StartError, listen: Ipv4Addr) -> CliError {
+    let [a, b, c, d] = listen.octets();
+    let other = Ipv4Addr::new(a, b, c, d.wrapping_add(1));
+    match error {
+        StartError::Bind(_) | StartError::Serve(_) => {
+            format!("{error}\nanother address is chosen with --listen, such as --listen {other}").into()
+        }
+        error => error.into(),
+    }
+}

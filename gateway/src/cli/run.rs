@@ -1,0 +1,50 @@
+//! `axisbridge run`: the box.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use tracing::{info, warn};
+use tracing_subscriber::EnvFilter;
+
+use super::{CliError, RunArguments};
+use crate::config::{Config, LogLevel};
+use crate::runner;
+
+/// How often the box is looked after.
+const LOOK_INTERVAL: Duration = Duration::from_millis(200);
+
+/// Runs the box until it is asked to end.
+pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
+    let config = Config::load(&arguments.config)?;
+    log_to_stderr(config.log_level);
+    let stop = super::signal::stop_on_signals()?;
+    info!(name = config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
+    let running = runner::start(&config, arguments.capture.as_deref())?;
+    let mut told = false;
+    while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+        std::thread::sleep(LOOK_INTERVAL);
+        if !told {
+            told = true;
+            let refused = running.realtime_report();
+            if !refused.is_empty() {
+                warn!(refused, "the cycle thread runs without");
+            }
+        }
+        if running.is_dead() {
+            return Err("the cycle thread has ended by itself; see above".into());
+        }
+    }
+    info!("axisbridge ends: axes stop, the bus goes down");
+    if let Some(dropped) = running.stop()?.filter(|dropped| *dropped > 0) {
+        warn!(dropped, "frames are missing in the recording");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file.
+fn log_to_stderr(level: LogLevel) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level.name()));
+    let logger = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
+    // Refused only when a logger is set already.
+    let _ = logger.try_init();
+}

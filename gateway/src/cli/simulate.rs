@@ -1,0 +1,94 @@
+//! `axisbridge simulate`: the other sides as processes of their own.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use profile_generic::scaling::UnitKind;
+
+use super::progress::Progress;
+use super::report::{AxisResult, RunResult, failure};
+use super::{CliError, ControllerArguments, SercosDriveArguments, signal};
+use crate::mapping::Mapping;
+use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::line;
+use crate::simulate::program::{self, AxisPlan};
+use crate::simulate::setup;
+use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
+use crate::sys::realtime;
+
+/// `SCHED_FIFO` priority of simulated drives: above a master on the same host, as hardware would answer.
+const DRIVE_PRIORITY: u8 = 85;
+
+/// How far from its target an axis may end, in its units.
+const WINDOW: f64 = 0.005;
+
+/// A line of simulated drives on a network interface.
+pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliError> {
+    let last = arguments.address.checked_add(arguments.slaves - 1).filter(|last| *last <= 511);
+    let Some(last) = last else {
+        return Err(format!(
+            "expected addresses up to 511, got {} drives from address {}",
+            arguments.slaves, arguments.address
+        )
+        .into());
+    };
+    if let Some(unknown) = arguments.linear.iter().find(|address| !(arguments.address..=last).contains(address)) {
+        return Err(format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into());
+    }
+    let socket = PacketSocket::open(&arguments.interface, ETHER_TYPE_SERCOS)?;
+    let kind = |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
+    let mut drives = line::line((arguments.address..=last).map(|address| (address, kind(&address))));
+    let stop = signal::stop_on_signals()?;
+    if let Some(seconds) = arguments.seconds {
+        end_after(Arc::clone(&stop), seconds);
+    }
+    // Without real-time scheduling the drives answer later, which the master counts; nothing else changes.
+    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), cpu: None, lock_memory: false };
+    let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    let mut progress = Progress::new(false);
+    progress.step(&format!(
+        "{} drives with addresses {} to {last} on {}{}",
+        arguments.slaves,
+        arguments.address,
+        arguments.interface,
+        if refused.is_empty() { String::new() } else { format!(" ({refused})") }
+    ));
+    line::run(&mut drives, &socket, &stop)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn end_after(stop: Arc<AtomicBool>, seconds: u64) {
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(seconds));
+        stop.store(true, Ordering::Relaxed);
+    });
+}
+
+/// A CIP Motion controller that moves the axes of a device.
+pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError> {
+    let stop = signal::stop_on_signals()?;
+    let seconds = f64::from(arguments.seconds);
+    let counts = |axis: usize| {
+        let last = arguments.counts_per_unit.last().copied().unwrap_or(setup::COUNTS_PER_UNIT);
+        f64::from(arguments.counts_per_unit.get(axis).copied().unwrap_or(last))
+    };
+    let speed = |axis: usize| {
+        let last = arguments.speed.last().copied().unwrap_or(setup::SPEED);
+        arguments.speed.get(axis).copied().unwrap_or(last)
+    };
+    let axes: Vec<_> = (0..usize::from(arguments.axes)).map(counts).collect();
+    let plans: Vec<_> = (1..=arguments.axes)
+        .map(|axis| AxisPlan::new(axis, speed(usize::from(axis) - 1), setup::REACH, WINDOW, seconds))
+        .collect();
+    let mapping = Mapping::embedded()?;
+    let config = setup::controller(&mapping, &axes, arguments.update_period_us);
+    let endpoints = Endpoints { target: arguments.target, bind: arguments.bind };
+    let mut progress = Progress::new(arguments.json);
+    let steps = program::standard(&plans, seconds);
+    let report = controller::run(endpoints, config, steps, &stop, &mut |event| progress.step(&event.to_string()))?;
+    drop(progress);
+    let result = RunResult { axes: AxisResult::all(&plans, &report), capture: None, failure: failure(&report) };
+    result.print(arguments.json)
+}

@@ -1,0 +1,243 @@
+//! From a configuration to an engine and the adapters beside it.
+
+use std::net::Ipv4Addr;
+
+use arrayvec::{ArrayString, ArrayVec};
+use profile_cip::target::axis_object::AxisConfig;
+use profile_cip::target::axis_state::ControlKind;
+use profile_cip::target::config::{
+    AdapterConfig, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
+};
+use profile_cip::target::motion_device::DeviceConfig;
+use profile_cip::wire::motion::codes::EventChecking;
+use profile_generic::fault::Reaction;
+use profile_generic::mode::OperatingMode;
+use profile_generic::parameter::Parameter;
+use profile_generic::scaling::UnitKind;
+use profile_sercos::master::config::MasterConfig;
+
+use super::axis::{AxisChannel, Limits};
+use super::bus::SercosBus;
+use super::device::DeviceChannel;
+use super::notice::Notice;
+use super::{Engine, Parts};
+use crate::config::{Axis, AxisKind, Config, Device, StoppingAction};
+use crate::latest::{self, Reader};
+use crate::mapping::{AxisUnits, CipScaling, Mapping, Reference, SercosAxis};
+use crate::north::{AdapterEnd, motion_link};
+use crate::status::BoxStatus;
+
+/// CIP Motion Drive.
+const DEVICE_TYPE: u16 = 0x25;
+
+/// Notices kept until the supervisor takes them.
+const NOTICES: usize = 1024;
+
+/// Largest connection sizes that a device takes, with the sequence count.
+const CONNECTION_SIZE_MAX: u16 = 1400;
+
+/// What a device needs from the start of a D-to-C update to its transmission.
+const TRANSMISSION_PROCESSING_NS: u64 = 100_000;
+
+/// The whole of a box but its sockets and threads.
+#[derive(Debug)]
+pub struct Built {
+    /// What runs in the cycle.
+    pub engine: Engine,
+    /// For each device the configuration of its explicit side and that side's end of the link.
+    pub adapters: Vec<(AdapterConfig, AdapterEnd)>,
+    /// What people should know.
+    pub notices: rtrb::Consumer<Notice>,
+    /// The status of the box.
+    pub status: Reader<BoxStatus>,
+}
+
+/// Why a configuration makes no box.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The master cannot work so.
+    #[error("SERCOS master: {0}")]
+    Master(#[from] profile_sercos::master::config::ConfigError),
+    /// A device cannot work so.
+    #[error("device {name}: {error}")]
+    Device {
+        /// Its name.
+        name: String,
+        /// Why.
+        error: super::device::ChannelError,
+    },
+    /// The mapping tables lack something that every box needs.
+    #[error("axis {name}: the mapping tables have no {what}")]
+    Tables {
+        /// The axis.
+        name: String,
+        /// What is missing.
+        what: &'static str,
+    },
+}
+
+/// What is known of the host.
+#[derive(Debug, Clone, Copy)]
+pub struct Host {
+    /// The master's Ethernet address where the configuration gives none.
+    pub mac: [u8; 6],
+    /// Differs from start to start, so that session handles do.
+    pub incarnation: u16,
+}
+
+/// Builds the engine and everything it is connected to.
+///
+/// # Errors
+/// See [`BuildError`].
+pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, BuildError> {
+    let bus = bus(config, host)?;
+    let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
+    let mut devices = Vec::with_capacity(config.devices.len());
+    let mut adapters = Vec::with_capacity(config.devices.len());
+    for (number, device) in config.devices.iter().enumerate() {
+        let mut members: Vec<_> = config.axes_of(number).collect();
+        members.sort_by_key(|(_, axis)| axis.instance);
+        let (adapter_end, device_end) = motion_link();
+        let scalings: Vec<_> = members.iter().map(|(number, axis)| (*number, scaling(axis))).collect();
+        let number = u8::try_from(number).unwrap_or(u8::MAX);
+        let channel = DeviceChannel::new(number, device_config(device, members.len()), device_end, &scalings, &mapping)
+            .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
+        devices.push(channel);
+        adapters.push((adapter_config(device, &members, host), adapter_end));
+    }
+    let (producer, notices) = rtrb::RingBuffer::new(NOTICES);
+    let (publisher, status) = latest::latest(BoxStatus::STARTING);
+    let engine = Engine::new(Parts { mapping, bus, devices, axes, notices: producer, publisher });
+    Ok(Built { engine, adapters, notices, status })
+}
+
+fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
+    let sercos = &config.sercos;
+    let ns = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
+    let mut master = MasterConfig::new(sercos.master_mac.unwrap_or(host.mac), ns(sercos.cycle_time));
+    master.mst_jitter_ns = ns(sercos.jitter);
+    master.stable_cycles = sercos.cp0_stable_cycles;
+    master.mst_losses = sercos.allowed_losses;
+    let drives = config
+        .axes
+        .iter()
+        .map(|axis| {
+            let drive = &sercos.drives[axis.drive];
+            (drive.address, needs(axis, drive.set_scaling))
+        })
+        .collect();
+    Ok(SercosBus::new(master, drives)?)
+}
+
+fn kind(axis: &Axis) -> UnitKind {
+    match axis.kind {
+        AxisKind::Rotary => UnitKind::Rotary,
+        AxisKind::Linear => UnitKind::Linear,
+    }
+}
+
+/// What the commissioning has to achieve.
+fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
+    let limits = &axis.limits;
+    let mut parameters = Vec::new();
+    let mut limit = |parameter: Parameter, value: Option<i64>| parameters.extend(value.map(|value| (parameter.into(), value)));
+    limit(Parameter::ACCELERATION_LIMIT, limits.acceleration.map(|value| value.0));
+    limit(Parameter::DECELERATION_LIMIT, limits.acceleration.map(|value| value.0));
+    limit(Parameter::TORQUE_LIMIT_POSITIVE, limits.torque.map(|value| value.0));
+    limit(Parameter::TORQUE_LIMIT_NEGATIVE, limits.torque.map(|value| -value.0));
+    limit(Parameter::POSITION_ERROR_TOLERANCE, limits.following_error.map(|value| value.0));
+    SercosAxis {
+        units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated_torque: None },
+        modes: [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque].into_iter().collect(),
+        modulo: false,
+        set_scaling,
+        parameters,
+    }
+}
+
+/// The controller's counts as the configuration has them; a controller may set others.
+fn scaling(axis: &Axis) -> CipScaling {
+    CipScaling {
+        kind: kind(axis),
+        nanounits_per_unit: profile_generic::scaling::NANO,
+        counts_per_unit: i64::from(axis.motion_resolution),
+        inverted: false,
+        unwind: axis.unwind_counts.map(i64::from),
+    }
+}
+
+fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
+    let missing = |what| BuildError::Tables { name: axis.name.clone(), what };
+    let program = mapping.cip_program(&scaling(axis)).ok_or_else(|| missing("exact ratio for its resolution"))?;
+    let limits = Limits {
+        position_min: axis.limits.position_min,
+        position_max: axis.limits.position_max,
+        velocity: axis.limits.velocity,
+        following_error: axis.limits.following_error,
+    };
+    Ok(AxisChannel::new(program, limits, reaction(axis.on_command_loss)))
+}
+
+/// What a lost command makes of the configured stopping action.
+fn reaction(action: StoppingAction) -> Reaction {
+    match action {
+        StoppingAction::DisableAndCoast => Reaction::CoastAndDisable,
+        StoppingAction::CurrentDecelAndDisable | StoppingAction::RampedDecelAndDisable => {
+            Reaction::DecelerateAndDisable
+        }
+        StoppingAction::CurrentDecelAndHold | StoppingAction::RampedDecelAndHold => Reaction::HoldPosition,
+    }
+}
+
+fn device_config(device: &Device, axes: usize) -> DeviceConfig {
+    let axis = AxisConfig {
+        kind: ControlKind::Active,
+        // Position, velocity and torque.
+        control_modes: 1 << 1 | 1 << 2 | 1 << 4,
+        flying_start: false,
+        lint_position: false,
+        events: EventChecking::empty(),
+    };
+    DeviceConfig {
+        axes: vec![axis; axes],
+        attributes: Vec::new(),
+        power_structure_class_id: device.power_structure_class_id,
+        supports_sync: true,
+        transmission_processing_ns: TRANSMISSION_PROCESSING_NS,
+    }
+}
+
+fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
+    let identity = &device.identity;
+    let us = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos() / 1000).unwrap_or(u32::MAX);
+    let netmask = if device.listen.is_loopback() { Ipv4Addr::new(255, 0, 0, 0) } else { Ipv4Addr::new(255, 255, 255, 0) };
+    AdapterConfig {
+        identity: IdentityConfig {
+            vendor: identity.vendor_id,
+            device_type: DEVICE_TYPE,
+            product_code: identity.product_code,
+            major: identity.revision_major,
+            minor: identity.revision_minor,
+            serial_number: identity.serial_number,
+            product_name: ArrayString::from(&identity.product_name).unwrap_or_default(),
+        },
+        interface: InterfaceConfig::new(device.listen, netmask),
+        link: LinkConfig {
+            mac: host.mac,
+            speed_mbit: 100,
+            full_duplex: true,
+            label: ArrayString::from(&device.name).unwrap_or_default(),
+        },
+        qos: QosConfig::default(),
+        motion: MotionConfig {
+            rpi_min_us: us(device.update_period_min),
+            rpi_max_us: us(device.update_period_max),
+            rpi_multiple_us: 1,
+            o_to_t_size_max: CONNECTION_SIZE_MAX,
+            t_to_o_size_max: CONNECTION_SIZE_MAX,
+            power_structure_class_id: device.power_structure_class_id,
+            power_structure_axis_ids: members.iter().map(|(_, axis)| axis.power_structure_axis_id).collect::<ArrayVec<_, 16>>(),
+        },
+        incarnation: host.incarnation,
+    }
+}

@@ -1,0 +1,452 @@
+//! The SERCOS III side of the engine: the master, and the drives on the way from the scan to the cycle.
+//!
+//! The master stops twice for its application. In CP2 each drive is written to and asked what its plan says, its
+//! connections follow from that; in CP3 it is told its modes and asked its scaling, its program follows from that.
+//! Compiling programs allocates; it happens before the cyclic operation of CP4 begins.
+
+use arrayvec::ArrayVec;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::master::Master;
+use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
+use profile_sercos::master::connection::Consumer;
+use profile_sercos::master::event::{Event, SlaveId, Ticket};
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOutcome, SvcRequest};
+use profile_sercos::wire::header::Phase;
+use profile_sercos::wire::idn::Idn;
+
+use super::axis::AxisChannel;
+use super::commissioning::Commissioning;
+use super::notice::Notice;
+use crate::mapping::{DriveFacts, Mapping, SercosAxis};
+
+/// The connection in the MDT, by its number at the slave.
+pub const COMMAND_CONNECTION: u8 = 0;
+
+/// The connection in the AT.
+pub const FEEDBACK_CONNECTION: u8 = 1;
+
+/// Pause before a failed phase-up is tried again.
+const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
+
+/// Service channel accesses of one drive that wait for an answer at the same time.
+const ACCESSES_MAX: usize = 4;
+
+/// Where the drive of an axis is on its way.
+#[derive(Debug)]
+enum Stage {
+    /// Not found, failed, or lost.
+    Absent,
+    /// Working through the plan of CP2 or CP3.
+    Commissioning(Box<Commissioning>),
+    /// Through with the plan of this phase.
+    Ready,
+}
+
+/// What a service channel request of the engine was for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// A controller's access to an attribute that lives in the drive.
+    Attribute {
+        /// The motion device's ticket.
+        ticket: u32,
+        /// Index of the axis's device.
+        device: u8,
+        /// The attribute.
+        attribute: u16,
+        /// Whether it writes.
+        write: bool,
+    },
+    /// A diagnostic word, to find the cause of a fault: its place in the order.
+    Diagnosis(usize),
+    /// The drive's fault reset.
+    FaultReset,
+}
+
+/// The drive of one axis.
+#[derive(Debug)]
+struct Drive {
+    address: u16,
+    needs: SercosAxis,
+    slave: Option<SlaveId>,
+    stage: Stage,
+    facts: DriveFacts,
+    accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
+    /// The diagnostic word to be read next while a cause is wanted.
+    diagnosis: Option<usize>,
+}
+
+/// An answer to an access.
+#[derive(Debug)]
+pub struct Answer {
+    /// The axis.
+    pub axis: usize,
+    /// What it was for.
+    pub purpose: Purpose,
+    /// The data block.
+    pub idn: Idn,
+    /// The bytes, or why there are none.
+    pub result: Result<SvcData, SvcFailure>,
+}
+
+/// The bus.
+#[derive(Debug)]
+pub struct SercosBus {
+    master: Master,
+    drives: Vec<Drive>,
+    retry_at: Option<MonotonicTime>,
+    wanted: Option<Phase>,
+    cycles_seen: u64,
+}
+
+impl SercosBus {
+    /// A bus whose master goes for CP4. `drives` are the SERCOS address and the needs of each axis.
+    ///
+    /// # Errors
+    /// What the master finds wrong with its configuration.
+    pub fn new(config: MasterConfig, drives: Vec<(u16, SercosAxis)>) -> Result<Self, ConfigError> {
+        let mut master = Master::new(config)?;
+        master.set_target_phase(Phase::CP4);
+        let drive = |(address, needs)| Drive {
+            address,
+            needs,
+            slave: None,
+            stage: Stage::Absent,
+            facts: DriveFacts::new(),
+            accesses: ArrayVec::new(),
+            diagnosis: None,
+        };
+        Ok(Self {
+            master,
+            drives: drives.into_iter().map(drive).collect(),
+            retry_at: None,
+            wanted: Some(Phase::CP4),
+            cycles_seen: 0,
+        })
+    }
+
+    /// The master.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    /// The master, for its frames.
+    pub fn master_mut(&mut self) -> &mut Master {
+        &mut self.master
+    }
+
+    /// Ends the telegrams by way of CP0.
+    pub fn stop(&mut self) {
+        self.wanted = None;
+        self.master.stop();
+    }
+
+    /// Whether a cycle was sent since the last call: then the axes have one step to do.
+    pub fn take_cycle(&mut self) -> bool {
+        let cycles = self.master.statistics().cycles;
+        std::mem::replace(&mut self.cycles_seen, cycles) != cycles
+    }
+
+    /// What the drive of an axis sent in the cycle that has just ended; `None` before CP4 and without a drive.
+    #[must_use]
+    pub fn feedback(&self, axis: usize) -> Option<Consumer<'_>> {
+        let drive = self.drives.get(axis)?;
+        if self.master.phase() != Some(Phase::CP4) {
+            return None;
+        }
+        self.master.consumer(drive.slave?, FEEDBACK_CONNECTION)
+    }
+
+    /// Lets an axis fill its values for the next cycle.
+    pub fn command(&mut self, axis: usize, fill: impl FnOnce(Option<&mut [u8]>) -> bool) {
+        let slave = self.drives.get(axis).and_then(|drive| drive.slave);
+        let Some(slave) = slave else {
+            fill(None);
+            return;
+        };
+        if fill(self.master.producer(slave, COMMAND_CONNECTION)) {
+            self.master.commit(slave, COMMAND_CONNECTION);
+        } else {
+            self.master.withdraw(slave, COMMAND_CONNECTION);
+        }
+    }
+
+    /// Sends a request over the drive's service channel; `false` when the drive is not there or too many wait.
+    pub fn access(&mut self, axis: usize, request: SvcRequest, purpose: Purpose) -> bool {
+        let Some(drive) = self.drives.get_mut(axis) else { return false };
+        let Some(slave) = drive.slave.filter(|_| !drive.accesses.is_full()) else { return false };
+        match self.master.svc_submit(slave, request) {
+            Ok(ticket) => {
+                drive.accesses.push((ticket, purpose));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    /// Handles the master's events and drives the commissioning on. `answer` gets what accesses came to, `notice` what
+    /// people should know.
+    pub fn run(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        while let Some(event) = self.master.poll_event() {
+            match event {
+                Event::Svc { ticket, outcome } => self.outcome(ticket, outcome, axes, answer),
+                event => {
+                    self.event(now, system, mapping, axes, &event, notice);
+                    notice(Notice::Sercos(event));
+                }
+            }
+        }
+        self.commission(mapping, axes, notice);
+        self.diagnose(axes);
+        let alone = self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
+        if alone {
+            self.master.set_target_phase(Phase::CP0);
+        }
+        if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
+            let due = *self.retry_at.get_or_insert(now + RETRY_PAUSE);
+            if now >= due {
+                self.retry_at = None;
+                notice(Notice::Retry);
+                self.master.set_target_phase(Phase::CP4);
+            }
+        }
+    }
+
+    fn event(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        event: &Event,
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        match event {
+            Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
+                for axis in 0..self.drives.len() {
+                    self.begin(axis, mapping, notice);
+                }
+            }
+            Event::AwaitingApplication { phase } => {
+                for (axis, drive) in self.drives.iter_mut().enumerate() {
+                    if drive.slave.is_some() {
+                        drive.plan(axis, mapping, phase.0, notice);
+                    }
+                }
+            }
+            Event::SlaveLost { slave, .. } => {
+                for (drive, axis) in self.drives.iter_mut().zip(axes) {
+                    if drive.slave == Some(*slave) {
+                        drive.lose();
+                        axis.lose_south(now, system);
+                    }
+                }
+            }
+            // The master waits again for its application: the others go on without the slave that stands in the way.
+            Event::StepFailed { slave, .. }
+            | Event::ClassMismatch { slave }
+            | Event::CheckFailed { slave, .. }
+            | Event::AddressConflict { slave } => {
+                // Refused only when the master has left the phase meanwhile.
+                let _ = self.master.exclude(*slave);
+                for (drive, axis) in self.drives.iter_mut().zip(axes) {
+                    if drive.slave == Some(*slave) {
+                        drive.lose();
+                        axis.lose_south(now, system);
+                    }
+                }
+            }
+            // Nothing but another configuration helps; until then the phase-up is tried again and again.
+            Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
+            Event::Phase(phase) if *phase < Phase::CP2 => self.lose_all(now, system, axes),
+            Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
+            _ => {}
+        }
+    }
+
+    fn lose_all(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        for (drive, axis) in self.drives.iter_mut().zip(axes) {
+            drive.lose();
+            axis.lose_south(now, system);
+        }
+    }
+
+    /// Starts the commissioning of a drive in CP2.
+    fn begin(&mut self, axis: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
+        let drive = &mut self.drives[axis];
+        drive.slave = self.master.slave_by_address(drive.address);
+        drive.facts = DriveFacts::new();
+        if drive.slave.is_some() {
+            drive.plan(axis, mapping, Phase::CP2.0, notice);
+        } else {
+            drive.stage = Stage::Absent;
+            notice(Notice::DriveMissing { axis: index(axis), address: drive.address });
+        }
+    }
+
+    fn commission(&mut self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
+        let Some(phase) = self.master.state().awaits() else { return };
+        let mut busy = false;
+        for (axis, drive) in self.drives.iter_mut().enumerate() {
+            let (Stage::Commissioning(work), Some(slave)) = (&mut drive.stage, drive.slave) else { continue };
+            work.poll(&mut self.master, slave);
+            if !work.is_done() {
+                busy = true;
+                continue;
+            }
+            let failure = work.failure();
+            for failure in work.passed_over() {
+                notice(Notice::PassedOver { axis: index(axis), failure: *failure });
+            }
+            drive.stage = Stage::Ready;
+            let taken = match failure {
+                Some(failure) => {
+                    notice(Notice::Commissioning { axis: index(axis), failure });
+                    false
+                }
+                None if phase == Phase::CP2 => drive.connect(axis, mapping, &mut self.master, slave, notice),
+                None => match mapping.sercos_program(&drive.needs, &drive.facts) {
+                    Ok(program) => {
+                        axes[axis].set_south(program);
+                        true
+                    }
+                    Err(error) => {
+                        notice(Notice::Program { axis: index(axis), error });
+                        false
+                    }
+                },
+            };
+            if !taken {
+                // The others go on without it.
+                let _ = self.master.exclude(slave);
+                drive.lose();
+            }
+        }
+        if !busy {
+            // Refused only when the master has left the phase meanwhile.
+            let _ = self.master.proceed();
+        }
+    }
+
+    /// Reads the diagnostic words of drives that show a fault without a cause.
+    fn diagnose(&mut self, axes: &mut [AxisChannel]) {
+        for (axis, channel) in axes.iter_mut().enumerate() {
+            if channel.take_drive_reset()
+                && let Some(idn) = channel.south().and_then(|program| {
+                    program.command_of(profile_generic::state::Action::ResetFault)
+                })
+            {
+                self.access(axis, SvcRequest::command(idn).urgent(), Purpose::FaultReset);
+            }
+            let Some(drive) = self.drives.get_mut(axis) else { continue };
+            if !channel.wants_cause() {
+                drive.diagnosis = None;
+                continue;
+            }
+            if drive.diagnosis.is_some() {
+                continue;
+            }
+            drive.diagnosis = Some(0);
+            self.read_diagnosis(axis, channel, 0);
+        }
+    }
+
+    fn read_diagnosis(&mut self, axis: usize, channel: &AxisChannel, place: usize) {
+        let idn = channel.south().and_then(|program| program.diagnostic_words().nth(place));
+        if let Some(idn) = idn {
+            self.access(axis, SvcRequest::read(idn).urgent(), Purpose::Diagnosis(place));
+        }
+    }
+
+    fn outcome(
+        &mut self,
+        ticket: Ticket,
+        outcome: SvcOutcome,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+    ) {
+        let Some(axis) = self.drives.iter().position(|drive| drive.slave == Some(ticket.slave)) else { return };
+        let drive = &mut self.drives[axis];
+        if let Stage::Commissioning(work) = &mut drive.stage
+            && work.handle(ticket, &outcome, &mut drive.facts)
+        {
+            return;
+        }
+        let Some(place) = drive.accesses.iter().position(|(known, _)| *known == ticket) else { return };
+        let (_, purpose) = drive.accesses.remove(place);
+        let idn = outcome.idn;
+        let result = match outcome.result {
+            Ok(_) => Ok(outcome.data),
+            Err(failure) => Err(failure),
+        };
+        answer(axes, Answer { axis, purpose, idn, result });
+        if let Purpose::Diagnosis(place) = purpose
+            && axes[axis].wants_cause()
+        {
+            self.read_diagnosis(axis, &axes[axis], place + 1);
+        }
+    }
+}
+
+impl Drive {
+    fn lose(&mut self) {
+        self.slave = None;
+        self.stage = Stage::Absent;
+        self.accesses.clear();
+        self.diagnosis = None;
+    }
+
+    fn plan(&mut self, axis: usize, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
+        match mapping.commissioning(&self.needs, phase, &self.facts) {
+            Ok(plan) => self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan))),
+            Err(error) => {
+                notice(Notice::Program { axis: index(axis), error });
+                self.lose();
+            }
+        }
+    }
+
+    /// Sets up the two connections of the drive from what it has told in CP2.
+    fn connect(
+        &mut self,
+        axis: usize,
+        mapping: &Mapping,
+        master: &mut Master,
+        slave: SlaveId,
+        notice: &mut dyn FnMut(Notice),
+    ) -> bool {
+        let telegram = match mapping.telegram(&self.needs, &self.facts) {
+            Ok(telegram) => telegram,
+            Err(error) => {
+                notice(Notice::Program { axis: index(axis), error });
+                return false;
+            }
+        };
+        let mut connections = Connections::new();
+        let both = [
+            (COMMAND_CONNECTION, false, &telegram.command),
+            (FEEDBACK_CONNECTION, true, &telegram.feedback),
+        ];
+        for (instance, slave_produces, idns) in both {
+            let Some(connection) = ConnectionConfig::new(instance, slave_produces, idns) else {
+                let error = crate::mapping::SercosError::Full("a connection");
+                notice(Notice::Program { axis: index(axis), error });
+                return false;
+            };
+            connections.push(connection);
+        }
+        master.set_connections(slave, connections).is_ok()
+    }
+}
+
+fn index(axis: usize) -> u8 {
+    u8::try_from(axis).unwrap_or(u8::MAX)
+}

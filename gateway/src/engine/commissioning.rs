@@ -1,0 +1,160 @@
+//! Carrying out a commissioning plan: the reads and writes of one drive in one communication phase.
+//!
+//! Steps run one after the other over the drive's service channel; all drives run at the same time. What the drive
+//! says is kept in its [`DriveFacts`], from which the next plan and in the end the drive's program are compiled.
+
+use profile_sercos::master::Master;
+use profile_sercos::master::event::{SlaveId, Ticket};
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
+use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::svc::Element;
+
+use crate::mapping::{CommissioningPlan, DriveFacts, Refused, Step};
+
+/// Bytes kept of an element that is longer than a request holds by itself; texts and lists are not scaling.
+const BUFFER_LEN: usize = 1024;
+
+/// A step that the drive did not take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{what} {idn}: {failure}")]
+pub struct StepFailure {
+    /// What was tried.
+    pub what: &'static str,
+    /// The parameter or command.
+    pub idn: Idn,
+    /// Why it failed.
+    pub failure: SvcFailure,
+}
+
+/// One plan under way.
+#[derive(Debug, Default)]
+pub struct Commissioning {
+    plan: CommissioningPlan,
+    /// The step under way.
+    at: usize,
+    /// The value of a write, or the element of a read, under way.
+    part: usize,
+    ticket: Option<Ticket>,
+    failure: Option<StepFailure>,
+    /// Steps that failed and were allowed to.
+    passed_over: Vec<StepFailure>,
+}
+
+impl Commissioning {
+    /// Starts a plan.
+    #[must_use]
+    pub fn new(plan: CommissioningPlan) -> Self {
+        Self { plan, ..Self::default() }
+    }
+
+    /// Whether every step is through, or one failed that must not.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.failure.is_some() || self.at >= self.plan.steps.len()
+    }
+
+    /// The step that ended the plan early.
+    #[must_use]
+    pub fn failure(&self) -> Option<StepFailure> {
+        self.failure
+    }
+
+    /// Steps that the drive refused and that it may refuse.
+    #[must_use]
+    pub fn passed_over(&self) -> &[StepFailure] {
+        &self.passed_over
+    }
+
+    /// Submits what is next, when nothing is under way.
+    pub fn poll(&mut self, master: &mut Master, slave: SlaveId) {
+        while self.ticket.is_none() && !self.is_done() {
+            let Some(request) = self.request() else {
+                self.next_step();
+                continue;
+            };
+            match master.svc_submit(slave, request) {
+                Ok(ticket) => self.ticket = Some(ticket),
+                // The queue is full or the phase changes: tried again in the next cycle.
+                Err(_) => return,
+            }
+        }
+    }
+
+    /// Takes an outcome if it is this plan's; `false` when it is another's.
+    pub fn handle(&mut self, ticket: Ticket, outcome: &SvcOutcome, facts: &mut DriveFacts) -> bool {
+        if self.ticket != Some(ticket) {
+            return false;
+        }
+        self.ticket = None;
+        match &outcome.result {
+            Ok(reply) => {
+                if let Some(attribute) = reply.attribute {
+                    facts.note_attribute(outcome.idn, attribute);
+                }
+                let data = matches!(
+                    outcome.operation,
+                    SvcOperation::Read(Element::Data) | SvcOperation::Write(Element::Data)
+                );
+                if data {
+                    facts.note_data(outcome.idn, outcome.data.as_slice());
+                }
+                self.succeeded();
+            }
+            Err(failure) => {
+                if failure.is_absent() {
+                    facts.note_missing(outcome.idn);
+                }
+                self.failed(outcome.idn, *failure);
+            }
+        }
+        true
+    }
+
+    fn request(&self) -> Option<SvcRequest> {
+        match self.plan.steps.get(self.at)? {
+            Step::Write { idn, candidates, .. } => {
+                let data = SvcData::inline(candidates.get(self.part)?)?;
+                Some(SvcRequest::write(*idn, data))
+            }
+            Step::Read { idn, attribute, data, .. } => match self.part {
+                // Reading the data reads the attribute first, so that one request serves both.
+                0 if *data => Some(SvcRequest::read(*idn).with_buffer(Vec::with_capacity(BUFFER_LEN))),
+                0 if *attribute => Some(SvcRequest::new(*idn, SvcOperation::Read(Element::Attribute))),
+                _ => None,
+            },
+            Step::Command { idn, .. } => (self.part == 0).then(|| SvcRequest::command(*idn)),
+        }
+    }
+
+    fn next_step(&mut self) {
+        self.at += 1;
+        self.part = 0;
+    }
+
+    fn succeeded(&mut self) {
+        self.next_step();
+    }
+
+    fn failed(&mut self, idn: Idn, failure: SvcFailure) {
+        let (what, refused, another) = match self.plan.steps.get(self.at) {
+            Some(Step::Write { candidates, refused, .. }) => {
+                ("writing", *refused, self.part + 1 < candidates.len())
+            }
+            Some(Step::Read { refused, .. }) => ("reading", *refused, false),
+            Some(Step::Command { refused, .. }) => ("executing", *refused, false),
+            None => return,
+        };
+        if another {
+            self.part += 1;
+            return;
+        }
+        let failure = StepFailure { what, idn, failure };
+        match refused {
+            Refused::Fail => self.failure = Some(failure),
+            Refused::Continue => {
+                self.passed_over.push(failure);
+                self.next_step();
+            }
+        }
+    }
+}

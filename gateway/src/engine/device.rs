@@ -1,0 +1,513 @@
+//! The CIP Motion side of the engine: one motion device with its axes, its I/O connection and its attributes.
+
+use std::net::SocketAddrV4;
+
+use arrayvec::ArrayVec;
+use profile_cip::target::attribute::{Access, AttributeDefinition, Backing, DataType, DefaultValue, Scope};
+use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
+use profile_cip::target::axis_state::AxisState;
+use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
+use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::image::Signal;
+use profile_generic::interpolation::TargetUpdate;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
+
+use super::axis::AxisChannel;
+use super::bus::{Answer, Purpose, SercosBus};
+use super::notice::Notice;
+use super::port::{FRAME_MAX, NorthPort};
+use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping};
+use crate::north::DeviceEnd;
+
+/// Attribute accesses handled in one cycle; the rest waits for the next.
+const ACCESSES_PER_CYCLE: usize = 8;
+
+/// Explicit requests handed to the device in one cycle.
+const REQUESTS_PER_CYCLE: usize = 4;
+
+/// Datagrams taken in one cycle: at most this many are believed to be no storm.
+const DATAGRAMS_PER_CYCLE: usize = 16;
+
+/// Attributes that describe the scaling of an axis.
+const SCALING_MAX: usize = 8;
+
+/// One axis of the device.
+#[derive(Debug)]
+struct Member {
+    /// Its number in the engine.
+    axis: usize,
+    scaling: CipScaling,
+    /// The scaling of the configuration, to which every new connection returns.
+    configured: CipScaling,
+    attributes: AttributeTable,
+    state: AxisState,
+}
+
+/// What the I/O connection has counted beside the motion device.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct DatagramCounters {
+    /// Datagrams of nobody's connection, or malformed before the connection data.
+    pub refused: u64,
+    /// Datagrams that could not be sent.
+    pub send_failures: u64,
+}
+
+/// One motion device.
+pub struct DeviceChannel {
+    number: u8,
+    device: MotionDevice,
+    link: DeviceEnd,
+    members: Vec<Member>,
+    encapsulation_sequence: u32,
+    counters: DatagramCounters,
+    /// The connection for which the scaling attributes were preset.
+    preset: Option<u32>,
+}
+
+impl std::fmt::Debug for DeviceChannel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("DeviceChannel").field("number", &self.number).field("members", &self.members).finish()
+    }
+}
+
+/// Why a device cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ChannelError {
+    /// The device refuses its configuration.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// A ratio of an axis's scaling does not fit.
+    #[error("axis {axis}: the motion resolution cannot be expressed exactly in the units of the tables")]
+    Scaling {
+        /// Number of the axis, from 0.
+        axis: usize,
+    },
+}
+
+impl DeviceChannel {
+    /// A device; `axes` are the engine's numbers of its axes in the order of their instances, with their scaling.
+    ///
+    /// # Errors
+    /// See [`ChannelError`].
+    pub fn new(
+        number: u8,
+        mut config: DeviceConfig,
+        link: DeviceEnd,
+        axes: &[(usize, CipScaling)],
+        mapping: &Mapping,
+    ) -> Result<Self, ChannelError> {
+        config.attributes = definitions(mapping, &axes[0].1).ok_or(ChannelError::Scaling { axis: axes[0].0 })?;
+        let device = MotionDevice::new(config)?;
+        let members = axes
+            .iter()
+            .map(|(axis, scaling)| {
+                let attributes = mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
+                let (scaling, configured) = (*scaling, *scaling);
+                Ok(Member { axis: *axis, scaling, configured, attributes, state: AxisState::Off })
+            })
+            .collect::<Result<_, ChannelError>>()?;
+        Ok(Self {
+            number,
+            device,
+            link,
+            members,
+            encapsulation_sequence: 0,
+            counters: DatagramCounters::default(),
+            preset: None,
+        })
+    }
+
+    /// Its number in the box, from 0.
+    #[must_use]
+    pub fn number(&self) -> u8 {
+        self.number
+    }
+
+    /// The motion device.
+    #[must_use]
+    pub fn device(&self) -> &MotionDevice {
+        &self.device
+    }
+
+    /// The motion device, to set its synchronization.
+    pub fn device_mut(&mut self) -> &mut MotionDevice {
+        &mut self.device
+    }
+
+    /// Counters beside those of the motion device.
+    #[must_use]
+    pub fn counters(&self) -> DatagramCounters {
+        self.counters
+    }
+
+    /// The engine's number of each axis with its state, in the order of the instances.
+    pub fn axis_states(&self) -> impl Iterator<Item = (usize, AxisState)> + '_ {
+        self.members.iter().map(|member| (member.axis, member.state))
+    }
+
+    /// Takes requests of the explicit side and what came on the I/O connection.
+    pub fn receive(&mut self, now: MonotonicTime, system: SystemTime, port: &mut dyn NorthPort) {
+        for _ in 0..REQUESTS_PER_CYCLE {
+            let Some(request) = self.link.request() else { break };
+            self.device.request(now, Some(system), request);
+        }
+        let mut buffer = [0; FRAME_MAX];
+        for _ in 0..DATAGRAMS_PER_CYCLE {
+            let Some((length, from)) = port.receive(&mut buffer) else { break };
+            if !self.datagram(now, system, &buffer[..length], from) {
+                self.counters.refused += 1;
+            }
+        }
+    }
+
+    fn datagram(&mut self, now: MonotonicTime, system: SystemTime, bytes: &[u8], from: SocketAddrV4) -> bool {
+        let Some(connection) = self.device.connection() else { return false };
+        let Ok(datagram) = Class1Datagram::parse(bytes) else { return false };
+        if datagram.connection_id != connection.o_to_t_id || *from.ip() != connection.originator {
+            return false;
+        }
+        self.device.handle_io(now, Some(system), &bytes[CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN..]);
+        true
+    }
+
+    /// Tells the device of its drives, lets time pass, and hands each axis what it has to do.
+    pub fn exchange(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        self.preset_scaling(mapping, axes);
+        for (place, member) in self.members.iter().enumerate() {
+            self.device.set_drive(place, axes[member.axis].drive_image());
+        }
+        self.device.poll(now, Some(system));
+        let period = self.device.connection().map(|connection| i64::from(connection.rpi_us));
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let axis = &mut axes[member.axis];
+            if let Some(state) = self.device.axis_state(place)
+                && state != member.state
+            {
+                let number = u8::try_from(member.axis).unwrap_or(u8::MAX);
+                notice(Notice::AxisState { axis: number, from: member.state, to: state });
+                if member.state == AxisState::Initializing && state != AxisState::MajorFaulted {
+                    let device = &self.device;
+                    let scaling = member.take_scaling(mapping, axis, |id| number_of(device.attribute(place, id)));
+                    if let Err(error) = scaling {
+                        axis.refuse_configuration(now, system);
+                        notice(Notice::Scaling { axis: number, error });
+                    }
+                }
+                member.state = state;
+            }
+            if let Some(period) = period {
+                // The update may bring another target; the period stays for the life of the connection.
+                axis.keep_update_period(DurationNs::from_micros(period), TargetUpdate::Interpolate);
+            }
+            if let Some(image) = self.device.command(place, now) {
+                axis.from_controller(now, system, &image);
+            }
+        }
+    }
+
+    /// A new connection finds the scaling attributes as the configuration of the box has them.
+    fn preset_scaling(&mut self, mapping: &Mapping, axes: &mut [AxisChannel]) {
+        let open = self.device.connection().map(|connection| connection.o_to_t_id);
+        if open == self.preset {
+            return;
+        }
+        self.preset = open;
+        if open.is_none() {
+            return;
+        }
+        for (place, member) in self.members.iter_mut().enumerate() {
+            for (id, value) in scaling_attributes(&mapping.cip, &member.configured) {
+                let Some(entry) = member.attributes.get(id) else { continue };
+                let bytes = value.to_le_bytes();
+                // Refused only for an attribute that the device does not have.
+                let _ = self.device.put_attribute(place, id, &bytes[..width(entry.data_type)]);
+            }
+            member.use_scaling(mapping, &mut axes[member.axis], member.configured);
+        }
+    }
+
+    /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
+    pub fn attributes(&mut self, axes: &[AxisChannel], bus: &mut SercosBus) {
+        for _ in 0..ACCESSES_PER_CYCLE {
+            let Some(access) = self.device.poll_attribute_access() else { break };
+            if let Err(status) = self.access(&access, axes, bus) {
+                self.device.complete_attribute(access.ticket, Err(status));
+            }
+        }
+    }
+
+    fn access(
+        &mut self,
+        access: &AttributeAccess,
+        axes: &[AxisChannel],
+        bus: &mut SercosBus,
+    ) -> Result<(), GeneralStatus> {
+        let place = usize::from(access.instance).checked_sub(1).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let member = self.members.get(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let entry = *member.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let axis = &axes[member.axis];
+        match entry.backing {
+            mapping::Backing::Signal { signal, .. } => {
+                let generic = signal_value(axis, signal).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+                let mut bytes = [0; 8];
+                let (len, _) =
+                    entry.from_generic(generic, &mut bytes).map_err(|_| GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+                self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
+                Ok(())
+            }
+            mapping::Backing::Parameter { parameter, reject, .. } => {
+                let program = axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+                let Some(held) = program.parameter(parameter) else {
+                    return self.shadow(access, place, reject);
+                };
+                let (request, write) = match &access.operation {
+                    AccessOperation::Read(_) => (SvcRequest::read(held.idn), false),
+                    AccessOperation::Write(bytes) => {
+                        let generic =
+                            entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?;
+                        let (bytes, len, clamped) =
+                            held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
+                        if clamped {
+                            return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+                        }
+                        let data = SvcData::inline(&bytes[..len]).ok_or(GeneralStatus::TOO_MUCH_DATA)?;
+                        (SvcRequest::write(held.idn, data), true)
+                    }
+                };
+                let purpose = Purpose::Attribute {
+                    ticket: access.ticket,
+                    device: self.number,
+                    attribute: access.id,
+                    write,
+                };
+                if bus.access(member.axis, request, purpose) { Ok(()) } else { Err(GeneralStatus::RESOURCE_UNAVAILABLE) }
+            }
+            _ => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        }
+    }
+
+    /// A parameter that the drive lacks: kept and given back where the tables allow it.
+    fn shadow(&mut self, access: &AttributeAccess, place: usize, reject: bool) -> Result<(), GeneralStatus> {
+        if reject {
+            return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+        }
+        match &access.operation {
+            AccessOperation::Read(_) => {
+                let mut bytes = [0; 8];
+                let held = self.device.attribute(place, access.id)?;
+                let len = held.len().min(bytes.len());
+                bytes[..len].copy_from_slice(&held[..len]);
+                self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
+            }
+            AccessOperation::Write(bytes) => {
+                self.device.put_attribute(place, access.id, bytes)?;
+                self.device.complete_attribute(access.ticket, Ok(&[]));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the drive's answer to an attribute access; `false` when it is another device's.
+    pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel]) -> bool {
+        let Purpose::Attribute { ticket, device, attribute, write } = answer.purpose else { return false };
+        if device != self.number {
+            return false;
+        }
+        let member = self.members.iter().find(|member| member.axis == answer.axis);
+        let mut bytes = [0; 8];
+        let result = match (&answer.result, member) {
+            (Err(failure), _) => Err(refusal(*failure)),
+            (Ok(_), _) if write => Ok(0),
+            (Ok(data), Some(member)) => {
+                let entry = member.attributes.get(attribute);
+                let held = entry.and_then(|entry| match entry.backing {
+                    mapping::Backing::Parameter { parameter, .. } => axes[member.axis].south()?.parameter(parameter),
+                    _ => None,
+                });
+                let generic = held.and_then(|held| held.decode(data.as_slice()));
+                match (generic, entry) {
+                    (Some(generic), Some(entry)) => entry
+                        .from_generic(generic, &mut bytes)
+                        .map(|(len, _)| len)
+                        .map_err(|_| GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+                    _ => Err(GeneralStatus::DEVICE_STATE_CONFLICT),
+                }
+            }
+            (Ok(_), None) => Err(GeneralStatus::OBJECT_DOES_NOT_EXIST),
+        };
+        match result {
+            Ok(len) => self.device.complete_attribute(ticket, Ok(&bytes[..len])),
+            Err(status) => self.device.complete_attribute(ticket, Err(status)),
+        }
+        true
+    }
+
+    /// Sends what is due on the I/O connection, and answers the explicit side.
+    pub fn transmit(&mut self, now: MonotonicTime, system: SystemTime, port: &mut dyn NorthPort) {
+        let mut buffer = [0; FRAME_MAX];
+        let data = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
+        if let Some(length) = self.device.poll_transmit(now, Some(system), &mut buffer[data..])
+            && let Some(connection) = self.device.connection()
+        {
+            self.encapsulation_sequence = self.encapsulation_sequence.wrapping_add(1);
+            let (id, to) = (connection.t_to_o_id, connection.t_to_o_destination);
+            let sequence = u16::from_le_bytes([buffer[data], buffer[data + 1]]);
+            let header = Class1Datagram::emit_header(
+                id,
+                self.encapsulation_sequence,
+                sequence,
+                length - SEQUENCE_COUNT_LEN,
+                &mut buffer,
+            );
+            if header.is_err() || !port.send(&buffer[..data + length], to) {
+                self.counters.send_failures += 1;
+            }
+        }
+        while let Some(reply) = self.device.poll_reply() {
+            // A full queue means that the explicit side has given up waiting.
+            let _ = self.link.reply(reply);
+        }
+    }
+}
+
+impl Member {
+    /// The controller has finished its configuration: its scaling counts from now on.
+    fn take_scaling(
+        &mut self,
+        mapping: &Mapping,
+        axis: &mut AxisChannel,
+        get: impl Fn(u16) -> i64,
+    ) -> Result<(), mapping::CipScalingError> {
+        let scaling = CipScaling::from_attributes(&mapping.cip, get)?;
+        self.use_scaling(mapping, axis, scaling);
+        Ok(())
+    }
+
+    fn use_scaling(&mut self, mapping: &Mapping, axis: &mut AxisChannel, scaling: CipScaling) {
+        if scaling == self.scaling {
+            return;
+        }
+        if let Some(program) = mapping.cip_program(&scaling)
+            && let Some(attributes) = mapping.attribute_table(&scaling)
+            && axis.set_north(program)
+        {
+            self.attributes = attributes;
+            self.scaling = scaling;
+        }
+    }
+}
+
+/// The attributes that describe a scaling, with their values.
+fn scaling_attributes(tables: &mapping::CipTables, scaling: &CipScaling) -> ArrayVec<(u16, i64), SCALING_MAX> {
+    let rows = &tables.scaling;
+    let known = |unit: &&mapping::DisplacementUnit| {
+        unit.kind == scaling.kind && unit.nanounits == scaling.nanounits_per_unit
+    };
+    let unit = tables.motion_units.iter().find(known).map_or(0, |unit| i64::from(unit.code));
+    let polarity = if scaling.inverted { i64::from(rows.inverted) } else { 0 };
+    let resolution = rows.resolution.iter().zip([scaling.counts_per_unit].into_iter().chain(std::iter::repeat(1)));
+    let fixed = [
+        (rows.configuration, i64::from(rows.drive_scaling)),
+        (rows.unit, unit),
+        (rows.polarity, polarity),
+        (rows.unwind, i64::from(scaling.unwind.is_some())),
+        (rows.unwind_position, scaling.unwind.unwrap_or(0)),
+    ];
+    fixed.into_iter().chain(resolution.map(|(id, value)| (*id, value))).take(SCALING_MAX).collect()
+}
+
+/// The attributes of the device as its object needs them; backing and conversions stay with the tables.
+fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeDefinition>> {
+    let dictionary = &mapping.dictionaries.cip;
+    let class = dictionary.class_attributes().iter().filter_map(|row| {
+        Some(AttributeDefinition {
+            scope: Scope::Class,
+            id: row.id,
+            data_type: DataType::from_name(row.data_type.name())?,
+            elements: row.length,
+            access: access(row.access),
+            settable_in_running: row.running,
+            backing: Backing::Stored,
+            default: DefaultValue::Integer(row.default),
+            range: None,
+            name: row.name.clone(),
+        })
+    });
+    let table = mapping.attribute_table(scaling)?;
+    let instance = table.entries().iter().filter_map(|entry| {
+        let name = dictionary.attribute_by_id(entry.id).map(|row| row.name.clone()).unwrap_or_default();
+        Some(AttributeDefinition {
+            scope: Scope::Instance,
+            id: entry.id,
+            data_type: DataType::from_name(entry.data_type.name())?,
+            elements: entry.length,
+            access: access(entry.access),
+            settable_in_running: entry.running,
+            backing: match entry.backing {
+                mapping::Backing::Signal { .. } | mapping::Backing::Parameter { .. } => Backing::Drive,
+                _ => Backing::Stored,
+            },
+            default: DefaultValue::Integer(match entry.backing {
+                mapping::Backing::Constant(value) => value,
+                _ => entry.default,
+            }),
+            range: None,
+            name,
+        })
+    });
+    Some(class.chain(instance).collect())
+}
+
+fn access(access: mapping::Access) -> Access {
+    match access {
+        mapping::Access::Get => Access::Get,
+        mapping::Access::Set => Access::Set,
+        mapping::Access::SetCyclic => Access::Cyclic,
+    }
+}
+
+/// Octets of an integer type.
+fn width(cip: CipType) -> usize {
+    match cip {
+        CipType::Bool | CipType::Sint | CipType::Usint | CipType::Byte | CipType::ShortString => 1,
+        CipType::Int | CipType::Uint | CipType::Word => 2,
+        CipType::Dint | CipType::Udint | CipType::Dword | CipType::Real => 4,
+        CipType::Lint | CipType::Ulint | CipType::Lword | CipType::Lreal => 8,
+    }
+}
+
+/// An attribute's bytes as an unsigned number; 0 where there is none.
+fn number_of(bytes: Result<&[u8], GeneralStatus>) -> i64 {
+    let bytes = bytes.unwrap_or_default();
+    let mut wide = [0; 8];
+    for (to, from) in wide.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    i64::from_le_bytes(wide)
+}
+
+fn signal_value(axis: &AxisChannel, signal: Signal) -> Option<i64> {
+    if signal.is_command() { axis.command().get(signal) } else { axis.feedback().get(signal) }
+}
+
+/// What a refusal of the drive's service channel means to the controller.
+fn refusal(failure: SvcFailure) -> GeneralStatus {
+    match failure {
+        SvcFailure::Refused { code, .. } => match code.0 & 0x0FFF {
+            0x001 => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+            0x004 => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+            0x006..=0x008 | 0x00D => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+            _ => GeneralStatus::DEVICE_STATE_CONFLICT,
+        },
+        _ => GeneralStatus::DEVICE_STATE_CONFLICT,
+    }
+}

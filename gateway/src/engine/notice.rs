@@ -1,0 +1,145 @@
+//! What the cycle thread has to tell people. The supervisor logs it; the cycle itself never does.
+
+use std::fmt;
+
+use profile_cip::target::axis_state::AxisState;
+use profile_generic::fault::Fault;
+use profile_generic::state::DriveState;
+use profile_sercos::master::event::Event;
+
+use super::commissioning::StepFailure;
+use crate::mapping::SercosError;
+
+/// How much a notice matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// The normal course.
+    Info,
+    /// Something to look at.
+    Warning,
+}
+
+/// One thing that happened. Axes are numbered as in the configuration, from 0.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+pub enum Notice {
+    /// The SERCOS master.
+    Sercos(Event),
+    /// The phase-up failed; it is tried again after a pause.
+    Retry,
+    /// The drive of an axis was not found on the bus.
+    DriveMissing {
+        /// The axis.
+        axis: u8,
+        /// The SERCOS address looked for.
+        address: u16,
+    },
+    /// A step of the commissioning failed; the drive is left out.
+    Commissioning {
+        /// The axis.
+        axis: u8,
+        /// What failed.
+        failure: StepFailure,
+    },
+    /// A step failed that may fail.
+    PassedOver {
+        /// The axis.
+        axis: u8,
+        /// What failed.
+        failure: StepFailure,
+    },
+    /// The drive does not fit the mapping tables; it is left out.
+    Program {
+        /// The axis.
+        axis: u8,
+        /// Why.
+        error: SercosError,
+    },
+    /// An axis changed its generic state.
+    State {
+        /// The axis.
+        axis: u8,
+        /// Before.
+        from: DriveState,
+        /// Now.
+        to: DriveState,
+    },
+    /// An axis changed its CIP axis state.
+    AxisState {
+        /// The axis.
+        axis: u8,
+        /// Before.
+        from: AxisState,
+        /// Now.
+        to: AxisState,
+    },
+    /// An axis has a fault.
+    Fault {
+        /// The axis.
+        axis: u8,
+        /// The fault.
+        fault: Fault,
+    },
+    /// The scaling attributes of the controller make no sense; the axis stays out of operation.
+    Scaling {
+        /// The axis.
+        axis: u8,
+        /// Why.
+        error: crate::mapping::CipScalingError,
+    },
+}
+
+impl Notice {
+    /// How much it matters.
+    #[must_use]
+    pub fn severity(&self) -> Severity {
+        match self {
+            Self::State { .. } | Self::AxisState { .. } | Self::PassedOver { .. } => Severity::Info,
+            Self::Sercos(event) => match event {
+                Event::Phase(_)
+                | Event::Stopped
+                | Event::Scanned { .. }
+                | Event::AwaitingApplication { .. }
+                | Event::Connection { .. }
+                | Event::Svc { .. } => Severity::Info,
+                _ => Severity::Warning,
+            },
+            _ => Severity::Warning,
+        }
+    }
+
+    /// The axis it is about.
+    #[must_use]
+    pub fn axis(&self) -> Option<u8> {
+        match self {
+            Self::Sercos(_) | Self::Retry => None,
+            Self::DriveMissing { axis, .. }
+            | Self::Commissioning { axis, .. }
+            | Self::PassedOver { axis, .. }
+            | Self::Program { axis, .. }
+            | Self::State { axis, .. }
+            | Self::AxisState { axis, .. }
+            | Self::Fault { axis, .. }
+            | Self::Scaling { axis, .. } => Some(*axis),
+        }
+    }
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sercos(event) => write!(f, "{event}"),
+            Self::Retry => f.write_str("phase-up failed; the next attempt follows"),
+            Self::DriveMissing { address, .. } => {
+                write!(f, "expected a drive with SERCOS address {address} on the bus, found none")
+            }
+            Self::Commissioning { failure, .. } => write!(f, "commissioning failed: {failure}; the drive is left out"),
+            Self::PassedOver { failure, .. } => write!(f, "commissioning goes on without: {failure}"),
+            Self::Program { error, .. } => write!(f, "the drive cannot be used: {error}; it is left out"),
+            Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
+            Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
+            Self::Fault { fault, .. } => write!(f, "{fault}"),
+            Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
+        }
+    }
+}

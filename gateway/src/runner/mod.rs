@@ -1,0 +1,260 @@
+//! The box on a host: sockets, the cycle thread, and the servers beside it.
+//!
+//! ```text
+//! cycle thread:  UDP 2222, SERCOS interface, engine
+//! tokio:         TCP and UDP 44818, Modbus TCP, log of the engine's notices
+//! ```
+
+mod cycle;
+pub mod port;
+
+use std::io;
+use std::net::{SocketAddr, SocketAddrV4};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, SystemTime as WallClock};
+
+use profile_cip::target::adapter::Adapter;
+use profile_cip::target::motion_device::SyncState;
+use tracing::{info, warn};
+
+use self::cycle::{CycleThread, Setup};
+use self::port::{PacketPort, UdpPort};
+use crate::capture::recorder::{Recorder, Settings, Tap};
+use crate::config::{Config, Link};
+use crate::engine::build::{BuildError, Built, Host, build};
+use crate::engine::notice::{Notice, Severity};
+use crate::engine::port::SouthPort;
+use crate::latest::Reader;
+use crate::mapping::{Mapping, TableErrors};
+use crate::modbus::ModbusServer;
+use crate::north::{self, ExplicitServer, ServeError};
+use crate::simulate::line::InProcessLine;
+use crate::simulate::setup::HOST_CLOCK;
+use crate::status::BoxStatus;
+use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
+use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
+
+/// Ethernet address of the master on simulated drives: locally administered.
+const SIMULATED_MAC: [u8; 6] = [0x02, 0x41, 0x42, 0x00, 0x00, 0x01];
+
+/// How often notices are taken from the cycle thread.
+const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
+
+/// How long a box that is asked to end waits for its axes to stop.
+const STOP_TIME_OUT: Duration = Duration::from_secs(5);
+
+/// Why the box cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The mapping tables are faulty.
+    #[error("{0}")]
+    Tables(#[from] TableErrors),
+    /// The configuration makes no box.
+    #[error("{0}")]
+    Build(#[from] BuildError),
+    /// The SERCOS interface cannot be opened.
+    #[error("{0}")]
+    Interface(#[from] OpenError),
+    /// The UDP port of a device is not to be had.
+    #[error("{0}")]
+    Bind(#[from] BindError),
+    /// The TCP and UDP port of a device is not to be had.
+    #[error("{0}")]
+    Serve(#[from] ServeError),
+    /// The device's explicit side refuses its configuration.
+    #[error("device {name}: {error}")]
+    Adapter {
+        /// Its name.
+        name: String,
+        /// Why.
+        error: profile_cip::target::config::ConfigError,
+    },
+    /// The Modbus TCP port is not to be had.
+    #[error("cannot listen on {address} for Modbus TCP: {source}")]
+    Modbus {
+        /// The address.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The recording cannot be written.
+    #[error("cannot write the recording {path}: {source}")]
+    Recording {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A thread or runtime cannot be started.
+    #[error("cannot start {what}: {source}")]
+    Thread {
+        /// Which one.
+        what: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// A box that runs.
+#[derive(Debug)]
+pub struct RunningBox {
+    status: Reader<BoxStatus>,
+    cycle: CycleThread,
+    runtime: tokio::runtime::Runtime,
+    servers: Vec<north::Handle>,
+    recorder: Option<Recorder>,
+    stop_notices: Arc<AtomicBool>,
+}
+
+/// Starts a box; `capture` records both sides.
+///
+/// # Errors
+/// [`StartError`]; nothing runs then.
+pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, StartError> {
+    let mapping = match &config.mappings_dir {
+        Some(dir) => Mapping::from_folder(dir)?,
+        None => Mapping::embedded()?,
+    };
+    let socket = match &config.sercos.link {
+        Link::Interface(name) => Some(PacketSocket::open(name, ETHER_TYPE_SERCOS)?),
+        Link::InProcess => None,
+    };
+    let mac = socket.as_ref().map_or(SIMULATED_MAC, PacketSocket::mac);
+    let Built { mut engine, adapters, notices, status } = build(config, mapping, Host { mac, incarnation: incarnation() })?;
+    // One host clock serves the box and, by the configuration's word, everybody else's time.
+    engine.set_sync(SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 });
+
+    let (recorder, mut taps) = record(config, capture)?;
+    let mut tap = || taps.pop();
+    let south: Box<dyn SouthPort + Send> = match socket {
+        Some(socket) => Box::new(PacketPort::new(socket, tap())),
+        None => Box::new(InProcessLine::of(config, tap())),
+    };
+    let mut north = Vec::with_capacity(config.devices.len());
+    for device in &config.devices {
+        let socket = IoSocket::bind(SocketAddrV4::new(device.listen, PORT_IO), DSCP_URGENT)?;
+        north.push(UdpPort::new(socket, tap()));
+    }
+
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .thread_name("axisbridge-aux")
+        .build()
+        .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })?;
+    let _inside = runtime.enter();
+    let mut servers = Vec::with_capacity(adapters.len());
+    for (device, (adapter_config, end)) in config.devices.iter().zip(adapters) {
+        let adapter = Adapter::new(adapter_config)
+            .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
+        let server = ExplicitServer::bind(device.listen, adapter, end, tap())?;
+        info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
+        servers.push(north::spawn(server));
+    }
+    if let Some(modbus) = config.modbus {
+        let server = runtime
+            .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
+            .map_err(|source| StartError::Modbus { address: modbus.listen, source })?;
+        info!(address = %modbus.listen, "Modbus TCP");
+        let source = status.clone();
+        runtime.spawn(async move {
+            if let Err(error) = server.run(source).await {
+                warn!(%error, "Modbus TCP ended");
+            }
+        });
+    }
+    let stop_notices = Arc::new(AtomicBool::new(false));
+    let names = config.axes.iter().map(|axis| axis.name.clone()).collect();
+    runtime.spawn(log_notices(notices, names, Arc::clone(&stop_notices)));
+
+    let setup = Setup { engine, north, south, realtime: config.sercos.realtime };
+    let cycle = CycleThread::start(setup)
+        .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
+    drop(_inside);
+    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices })
+}
+
+fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
+    let Some(path) = capture else { return Ok((None, Vec::new())) };
+    let mut settings = Settings::new(path);
+    settings.north = config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
+    settings.south = match &config.sercos.link {
+        Link::Interface(name) => name.clone(),
+        Link::InProcess => "simulated SERCOS III line".to_owned(),
+    };
+    settings.depth = 4096;
+    // The bus, and for each device its I/O and its explicit side.
+    let (recorder, taps) = Recorder::start(settings, 1 + 2 * config.devices.len())
+        .map_err(|source| StartError::Recording { path: path.display().to_string(), source })?;
+    Ok((Some(recorder), taps))
+}
+
+/// Differs from start to start.
+fn incarnation() -> u16 {
+    let seconds = WallClock::now().duration_since(WallClock::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let [low, high, ..] = seconds.to_le_bytes();
+    u16::from_le_bytes([low, high]).max(1)
+}
+
+/// Logs what the cycle thread has to tell, until it has ended.
+async fn log_notices(mut notices: rtrb::Consumer<Notice>, axes: Vec<String>, stop: Arc<AtomicBool>) {
+    let mut interval = tokio::time::interval(NOTICE_INTERVAL);
+    loop {
+        interval.tick().await;
+        let last = stop.load(Ordering::Relaxed);
+        while let Ok(notice) = notices.pop() {
+            let axis = notice.axis().and_then(|axis| axes.get(usize::from(axis))).map(String::as_str);
+            match (notice.severity(), axis) {
+                (Severity::Info, Some(axis)) => info!(axis, "{notice}"),
+                (Severity::Info, None) => info!("{notice}"),
+                (Severity::Warning, Some(axis)) => warn!(axis, "{notice}"),
+                (Severity::Warning, None) => warn!("{notice}"),
+            }
+        }
+        if last {
+            return;
+        }
+    }
+}
+
+impl RunningBox {
+    /// The status of the box.
+    #[must_use]
+    pub fn status(&self) -> BoxStatus {
+        self.status.read()
+    }
+
+    /// What was refused of the asked-for real-time properties, in words; empty when everything was granted.
+    #[must_use]
+    pub fn realtime_report(&self) -> String {
+        self.cycle.realtime_report()
+    }
+
+    /// Whether the cycle thread has ended by itself, which it should never do.
+    #[must_use]
+    pub fn is_dead(&self) -> bool {
+        self.cycle.is_dead()
+    }
+
+    /// Stops the axes, takes the bus down, ends every server, and finishes the recording. Returns how many records the
+    /// recording lost, or `None` without one.
+    ///
+    /// # Errors
+    /// The recording cannot be finished.
+    pub fn stop(self) -> io::Result<Option<u64>> {
+        self.cycle.stop(STOP_TIME_OUT);
+        self.stop_notices.store(true, Ordering::Relaxed);
+        let servers = self.servers;
+        self.runtime.block_on(async {
+            for server in servers {
+                server.stop().await;
+            }
+            tokio::time::sleep(2 * NOTICE_INTERVAL).await;
+        });
+        self.runtime.shutdown_timeout(Duration::from_secs(1));
+        let summary = self.recorder.map(Recorder::finish).transpose()?;
+        Ok(summary.map(|summary| summary.dropped))
+    }
+}

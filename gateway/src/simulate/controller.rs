@@ -1,0 +1,160 @@
+//! A CIP Motion controller on real sockets: the engine of `profile_cip::controller` with a TCP stream, a UDP socket and
+//! the host's clocks.
+
+use std::io::{self, Read as _, Write as _};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use profile_cip::controller::{Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step};
+use profile_generic::time::DurationNs;
+
+use crate::sys::clock::{self, SystemClock};
+use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
+
+/// TCP port of EtherNet/IP explicit messages.
+pub const PORT_EXPLICIT: u16 = 44818;
+
+/// How long a device may take to accept the TCP connection.
+const CONNECT_TIME_OUT: Duration = Duration::from_secs(5);
+
+/// Longest wait between two looks at the sockets.
+const POLL_INTERVAL: DurationNs = DurationNs(500_000);
+
+/// Bytes taken from the stream at once.
+const STREAM_CHUNK: usize = 4096;
+
+/// Where the controller and its device are.
+#[derive(Debug, Clone, Copy)]
+pub struct Endpoints {
+    /// The device; TCP 44818 and UDP 2222.
+    pub target: Ipv4Addr,
+    /// The controller's own address, to which it binds UDP 2222.
+    pub bind: Ipv4Addr,
+}
+
+/// Why a run could not begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The configuration cannot work.
+    #[error("controller configuration: {0}")]
+    Config(#[from] profile_cip::controller::config::ConfigError),
+    /// The UDP socket is not to be had.
+    #[error(transparent)]
+    Bind(#[from] BindError),
+    /// The device does not accept the TCP connection.
+    #[error("cannot connect to the device at TCP {target}: {source}")]
+    Connect {
+        /// The device.
+        target: SocketAddrV4,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A socket failed during the run.
+    #[error("{what}: {source}")]
+    Socket {
+        /// Which socket.
+        what: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Runs `program` on the device to its end and returns the report. `on_event` sees every event as it comes; setting
+/// `stop` winds the run up early: the axes are stopped and disabled, the connection is closed.
+///
+/// # Errors
+/// [`RunError`] when the run could not begin or a socket failed; how the program itself went stands in the report.
+pub fn run(
+    endpoints: Endpoints,
+    config: ControllerConfig,
+    program: Vec<Step>,
+    stop: &AtomicBool,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Report, RunError> {
+    let mut controller = Controller::new(config, program)?;
+    let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
+    let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
+    let mut stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
+    let clock = SystemClock::detect();
+    let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
+    let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
+    let mut stream_open = true;
+    let mut stopping = false;
+    controller.tcp_connected(clock::monotonic_now());
+    while !controller.is_closed() {
+        if stop.load(Ordering::Relaxed) && !stopping {
+            stopping = true;
+            controller.finish(clock::monotonic_now());
+        }
+        while stream_open {
+            match stream.read(&mut buffer[..STREAM_CHUNK]) {
+                Ok(0) => {
+                    stream_open = false;
+                    controller.tcp_closed(clock::monotonic_now());
+                }
+                Ok(length) => controller.handle_stream(clock::monotonic_now(), &buffer[..length]),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                Err(source) => return Err(RunError::Socket { what: "TCP stream to the device", source }),
+            }
+        }
+        while let Some(datagram) = io.recv(&mut buffer).map_err(udp_error)? {
+            // A longer datagram than any of ours, or one from elsewhere, is none of the device's.
+            if !datagram.truncated && *datagram.from.ip() == endpoints.target {
+                let bytes = &buffer[..datagram.len];
+                controller.handle_datagram(clock::monotonic_now(), clock.now(), bytes);
+            }
+        }
+        controller.handle_time(clock::monotonic_now(), clock.now());
+        while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
+            if let Some(destination) = controller.datagram_destination() {
+                match io.send_to(&buffer[..length], destination) {
+                    // A full queue loses this update; the device counts it.
+                    Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Err(udp_error(error)),
+                    _ => {}
+                }
+            }
+        }
+        while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
+            outgoing.extend_from_slice(&buffer[..length]);
+        }
+        flush(&mut stream, &mut outgoing, stream_open)?;
+        while let Some(event) = controller.poll_event() {
+            on_event(&event);
+        }
+        let now = clock::monotonic_now();
+        let latest = now + POLL_INTERVAL;
+        let wake = controller.wake_at().map_or(latest, |due| due.min(latest));
+        if wake > now {
+            clock::sleep_until(wake).map_err(|source| RunError::Socket { what: "clock", source })?;
+        }
+    }
+    Ok(controller.report())
+}
+
+fn connect(target: SocketAddrV4, bind: Ipv4Addr) -> io::Result<TcpStream> {
+    let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None)?;
+    socket.bind(&SocketAddr::from((bind, 0)).into())?;
+    socket.connect_timeout(&SocketAddr::V4(target).into(), CONNECT_TIME_OUT)?;
+    socket.set_tcp_nodelay(true)?;
+    socket.set_nonblocking(true)?;
+    Ok(socket.into())
+}
+
+/// Writes what the stream takes now; the rest waits.
+fn flush(stream: &mut TcpStream, outgoing: &mut Vec<u8>, open: bool) -> Result<(), RunError> {
+    while open && !outgoing.is_empty() {
+        match stream.write(outgoing) {
+            Ok(written) => {
+                outgoing.drain(..written);
+            }
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+            Err(source) => return Err(RunError::Socket { what: "TCP stream to the device", source }),
+        }
+    }
+    Ok(())
+}
+
+fn udp_error(source: io::Error) -> RunError {
+    RunError::Socket { what: "UDP socket of the motion connection", source }
+}

@@ -1,0 +1,8 @@
+//! The other sides of the protocols as runnable peers: what `demo` and `simulate` start.
+//!
+//! The protocol engines live in the profile crates; here they get sockets, a clock and a program.
+
+pub mod controller;
+pub mod line;
+pub mod program;
+pub mod setup;

@@ -1,0 +1,132 @@
+//! The demonstration as a user runs it, and its recording as tshark reads it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use axisbridge::capture::reader::Reader;
+use axisbridge_tests::process::{Running, axisbridge};
+use axisbridge_tests::tshark::Frame;
+use axisbridge_tests::{expected, peer, tshark};
+
+/// Runs the demo for `seconds` with its own loopback addresses and returns its JSON object and its recording.
+fn demo(seconds: u32, listen: &str, name: &str) -> (serde_json::Value, PathBuf) {
+    let capture = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.pcapng"));
+    let output = Command::new(axisbridge())
+        .args(["demo", "--json", "--seconds", &seconds.to_string(), "--listen", listen, "--capture"])
+        .arg(&capture)
+        .output()
+        .expect("the demo can be started");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "the demo ended with {}: {errors}", output.status);
+    assert_eq!(errors, "", "a demo that is not on a terminal keeps quiet");
+    let result = serde_json::from_slice(&output.stdout).expect("--json prints one JSON object");
+    (result, capture)
+}
+
+#[test]
+fn both_axes_reach_their_targets_and_tshark_agrees_on_every_frame() {
+    let (result, capture) = demo(3, "127.0.0.34", "demo-tshark");
+    let axes = result["axes"].as_array().expect("an array `axes`");
+    assert_eq!(axes.len(), 2);
+    for axis in axes {
+        let number = |key: &str| axis[key].as_f64().unwrap_or_else(|| panic!("{key} in {axis}"));
+        let (target, reached) = (number("target"), number("reached"));
+        assert!(target.abs() > 1.0, "the axis is asked to move: {axis}");
+        assert!((target - reached).abs() < 0.01, "the axis reached its target: {axis}");
+        // A servo behind a bus lags: an axis that follows without any error did not move on real set-points.
+        let following = number("max_following_error");
+        assert!(following > 0.0 && following < 1.0, "a drive lags, but not far: {axis}");
+        assert!(number("cycles") > 200.0, "{axis}");
+        assert!(axis["lost_updates"].is_u64() && axis["late_updates"].is_u64(), "{axis}");
+    }
+    if peer::tshark_or_skip("both_axes_reach_their_targets_and_tshark_agrees_on_every_frame") {
+        judge(&capture);
+    }
+}
+
+/// Every frame of the recording, as tshark reads it, against what was meant.
+fn judge(capture: &Path) {
+    let raw = frames(capture);
+    let cip = tshark::dissect(capture, "udp.port == 2222", &[]);
+    assert!(cip.len() > 400, "class 1 data of both directions were recorded: {}", cip.len());
+    for frame in &cip {
+        assert!(frame.has("cipm"), "frame {} is CIP Motion: {:?}", frame.number, frame.protocols);
+        assert!(frame.field("cipm.data").is_none(), "frame {} has no surplus data", frame.number);
+        let bytes = &raw[frame.number - 1];
+        let wanted = expected::cip_motion(bytes).unwrap_or_else(|| panic!("frame {} parses", frame.number));
+        compare(frame, &wanted);
+    }
+    let sercos = tshark::dissect(capture, "eth.type == 0x88cd", &["-c", "20000"]);
+    assert!(sercos.len() > 1000, "SERCOS telegrams were recorded: {}", sercos.len());
+    let mut phases = BTreeSet::new();
+    for frame in &sercos {
+        assert!(frame.has("siii"), "frame {} is SERCOS III: {:?}", frame.number, frame.protocols);
+        let bytes = &raw[frame.number - 1];
+        phases.insert(bytes[15] & 0x8F);
+        let wanted: Vec<expected::Expected> = vec![
+            ("siii.type", 14, vec![bytes[14]]),
+            ("siii.telno", 14, vec![bytes[14]]),
+            ("siii.mst.phase", 15, vec![bytes[15]]),
+            ("siii.mst.cyclecnt", 15, vec![bytes[15]]),
+            ("siii.mst.crc32", 16, bytes[16..20].to_vec()),
+        ];
+        compare(frame, &wanted);
+    }
+    // CP0 to CP4 and the switch telegrams to each of CP1 to CP4.
+    for phase in [0, 1, 2, 3, 4, 0x81, 0x82, 0x83, 0x84] {
+        assert!(phases.contains(&phase), "phase byte {phase:#04x} was recorded: {phases:x?}");
+    }
+    // tshark calls each phase-switch telegram an unknown phase, those of a foreign master too. Nothing else may be found.
+    let mut findings = BTreeMap::<String, Vec<usize>>::new();
+    for (number, message) in tshark::warnings(capture) {
+        let switching = raw[number - 1][12..14] == [0x88, 0xCD] && raw[number - 1][15] & 0x80 != 0;
+        if !(switching && message.contains("CP is unknown")) {
+            findings.entry(message).or_default().push(number);
+        }
+    }
+    assert!(findings.is_empty(), "tshark finds fault: {findings:?}");
+}
+
+fn compare(frame: &Frame, wanted: &[expected::Expected]) {
+    for (name, position, bytes) in wanted {
+        let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let found = frame.all(name).any(|field| field.position == *position && field.value == hex);
+        let shown: Vec<_> = frame.all(name).collect();
+        assert!(found, "frame {}: expected {name} = {hex} at {position}, tshark has {shown:?}", frame.number);
+    }
+}
+
+/// All frames of a recording.
+fn frames(capture: &Path) -> Vec<Vec<u8>> {
+    let mut reader = Reader::open(capture).expect("our own recording opens");
+    let mut frames = Vec::new();
+    while let Some(frame) = reader.next_frame().expect("our own recording reads") {
+        frames.push(frame.data.to_vec());
+    }
+    frames
+}
+
+#[test]
+fn an_address_in_use_is_said_with_what_to_do() {
+    let blocker = std::net::TcpListener::bind("127.0.0.35:44818").expect("the test's own address is free");
+    let mut command = Command::new(axisbridge());
+    command.args(["demo", "--json", "--seconds", "1", "--listen", "127.0.0.35"]).stdout(Stdio::piped());
+    command.stderr(Stdio::piped());
+    let output = command.output().expect("the demo can be started");
+    drop(blocker);
+    assert_eq!(output.status.code(), Some(1));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("127.0.0.35:44818") && errors.contains("--listen"), "{errors}");
+}
+
+#[test]
+fn wrong_usage_ends_with_status_2() {
+    for arguments in [&["demo", "--seconds", "0"][..], &["demo", "--listen", "nowhere"], &["fly"], &[]] {
+        let mut command = Command::new(axisbridge());
+        command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
+        let status = Running::start("axisbridge", &mut command).wait(Duration::from_secs(10));
+        assert_eq!(status.code(), Some(2), "axisbridge {arguments:?}");
+    }
+}
