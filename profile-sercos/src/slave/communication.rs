@@ -257,7 +257,7 @@ pub fn define_lists(store: &mut Store) {
 
 /// Whether a communication cycle of `ns` is possible.
 pub fn is_cycle_time(ns: u32) -> bool {
-    matches!(ns, 31_250 | 62_500 | 125_000) || (ns != 0 && ns % 250_000 == 0 && ns <= CYCLE_NS_MAX)
+    matches!(ns, 31_250 | 62_500 | 125_000) || (ns != 0 && ns.is_multiple_of(250_000) && ns <= CYCLE_NS_MAX)
 }
 
 /// Judges the new value of a communication parameter beyond its limits.

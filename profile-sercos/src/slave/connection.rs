@@ -179,7 +179,7 @@ impl Consumer {
         let mut event = event;
         if matches!(self.state, ConsumerState::Consuming | ConsumerState::Warning) {
             self.age = self.age.saturating_add(1);
-            if event == ConsumerEvent::NoData && self.age % self.interval != 0 {
+            if event == ConsumerEvent::NoData && !self.age.is_multiple_of(self.interval) {
                 // The producer's next value is not due yet.
                 return;
             }

@@ -216,7 +216,7 @@ impl Parameter {
         let attribute = self.attribute();
         if attribute.is_list() {
             let item = usize::from(attribute.item_length().bytes());
-            return if data.len() % item == 0 { Ok(()) } else { Err(SvcError::INVALID_DATA) };
+            return if data.len().is_multiple_of(item) { Ok(()) } else { Err(SvcError::INVALID_DATA) };
         }
         if data.len() < self.capacity() {
             return Err(SvcError::DATA_SHORT);

@@ -66,7 +66,8 @@ impl Server {
             busy: None,
             open: None,
             progress: None,
-            buffer: Vec::with_capacity(longest + LIST_HEAD_LEN),
+            // The last part may be longer than what is left of the list.
+            buffer: Vec::with_capacity(longest + LIST_HEAD_LEN + PART),
         }
     }
 

@@ -66,7 +66,7 @@ pub struct Drive {
     /// Time at standstill since the drive was switched off by bit 15.
     off_for: DurationNs,
     follows: bool,
-    /// The connection was lost in operation: the enabling bits have to go away once.
+    /// The connection was lost in operation, or a fault was reset: the enabling bits have to go away once.
     locked: bool,
     referenced: bool,
 }
@@ -227,7 +227,8 @@ impl Drive {
     fn command(&mut self, cycle: &Cycle, mode: OperatingMode, store: &Store) -> ServoCommand {
         let control = self.servo_control(cycle, store);
         let running = self.actual.report == Report::Operating;
-        self.on_for = if running { self.on_for + cycle.elapsed } else { DurationNs::ZERO };
+        let torque = running || self.actual.report == Report::Halted;
+        self.on_for = if torque { self.on_for + cycle.elapsed } else { DurationNs::ZERO };
         let delayed = self.on_for < tenth_millis(store, idn::ON_DELAY);
         self.follows = running && !delayed && control == ServoControl::Enable;
         let actual = self.scales.position.counts(self.actual.position.0);
@@ -483,6 +484,9 @@ impl Application for Drive {
     }
 
     fn reset(&mut self, _: &mut Store) -> bool {
+        if self.actual.fault.is_none() {
+            return true;
+        }
         // A stop that is going on goes on; the fault is not reset then.
         let command = ServoCommand {
             control: ServoControl::Disable,
@@ -491,6 +495,8 @@ impl Application for Drive {
             ..ServoCommand::default()
         };
         self.actual = self.servo.step(1, &command);
+        // Bits that still stand do not switch the drive on again.
+        self.locked = true;
         self.actual.fault.is_none()
     }
 }

@@ -325,7 +325,8 @@ mod tests {
             let scales = Scales::read(&store, &servo).unwrap();
             let there = reference + step;
             let sent = scales.fold(there);
-            prop_assert!(if modulo { (0..3_600_000).contains(&sent) } else { i32::try_from(sent).is_ok() });
+            let fits = if modulo { (0..3_600_000).contains(&sent) } else { i32::try_from(sent).is_ok() };
+            prop_assert!(fits, "{} is transmitted", sent);
             prop_assert_eq!(scales.unfold(sent, reference), there);
         }
     }
