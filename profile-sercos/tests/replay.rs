@@ -1,13 +1,14 @@
 //! A foreign master's recorded telegrams are played to a line of two slaves of ours. The answers are compared
 //! with those of the recorded slaves, a small simulator; every difference is in the snapshot:
 //!
+//! * S-0-1051: another greatest length.
 //! * CP1: ours makes the service channel valid when the master has shown Master valid, the simulator at once.
 //! * Attributes: ours have write protection and format, the simulator's only length, list and command.
 //! * S-0-0135 bit 3: ours shows that it follows, the simulator never does.
 //!
-//! Left out of the comparison is S-DEV bit 5: the simulator toggles it with every change of a command, ours sets
-//! it when a command has ended and resets it when the command is cancelled. Counters and values in connections
-//! are left out as well.
+//! Left out of the comparison is S-DEV bit 5: the simulator toggles it with every change of a command, ours
+//! sets it when a command has ended and resets it when the command is cancelled. Counters and values in
+//! connections are left out as well.
 
 mod support;
 

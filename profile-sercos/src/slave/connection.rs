@@ -1,12 +1,10 @@
-//! The slave's ends of its connections: the consumer of command values and the producer of feedback values.
-//!
-//! Consumer:
+//! The consumer of a connection: judges from cycle to cycle whether the values are new.
 //!
 //! ```text
-//! Prepare --producer ready--> Waiting --new data--> Consuming <--> Warning --too many losses--> Error
-//!    ^------- not ready ---------+                     |  ^
-//!                                                      v  |
-//!                                                     Stopped (flow control)
+//! Prepare --ready--> Waiting --new data--> Consuming <--> Warning --too many losses--> Error
+//!    ^-- not ready ----+                      |  ^
+//!                                             v  |
+//!                                            Stopped (flow control)
 //! ```
 //!
 //! A producer may count, or only toggle its new-data bit. Once a counter other than 0 has been seen the counter

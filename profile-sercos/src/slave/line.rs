@@ -4,7 +4,8 @@ use profile_generic::time::MonotonicTime;
 
 use super::{Application, Forward, Port, Slave};
 
-/// Slaves one behind the other. A frame goes out through all of them, turns round at the last one and comes back.
+/// Slaves one behind the other. A frame goes out through all of them, turns round at the last one and comes
+/// back.
 #[derive(Debug)]
 pub struct Line<A> {
     slaves: Vec<Slave<A>>,
@@ -37,7 +38,8 @@ impl<A: Application> Line<A> {
         }
     }
 
-    /// When [`handle_time`](Self::handle_time) has something to do unless a frame comes before; `None` without slaves.
+    /// When [`handle_time`](Self::handle_time) has something to do unless a frame comes before; `None` without
+    /// slaves.
     pub fn wake_at(&self) -> Option<MonotonicTime> {
         self.slaves.iter().map(Slave::wake_at).min()
     }

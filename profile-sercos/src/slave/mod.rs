@@ -1,8 +1,9 @@
-//! The slave role: phases, service channel server, parameters, cyclic data, and the simulated drive behind it.
+//! The slave role: phases, service channel server, parameters, cyclic data, and a simulated drive behind it.
 //!
-//! A [`Slave`] sits between two ports. Every frame that comes in goes through [`Slave::handle_frame`], which takes
-//! what is for this slave, puts in what is from it, and says where the frame goes on. [`Line`] joins slaves. The
-//! function-specific profile behind the communication is an [`Application`]; [`drive::Drive`] is one.
+//! A [`Slave`] sits between two ports. Every frame that comes in goes through [`Slave::handle_frame`], which
+//! takes what is for this slave, puts in what is from it, and says where the frame goes on. [`Line`] joins
+//! slaves. The function-specific profile behind the communication is an [`Application`]; [`drive::Drive`] is
+//! one.
 //!
 //! Nothing is allocated after a slave is built.
 
@@ -12,6 +13,7 @@ pub mod configuration;
 pub mod connection;
 mod core;
 mod cyclic;
+mod diagnosis;
 pub mod drive;
 mod line;
 pub mod parameter;
@@ -481,68 +483,6 @@ impl<A: Application> Slave<A> {
         status.set(DeviceStatus::COMMUNICATION_WARNING, self.loss_warning());
         self.core.store.set_number_of(Idn::DEVICE_STATUS, i64::from(status.bits()));
         status
-    }
-
-    fn communication_error(&self) -> bool {
-        self.core.fault.is_some() || self.core.connection_failed
-    }
-
-    /// More than half of the permitted MST losses came in a row.
-    fn loss_warning(&self) -> bool {
-        let permitted = self.core.configuration.as_ref().map_or(0, |configuration| configuration.mst_losses);
-        self.losses > permitted / 2
-    }
-
-    /// S-0-0011, S-0-0012, S-0-0390 and S-0-0095.
-    fn show_diagnosis(&mut self) {
-        const COMMUNICATION_ERROR: u16 = 1 << 12;
-        let own = self.app.diagnosis();
-        let communication = if self.communication_error() { COMMUNICATION_ERROR } else { 0 };
-        let store = &mut self.core.store;
-        store.set_number_of(idn::ERRORS, i64::from(own.errors | communication));
-        store.set_number_of(idn::WARNINGS, i64::from(own.warnings));
-        let (number, text) = self.diagnosis_shown(&own);
-        if number != self.shown {
-            self.shown = number;
-            let store = &mut self.core.store;
-            store.set_number_of(idn::DIAGNOSIS_NUMBER, i64::from(number));
-            store.set_data_of(idn::DIAGNOSIS_TEXT, text.as_bytes());
-        }
-    }
-
-    /// The most important of the application's and the communication's diagnosis: error, warning, command, state.
-    fn diagnosis_shown(&self, own: &Diagnosis) -> (u32, &'static str) {
-        if own.errors != 0 {
-            return (own.number, own.text);
-        }
-        if let Some(fault) = self.core.fault {
-            let (bit, text) = fault.interface_status();
-            return (0xC30F_0000 | u32::from(bit), text);
-        }
-        if self.core.connection_failed {
-            return (0xC30F_0001, "connection lost");
-        }
-        if self.loss_warning() {
-            return (0xC30E_4001, "MST losses");
-        }
-        if own.warnings != 0 {
-            return (own.number, own.text);
-        }
-        match self.core.failed_check() {
-            Some(Idn::CP3_CHECK) => return (0xC30C_0101, "invalid parameters for CP3, see S-0-0021"),
-            Some(_) => return (0xC30C_0111, "invalid parameters for CP4, see S-0-0022"),
-            None => {}
-        }
-        match self.core.state {
-            State::In(Phase::CP4) if own.number != 0 => (own.number, own.text),
-            State::In(Phase::CP4) => (0xC30A_0040, "CP4"),
-            State::Nrt => (0xC30A_0008, "NRT"),
-            State::In(phase) | State::Switching(phase, _) => {
-                let texts = ["CP0", "CP1", "CP2", "CP3", "CP4"];
-                let text = texts[usize::from(phase.0.min(4))];
-                (if phase == Phase::CP4 { 0xC30A_0040 } else { 0xC30A_0000 | u32::from(phase.0) }, text)
-            }
-        }
     }
 
     /// MDT of CP1 and CP2.

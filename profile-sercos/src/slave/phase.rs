@@ -1,12 +1,11 @@
 //! Communication phases of a slave.
 //!
 //! ```text
-//!         CP0                CPS, CP1 .. no CPS, CP1         CPS .. CP2            CPS .. CP3            CPS .. CP4
-//! NRT ---------> CP0 ------------------------------> CP1 -----------------> CP2 ---------------> CP3 ---------------> CP4
-//!  ^              ^                                                         needs S-0-0127       needs S-0-0128
-//!  |              |
-//!  |              +---- CP0, announced by CPS or not, from any phase
-//!  +------------------- no MST for too long, or a phase out of order
+//!      CP0          CPS CP1, CP1         CPS CP2, CP2         CPS CP3, CP3         CPS CP4, CP4
+//! NRT -----> CP0 ----------------> CP1 ----------------> CP2 ----------------> CP3 ----------------> CP4
+//!  ^          ^                                              needs S-0-0127        needs S-0-0128
+//!  |          +--- CP0, announced by CPS or not, from any phase
+//!  +-------------- no MST for too long, or a phase out of order
 //! ```
 //!
 //! A switch is announced by CPS = 1 with the new phase; the telegrams keep the old layout and the slave stops

@@ -4,8 +4,8 @@ use super::{Application, Slave};
 use crate::wire::cp0::{AT_LEN, CommunicationVersion, MdtRepr, SLAVES_MAX, SequenceCounter, TopologyField};
 use crate::wire::idn::Idn;
 
-/// What of the communication version this slave can do. It needs no pause beyond the reconfiguration, and a line's
-/// last slave never sends on its free port.
+/// What of the communication version this slave can do. It needs no pause beyond the reconfiguration, and the
+/// last slave of a line never sends on its free port.
 const SUPPORTED: CommunicationVersion = CommunicationVersion::ADDRESS_ALLOCATION
     .union(CommunicationVersion::FOUR_TELEGRAMS)
     .union(CommunicationVersion::TIMES)

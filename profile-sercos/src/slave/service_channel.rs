@@ -1,7 +1,7 @@
 //! The slave's end of the service channel: one step a cycle.
 //!
-//! A step begins when the master's handshake bit MHS differs from the slave's AHS. The slave works on it, shows
-//! busy as long as that takes, and ends it by AHS = MHS with the result or an error code in INFO.
+//! A step begins when the master's handshake bit MHS differs from the slave's AHS. The slave sets AHS = MHS,
+//! shows busy as long as it works, and then has the result or an error code in INFO.
 //!
 //! An element is read or written in parts of four bytes; only the step with the last part has the end bit.
 //! Lists and texts begin with a part of their own, the current and the greatest length.

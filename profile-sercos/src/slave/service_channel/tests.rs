@@ -149,8 +149,8 @@ fn errors_have_their_codes() {
     assert_eq!(pair.read(Element::Maximum, true), Err(SvcError::NO_MAXIMUM));
 }
 
-/// The shape of recording sercos3_startup_line2, frames 2209 to 2359 (reading S-0-1000): the head alone, close,
-/// then head and data.
+/// The shape of recording sercos3_startup_line2, frames 2209 to 2359 (S-0-1000): the head alone, close, then
+/// head and data.
 #[test]
 fn lists_are_read_with_their_head() {
     let mut pair = Pair::new();
@@ -254,7 +254,9 @@ fn nothing_happens_before_the_channel_is_valid_or_without_a_toggle() {
 proptest::proptest! {
     /// Whatever a master sends, each step is answered and the parameters stay within their limits.
     #[test]
-    fn any_steps_are_answered(steps in proptest::collection::vec((0u8..8, proptest::bool::ANY, proptest::bool::ANY, 0u32..0x12), 1..200)) {
+    fn any_steps_are_answered(steps in proptest::collection::vec(
+        (0u8..8, proptest::bool::ANY, proptest::bool::ANY, 0u32..0x12), 1..200
+    )) {
         let mut pair = Pair::new();
         for (element, write, last, info) in steps {
             let info = if element == 1 { 95 + info } else { info };

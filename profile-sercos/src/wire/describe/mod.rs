@@ -1,8 +1,8 @@
 //! A frame as an indented tree for people.
 //!
-//! [`describe`] never fails: what cannot be read is said and shown as bytes. A [`DecodeContext`] carries what the
-//! frames before have told: the phase, the data block that is open at each slave, and the layout of CP3 and CP4,
-//! which the master writes over the service channel in CP2.
+//! [`describe`] never fails: what cannot be read is said and shown as bytes. A [`DecodeContext`] carries what
+//! the frames before have told: the phase, the data block that is open at each slave, and the layout of CP3 and
+//! CP4, which the master writes over the service channel in CP2.
 
 mod context;
 
