@@ -52,8 +52,13 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         .collect();
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
-    let running = runner::start(&config, Some(&arguments.capture)).map_err(|error| in_use(error, arguments.listen))?;
-    progress.step(&format!("gateway on {}, a simulated line of {} drives behind", arguments.listen, config.axes.len()));
+    let running =
+        runner::start(&config, Some(&arguments.capture)).map_err(|error| in_use(error, arguments.listen))?;
+    progress.step(&format!(
+        "gateway on {}, a simulated line of {} drives behind",
+        arguments.listen,
+        config.axes.len()
+    ));
     wait_for_phase(&running, &mut progress)?;
 
     let endpoints = endpoints(arguments.listen);
@@ -80,7 +85,8 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     }
     let report = outcome?;
     let capture = Some(arguments.capture.display().to_string());
-    RunResult { axes: AxisResult::all(&plans, &report), capture, failure: failure(&report) }.print(arguments.json)
+    RunResult { axes: AxisResult::all(&plans, &report), capture, failure: failure(&report) }
+        .print(arguments.json)
 }
 
 /// The controller has an address of its own on loopback, so that both ends have UDP port 2222.
@@ -103,7 +109,9 @@ fn wait_for_phase(running: &RunningBox, progress: &mut Progress) -> Result<(), C
             return Ok(());
         }
         if Instant::now() > end {
-            return Err(format!("expected the bus in CP4 within {PHASE_UP_TIME_OUT:?}, it is in CP{phase}").into());
+            return Err(
+                format!("expected the bus in CP4 within {PHASE_UP_TIME_OUT:?}, it is in CP{phase}").into()
+            );
         }
         std::thread::sleep(LOOK_INTERVAL);
     }

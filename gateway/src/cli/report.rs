@@ -71,13 +71,15 @@ pub struct RunResult {
 impl RunResult {
     /// Prints it, and says with which status to end: success only if every axis reached its target and nothing failed.
     pub fn print(&self, json: bool) -> Result<ExitCode, CliError> {
-        let good = self.failure.is_none() && !self.axes.is_empty() && self.axes.iter().all(|axis| axis.in_window);
+        let good =
+            self.failure.is_none() && !self.axes.is_empty() && self.axes.iter().all(|axis| axis.in_window);
         if json {
             println!("{}", serde_json::to_string(self)?);
         } else {
             println!("axis    commanded      reached  following error    cycles  lost  late");
             for axis in &self.axes {
-                let reached = axis.reached.map_or_else(|| "never ran".to_owned(), |reached| format!("{reached:.4}"));
+                let reached =
+                    axis.reached.map_or_else(|| "never ran".to_owned(), |reached| format!("{reached:.4}"));
                 println!(
                     "{:>4}  {:>11.4}  {reached:>11}  {:>15.4}  {:>8}  {:>4}  {:>4}{}",
                     axis.axis,

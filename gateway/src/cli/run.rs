@@ -44,7 +44,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
 /// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file.
 fn log_to_stderr(level: LogLevel) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level.name()));
-    let logger = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
+    let logger =
+        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
     // Refused only when a logger is set already.
     let _ = logger.try_init();
 }

@@ -34,11 +34,16 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         )
         .into());
     };
-    if let Some(unknown) = arguments.linear.iter().find(|address| !(arguments.address..=last).contains(address)) {
-        return Err(format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into());
+    if let Some(unknown) =
+        arguments.linear.iter().find(|address| !(arguments.address..=last).contains(address))
+    {
+        return Err(
+            format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into()
+        );
     }
     let socket = PacketSocket::open(&arguments.interface, ETHER_TYPE_SERCOS)?;
-    let kind = |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
+    let kind =
+        |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
     let mut drives = line::line((arguments.address..=last).map(|address| (address, kind(&address))));
     let stop = signal::stop_on_signals()?;
     if let Some(seconds) = arguments.seconds {
@@ -87,8 +92,10 @@ pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError>
     let endpoints = Endpoints { target: arguments.target, bind: arguments.bind };
     let mut progress = Progress::new(arguments.json);
     let steps = program::standard(&plans, seconds);
-    let report = controller::run(endpoints, config, steps, &stop, &mut |event| progress.step(&event.to_string()))?;
+    let report =
+        controller::run(endpoints, config, steps, &stop, &mut |event| progress.step(&event.to_string()))?;
     drop(progress);
-    let result = RunResult { axes: AxisResult::all(&plans, &report), capture: None, failure: failure(&report) };
+    let result =
+        RunResult { axes: AxisResult::all(&plans, &report), capture: None, failure: failure(&report) };
     result.print(arguments.json)
 }

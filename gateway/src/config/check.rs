@@ -18,7 +18,7 @@ use super::file::{
 };
 use super::{
     AXES_MAX, Axis, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link, LogLevel, Modbus,
-    Sercos, StoppingAction, Telegram, TimeSource,
+    Sercos, StoppingAction, TimeSource,
 };
 use crate::sys::realtime::{self, PRIORITY_MAX};
 
@@ -31,8 +31,6 @@ const SHORT_CYCLES_NS: [i64; 3] = [31_250, 62_500, 125_000];
 const CYCLE_STEP_NS: i64 = 250_000;
 const CYCLE_MAX_NS: i64 = 65_000_000;
 const UPDATE_PERIOD_NS: RangeInclusive<i64> = 250_000..=100_000_000;
-const STANDARD_TELEGRAMS: RangeInclusive<u8> = 1..=6;
-
 const DEFAULT_CLIENTS_MAX: u8 = 8;
 const DEFAULT_UPDATE_PERIOD_MIN: DurationNs = DurationNs::from_millis(1);
 const DEFAULT_UPDATE_PERIOD_MAX: DurationNs = DurationNs::from_millis(32);
@@ -641,32 +639,7 @@ impl Checker {
     fn drive(&mut self, table: &DriveTable) -> Option<Drive> {
         let name = self.name("drive", &table.name);
         let address = self.number(&table.address, "the SERCOS address", 1..=SERCOS_ADDRESS_MAX);
-        let telegram = self.telegram(table.telegram.as_ref());
-        let overlays = table.overlays.as_deref().unwrap_or_default();
-        self.unique("the overlay", overlays);
-        let overlays: Vec<_> = overlays.iter().map(|overlay| self.name("overlay", overlay)).collect();
-        Some(Drive {
-            name: name?,
-            address: address?,
-            telegram: telegram?,
-            overlays: overlays.into_iter().collect::<Option<_>>()?,
-        })
-    }
-
-    fn telegram(&mut self, name: Option<&Spanned<String>>) -> Option<Telegram> {
-        let Some(name) = name else { return Some(Telegram::IdnList) };
-        if name.get_ref() == "idn-list" {
-            return Some(Telegram::IdnList);
-        }
-        let number = name.get_ref().strip_prefix("standard-").and_then(|number| number.parse().ok());
-        match number {
-            Some(number) if STANDARD_TELEGRAMS.contains(&number) => Some(Telegram::Standard(number)),
-            _ => self.report(
-                name.span(),
-                format_args!("unknown telegram `{}`", name.get_ref()),
-                "expected \"idn-list\" or \"standard-1\" to \"standard-6\"",
-            ),
-        }
+        Some(Drive { name: name?, address: address?, set_scaling: table.set_scaling.unwrap_or(false) })
     }
 
     /// A name that other parts of the file refer to.

@@ -216,9 +216,7 @@ pub struct DriveTable {
     pub name: Spanned<String>,
     /// SERCOS address, 1 to 511, unique.
     pub address: Spanned<i64>,
-    /// How the contents of its connections are agreed: `"idn-list"` (S-0-1050.x.6), or `"standard-1"` to
-    /// `"standard-6"` for a telegram of the drive profile (S-0-0015). Default: `"idn-list"`.
-    pub telegram: Option<Spanned<String>>,
-    /// Mapping overlays for this drive, applied in this order. Default: none.
-    pub overlays: Option<Vec<Spanned<String>>>,
+    /// Whether the drive's scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
+    /// Default: false.
+    pub set_scaling: Option<bool>,
 }

@@ -303,19 +303,8 @@ pub struct Drive {
     pub name: String,
     /// SERCOS address, 1 to 511, unique.
     pub address: u16,
-    /// How the contents of its connections are agreed.
-    pub telegram: Telegram,
-    /// Mapping overlays for this drive, in the order in which they apply.
-    pub overlays: Vec<String>,
-}
-
-/// How the contents of a connection are agreed (S-0-1050.x.1, bits 5 and 4).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Telegram {
-    /// By lists of IDNs, from the mapping tables (S-0-1050.x.6).
-    IdnList,
-    /// One of the drive profile's standard telegrams, 1 to 6 (S-0-0015).
-    Standard(u8),
+    /// Whether its scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
+    pub set_scaling: bool,
 }
 
 #[cfg(test)]

@@ -8,7 +8,9 @@
 //!
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
 
-use profile_cip::target::drive_link::{AxisCommandImage, Command, DriveAction, DriveImage, SetPoints, Withheld};
+use profile_cip::target::drive_link::{
+    AxisCommandImage, Command, DriveAction, DriveImage, SetPoints, Withheld,
+};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::inhibit::Inhibits;
@@ -230,9 +232,8 @@ impl AxisChannel {
     /// Takes what the drive's connection brought in this cycle.
     pub fn from_drive(&mut self, now: MonotonicTime, system: SystemTime, consumer: Option<Consumer<'_>>) {
         let Some((program, trackers)) = self.south.as_mut() else { return };
-        let consumer = consumer.filter(|consumer| {
-            matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning)
-        });
+        let consumer = consumer
+            .filter(|consumer| matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning));
         let Some(consumer) = consumer else {
             // Not connected yet, or more losses in a row than the connection bears.
             self.feedback.fresh = false;
@@ -283,7 +284,13 @@ impl AxisChannel {
             self.follow(now, system, transition);
         }
         if self.cause_wanted.is_some_and(|since| now.since(since) > CAUSE_TIME_OUT) {
-            self.set_cause(now, system, FaultCause::DRIVE_SPECIFIC, FaultCause::DRIVE_SPECIFIC.default_reaction(), 0);
+            self.set_cause(
+                now,
+                system,
+                FaultCause::DRIVE_SPECIFIC,
+                FaultCause::DRIVE_SPECIFIC.default_reaction(),
+                0,
+            );
         }
         self.finish_reset(now);
         self.feedback.state = self.state();
@@ -297,7 +304,9 @@ impl AxisChannel {
             return;
         }
         let speed = self.feedback.velocity.get().unsigned_abs();
-        let too_fast = |limit: Velocity| speed > limit.get().unsigned_abs().saturating_add(limit.get().unsigned_abs() / 10);
+        let too_fast = |limit: Velocity| {
+            speed > limit.get().unsigned_abs().saturating_add(limit.get().unsigned_abs() / 10)
+        };
         if self.limits.velocity.is_some_and(too_fast) {
             self.raise(now, system, Fault::new(FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, system));
         }
@@ -306,7 +315,11 @@ impl AxisChannel {
             if self.feedback.get(profile_generic::image::Signal::FollowingError).is_none() {
                 self.feedback.following_error = Position(error);
             }
-            if self.limits.following_error.is_some_and(|limit| error.unsigned_abs() > limit.get().unsigned_abs()) {
+            if self
+                .limits
+                .following_error
+                .is_some_and(|limit| error.unsigned_abs() > limit.get().unsigned_abs())
+            {
                 self.raise(now, system, Fault::new(FaultCause::EXCESSIVE_POSITION_ERROR, system));
             }
         }
@@ -345,7 +358,11 @@ impl AxisChannel {
         vendor_code: u32,
     ) {
         self.cause_wanted = None;
-        self.raise(now, system, Fault::new(cause, system).with_reaction(reaction).with_vendor_code(vendor_code));
+        self.raise(
+            now,
+            system,
+            Fault::new(cause, system).with_reaction(reaction).with_vendor_code(vendor_code),
+        );
     }
 
     fn raise(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
@@ -382,7 +399,8 @@ impl AxisChannel {
     }
 
     fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
-        if action == DriveAction::PowerUp && self.fault.is_some_and(|fault| caused_by_controller(fault.cause)) {
+        if action == DriveAction::PowerUp && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
+        {
             // A new start of the controller; nothing moves before it enables the axis anew.
             self.clear_fault(now, system);
         }
@@ -452,7 +470,8 @@ impl AxisChannel {
         }
         let mut fresh = self.command;
         let values = CyclicValues::from(&points.values);
-        let conversions = self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
+        let conversions =
+            self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
         self.count_saturated(conversions.saturated);
         if conversions.not_finite > 0 || conversions.saturated > 0 {
             // Half understood is not understood.
@@ -502,7 +521,8 @@ impl AxisChannel {
     }
 
     fn start_interpolator(&mut self) {
-        let position = self.feedback.present.contains(FeedbackSet::POSITION).then_some(self.feedback.position);
+        let position =
+            self.feedback.present.contains(FeedbackSet::POSITION).then_some(self.feedback.position);
         if let Some(interpolator) = self.interpolator.as_mut() {
             interpolator.start(position);
         }

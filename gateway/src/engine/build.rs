@@ -14,7 +14,7 @@ use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
 use profile_generic::scaling::UnitKind;
-use profile_sercos::master::config::MasterConfig;
+use profile_sercos::master::config::{Connections, MasterConfig, SlaveConfig};
 
 use super::axis::{AxisChannel, Limits};
 use super::bus::SercosBus;
@@ -35,6 +35,12 @@ const NOTICES: usize = 1024;
 
 /// Largest connection sizes that a device takes, with the sequence count.
 const CONNECTION_SIZE_MAX: u16 = 1400;
+
+/// Most slaves of a SERCOS III network.
+const SLAVES_MAX: u16 = 511;
+
+/// Slaves that may be on the bus without being configured: they are told of instead of keeping the bus down.
+const SPARE_SLAVES: u16 = 16;
 
 /// What a device needs from the start of a D-to-C update to its transmission.
 const TRANSMISSION_PROCESSING_NS: u64 = 100_000;
@@ -100,8 +106,9 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let (adapter_end, device_end) = motion_link();
         let scalings: Vec<_> = members.iter().map(|(number, axis)| (*number, scaling(axis))).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
-        let channel = DeviceChannel::new(number, device_config(device, members.len()), device_end, &scalings, &mapping)
-            .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
+        let channel =
+            DeviceChannel::new(number, device_config(device, members.len()), device_end, &scalings, &mapping)
+                .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
         devices.push(channel);
         adapters.push((adapter_config(device, &members, host), adapter_end));
     }
@@ -118,6 +125,14 @@ fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
     master.mst_jitter_ns = ns(sercos.jitter);
     master.stable_cycles = sercos.cp0_stable_cycles;
     master.mst_losses = sercos.allowed_losses;
+    // Which connections a drive needs is known once it has told what it can.
+    let slave = |drive: &crate::config::Drive| SlaveConfig {
+        address: drive.address,
+        connections: Connections::new(),
+    };
+    master.slaves = sercos.drives.iter().map(slave).collect();
+    master.slaves_max =
+        u16::try_from(sercos.drives.len()).unwrap_or(SLAVES_MAX).saturating_add(SPARE_SLAVES).min(SLAVES_MAX);
     let drives = config
         .axes
         .iter()
@@ -140,7 +155,9 @@ fn kind(axis: &Axis) -> UnitKind {
 fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
     let limits = &axis.limits;
     let mut parameters = Vec::new();
-    let mut limit = |parameter: Parameter, value: Option<i64>| parameters.extend(value.map(|value| (parameter.into(), value)));
+    let mut limit = |parameter: Parameter, value: Option<i64>| {
+        parameters.extend(value.map(|value| (parameter.into(), value)))
+    };
     limit(Parameter::ACCELERATION_LIMIT, limits.acceleration.map(|value| value.0));
     limit(Parameter::DECELERATION_LIMIT, limits.acceleration.map(|value| value.0));
     limit(Parameter::TORQUE_LIMIT_POSITIVE, limits.torque.map(|value| value.0));
@@ -148,7 +165,9 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
     limit(Parameter::POSITION_ERROR_TOLERANCE, limits.following_error.map(|value| value.0));
     SercosAxis {
         units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated_torque: None },
-        modes: [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque].into_iter().collect(),
+        modes: [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
+            .into_iter()
+            .collect(),
         modulo: false,
         set_scaling,
         parameters,
@@ -168,7 +187,8 @@ fn scaling(axis: &Axis) -> CipScaling {
 
 fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
     let missing = |what| BuildError::Tables { name: axis.name.clone(), what };
-    let program = mapping.cip_program(&scaling(axis)).ok_or_else(|| missing("exact ratio for its resolution"))?;
+    let program =
+        mapping.cip_program(&scaling(axis)).ok_or_else(|| missing("exact ratio for its resolution"))?;
     let limits = Limits {
         position_min: axis.limits.position_min,
         position_max: axis.limits.position_max,
@@ -209,8 +229,13 @@ fn device_config(device: &Device, axes: usize) -> DeviceConfig {
 
 fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
     let identity = &device.identity;
-    let us = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos() / 1000).unwrap_or(u32::MAX);
-    let netmask = if device.listen.is_loopback() { Ipv4Addr::new(255, 0, 0, 0) } else { Ipv4Addr::new(255, 255, 255, 0) };
+    let us =
+        |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos() / 1000).unwrap_or(u32::MAX);
+    let netmask = if device.listen.is_loopback() {
+        Ipv4Addr::new(255, 0, 0, 0)
+    } else {
+        Ipv4Addr::new(255, 255, 255, 0)
+    };
     AdapterConfig {
         identity: IdentityConfig {
             vendor: identity.vendor_id,
@@ -236,7 +261,10 @@ fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ad
             o_to_t_size_max: CONNECTION_SIZE_MAX,
             t_to_o_size_max: CONNECTION_SIZE_MAX,
             power_structure_class_id: device.power_structure_class_id,
-            power_structure_axis_ids: members.iter().map(|(_, axis)| axis.power_structure_axis_id).collect::<ArrayVec<_, 16>>(),
+            power_structure_axis_ids: members
+                .iter()
+                .map(|(_, axis)| axis.power_structure_axis_id)
+                .collect::<ArrayVec<_, 16>>(),
         },
         incarnation: host.incarnation,
     }

@@ -206,7 +206,8 @@ impl SercosBus {
         }
         self.commission(mapping, axes, notice);
         self.diagnose(axes);
-        let alone = self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
+        let alone =
+            self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
         if alone {
             self.master.set_target_phase(Phase::CP0);
         }
@@ -340,9 +341,9 @@ impl SercosBus {
     fn diagnose(&mut self, axes: &mut [AxisChannel]) {
         for (axis, channel) in axes.iter_mut().enumerate() {
             if channel.take_drive_reset()
-                && let Some(idn) = channel.south().and_then(|program| {
-                    program.command_of(profile_generic::state::Action::ResetFault)
-                })
+                && let Some(idn) = channel
+                    .south()
+                    .and_then(|program| program.command_of(profile_generic::state::Action::ResetFault))
             {
                 self.access(axis, SvcRequest::command(idn).urgent(), Purpose::FaultReset);
             }
@@ -373,7 +374,9 @@ impl SercosBus {
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
-        let Some(axis) = self.drives.iter().position(|drive| drive.slave == Some(ticket.slave)) else { return };
+        let Some(axis) = self.drives.iter().position(|drive| drive.slave == Some(ticket.slave)) else {
+            return;
+        };
         let drive = &mut self.drives[axis];
         if let Stage::Commissioning(work) = &mut drive.stage
             && work.handle(ticket, &outcome, &mut drive.facts)
@@ -431,10 +434,8 @@ impl Drive {
             }
         };
         let mut connections = Connections::new();
-        let both = [
-            (COMMAND_CONNECTION, false, &telegram.command),
-            (FEEDBACK_CONNECTION, true, &telegram.feedback),
-        ];
+        let both =
+            [(COMMAND_CONNECTION, false, &telegram.command), (FEEDBACK_CONNECTION, true, &telegram.feedback)];
         for (instance, slave_produces, idns) in both {
             let Some(connection) = ConnectionConfig::new(instance, slave_produces, idns) else {
                 let error = crate::mapping::SercosError::Full("a connection");

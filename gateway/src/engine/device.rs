@@ -98,12 +98,14 @@ impl DeviceChannel {
         axes: &[(usize, CipScaling)],
         mapping: &Mapping,
     ) -> Result<Self, ChannelError> {
-        config.attributes = definitions(mapping, &axes[0].1).ok_or(ChannelError::Scaling { axis: axes[0].0 })?;
+        config.attributes =
+            definitions(mapping, &axes[0].1).ok_or(ChannelError::Scaling { axis: axes[0].0 })?;
         let device = MotionDevice::new(config)?;
         let members = axes
             .iter()
             .map(|(axis, scaling)| {
-                let attributes = mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
+                let attributes =
+                    mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
                 let (scaling, configured) = (*scaling, *scaling);
                 Ok(Member { axis: *axis, scaling, configured, attributes, state: AxisState::Off })
             })
@@ -196,7 +198,8 @@ impl DeviceChannel {
                 notice(Notice::AxisState { axis: number, from: member.state, to: state });
                 if member.state == AxisState::Initializing && state != AxisState::MajorFaulted {
                     let device = &self.device;
-                    let scaling = member.take_scaling(mapping, axis, |id| number_of(device.attribute(place, id)));
+                    let scaling =
+                        member.take_scaling(mapping, axis, |id| number_of(device.attribute(place, id)));
                     if let Err(error) = scaling {
                         axis.refuse_configuration(now, system);
                         notice(Notice::Scaling { axis: number, error });
@@ -251,7 +254,8 @@ impl DeviceChannel {
         axes: &[AxisChannel],
         bus: &mut SercosBus,
     ) -> Result<(), GeneralStatus> {
-        let place = usize::from(access.instance).checked_sub(1).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let place =
+            usize::from(access.instance).checked_sub(1).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let member = self.members.get(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
         let entry = *member.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let axis = &axes[member.axis];
@@ -259,8 +263,9 @@ impl DeviceChannel {
             mapping::Backing::Signal { signal, .. } => {
                 let generic = signal_value(axis, signal).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
                 let mut bytes = [0; 8];
-                let (len, _) =
-                    entry.from_generic(generic, &mut bytes).map_err(|_| GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+                let (len, _) = entry
+                    .from_generic(generic, &mut bytes)
+                    .map_err(|_| GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
                 self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
                 Ok(())
             }
@@ -289,7 +294,11 @@ impl DeviceChannel {
                     attribute: access.id,
                     write,
                 };
-                if bus.access(member.axis, request, purpose) { Ok(()) } else { Err(GeneralStatus::RESOURCE_UNAVAILABLE) }
+                if bus.access(member.axis, request, purpose) {
+                    Ok(())
+                } else {
+                    Err(GeneralStatus::RESOURCE_UNAVAILABLE)
+                }
             }
             _ => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         }
@@ -330,7 +339,9 @@ impl DeviceChannel {
             (Ok(data), Some(member)) => {
                 let entry = member.attributes.get(attribute);
                 let held = entry.and_then(|entry| match entry.backing {
-                    mapping::Backing::Parameter { parameter, .. } => axes[member.axis].south()?.parameter(parameter),
+                    mapping::Backing::Parameter { parameter, .. } => {
+                        axes[member.axis].south()?.parameter(parameter)
+                    }
                     _ => None,
                 });
                 let generic = held.and_then(|held| held.decode(data.as_slice()));
@@ -407,14 +418,18 @@ impl Member {
 }
 
 /// The attributes that describe a scaling, with their values.
-fn scaling_attributes(tables: &mapping::CipTables, scaling: &CipScaling) -> ArrayVec<(u16, i64), SCALING_MAX> {
+fn scaling_attributes(
+    tables: &mapping::CipTables,
+    scaling: &CipScaling,
+) -> ArrayVec<(u16, i64), SCALING_MAX> {
     let rows = &tables.scaling;
     let known = |unit: &&mapping::DisplacementUnit| {
         unit.kind == scaling.kind && unit.nanounits == scaling.nanounits_per_unit
     };
     let unit = tables.motion_units.iter().find(known).map_or(0, |unit| i64::from(unit.code));
     let polarity = if scaling.inverted { i64::from(rows.inverted) } else { 0 };
-    let resolution = rows.resolution.iter().zip([scaling.counts_per_unit].into_iter().chain(std::iter::repeat(1)));
+    let resolution =
+        rows.resolution.iter().zip([scaling.counts_per_unit].into_iter().chain(std::iter::repeat(1)));
     let fixed = [
         (rows.configuration, i64::from(rows.drive_scaling)),
         (rows.unit, unit),

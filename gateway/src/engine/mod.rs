@@ -204,7 +204,8 @@ impl Engine {
     fn count_lateness(&mut self, now: MonotonicTime) {
         let Some(due) = self.due else { return };
         let late = now.since(due).as_nanos().max(0);
-        self.status.lateness_max_ns = self.status.lateness_max_ns.max(u32::try_from(late).unwrap_or(u32::MAX));
+        self.status.lateness_max_ns =
+            self.status.lateness_max_ns.max(u32::try_from(late).unwrap_or(u32::MAX));
         if late > self.cycle_time.as_nanos() / 2 {
             self.status.counters.late_cycles += 1;
         }

@@ -133,7 +133,9 @@ impl fmt::Display for Notice {
             Self::DriveMissing { address, .. } => {
                 write!(f, "expected a drive with SERCOS address {address} on the bus, found none")
             }
-            Self::Commissioning { failure, .. } => write!(f, "commissioning failed: {failure}; the drive is left out"),
+            Self::Commissioning { failure, .. } => {
+                write!(f, "commissioning failed: {failure}; the drive is left out")
+            }
             Self::PassedOver { failure, .. } => write!(f, "commissioning goes on without: {failure}"),
             Self::Program { error, .. } => write!(f, "the drive cannot be used: {error}; it is left out"),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),

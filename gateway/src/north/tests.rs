@@ -86,7 +86,11 @@ impl Device {
             let mut asked = Vec::new();
             while !flag.load(Ordering::Relaxed) {
                 while let Some(request) = end.request() {
-                    end.reply(answer(&request)).unwrap();
+                    let mut reply = answer(&request);
+                    while let Err(full) = end.reply(reply) {
+                        reply = full;
+                        std::thread::yield_now();
+                    }
                     asked.push(request);
                 }
                 std::thread::sleep(Duration::from_micros(500));

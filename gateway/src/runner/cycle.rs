@@ -76,7 +76,8 @@ impl CycleThread {
 fn run(setup: Setup, stop: &AtomicBool) {
     let Setup { mut engine, mut north, mut south, .. } = setup;
     let clock = SystemClock::detect();
-    let mut ports: Vec<&mut dyn NorthPort> = north.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
+    let mut ports: Vec<&mut dyn NorthPort> =
+        north.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
     let mut stopping = false;
     loop {
         if stop.load(Ordering::Relaxed) && !stopping {

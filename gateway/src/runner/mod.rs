@@ -122,7 +122,8 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
         Link::InProcess => None,
     };
     let mac = socket.as_ref().map_or(SIMULATED_MAC, PacketSocket::mac);
-    let Built { mut engine, adapters, notices, status } = build(config, mapping, Host { mac, incarnation: incarnation() })?;
+    let Built { mut engine, adapters, notices, status } =
+        build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
     engine.set_sync(SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 });
 
@@ -179,7 +180,8 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
 fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
     let Some(path) = capture else { return Ok((None, Vec::new())) };
     let mut settings = Settings::new(path);
-    settings.north = config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
+    settings.north =
+        config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
     settings.south = match &config.sercos.link {
         Link::Interface(name) => name.clone(),
         Link::InProcess => "simulated SERCOS III line".to_owned(),

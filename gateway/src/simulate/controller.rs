@@ -75,7 +75,8 @@ pub fn run(
     let mut controller = Controller::new(config, program)?;
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
-    let mut stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
+    let mut stream =
+        connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
     let clock = SystemClock::detect();
     let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
     let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
@@ -107,12 +108,10 @@ pub fn run(
         }
         controller.handle_time(clock::monotonic_now(), clock.now());
         while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
-            if let Some(destination) = controller.datagram_destination() {
-                match io.send_to(&buffer[..length], destination) {
-                    // A full queue loses this update; the device counts it.
-                    Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Err(udp_error(error)),
-                    _ => {}
-                }
+            match io.send_to(&buffer[..length], destination(&controller, endpoints.target)) {
+                // A full queue loses this update; the device counts it.
+                Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Err(udp_error(error)),
+                _ => {}
             }
         }
         while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
@@ -130,6 +129,12 @@ pub fn run(
         }
     }
     Ok(controller.report())
+}
+
+/// Where the device wants the C-to-D datagrams: at its own address and the usual port, where it does not say otherwise.
+fn destination(controller: &Controller, target: Ipv4Addr) -> SocketAddrV4 {
+    let named = controller.datagram_destination().unwrap_or(SocketAddrV4::new(target, PORT_IO));
+    if named.ip().is_unspecified() { SocketAddrV4::new(target, named.port()) } else { named }
 }
 
 fn connect(target: SocketAddrV4, bind: Ipv4Addr) -> io::Result<TcpStream> {

@@ -101,10 +101,11 @@ impl InProcessLine {
     /// The drives of a configuration, each for the axis it is to move.
     #[must_use]
     pub fn of(config: &Config, tap: Option<Tap>) -> Self {
-        let kind = |drive: usize| match config.axes.iter().find(|axis| axis.drive == drive).map(|axis| axis.kind) {
-            Some(AxisKind::Linear) => UnitKind::Linear,
-            _ => UnitKind::Rotary,
-        };
+        let kind =
+            |drive: usize| match config.axes.iter().find(|axis| axis.drive == drive).map(|axis| axis.kind) {
+                Some(AxisKind::Linear) => UnitKind::Linear,
+                _ => UnitKind::Rotary,
+            };
         let drives = config.sercos.drives.iter().enumerate();
         Self::new(line(drives.map(|(number, drive)| (drive.address, kind(number)))), tap)
     }

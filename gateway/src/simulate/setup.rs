@@ -60,7 +60,9 @@ fn class_attributes(mapping: &Mapping) -> Vec<AttributeSet> {
         ("Controller Update Delay High Limit", DELAY_LIMITS.0),
         ("Controller Update Delay Low Limit", DELAY_LIMITS.1),
     ];
-    sets.iter().filter_map(|(name, value)| id(name).map(|id| AttributeSet::usint(id, *value).optional())).collect()
+    sets.iter()
+        .filter_map(|(name, value)| id(name).map(|id| AttributeSet::usint(id, *value).optional()))
+        .collect()
 }
 
 /// Instance attributes by the names of the dictionary: a closed loop on the motor feedback with stops on the ramp. The

@@ -139,12 +139,15 @@ impl Drive {
     /// Limits and windows of the parameters, as the servo takes them.
     fn servo_parameters(&self, scales: &Scales, store: &Store, lag_less: bool) -> ServoParameters {
         let number = |idn| store.number_of(idn);
+        // Of several limits of the same value the tightest counts.
+        let least = |idns: [Idn; 3]| idns.into_iter().map(|idn| store.number_of(idn)).min().unwrap_or(1);
+        let torque_limits = [idn::TORQUE_LIMIT, idn::TORQUE_LIMIT_POSITIVE, idn::TORQUE_LIMIT_NEGATIVE];
+        let acceleration_limits =
+            [idn::ACCELERATION_LIMIT, idn::ACCELERATION_LIMIT_POSITIVE, idn::ACCELERATION_LIMIT_NEGATIVE];
         ServoParameters {
             velocity_limit: Velocity(scales.velocity.generic(number(idn::VELOCITY_LIMIT)).max(1)),
-            torque_limit: Torque(scales.torque.generic(number(idn::TORQUE_LIMIT)).max(1)),
-            deceleration_limit: Acceleration(
-                scales.acceleration.generic(number(idn::ACCELERATION_LIMIT)).max(1),
-            ),
+            torque_limit: Torque(scales.torque.generic(least(torque_limits)).max(1)),
+            deceleration_limit: Acceleration(scales.acceleration.generic(least(acceleration_limits)).max(1)),
             position_error_tolerance: Position(scales.position.generic(number(idn::MONITORING_WINDOW))),
             in_position_window: Position(scales.position.generic(number(idn::POSITION_WINDOW)).max(1)),
             standstill_window: Velocity(scales.velocity.generic(number(idn::STANDSTILL_WINDOW)).max(1)),

@@ -47,6 +47,18 @@ pub mod idn {
     pub const TORQUE_FEEDBACK: Idn = Idn::standard(84);
     /// Torque polarity.
     pub const TORQUE_POLARITY: Idn = Idn::standard(85);
+    /// Positive torque/force limit value.
+    pub const TORQUE_LIMIT_POSITIVE: Idn = Idn::standard(82);
+    /// Negative torque/force limit value, a magnitude.
+    pub const TORQUE_LIMIT_NEGATIVE: Idn = Idn::standard(83);
+    /// Positive acceleration limit value.
+    pub const ACCELERATION_LIMIT_POSITIVE: Idn = Idn::standard(136);
+    /// Negative acceleration limit value, a magnitude.
+    pub const ACCELERATION_LIMIT_NEGATIVE: Idn = Idn::standard(137);
+    /// Input revolutions of the load gear.
+    pub const GEAR_INPUT: Idn = Idn::standard(121);
+    /// Output revolutions of the load gear.
+    pub const GEAR_OUTPUT: Idn = Idn::standard(122);
     /// Bipolar velocity limit.
     pub const VELOCITY_LIMIT: Idn = Idn::standard(91);
     /// Bipolar torque limit.
@@ -111,6 +123,7 @@ mod attribute {
     pub const CURRENT_READ: u32 = 0x7312_0001;
     pub const SPEED_READ: u32 = 0x7412_0001;
     pub const U16_READ: u32 = 0x7011_0001;
+    pub const U32_READ: u32 = 0x7012_0001;
     pub const VOLTAGE_READ: u32 = 0x7111_0001;
     pub const MODE_LIST: u32 = 0x7035_0001;
 }
@@ -229,12 +242,23 @@ fn define_settings(store: &mut Store) {
         value(idn::POSITION_WINDOW, a::POSITION_UNSIGNED, "Position window", 1).range(1, double),
         value(idn::VELOCITY_LIMIT, a::VELOCITY_UNSIGNED, "Bipolar velocity limit value", 1).range(1, double),
         value(idn::TORQUE_LIMIT, a::TORQUE_UNSIGNED, "Bipolar torque/force limit value", 1).range(1, word),
+        value(idn::TORQUE_LIMIT_POSITIVE, a::TORQUE_UNSIGNED, "Positive torque/force limit value", 1)
+            .range(1, word),
+        value(idn::TORQUE_LIMIT_NEGATIVE, a::TORQUE_UNSIGNED, "Negative torque/force limit value", 1)
+            .range(1, word),
         value(idn::POSITION_GAIN, a::GAIN, "Position loop Kv-factor", 1).unit("1000/min").range(1, word),
         value(idn::STANDSTILL_WINDOW, a::VELOCITY_UNSIGNED, "Standstill window", 1).range(1, double),
         value(idn::VELOCITY_THRESHOLD, a::VELOCITY_UNSIGNED, "Velocity threshold n_x", 0).range(0, double),
         value(idn::TORQUE_THRESHOLD, a::TORQUE_UNSIGNED, "Torque/force threshold T_x", 0).range(0, word),
         value(idn::ACCELERATION_LIMIT, a::VELOCITY_UNSIGNED, "Bipolar acceleration limit value", 1)
             .range(1, double),
+        value(idn::ACCELERATION_LIMIT_POSITIVE, a::VELOCITY_UNSIGNED, "Positive acceleration limit value", 1)
+            .range(1, double),
+        value(idn::ACCELERATION_LIMIT_NEGATIVE, a::VELOCITY_UNSIGNED, "Negative acceleration limit value", 1)
+            .range(1, double),
+        // Motor and load turn alike: there is no gear between them.
+        value(idn::GEAR_INPUT, a::U32_READ, "Input revolutions of load gear", 1),
+        value(idn::GEAR_OUTPUT, a::U32_READ, "Output revolutions of load gear", 1),
         value(idn::MONITORING_WINDOW, a::POSITION_UNSIGNED, "Monitoring window", 0).range(0, double),
         value(idn::ON_DELAY, a::DELAY, "Drive on delay time", 0).unit("ms").range(0, word),
         value(idn::OFF_DELAY, a::DELAY, "Drive off delay time", 0).unit("ms").range(0, word),
@@ -264,6 +288,10 @@ fn preset(store: &mut Store, servo: &ServoParameters) {
     for (idn, value) in [
         (idn::VELOCITY_LIMIT, scales.velocity.counts(servo.velocity_limit.0)),
         (idn::TORQUE_LIMIT, scales.torque.counts(servo.torque_limit.0)),
+        (idn::TORQUE_LIMIT_POSITIVE, scales.torque.counts(servo.torque_limit.0)),
+        (idn::TORQUE_LIMIT_NEGATIVE, scales.torque.counts(servo.torque_limit.0)),
+        (idn::ACCELERATION_LIMIT_POSITIVE, scales.acceleration.counts(servo.deceleration_limit.0)),
+        (idn::ACCELERATION_LIMIT_NEGATIVE, scales.acceleration.counts(servo.deceleration_limit.0)),
         (idn::ACCELERATION_LIMIT, scales.acceleration.counts(servo.deceleration_limit.0)),
         (idn::POSITION_WINDOW, scales.position.counts(servo.in_position_window.0)),
         (idn::STANDSTILL_WINDOW, scales.velocity.counts(servo.standstill_window.0)),
