@@ -1,7 +1,7 @@
 //! What a user's Modbus TCP client sees of the axes.
 //!
-//! The register numbers are written out here from `docs/modbus.md` and not taken from the gateway: a map that has
-//! moved is found.
+//! The register numbers are written out here from `docs/modbus.md` and not taken from the gateway: a map that
+//! has moved is found.
 
 use std::io;
 use std::net::SocketAddr;

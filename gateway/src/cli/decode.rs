@@ -53,7 +53,8 @@ fn options(arguments: &DecodeArguments) -> Options {
 struct DictionaryNames<'a>(&'a SercosDictionary);
 
 impl DictionaryNames<'_> {
-    /// The row of a parameter. Those of other parameter sets and structure instances are like those of the first.
+    /// The row of a parameter. Those of other parameter sets and structure instances are like those of the
+    /// first.
     fn row(&self, idn: Idn) -> Option<&SercosIdn> {
         let first_set = idn.with_set(0);
         let first_instance = first_set.with_structure(0, first_set.element());
@@ -120,7 +121,8 @@ mod tests {
     fn a_damaged_file_is_printed_up_to_the_damage_and_then_an_error() {
         let bytes = std::fs::read(RECORDING).unwrap();
         let path = std::env::temp_dir().join(format!("axisbridge-decode-{}.pcap", std::process::id()));
-        // Within the second record: 24 bytes of file header, 16 of record header and the first frame before it.
+        // Within the second record: 24 bytes of file header, 16 of record header and the first frame before
+        // it.
         let first_len = usize::try_from(u32::from_le_bytes(bytes[32..36].try_into().unwrap())).unwrap();
         std::fs::write(&path, &bytes[..24 + 16 + first_len + 20]).unwrap();
         let (outcome, numbers, _) = printed(&arguments(&path));

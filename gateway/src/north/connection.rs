@@ -1,8 +1,8 @@
 //! One TCP stream: a task that reads into one buffer and writes from another.
 //!
-//! The buffers go to and fro between this task and the server: the server gives a read buffer back when all its
-//! bytes have been taken, and sends the next bytes when the write buffer has come back. So each stream has at most
-//! one buffer of each kind, and never more than two messages waiting at the server.
+//! The buffers go to and fro between this task and the server: the server gives a read buffer back when all
+//! its bytes have been taken, and sends the next bytes when the write buffer has come back. So each stream
+//! has at most one buffer of each kind, and never more than two messages waiting at the server.
 
 use std::io;
 use std::net::SocketAddrV4;

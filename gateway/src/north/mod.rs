@@ -1,7 +1,7 @@
 //! The north side's explicit messaging: EtherNet/IP sessions over TCP and the List commands over UDP.
 //!
-//! The protocol is `profile_cip::target::adapter`, which knows no socket. Here are the sockets around it and the
-//! way to the motion device, which runs in the cycle thread:
+//! The protocol is `profile_cip::target::adapter`, which knows no socket. Here are the sockets around it and
+//! the way to the motion device, which runs in the cycle thread:
 //!
 //! ```text
 //! TCP streams --reader--> |          | --MotionRequest--> queue --> DeviceEnd (cycle thread)
@@ -9,8 +9,8 @@
 //! UDP datagrams --------> |  (task)  | --> recording, log, statistics
 //! ```
 //!
-//! One task owns the adapter. Each stream has a task of its own that holds at most one buffer of input and one of
-//! output, so that a peer that stalls holds up nobody else.
+//! One task owns the adapter. Each stream has a task of its own that holds at most one buffer of input and
+//! one of output, so that a peer that stalls holds up nobody else.
 
 mod connection;
 mod error;

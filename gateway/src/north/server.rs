@@ -42,10 +42,11 @@ const ANSWER_LEN_MAX: usize = 256;
 /// A peer that does not take 4 KiB in this time is dropped.
 pub const STALL_LIMIT: Duration = Duration::from_secs(30);
 
-/// How often the motion device's replies are looked for while it owes one: the resolution of the runtime's timers.
+/// How often the motion device's replies are looked for while it owes one: the resolution of the runtime's
+/// timers.
 ///
-/// The cycle thread does not wake this task, because that would be a system call in its cycle, into a runtime whose
-/// locks it would have to wait for. A reply is late by a millisecond, which no explicit message minds.
+/// The cycle thread does not wake this task, because that would be a system call in its cycle, into a runtime
+/// whose locks it would have to wait for. A reply is late by a millisecond, which no explicit message minds.
 const POLL_AWAITING: DurationNs = DurationNs::from_millis(1);
 
 /// How often they are looked for otherwise: the loss of a connection comes unasked.
@@ -164,8 +165,8 @@ impl ExplicitServer {
         self
     }
 
-    /// Calls `on_event` for every event of the adapter, besides logging it: the place for the application's duties,
-    /// such as a reset or keeping a setting.
+    /// Calls `on_event` for every event of the adapter, besides logging it: the place for the application's
+    /// duties, such as a reset or keeping a setting.
     #[must_use]
     pub fn on_event(mut self, on_event: impl FnMut(&Event) + Send + 'static) -> Self {
         self.core.on_event = Some(Box::new(on_event));
@@ -184,7 +185,8 @@ impl ExplicitServer {
         self.published.subscribe()
     }
 
-    /// Answers until `stop` holds `true` or its sender is gone; then all streams are closed and their tasks ended.
+    /// Answers until `stop` holds `true` or its sender is gone; then all streams are closed and their tasks
+    /// ended.
     pub async fn run(mut self, mut stop: watch::Receiver<bool>) -> Statistics {
         let mut receivers = JoinSet::new();
         let udp = Arc::clone(&self.sockets.udp);
@@ -357,7 +359,8 @@ impl Core {
                 if taken < bytes.len() {
                     connection.input = Some((bytes, taken));
                 } else {
-                    // There is one read buffer, so there is room; only a task that has ended does not take it.
+                    // There is one read buffer, so there is room; only a task that has ended does not take
+                    // it.
                     let _ = connection.to_reader.try_send(bytes);
                 }
             }

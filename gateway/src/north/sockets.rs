@@ -13,7 +13,8 @@ use super::server::STALL_LIMIT;
 /// Streams that may wait to be accepted.
 const BACKLOG: i32 = 64;
 
-/// What the kernel may hold for a peer that does not read, in bytes (it doubles the number for its own needs).
+/// What the kernel may hold for a peer that does not read, in bytes (it doubles the number for its own
+/// needs).
 const SEND_BUFFER_LEN: usize = 32 * 1024;
 
 /// Port numbers tried when any free one will do: the one TCP gets may be taken for UDP.

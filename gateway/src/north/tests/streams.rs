@@ -123,7 +123,8 @@ async fn a_stream_that_speaks_something_else_is_closed() {
     let (server, _device) = bind(75);
     let handle = spawn(server);
     let mut client = Client::connect(handle.address()).await;
-    // The server may break off before it is all out. Read as headers, these lines announce packets of 8 KiB and more.
+    // The server may break off before it is all out. Read as headers, these lines announce packets of 8 KiB
+    // and more.
     let _ = client.stream.write_all(&b"GET / HTTP/1.1\r\n\r\n".repeat(20_000)).await;
     assert!(client.is_closed().await);
     assert_eq!(handle.stop().await.adapter.sessions_garbled, 1);
