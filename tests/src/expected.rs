@@ -48,7 +48,6 @@ fn command(data: &[u8], at: usize, fields: &mut Vec<Expected>) {
     }
     let mut offset = at + header.buffer_len();
     for instance in frame.instances() {
-        let instance = instance.expect("our own instance data block parses");
         let block = offset + 8;
         if let Some(cyclic) = &instance.cyclic {
             fields.push(("cipm.ctrlmode", block, vec![cyclic.control_mode.0]));
@@ -83,13 +82,12 @@ fn actual(data: &[u8], at: usize, fields: &mut Vec<Expected>) {
     }
     let mut offset = at + header.buffer_len();
     for instance in frame.instances() {
-        let instance = instance.expect("our own instance data block parses");
         let block = offset + 8;
         if let Some(cyclic) = &instance.cyclic {
             fields.push(("cipm.ctrlmode", block, vec![cyclic.control_mode.0]));
             fields.push(("cipm.axisresp", block + 2, vec![cyclic.axis_response.0]));
             fields.push(("cipm.respstat", block + 3, vec![cyclic.response_status]));
-            fields.push(("cipm.actset", block + 5, vec![cyclic.data_set().bits()]));
+            fields.push(("cipm.actset", block + 5, vec![cyclic.actual.data_set().bits()]));
             fields.push(("cipm.stsset", block + 6, vec![cyclic.status.data_set().bits()]));
             fields.push(("cipm.axste", block + 7, vec![cyclic.axis_state.0]));
             if let Some((status, manufacturer)) = cyclic.status.axis_status {
@@ -109,4 +107,38 @@ fn actual(data: &[u8], at: usize, fields: &mut Vec<Expected>) {
         offset += instance.buffer_len();
     }
     assert_eq!(offset - at, data.len(), "a D-to-C update has no surplus bytes");
+}
+
+/// Offsets in a SERCOS III telegram of CP1 and CP2: service channel slots, then device words.
+const SERCOS_DATA: usize = 20;
+const DEVICE_WORDS: usize = SERCOS_DATA + 128 * 6;
+
+/// The fields of a SERCOS III telegram: its header, and in CP1 and CP2 the slots of the first two slaves.
+#[must_use]
+pub fn sercos(frame: &[u8]) -> Vec<Expected> {
+    let mut fields: Vec<Expected> = vec![
+        ("siii.type", 14, vec![frame[14]]),
+        ("siii.telno", 14, vec![frame[14]]),
+        ("siii.mst.phase", 15, vec![frame[15]]),
+        ("siii.mst.cyclecnt", 15, vec![frame[15]]),
+        ("siii.mst.crc32", 16, frame[16..20].to_vec()),
+    ];
+    let answer = frame[14] & 0x40 != 0;
+    let slots = match (frame[15] & 0x8F, frame[14] & 0x0F) {
+        (1 | 2, 0) => 1..3,
+        _ => 0..0,
+    };
+    for slot in slots {
+        let (svc, device) = (SERCOS_DATA + 6 * slot, DEVICE_WORDS + 4 * slot);
+        let word = |at: usize| frame[at..at + 2].to_vec();
+        let (control, info, device_word) = if answer {
+            ("siii.mdt.svch.stat", "siii.at.svch.info", "siii.at.devstatus")
+        } else {
+            ("siii.mdt.svch.ctrl", "siii.mdt.svch.info", "siii.mdt.devcontrol")
+        };
+        fields.push((control, svc, word(svc)));
+        fields.push((info, svc + 2, frame[svc + 2..svc + 6].to_vec()));
+        fields.push((device_word, device, word(device)));
+    }
+    fields
 }

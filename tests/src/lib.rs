@@ -9,4 +9,5 @@ pub mod modbus;
 pub mod namespace;
 pub mod peer;
 pub mod process;
+pub mod rig;
 pub mod tshark;

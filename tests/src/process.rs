@@ -2,31 +2,50 @@
 
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// The `axisbridge` binary of this build: built by the same cargo run, beside the test binary.
+/// The `axisbridge` binary of the tree as it is now, of the same profile as the test itself.
+///
+/// `cargo test` of one package does not build the binary of another, and an older one may lie about: cargo is asked
+/// once a process, which costs little when nothing has changed.
 ///
 /// # Panics
-/// When it was not built.
+/// When it cannot be built.
 #[must_use]
 pub fn axisbridge() -> PathBuf {
-    let mut directory = std::env::current_exe().expect("the test knows its own path");
-    directory.pop();
-    if directory.ends_with("deps") {
-        directory.pop();
-    }
-    let binary = directory.join("axisbridge");
-    if !binary.exists() {
-        // `cargo test -p axisbridge-tests` alone does not build the binary of another package.
-        let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "-p", "axisbridge", "--bin", "axisbridge"]);
-        if directory.ends_with("release") {
-            build.arg("--release");
-        }
-        assert!(build.status().is_ok_and(|status| status.success()), "cannot build the axisbridge binary");
-    }
-    assert!(binary.exists(), "the axisbridge binary is not at {}", binary.display());
-    binary
+    static BUILT: OnceLock<PathBuf> = OnceLock::new();
+    BUILT
+        .get_or_init(|| {
+            let mut directory = std::env::current_exe().expect("the test knows its own path");
+            directory.pop();
+            if directory.ends_with("deps") {
+                directory.pop();
+            }
+            let mut build = Command::new(env!("CARGO"));
+            build.args([
+                "build",
+                "--quiet",
+                "--package",
+                "axisbridge",
+                "--bin",
+                "axisbridge",
+                "--target-dir",
+            ]);
+            build.arg(directory.parent().expect("the profile's folder has a parent"));
+            if directory.ends_with("release") {
+                build.arg("--release");
+            }
+            build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+            assert!(
+                build.status().is_ok_and(|status| status.success()),
+                "cannot build the axisbridge binary"
+            );
+            let binary = directory.join("axisbridge");
+            assert!(binary.exists(), "the axisbridge binary is not at {}", binary.display());
+            binary
+        })
+        .clone()
 }
 
 /// A child process that is ended when the test ends, however it ends.

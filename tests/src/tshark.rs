@@ -17,7 +17,7 @@ pub struct Field {
     pub size: usize,
     /// The value as shown.
     pub show: String,
-    /// The raw bytes in hexadecimal.
+    /// The raw bytes in hexadecimal; of a field of some bits the whole bytes.
     pub value: String,
 }
 
@@ -61,7 +61,14 @@ pub fn dissect(file: &Path, filter: &str, arguments: &[&str]) -> Vec<Frame> {
         .args(["-n", "-T", "pdml", "-r"])
         .arg(file)
         .args(["-Y", filter])
-        .args(["-o", "ip.check_checksum:TRUE", "-o", "udp.check_checksum:TRUE", "-o", "tcp.check_checksum:TRUE"])
+        .args([
+            "-o",
+            "ip.check_checksum:TRUE",
+            "-o",
+            "udp.check_checksum:TRUE",
+            "-o",
+            "tcp.check_checksum:TRUE",
+        ])
         .args(arguments)
         .output()
         .expect("tshark can be started");
@@ -111,7 +118,10 @@ fn parse_pdml(text: &str) -> Vec<Frame> {
                     position: number("pos"),
                     size: number("size"),
                     show: attribute(line, "show").unwrap_or_default(),
-                    value: attribute(line, "value").unwrap_or_default(),
+                    // Of a field of some bits the bytes it stands in.
+                    value: attribute(line, "unmaskedvalue")
+                        .or_else(|| attribute(line, "value"))
+                        .unwrap_or_default(),
                 };
                 if field.name == "num" || field.name == "frame.number" {
                     frame.number = field.show.parse().unwrap_or(frame.number);
@@ -126,7 +136,13 @@ fn parse_pdml(text: &str) -> Vec<Frame> {
 fn attribute(line: &str, name: &str) -> Option<String> {
     let start = line.find(&format!(" {name}=\""))? + name.len() + 3;
     let end = line[start..].find('"')? + start;
-    Some(line[start..end].replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&amp;", "&"))
+    Some(
+        line[start..end]
+            .replace("&lt;", "<")
+            .replace("&gt;", ">")
+            .replace("&quot;", "\"")
+            .replace("&amp;", "&"),
+    )
 }
 
 #[cfg(test)]

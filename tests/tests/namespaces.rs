@@ -3,7 +3,7 @@
 //! Needs root and iproute2: a visible skip where they are missing, a failure in CI.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -24,9 +24,37 @@ fn scratch(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
+/// Starts the box on the shipped example; its log comes in a file.
+fn start_box(namespace: &Namespace, name: &str) -> (Running, PathBuf) {
+    let log = scratch(&format!("{name}.log"));
+    let config = configuration(&format!("{name}.toml"));
+    let mut run = in_namespace(namespace, &["run", "--config", config.to_str().expect("a path in UTF-8")]);
+    run.env("NO_COLOR", "1");
+    run.stderr(std::fs::File::create(&log).expect("the log can be written"));
+    (Running::start("run", &mut run), log)
+}
+
+/// Waits until `text` stands in the log of a box.
+fn wait_for(log: &Path, text: &str, process: &mut Running) {
+    let end = Instant::now() + Duration::from_secs(30);
+    loop {
+        let seen = std::fs::read_to_string(log).unwrap_or_default();
+        if seen.contains(text) {
+            return;
+        }
+        assert!(process.ended().is_none(), "the box has ended: {seen}");
+        assert!(Instant::now() < end, "no {text:?} in the log: {seen}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 /// The shipped example, with this test's interface and addresses.
 fn configuration(name: &str) -> PathBuf {
-    let example = include_str!("../../examples/two-axes-sercos.toml");
+    let example = include_str!("../../examples/two-axes-sercos.toml")
+        .replace("enp3s0", "sercos0")
+        .replace("192.168.1.10", "192.168.10.20")
+        // The machine of the tests has no processor to spare.
+        .replace("cpu = 1\n", "");
     let path = scratch(name);
     std::fs::write(&path, example).expect("the scratch folder can be written");
     path
@@ -38,18 +66,28 @@ fn three_processes_move_two_axes_while_a_modbus_client_reads_them() {
         return;
     }
     let (controller, gateway, drives) = (Namespace::new("ctl"), Namespace::new("box"), Namespace::new("drv"));
-    // The addresses and interface names of examples/two-axes-sercos.toml.
     cable((&controller, "net0", Some("192.168.10.1/24")), (&gateway, "net0", Some("192.168.10.20/24")));
     cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
 
-    let mut drive_command =
-        in_namespace(&drives, &["simulate", "sercos-drive", "--interface", "sercos0", "--slaves", "2", "--seconds", "60"]);
+    let mut drive_command = in_namespace(
+        &drives,
+        &[
+            "simulate",
+            "sercos-drive",
+            "--interface",
+            "sercos0",
+            "--slaves",
+            "2",
+            "--linear",
+            "2",
+            "--seconds",
+            "60",
+        ],
+    );
     let mut line = Running::start("simulate sercos-drive", drive_command.stderr(Stdio::inherit()));
-    let log = scratch("namespaces-box.log");
-    let config = configuration("namespaces.toml");
-    let mut run = in_namespace(&gateway, &["run", "--config", config.to_str().expect("a path in UTF-8")]);
-    run.stderr(std::fs::File::create(&log).expect("the log can be written"));
-    let mut gateway_process = Running::start("run", &mut run);
+    let (mut gateway_process, log) = start_box(&gateway, "namespaces-three");
+    // The two drives on the other end of the cable are taken to cyclic operation.
+    wait_for(&log, "CP4", &mut gateway_process);
 
     let mut reader = gateway.command(std::env::current_exe().expect("own path").to_str().expect("UTF-8"));
     reader.args(["--exact", "modbus_reader", "--nocapture"]).env(MODBUS_ADDRESS, "192.168.10.20:502");
@@ -58,7 +96,20 @@ fn three_processes_move_two_axes_while_a_modbus_client_reads_them() {
     let output = in_namespace(
         &controller,
         &[
-            "simulate", "controller", "--target", "192.168.10.20", "--bind", "192.168.10.1", "--axes", "2", "--seconds", "4",
+            "simulate",
+            "controller",
+            "--target",
+            "192.168.10.20",
+            "--bind",
+            "192.168.10.1",
+            "--axes",
+            "2",
+            "--counts-per-unit",
+            "1000000,10000",
+            "--speed",
+            "2,40",
+            "--seconds",
+            "4",
             "--json",
         ],
     )
@@ -71,10 +122,14 @@ fn three_processes_move_two_axes_while_a_modbus_client_reads_them() {
         output.status,
         String::from_utf8_lossy(&output.stderr)
     );
-    let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("--json prints one JSON object");
+    let result: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("--json prints one JSON object");
     for axis in result["axes"].as_array().expect("an array `axes`") {
         let (target, reached) = (axis["target"].as_f64().unwrap(), axis["reached"].as_f64().unwrap());
-        assert!(target.abs() > 1.0 && (target - reached).abs() < 0.01, "the axis moved and reached its target: {axis}");
+        assert!(
+            target.abs() > 1.0 && (target - reached).abs() < 0.01,
+            "the axis moved and reached its target: {axis}"
+        );
     }
     let mut modbus = modbus;
     assert!(modbus.wait(Duration::from_secs(20)).success(), "the Modbus client saw both axes moving");
@@ -95,7 +150,8 @@ fn modbus_reader() {
         let mut seen = String::new();
         loop {
             assert!(Instant::now() < end, "no axis was seen moving: {seen}");
-            match axisbridge_tests::modbus::watch(address.parse().unwrap(), Duration::from_millis(200)).await {
+            match axisbridge_tests::modbus::watch(address.parse().unwrap(), Duration::from_millis(200)).await
+            {
                 Ok(axes) if axes.len() == 2 && axes.iter().all(|axis| axis.running && axis.moved) => return,
                 Ok(axes) => {
                     seen.clear();

@@ -23,8 +23,9 @@ const CONFIGURATION: &str = include_str!("demo.toml");
 /// The address that stands in the configuration.
 const ADDRESS: &str = "127.0.0.2";
 
-/// Update period of the controller in microseconds: two cycles of the bus.
-const UPDATE_PERIOD_US: u32 = 4_000;
+/// Update period of the controller in microseconds: four cycles of the bus, between which the gateway interpolates. A
+/// controller on real-time hardware has a shorter one; here it has to live with the pauses of an ordinary host.
+const UPDATE_PERIOD_US: u32 = 8_000;
 
 /// What each axis has: speed in units per second, reach in units, window in units.
 const AXES: [(f64, f64, f64); 2] = [(2.0, 600.0, 0.002), (40.0, 700.0, 0.02)];
@@ -79,7 +80,6 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         "{} SERCOS cycles, {} late, {} telegrams lost",
         status.counters.cycles, status.counters.late_cycles, status.counters.lost_telegrams
     ));
-    drop(progress);
     if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
         eprintln!("warning: {dropped} frames are missing in the recording");
     }

@@ -130,7 +130,7 @@ struct ControllerArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
     axes: u8,
     /// Controller update period (the connection's RPI) in microseconds.
-    #[arg(long, value_name = "US", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(250..=1_000_000))]
+    #[arg(long, value_name = "US", default_value_t = 8000, value_parser = clap::value_parser!(u32).range(250..=1_000_000))]
     update_period_us: u32,
     /// Counts in a unit of each axis, separated by commas; the last one counts for the axes that follow.
     #[arg(long, value_name = "COUNTS", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..))]

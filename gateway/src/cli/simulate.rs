@@ -94,7 +94,6 @@ pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError>
     let steps = program::standard(&plans, seconds);
     let report =
         controller::run(endpoints, config, steps, &stop, &mut |event| progress.step(&event.to_string()))?;
-    drop(progress);
     let result =
         RunResult { axes: AxisResult::all(&plans, &report), capture: None, failure: failure(&report) };
     result.print(arguments.json)

@@ -38,7 +38,9 @@ pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
 
 /// Update periods that the interpolator goes on beyond its last target before it holds and the command counts as lost.
-const EXTRAPOLATE_PERIODS: u32 = 2;
+/// The connection's own limit for missed updates, 4 by default (class attribute Controller Update Delay High Limit), is
+/// of the same order: whichever is reached first stops the axis.
+const EXTRAPOLATE_PERIODS: u32 = 4;
 
 /// What the box itself watches.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

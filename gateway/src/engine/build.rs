@@ -155,9 +155,8 @@ fn kind(axis: &Axis) -> UnitKind {
 fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
     let limits = &axis.limits;
     let mut parameters = Vec::new();
-    let mut limit = |parameter: Parameter, value: Option<i64>| {
-        parameters.extend(value.map(|value| (parameter.into(), value)))
-    };
+    let mut limit =
+        |parameter: Parameter, value: Option<i64>| parameters.extend(value.map(|value| (parameter, value)));
     limit(Parameter::ACCELERATION_LIMIT, limits.acceleration.map(|value| value.0));
     limit(Parameter::DECELERATION_LIMIT, limits.acceleration.map(|value| value.0));
     limit(Parameter::TORQUE_LIMIT_POSITIVE, limits.torque.map(|value| value.0));

@@ -94,16 +94,17 @@ impl Notice {
     #[must_use]
     pub fn severity(&self) -> Severity {
         match self {
-            Self::State { .. } | Self::AxisState { .. } | Self::PassedOver { .. } => Severity::Info,
-            Self::Sercos(event) => match event {
+            Self::State { .. }
+            | Self::AxisState { .. }
+            | Self::PassedOver { .. }
+            | Self::Sercos(
                 Event::Phase(_)
                 | Event::Stopped
                 | Event::Scanned { .. }
                 | Event::AwaitingApplication { .. }
                 | Event::Connection { .. }
-                | Event::Svc { .. } => Severity::Info,
-                _ => Severity::Warning,
-            },
+                | Event::Svc { .. },
+            ) => Severity::Info,
             _ => Severity::Warning,
         }
     }

@@ -10,6 +10,7 @@ use profile_cip::controller::{Controller, ControllerConfig, DATAGRAM_MAX, Event,
 use profile_generic::time::DurationNs;
 
 use crate::sys::clock::{self, SystemClock};
+use crate::sys::realtime;
 use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
 /// TCP port of EtherNet/IP explicit messages.
@@ -20,6 +21,9 @@ const CONNECT_TIME_OUT: Duration = Duration::from_secs(5);
 
 /// Longest wait between two looks at the sockets.
 const POLL_INTERVAL: DurationNs = DurationNs(500_000);
+
+/// `SCHED_FIFO` priority, below that of the box and of the drives.
+const PRIORITY: u8 = 10;
 
 /// Bytes taken from the stream at once.
 const STREAM_CHUNK: usize = 4096;
@@ -73,6 +77,8 @@ pub fn run(
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Report, RunError> {
     let mut controller = Controller::new(config, program)?;
+    // A controller is a real-time device too; where the host refuses, its updates only come less evenly.
+    let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), cpu: None, lock_memory: false });
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
     let mut stream =
