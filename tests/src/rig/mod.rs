@@ -1,0 +1,620 @@
+//! The whole chain in virtual time: controller, network, box and drives on one clock that only the rig moves.
+//!
+//! ```text
+//! Controller --stream--> Adapter --queue--> Engine --frames--> Line<Drive>
+//!            --datagrams (Knobs)-->         (NorthQueue, SouthQueue)
+//! ```
+//!
+//! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a test that fails
+//! prints the seed.
+
+pub mod network;
+pub mod ports;
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+
+use axisbridge::config::Config;
+use axisbridge::engine::Engine;
+use axisbridge::engine::build::{Built, Host, build};
+use axisbridge::engine::notice::Notice;
+use axisbridge::latest::Reader;
+use axisbridge::mapping::Mapping;
+use axisbridge::north::AdapterEnd;
+use axisbridge::simulate::line::{DriveLine, line};
+use axisbridge::simulate::setup;
+use axisbridge::status::BoxStatus;
+use profile_cip::controller::{Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step};
+use profile_cip::target::adapter::{Adapter, SessionSlot};
+use profile_cip::target::axis_state::AxisState;
+use profile_cip::target::motion_device::SyncState;
+use profile_cip::wire::encapsulation::IO_PORT;
+use profile_generic::scaling::UnitKind;
+use profile_generic::state::DriveState;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::slave::drive::Drive;
+use profile_sercos::wire::drive_words::DriveControl;
+use profile_sercos::wire::idn::Idn;
+
+use self::network::{Knobs, Pipe};
+use self::ports::{Bytes, NorthQueue, SouthQueue};
+
+/// The configuration of the box: a turntable (axis 1, revolutions) and a slide (axis 2, millimetres).
+pub const BOX: &str = include_str!("box.toml");
+
+/// Update period of the controller in microseconds: two cycles of the bus.
+pub const UPDATE_PERIOD_US: u32 = 4_000;
+
+/// Where the controller is; its datagrams come from [`IO_PORT`] there.
+pub const CONTROLLER: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 1);
+
+/// TCP port of the controller.
+const CONTROLLER_PORT: u16 = 50_000;
+
+/// When the box is switched on.
+const START: MonotonicTime = MonotonicTime(1_000_000_000);
+
+/// System time less monotonic time.
+const SYSTEM_OFFSET: u64 = 1_700_000_000_000_000_000;
+
+/// Address of the box's Ethernet port.
+const HOST: Host = Host { mac: [0x02, 0x41, 0x42, 0, 0, 1], incarnation: 0x7A00 };
+
+/// Longest step of the virtual clock, so that streams are looked at when nothing else is due.
+const STEP_MAX: DurationNs = DurationNs::from_millis(1);
+
+/// The two tables that everybody needs are compiled once in a process.
+fn mapping() -> Mapping {
+    Mapping::embedded().expect("the shipped tables are sound")
+}
+
+/// How a rig is set up.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Configuration of the box.
+    pub configuration: String,
+    /// Address and kind of each drive on the line, nearest to the master first.
+    pub drives: Vec<(u16, UnitKind)>,
+    /// The network between controller and box.
+    pub knobs: Knobs,
+    /// What the network's dice start from.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            configuration: BOX.to_owned(),
+            drives: vec![(1, UnitKind::Rotary), (2, UnitKind::Linear)],
+            knobs: Knobs::GOOD,
+            seed: 1,
+        }
+    }
+}
+
+/// What was seen of a drive from outside.
+#[derive(Debug, Clone, Default)]
+pub struct Watched {
+    /// Drive-on bit (S-0-0134 bit 15) as the drive had it last.
+    pub on: bool,
+    /// Changes of the drive-on bit with their time.
+    pub changes: Vec<(MonotonicTime, bool)>,
+}
+
+/// Changes a frame or datagram on its way; `false` loses it.
+pub type Tamper = Box<dyn FnMut(&mut Bytes) -> bool>;
+
+/// Everything on one clock.
+pub struct Rig {
+    /// The controller; `None` before the first one and while it is gone.
+    pub controller: Option<Controller>,
+    /// Its events.
+    pub events: Vec<Event>,
+    /// The explicit side of the box.
+    pub adapter: Adapter,
+    /// What runs in the cycle of the box.
+    pub engine: Engine,
+    /// What the engine told.
+    pub notices: Vec<Notice>,
+    /// The drives.
+    pub line: DriveLine,
+    /// What was seen of each drive.
+    pub watched: Vec<Watched>,
+    /// The network between controller and box.
+    pub knobs: Knobs,
+    /// What happens to datagrams from the controller.
+    pub tamper_command: Option<Tamper>,
+    /// What happens to frames on their way back from the line.
+    pub tamper_frame: Option<Tamper>,
+    /// Whether the stream of the controller still carries bytes.
+    pub stream_works: bool,
+    mapping: Mapping,
+    config: Config,
+    seed: u64,
+    now: MonotonicTime,
+    engine_due: MonotonicTime,
+    link: AdapterEnd,
+    notice_queue: rtrb::Consumer<Notice>,
+    status: Reader<BoxStatus>,
+    slot: Option<SessionSlot>,
+    north: NorthQueue,
+    south: SouthQueue,
+    commands: Pipe<Bytes>,
+    actuals: Pipe<Bytes>,
+}
+
+impl Rig {
+    /// A box that has just been switched on, with nobody connected.
+    ///
+    /// # Panics
+    /// When the configuration makes no box.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
+        let (engine, adapter, link, notice_queue, status) = assemble(&config);
+        let line = line(settings.drives.iter().copied());
+        Self {
+            controller: None,
+            events: Vec::new(),
+            adapter,
+            engine,
+            notices: Vec::new(),
+            watched: vec![Watched::default(); line.slaves().len()],
+            line,
+            knobs: settings.knobs,
+            tamper_command: None,
+            tamper_frame: None,
+            stream_works: true,
+            mapping: mapping(),
+            config,
+            seed: settings.seed,
+            now: START,
+            engine_due: START,
+            link,
+            notice_queue,
+            status,
+            slot: None,
+            north: NorthQueue::default(),
+            south: SouthQueue::default(),
+            commands: Pipe::new(settings.seed),
+            actuals: Pipe::new(!settings.seed),
+        }
+    }
+
+    /// A box with its bus in CP4.
+    #[must_use]
+    pub fn ready(settings: Settings) -> Self {
+        let mut rig = Self::new(settings);
+        rig.run_until(DurationNs::from_secs(20), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig
+    }
+
+    // ---- time --------------------------------------------------------------------------------------------------
+
+    /// The instant that has been reached.
+    #[must_use]
+    pub const fn now(&self) -> MonotonicTime {
+        self.now
+    }
+
+    /// System time, the same for controller and box.
+    #[must_use]
+    pub fn system(&self) -> SystemTime {
+        SystemTime(self.now.0 + SYSTEM_OFFSET)
+    }
+
+    /// Seconds since the box was switched on.
+    #[must_use]
+    pub fn elapsed(&self) -> DurationNs {
+        self.now.since(START)
+    }
+
+    /// Goes on to the next thing that is due.
+    pub fn step(&mut self) {
+        let controller = self.controller.as_ref().and_then(Controller::wake_at);
+        let due = [Some(self.engine_due), controller, self.actuals.wake_at()];
+        let next = due.into_iter().flatten().min().unwrap_or(self.engine_due);
+        self.now = next.clamp(self.now, self.now + STEP_MAX);
+        self.deliver();
+        if self.now >= self.engine_due {
+            self.cycle();
+        }
+        self.control();
+        self.explicit();
+    }
+
+    /// Goes on for a time.
+    pub fn run_for(&mut self, span: DurationNs) {
+        let end = self.now + span;
+        while self.now < end {
+            self.step();
+        }
+    }
+
+    /// Goes on until `done`, and says how long that took.
+    ///
+    /// # Panics
+    /// When it takes longer than `limit`.
+    pub fn run_until(
+        &mut self,
+        limit: DurationNs,
+        what: &str,
+        mut done: impl FnMut(&Self) -> bool,
+    ) -> DurationNs {
+        let start = self.now;
+        while !done(self) {
+            assert!(
+                self.now.since(start) < limit,
+                "{what} is not reached within {limit}\n{}\n{}",
+                self.log(),
+                self.told()
+            );
+            self.step();
+        }
+        self.now.since(start)
+    }
+
+    // ---- the controller ----------------------------------------------------------------------------------------
+
+    /// The configuration of a controller for this box.
+    #[must_use]
+    pub fn controller_config(&self) -> ControllerConfig {
+        let counts: Vec<_> = self.config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
+        setup::controller(&self.mapping, &counts, UPDATE_PERIOD_US)
+    }
+
+    /// Connects a controller that carries out `program`; one that was there before is gone.
+    pub fn connect(&mut self, program: Vec<Step>) {
+        let config = self.controller_config();
+        self.connect_with(config, program);
+    }
+
+    /// Connects a controller with a configuration of its own.
+    ///
+    /// # Panics
+    /// When the controller refuses its configuration, or the box the stream.
+    pub fn connect_with(&mut self, config: ControllerConfig, program: Vec<Step>) {
+        self.drop_stream();
+        self.commands.clear();
+        self.actuals.clear();
+        self.stream_works = true;
+        let mut controller =
+            Controller::new(config, program).expect("the controller's configuration is sound");
+        let peer = SocketAddrV4::new(CONTROLLER, CONTROLLER_PORT);
+        self.slot = Some(self.adapter.open(self.now, peer).expect("the box has room for a stream"));
+        controller.tcp_connected(self.now);
+        self.controller = Some(controller);
+        self.events.clear();
+    }
+
+    /// Runs the controller to its end.
+    ///
+    /// # Panics
+    /// When that takes longer than `limit`.
+    pub fn run(&mut self, limit: DurationNs) -> Report {
+        self.run_until(limit, "the end of the program", |rig| {
+            rig.controller.as_ref().is_none_or(Controller::is_closed)
+        });
+        self.report()
+    }
+
+    /// What the controller reports.
+    ///
+    /// # Panics
+    /// Without a controller.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        self.controller.as_ref().expect("a controller").report()
+    }
+
+    /// The controller loses its power: nothing comes from it any more, and nothing arrives there.
+    pub fn kill_controller(&mut self) -> Option<Report> {
+        self.actuals.clear();
+        self.controller.take().map(|controller| controller.report())
+    }
+
+    /// The stream breaks; the box sees it closed, the controller hears nothing more on it.
+    pub fn drop_stream(&mut self) {
+        self.stream_works = false;
+        if let Some(slot) = self.slot.take() {
+            self.adapter.close(slot);
+        }
+    }
+
+    /// The controller's events as text, one a line.
+    #[must_use]
+    pub fn log(&self) -> String {
+        self.events.iter().map(|event| format!("{event}\n")).collect()
+    }
+
+    // ---- the box -----------------------------------------------------------------------------------------------
+
+    /// The box loses its power and starts again, as a process does that is restarted. Streams break; the drives stay
+    /// as they are.
+    pub fn restart_box(&mut self) {
+        self.drop_stream();
+        let (engine, adapter, link, notice_queue, status) = assemble(&self.config);
+        (self.engine, self.adapter, self.link) = (engine, adapter, link);
+        (self.notice_queue, self.status) = (notice_queue, status);
+        self.north = NorthQueue::default();
+        self.south = SouthQueue::default();
+        self.engine_due = self.now;
+    }
+
+    /// The status that the box publishes.
+    #[must_use]
+    pub fn status(&self) -> BoxStatus {
+        self.status.read()
+    }
+
+    /// What the box has told, one notice a line, each with its axis.
+    #[must_use]
+    pub fn told(&self) -> String {
+        let line = |notice: &Notice| match notice.axis() {
+            Some(axis) => format!("axis {}: {notice}\n", axis + 1),
+            None => format!("{notice}\n"),
+        };
+        self.notices.iter().map(line).collect()
+    }
+
+    /// The generic states that an axis (from 0) took, each change once.
+    #[must_use]
+    pub fn states(&self, axis: u8) -> Vec<DriveState> {
+        let change = |notice: &Notice| match notice {
+            Notice::State { axis: of, to, .. } if *of == axis => Some(*to),
+            _ => None,
+        };
+        self.notices.iter().filter_map(change).collect()
+    }
+
+    /// The CIP axis states that an axis (from 0) took, each change once.
+    #[must_use]
+    pub fn axis_states(&self, axis: u8) -> Vec<AxisState> {
+        let change = |notice: &Notice| match notice {
+            Notice::AxisState { axis: of, to, .. } if *of == axis => Some(*to),
+            _ => None,
+        };
+        self.notices.iter().filter_map(change).collect()
+    }
+
+    /// Sends a datagram to the box, past the network's knobs.
+    pub fn inject_datagram(&mut self, bytes: &[u8], from: SocketAddrV4) {
+        self.north.inbound.push_back((Bytes::of(bytes), from));
+    }
+
+    /// Puts a frame on the box's SERCOS port.
+    pub fn inject_frame(&mut self, frame: &[u8]) {
+        self.south.inbound.push_back(Bytes::of(frame));
+    }
+
+    /// Datagrams that the network lost, doubled and held back: commands, then actual values.
+    #[must_use]
+    pub const fn network(&self) -> (network::Counts, network::Counts) {
+        (self.commands.counts(), self.actuals.counts())
+    }
+
+    /// Runs the engine's next cycle by itself and hands it to `around`, which has to call it: for whoever wants to
+    /// weigh the cycle alone. Before it comes everything that is due until then.
+    pub fn cycle_in<T>(&mut self, around: impl FnOnce(&mut dyn FnMut()) -> T) -> T {
+        loop {
+            let controller = self.controller.as_ref().and_then(Controller::wake_at);
+            let due = [controller, self.actuals.wake_at()].into_iter().flatten().min();
+            if due.is_none_or(|due| due >= self.engine_due) {
+                break;
+            }
+            self.now = due.unwrap_or(self.now).max(self.now);
+            self.deliver();
+            self.control();
+            self.explicit();
+        }
+        self.now = self.engine_due.max(self.now);
+        self.deliver();
+        let (now, system) = (self.now, self.system());
+        let Self { engine, engine_due, north, south, .. } = self;
+        let result = around(&mut || *engine_due = engine.cycle(now, system, &mut [north], south));
+        self.after_cycle();
+        self.control();
+        self.explicit();
+        result
+    }
+
+    // ---- the drives --------------------------------------------------------------------------------------------
+
+    /// A drive, by its place in the line.
+    pub fn drive(&self, place: usize) -> &Drive {
+        self.line.slaves()[place].application()
+    }
+
+    /// A drive, to act on it from outside.
+    pub fn drive_mut(&mut self, place: usize) -> &mut Drive {
+        self.line.slaves_mut()[place].application_mut()
+    }
+
+    /// Where a drive really is, in nanounits.
+    #[must_use]
+    pub fn position(&self, place: usize) -> i64 {
+        self.drive(place).actual().position.get()
+    }
+
+    /// How fast a drive really is, in nanounits per second.
+    #[must_use]
+    pub fn velocity(&self, place: usize) -> i64 {
+        self.drive(place).actual().velocity.get()
+    }
+
+    /// Whether every drive is without torque.
+    #[must_use]
+    pub fn torque_free(&self) -> bool {
+        use profile_generic::state::Report as R;
+        let free = |place: usize| {
+            matches!(
+                self.drive(place).actual().report,
+                R::NotReady | R::AwaitingPower | R::Ready | R::Faulted | R::Silent
+            )
+        };
+        (0..self.line.slaves().len()).all(free)
+    }
+
+    // ---- one step ----------------------------------------------------------------------------------------------
+
+    /// What the network brings now.
+    fn deliver(&mut self) {
+        let from = SocketAddrV4::new(CONTROLLER, IO_PORT);
+        while let Some(datagram) = self.commands.receive(self.now) {
+            self.north.inbound.push_back((datagram, from));
+        }
+        let (now, system) = (self.now, self.system());
+        while let Some(datagram) = self.actuals.receive(now) {
+            if let Some(controller) = self.controller.as_mut() {
+                controller.handle_datagram(now, system, datagram.as_slice());
+            }
+        }
+    }
+
+    fn cycle(&mut self) {
+        let (now, system) = (self.now, self.system());
+        self.engine_due = self.engine.cycle(now, system, &mut [&mut self.north], &mut self.south);
+        self.after_cycle();
+    }
+
+    /// The line answers, the network takes the device's datagrams, and the watchers look.
+    fn after_cycle(&mut self) {
+        self.line.handle_time(self.now);
+        while let Some(mut frame) = self.south.outbound.pop_front() {
+            let back = self.line.handle_frame(self.now, frame.as_mut_slice());
+            let kept = self.tamper_frame.as_mut().is_none_or(|tamper| tamper(&mut frame));
+            if back && kept {
+                self.south.inbound.push_back(frame);
+            }
+        }
+        while let Some((datagram, _)) = self.north.outbound.pop_front() {
+            self.actuals.send(self.now, &self.knobs, datagram);
+        }
+        while let Ok(notice) = self.notice_queue.pop() {
+            self.notices.push(notice);
+        }
+        for (slave, watched) in self.line.slaves().iter().zip(&mut self.watched) {
+            let [low, high, ..] = slave.store().number_of(Idn::DRIVE_CONTROL).to_le_bytes();
+            let control = DriveControl::from_bits_retain(u16::from_le_bytes([low, high]));
+            let on = control.contains(DriveControl::ON);
+            if on != watched.on {
+                watched.on = on;
+                watched.changes.push((self.now, on));
+            }
+        }
+    }
+
+    /// The controller does what is due and its datagrams go on their way.
+    fn control(&mut self) {
+        let (now, system) = (self.now, self.system());
+        let Some(controller) = self.controller.as_mut() else { return };
+        controller.handle_time(now, system);
+        let mut buffer = [0; DATAGRAM_MAX];
+        while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
+            let mut datagram = Bytes::of(&buffer[..length]);
+            if self.tamper_command.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
+                self.commands.send(now, &self.knobs, datagram);
+            }
+        }
+        while let Some(event) = controller.poll_event() {
+            self.events.push(event);
+        }
+    }
+
+    /// Moves everything that can move on the explicit side without time passing.
+    fn explicit(&mut self) {
+        let now = self.now;
+        while let Some(reply) = self.link.reply() {
+            self.adapter.complete(now, &reply);
+        }
+        if self.adapter.wake_at().is_some_and(|at| at <= now) {
+            self.adapter.handle_timeout(now);
+        }
+        let mut buffer = [0; 4096];
+        loop {
+            let mut moved = false;
+            if let (Some(controller), Some(slot)) = (self.controller.as_mut(), self.slot) {
+                while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
+                    moved = true;
+                    if self.stream_works {
+                        let taken = self.adapter.handle_stream(now, slot, &buffer[..length]);
+                        assert_eq!(taken, length, "the adapter has room for what the controller asks");
+                    }
+                }
+                loop {
+                    let length = self.adapter.poll_transmit(now, slot, &mut buffer);
+                    if length == 0 {
+                        break;
+                    }
+                    moved = true;
+                    if self.stream_works {
+                        controller.handle_stream(now, &buffer[..length]);
+                    }
+                }
+            } else if let Some(controller) = self.controller.as_mut() {
+                // What goes into a broken stream is lost.
+                while controller.poll_stream_transmit(&mut buffer).is_some() {}
+            }
+            self.send_requests();
+            if let Some(controller) = self.controller.as_mut() {
+                while let Some(event) = controller.poll_event() {
+                    self.events.push(event);
+                }
+            }
+            if !moved {
+                return;
+            }
+        }
+    }
+
+    fn send_requests(&mut self) {
+        while let Some(request) = self.adapter.poll_motion() {
+            self.link.request(request).expect("the queue to the engine has room");
+        }
+    }
+
+    // ---- streams of others -------------------------------------------------------------------------------------
+
+    /// Opens a stream beside the controller's.
+    pub fn open_stream(&mut self, from: SocketAddrV4) -> Option<SessionSlot> {
+        self.adapter.open(self.now, from)
+    }
+
+    /// Sends bytes on such a stream and returns what comes back within `limit`, all of it.
+    pub fn exchange(&mut self, slot: SessionSlot, bytes: &[u8], limit: DurationNs) -> Vec<u8> {
+        let mut rest = bytes;
+        let mut answer = Vec::new();
+        let mut buffer = [0; 4096];
+        let end = self.now + limit;
+        while self.now < end {
+            let taken = self.adapter.handle_stream(self.now, slot, rest);
+            rest = &rest[taken..];
+            self.send_requests();
+            self.step();
+            let length = self.adapter.poll_transmit(self.now, slot, &mut buffer);
+            answer.extend_from_slice(&buffer[..length]);
+            if length == 0 && !answer.is_empty() {
+                break;
+            }
+        }
+        answer
+    }
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("the rig ran with seed {} up to {}", self.seed, self.elapsed());
+        }
+    }
+}
+
+type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>);
+
+fn assemble(config: &Config) -> Assembled {
+    let Built { mut engine, adapters, notices, status } =
+        build(config, mapping(), HOST).expect("the configuration makes a box");
+    engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });
+    let (config, link) = adapters.into_iter().next().expect("one device");
+    let adapter = Adapter::new(config).expect("the adapter's configuration is sound");
+    (engine, adapter, link, notices, status)
+}

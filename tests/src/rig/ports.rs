@@ -1,0 +1,103 @@
+//! The engine's ports as queues. They own fixed storage: what the engine does in a cycle can be weighed without them.
+
+use std::collections::VecDeque;
+use std::net::SocketAddrV4;
+
+use axisbridge::engine::port::{FRAME_MAX, NorthPort, SouthPort};
+use profile_generic::time::MonotonicTime;
+use profile_sercos::master::event::Port;
+
+/// Frames or datagrams that a queue holds; more are lost.
+const QUEUE: usize = 64;
+
+/// Bytes of a frame or datagram.
+#[derive(Debug, Clone)]
+pub struct Bytes {
+    bytes: [u8; FRAME_MAX],
+    len: usize,
+}
+
+impl Bytes {
+    /// A copy of `bytes`, at most [`FRAME_MAX`] of them.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut copy = Self { bytes: [0; FRAME_MAX], len: bytes.len().min(FRAME_MAX) };
+        copy.bytes[..copy.len].copy_from_slice(&bytes[..copy.len]);
+        copy
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn as_slice(&self) -> &[u8] {
+        &self.bytes[..self.len]
+    }
+
+    /// The bytes, to be changed.
+    pub fn as_mut_slice(&mut self) -> &mut [u8] {
+        &mut self.bytes[..self.len]
+    }
+}
+
+/// The UDP port of a device.
+#[derive(Debug)]
+pub struct NorthQueue {
+    /// What the device receives, with its sender.
+    pub inbound: VecDeque<(Bytes, SocketAddrV4)>,
+    /// What the device has sent, with its destination.
+    pub outbound: VecDeque<(Bytes, SocketAddrV4)>,
+}
+
+impl Default for NorthQueue {
+    fn default() -> Self {
+        Self { inbound: VecDeque::with_capacity(QUEUE), outbound: VecDeque::with_capacity(QUEUE) }
+    }
+}
+
+impl NorthPort for NorthQueue {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(usize, SocketAddrV4)> {
+        let (datagram, from) = self.inbound.pop_front()?;
+        let bytes = datagram.as_slice();
+        buffer[..bytes.len()].copy_from_slice(bytes);
+        Some((bytes.len(), from))
+    }
+
+    fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
+        let room = self.outbound.len() < QUEUE && datagram.len() <= FRAME_MAX;
+        if room {
+            self.outbound.push_back((Bytes::of(datagram), to));
+        }
+        room
+    }
+}
+
+/// The Ethernet port of the SERCOS master.
+#[derive(Debug)]
+pub struct SouthQueue {
+    /// What comes back from the line.
+    pub inbound: VecDeque<Bytes>,
+    /// What the master has sent.
+    pub outbound: VecDeque<Bytes>,
+}
+
+impl Default for SouthQueue {
+    fn default() -> Self {
+        Self { inbound: VecDeque::with_capacity(QUEUE), outbound: VecDeque::with_capacity(QUEUE) }
+    }
+}
+
+impl SouthPort for SouthQueue {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        let frame = self.inbound.pop_front()?;
+        let bytes = frame.as_slice();
+        buffer[..bytes.len()].copy_from_slice(bytes);
+        Some((Port::One, bytes.len()))
+    }
+
+    fn send(&mut self, _now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        let room = port == Port::One && self.outbound.len() < QUEUE && frame.len() <= FRAME_MAX;
+        if room {
+            self.outbound.push_back(Bytes::of(frame));
+        }
+        room
+    }
+}
