@@ -4,6 +4,9 @@
 //! update that is sent late or lost leaves the path as it is. Whenever the axis is not Running the command
 //! stands at the actual position; a motion begins there, and the control mode changes only at standstill.
 //! So no command jumps.
+//!
+//! Motion is planned in counts. On the connection positions are in counts, the position control unit, while
+//! velocity and acceleration are in units, the velocity and acceleration control unit (Table 5-2.8).
 
 use super::config::AxisSetup;
 use super::event::Event;
@@ -35,7 +38,7 @@ const SETTLING_MAX: DurationNs = DurationNs::from_secs(1);
 enum Motion {
     /// The command stands.
     None,
-    /// The command follows a profile that began at `start`.
+    /// The command follows a profile that began at `start`; profile and limits are in counts.
     Moving { profile: Profile, start: MonotonicTime, limits: Limits },
     /// Velocity control at zero until the axis stands.
     Settling { since: MonotonicTime, last: i64, still: u8 },
@@ -63,6 +66,7 @@ pub(super) struct Axis {
     actual: Option<i64>,
     mode: ControlMode,
     motion: Motion,
+    /// In counts.
     command: State,
     planned_for: MonotonicTime,
     following: Following,
@@ -244,7 +248,8 @@ impl Axis {
 
     /// The cyclic command block for the command planned last.
     pub fn block(&self, configured: bool, target: CommandTarget) -> CommandBlock {
-        let velocity = Some(real(self.command.velocity));
+        let in_units = |counts: f64| Some(real(counts / self.setup.counts_per_unit));
+        let velocity = in_units(self.command.velocity);
         let position_control = self.mode == ControlMode::POSITION;
         let mut actual_data_set = ActualDataSet::POSITION;
         actual_data_set.set(ActualDataSet::VELOCITY, self.setup.actual_velocity);
@@ -261,7 +266,7 @@ impl Axis {
             values: CommandValues {
                 position: position_control.then(|| self.command_position()),
                 velocity: velocity.filter(|_| !position_control || self.setup.velocity_feed_forward),
-                acceleration: Some(real(self.command.acceleration))
+                acceleration: in_units(self.command.acceleration)
                     .filter(|_| self.setup.acceleration_feed_forward),
                 ..CommandValues::default()
             },
@@ -292,7 +297,7 @@ impl Axis {
         self.begin(profile, limits)
     }
 
-    /// Begins a jog; returns its planned length.
+    /// Begins a jog at `velocity` in units/s for `run` seconds; returns its planned length.
     pub fn jog(&mut self, velocity: f64, run: f64, limits: Limits) -> Result<DurationNs, Failure> {
         self.ready_for_motion()?;
         let scale = self.setup.counts_per_unit;

@@ -92,6 +92,11 @@ pub struct KeyExpectation {
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisSetup {
     /// Counts (position control units) per unit of the program; above zero.
+    ///
+    /// The unit of the program is the one that the device counts velocity in, since velocities go out in
+    /// units/s and accelerations in units/s² (Table 5-2.8). A device that scales (attribute 45 is 1) has
+    /// Motion Counts and Motion Units, and this is its Motion Resolution, attribute 78. One that does not has
+    /// counts and units of its feedback or motor, and this is the resolution of that.
     pub counts_per_unit: f64,
     /// Control Mode outside of jogs; position or velocity.
     pub control_mode: ControlMode,
@@ -99,11 +104,12 @@ pub struct AxisSetup {
     pub feedback_mode: FeedbackMode,
     /// Send Command Position as DINT instead of LREAL.
     pub integer_position: bool,
-    /// Send Command Velocity along with Command Position.
+    /// Send Command Velocity, in units/s, along with Command Position.
     pub velocity_feed_forward: bool,
-    /// Send Command Acceleration along with the other commands.
+    /// Send Command Acceleration, in units/s², along with the other commands.
     pub acceleration_feed_forward: bool,
-    /// Ask for Actual Velocity; not every device has it.
+    /// Ask for Actual Velocity, in units/s. The controller itself makes no use of it, and not every device has
+    /// it.
     pub actual_velocity: bool,
     /// Attributes written before Configuration Complete, in this order.
     pub attributes: Vec<AttributeSet>,

@@ -1,7 +1,9 @@
 //! What the controller does once the axes are ready: a list of steps.
 //!
 //! Axes are named by their instance number, from 1. Positions, velocities and so on are in units of the
-//! program; [`AxisSetup::counts_per_unit`](super::config::AxisSetup::counts_per_unit) leads to counts.
+//! program, which are the velocity control units of the device: velocities and accelerations go out as they
+//! stand here, positions in counts by
+//! [`AxisSetup::counts_per_unit`](super::config::AxisSetup::counts_per_unit).
 
 use core::fmt;
 

@@ -6,7 +6,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use arrayvec::{ArrayString, ArrayVec};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
-use super::rig::{OFFSET_NS, config, seconds};
+use super::rig::{COUNTS_PER_UNIT, OFFSET_NS, config, seconds};
 use crate::controller::{
     AttributeSet, AxisSet, Controller, ControllerConfig, DATAGRAM_MAX, Event, Limits, Report, Step,
 };
@@ -78,7 +78,8 @@ impl Plant {
         match command.command {
             Command::Follow(points) if started => {
                 if points.control_mode == ControlMode::VELOCITY {
-                    self.position += f64::from(points.values.velocity.unwrap_or(0.0)) * seconds(DRIVE_NS);
+                    let units = f64::from(points.values.velocity.unwrap_or(0.0)) * seconds(DRIVE_NS);
+                    self.position += units * COUNTS_PER_UNIT;
                     self.path.clear();
                     self.last = (system, self.position);
                 } else {
@@ -422,6 +423,17 @@ fn the_whole_program_runs_synchronously() {
     assert_eq!(one.states.kept(), [S::STOPPED, S::STARTING, S::RUNNING, S::STOPPING, S::STOPPED]);
     assert_eq!(report.identity.as_ref().unwrap().product_name, "Axisbridge");
     insta::assert_snapshot!(pair.log());
+}
+
+#[test]
+fn a_jog_covers_its_velocity_times_its_time() {
+    let one = AxisSet::one(1);
+    let jog = Step::Jog { axis: 1, velocity: 20.0, acceleration: 200.0, jerk: 5000.0, seconds: 0.3 };
+    let mut pair = Pair::new(configured(1), &[0.0], vec![Step::Enable(one), jog, Step::Disable(one)]);
+    let report = pair.run(30);
+    assert_good(&report, &pair);
+    let reached = report.axes[0].reached.unwrap();
+    assert!((reached - 6.0).abs() < 0.02, "{reached}");
 }
 
 #[test]

@@ -6,3 +6,4 @@ mod peer;
 mod rig;
 mod runs;
 mod session_table;
+mod units;

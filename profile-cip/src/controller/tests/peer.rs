@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use super::rig::{COUNTS_PER_UNIT, seconds};
 use crate::wire::ConnectionTriad;
 use crate::wire::class1::Class1Datagram;
 use crate::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
@@ -36,7 +37,7 @@ pub struct PeerAxis {
     pub attributes: BTreeMap<u16, Vec<u8>>,
     /// Position in counts.
     pub position: f64,
-    /// Velocity in counts/s, in velocity control.
+    /// Velocity in units/s, in velocity control.
     velocity: f64,
     /// Commands that apply later: instant in ns, position.
     path: VecDeque<(u64, f64)>,
@@ -83,7 +84,8 @@ impl PeerAxis {
             return;
         }
         if self.control_mode == ControlMode::VELOCITY {
-            self.position += self.velocity * crate::controller::tests::rig::seconds(now.saturating_sub(from));
+            let units = self.velocity * seconds(now.saturating_sub(from));
+            self.position += units * COUNTS_PER_UNIT;
             self.path.clear();
             self.last = (now, self.position);
             return;
@@ -97,8 +99,8 @@ impl PeerAxis {
         }
         self.position = self.last.1;
         if let Some(&(at, position)) = self.path.front() {
-            let whole = crate::controller::tests::rig::seconds(at - self.last.0);
-            let part = crate::controller::tests::rig::seconds(now.saturating_sub(self.last.0));
+            let whole = seconds(at - self.last.0);
+            let part = seconds(now.saturating_sub(self.last.0));
             self.position += (position - self.last.1) * part / whole;
         }
     }

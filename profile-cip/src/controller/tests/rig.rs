@@ -6,6 +6,8 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// System time less monotonic time in the rig.
 pub const OFFSET_NS: u64 = 1_700_000_000_000_000_000;
+/// Counts in a unit of the axes.
+pub const COUNTS_PER_UNIT: f64 = 1000.0;
 /// Time a datagram is under way.
 const LATENCY_NS: u64 = 100_000;
 
@@ -36,7 +38,7 @@ pub struct Rig {
 
 /// A configuration for these axes, synchronous, 2 ms.
 pub fn config(axes: usize) -> ControllerConfig {
-    ControllerConfig::new(Some([1, 2, 3, 4, 5, 6, 7, 8]), vec![AxisSetup::position(1000.0); axes])
+    ControllerConfig::new(Some([1, 2, 3, 4, 5, 6, 7, 8]), vec![AxisSetup::position(COUNTS_PER_UNIT); axes])
 }
 
 impl Rig {
