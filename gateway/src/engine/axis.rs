@@ -15,8 +15,9 @@ use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::{
-    FineInterpolator, InterpolatorConfig, Quality, SetPoints as FinePoints, TargetUpdate,
+    FineInterpolator, InterpolatorConfig, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError,
 };
+use profile_generic::mode::OperatingMode;
 use profile_generic::program::{ConversionReport, Trackers};
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Event, Report, Request, Transition};
@@ -68,6 +69,29 @@ pub struct AxisCounters {
     pub faults: u32,
 }
 
+/// Why a command counts as lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Loss {
+    /// The motion device gives no set-points.
+    #[error("the motion connection gives no set-points: {0:?}")]
+    Withheld(Withheld),
+    /// No update came for longer than the interpolator can go on.
+    #[error("no update of the controller came in time")]
+    Silent,
+    /// The update does not fit those before it.
+    #[error("{0}")]
+    Update(#[from] UpdateError),
+    /// A value of the update is none, or beyond what can be expressed.
+    #[error("a set-point cannot be expressed in the units of the drive model")]
+    NotUnderstood,
+    /// No update period is known.
+    #[error("no update period is known")]
+    NoPeriod,
+    /// The box ends.
+    #[error("the box ends")]
+    End,
+}
+
 /// A reset of faults under way.
 #[derive(Debug, Clone, Copy)]
 struct Reset {
@@ -97,6 +121,7 @@ pub struct AxisChannel {
     /// Set-points of this number were taken.
     sequence: Option<u32>,
     fault: Option<Fault>,
+    loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
     drive_reset_wanted: bool,
@@ -133,6 +158,7 @@ impl AxisChannel {
             reset: None,
             sequence: None,
             fault: None,
+            loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
             counters: AxisCounters::default(),
@@ -312,7 +338,7 @@ impl AxisChannel {
         if self.limits.velocity.is_some_and(too_fast) {
             self.raise(now, system, Fault::new(FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, system));
         }
-        if self.command.mode == profile_generic::mode::OperatingMode::Position {
+        if self.command.mode == OperatingMode::Position {
             let error = self.command.position.get().saturating_sub(self.feedback.position.get());
             if self.feedback.get(profile_generic::image::Signal::FollowingError).is_none() {
                 self.feedback.following_error = Position(error);
@@ -394,7 +420,7 @@ impl AxisChannel {
                 self.sequence = None;
                 let lost = matches!(why, Withheld::Stale | Withheld::NotConnected | Withheld::NodeFault);
                 if lost && self.state() == DriveState::Operating {
-                    self.lose_command(now, system);
+                    self.lose_command(now, system, Loss::Withheld(why));
                 }
             }
         }
@@ -464,8 +490,9 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
             return;
         };
-        if first {
-            // Where the drive is now is where the controller counts from.
+        if first || self.command.mode != mode {
+            // Where the drive is now is where the controller counts from: turns made without position commands do not
+            // show in a command that wraps.
             self.trackers = self.north.trackers();
             let counts = self.north.counts(self.feedback.position.get()).value;
             self.trackers.set_counts(counts);
@@ -477,21 +504,21 @@ impl AxisChannel {
         self.count_saturated(conversions.saturated);
         if conversions.not_finite > 0 || conversions.saturated > 0 {
             // Half understood is not understood.
-            self.lose_command(now, system);
+            self.lose_command(now, system, Loss::NotUnderstood);
             return;
         }
         if let Some(cause) = self.beyond_limits(&fresh) {
             self.raise(now, system, Fault::new(cause, system));
             return;
         }
-        if fresh.mode != mode || first {
+        if self.command.mode != mode || first {
             self.start_interpolator();
         }
         self.command.mode = mode;
         self.counters.commands = self.counters.commands.saturating_add(1);
         let target_update = TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default();
         let Some(interpolator) = self.interpolator.as_mut() else {
-            self.lose_command(now, system);
+            self.lose_command(now, system, Loss::NoPeriod);
             return;
         };
         if interpolator.config().target_update != target_update {
@@ -503,8 +530,8 @@ impl AxisChannel {
             Some(target) => SystemTime(target),
             None => target_update.target(system, interpolator.config().period),
         };
-        if interpolator.update(target, &FinePoints::from(&fresh)).is_err() {
-            self.lose_command(now, system);
+        if let Err(error) = interpolator.update(target, &FinePoints::from(&fresh)) {
+            self.lose_command(now, system, Loss::Update(error));
         }
     }
 
@@ -515,8 +542,9 @@ impl AxisChannel {
         (position && (below || above)).then_some(FaultCause::POSITION_COMMAND_LIMIT)
     }
 
-    fn lose_command(&mut self, now: MonotonicTime, system: SystemTime) {
+    fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
         if self.fault.is_none() && self.state().is_running() {
+            self.loss = Some(loss);
             let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(self.command_loss);
             self.raise(now, system, fault);
         }
@@ -561,14 +589,15 @@ impl AxisChannel {
         let points = match fine {
             Some(fine) => {
                 if fine.quality == Quality::Lost {
-                    self.lose_command(now, system);
+                    self.lose_command(now, system, Loss::Silent);
                 }
                 fine.set_points
             }
             None => FinePoints::default(),
         };
-        // Where the axis stops by itself, the position of its last command would pull at it.
-        let rest = if operating { self.command.position } else { self.feedback.position };
+        // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it.
+        let led = operating && self.command.mode == OperatingMode::Position;
+        let rest = if led { self.command.position } else { self.feedback.position };
         let all = FinePoints {
             position: Some(points.position.unwrap_or(rest)),
             velocity: Some(points.velocity.unwrap_or(Velocity::ZERO)),
@@ -627,7 +656,7 @@ impl AxisChannel {
 
     /// The box ends: the axis stops as on a lost command.
     pub fn end(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.lose_command(now, system);
+        self.lose_command(now, system, Loss::End);
     }
 
     /// Sets what keeps the axis from starting for reasons the box knows.
@@ -635,6 +664,12 @@ impl AxisChannel {
         if let Some(transition) = self.drive.machine.set_inhibits(inhibits) {
             self.follow(now, system, transition);
         }
+    }
+
+    /// Why the command was lost, when that is the fault.
+    #[must_use]
+    pub fn loss(&self) -> Option<Loss> {
+        self.loss.filter(|_| self.fault.is_some_and(|fault| fault.cause == FaultCause::COMMAND_LOST))
     }
 
     /// The fault that stands.

@@ -266,7 +266,7 @@ impl Engine {
                 told.0 = state;
             }
             if let Some(fault) = axis.fault().filter(|_| !told.1) {
-                tell(&mut self.notices, Notice::Fault { axis: number, fault });
+                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss: axis.loss() });
             }
             told.1 = axis.fault().is_some();
         }

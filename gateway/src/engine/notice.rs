@@ -7,6 +7,7 @@ use profile_generic::fault::Fault;
 use profile_generic::state::DriveState;
 use profile_sercos::master::event::Event;
 
+use super::axis::Loss;
 use super::commissioning::StepFailure;
 use crate::mapping::SercosError;
 
@@ -79,6 +80,8 @@ pub enum Notice {
         axis: u8,
         /// The fault.
         fault: Fault,
+        /// Why the command was lost, when that is the fault.
+        loss: Option<Loss>,
     },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
@@ -141,7 +144,8 @@ impl fmt::Display for Notice {
             Self::Program { error, .. } => write!(f, "the drive cannot be used: {error}; it is left out"),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
-            Self::Fault { fault, .. } => write!(f, "{fault}"),
+            Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
+            Self::Fault { fault, loss: None, .. } => write!(f, "{fault}"),
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }
     }
