@@ -24,7 +24,7 @@ use profile_generic::state::{Action, DriveState, Event, Report, Request, Transit
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 
-use crate::mapping::{CipProgram, CipTrackers, CyclicValues, SercosProgram};
+use crate::mapping::{CipFault, CipProgram, CipTrackers, CyclicValues, SercosProgram};
 
 /// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
 pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
@@ -81,9 +81,6 @@ pub enum Loss {
     /// The update does not fit those before it.
     #[error("{0}")]
     Update(#[from] UpdateError),
-    /// A value of the update is none, or beyond what can be expressed.
-    #[error("a set-point cannot be expressed in the units of the drive model")]
-    NotUnderstood,
     /// No update period is known.
     #[error("no update period is known")]
     NoPeriod,
@@ -96,7 +93,9 @@ pub enum Loss {
 #[derive(Debug, Clone, Copy)]
 struct Reset {
     id: u32,
+    /// Since it was asked for, then since it was begun.
     since: MonotonicTime,
+    begun: bool,
 }
 
 /// One axis.
@@ -320,7 +319,7 @@ impl AxisChannel {
                 0,
             );
         }
-        self.finish_reset(now);
+        self.go_on_with_reset(now, system);
         self.feedback.state = self.state();
         self.feedback.inhibits = self.drive.machine.conditions().inhibits;
         self.feedback.fault = self.fault;
@@ -408,8 +407,8 @@ impl AxisChannel {
     pub fn from_controller(&mut self, now: MonotonicTime, system: SystemTime, image: &AxisCommandImage) {
         if image.action_id != self.action_id {
             self.action_id = image.action_id;
-            self.north_action = image.action;
-            self.take_action(now, system, image.action);
+            let before = std::mem::replace(&mut self.north_action, image.action);
+            self.take_action(now, system, before, image.action);
         }
         if image.reset_id != self.reset_id && self.reset.is_none_or(|reset| reset.id != image.reset_id) {
             self.begin_reset(now, system, image.reset_id);
@@ -426,11 +425,20 @@ impl AxisChannel {
         }
     }
 
-    fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
-        if action == DriveAction::PowerUp && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
+    fn take_action(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        before: DriveAction,
+        action: DriveAction,
+    ) {
+        if action == DriveAction::PowerUp
+            && before == DriveAction::None
+            && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
         {
-            // A new start of the controller; nothing moves before it enables the axis anew.
-            self.clear_fault(now, system);
+            // A new connection with a new configuration; nothing moves before the controller enables the axis anew.
+            self.reset = Some(Reset { id: self.reset_id, since: now, begun: false });
+            self.go_on_with_reset(now, system);
         }
         let request = match action {
             // Without torque there is nothing to abort; the motion device keeps the fault.
@@ -458,13 +466,18 @@ impl AxisChannel {
     }
 
     fn begin_reset(&mut self, now: MonotonicTime, system: SystemTime, id: u32) {
-        self.reset = Some(Reset { id, since: now });
-        self.clear_fault(now, system);
-        self.finish_reset(now);
+        self.reset = Some(Reset { id, since: now, begun: false });
+        self.go_on_with_reset(now, system);
     }
 
-    fn finish_reset(&mut self, now: MonotonicTime) {
-        let Some(reset) = self.reset else { return };
+    /// A stop under way is not interrupted: faults are reset once the axis is without torque.
+    fn go_on_with_reset(&mut self, now: MonotonicTime, system: SystemTime) {
+        let Some(reset) = self.reset.as_mut() else { return };
+        if !reset.begun && self.drive.machine.state() != DriveState::FaultReaction {
+            *reset = Reset { since: now, begun: true, ..*reset };
+            self.clear_fault(now, system);
+        }
+        let Some(reset) = self.reset.filter(|reset| reset.begun) else { return };
         let late = now.since(reset.since) > RESET_TIME_OUT;
         if self.state() != DriveState::Faulted || late {
             if late {
@@ -504,7 +517,7 @@ impl AxisChannel {
         self.count_saturated(conversions.saturated);
         if conversions.not_finite > 0 || conversions.saturated > 0 {
             // Half understood is not understood.
-            self.lose_command(now, system, Loss::NotUnderstood);
+            self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
             return;
         }
         if let Some(cause) = self.beyond_limits(&fresh) {
@@ -530,8 +543,12 @@ impl AxisChannel {
             Some(target) => SystemTime(target),
             None => target_update.target(system, interpolator.config().period),
         };
-        if let Err(error) = interpolator.update(target, &FinePoints::from(&fresh)) {
-            self.lose_command(now, system, Loss::Update(error));
+        match interpolator.update(target, &FinePoints::from(&fresh)) {
+            Ok(()) => {}
+            Err(UpdateError::Jump) => {
+                self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
+            }
+            Err(error) => self.lose_command(now, system, Loss::Update(error)),
         }
     }
 
@@ -647,11 +664,21 @@ impl AxisChannel {
             reset_id: self.reset_id,
             ..DriveImage::default()
         };
-        // What the controller itself did is no fault of the drive, and while the cause is unknown there is none to tell.
+        // What the controller itself asked for is no fault of the drive; the motion device knows of it.
         let mut feedback = self.feedback;
-        feedback.fault = self.fault.filter(|fault| !caused_by_controller(fault.cause));
+        feedback.fault = self.fault.filter(|fault| fault.cause != FaultCause::CONTROLLER_ABORT);
         self.north.drive_image(&feedback, &mut image);
         image
+    }
+
+    /// The fault, where the controller knows it as one of the communications node: its code, and since when.
+    #[must_use]
+    pub fn node_fault(&self) -> Option<(u8, SystemTime)> {
+        let fault = self.fault?;
+        match self.north.fault(fault.cause) {
+            Some(CipFault::Node(code)) => Some((code, fault.at)),
+            _ => None,
+        }
     }
 
     /// The box ends: the axis stops as on a lost command.

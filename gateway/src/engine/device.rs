@@ -8,6 +8,7 @@ use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
+use profile_cip::wire::motion::codes::NodeFault;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::image::Signal;
 use profile_generic::interpolation::TargetUpdate;
@@ -43,6 +44,8 @@ struct Member {
     configured: CipScaling,
     attributes: AttributeTable,
     state: AxisState,
+    /// The fault of the axis that was told as one of the node.
+    node_fault: Option<SystemTime>,
 }
 
 /// What the I/O connection has counted beside the motion device.
@@ -107,7 +110,14 @@ impl DeviceChannel {
                 let attributes =
                     mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
                 let (scaling, configured) = (*scaling, *scaling);
-                Ok(Member { axis: *axis, scaling, configured, attributes, state: AxisState::Off })
+                Ok(Member {
+                    axis: *axis,
+                    scaling,
+                    configured,
+                    attributes,
+                    state: AxisState::Off,
+                    node_fault: None,
+                })
             })
             .collect::<Result<_, ChannelError>>()?;
         Ok(Self {
@@ -186,6 +196,15 @@ impl DeviceChannel {
         self.preset_scaling(mapping, axes);
         for (place, member) in self.members.iter().enumerate() {
             self.device.set_drive(place, axes[member.axis].drive_image());
+        }
+        for member in &mut self.members {
+            let fault = axes[member.axis].node_fault();
+            if let Some((code, at)) = fault
+                && member.node_fault != Some(at)
+            {
+                self.device.raise_node_fault(NodeFault(code));
+            }
+            member.node_fault = fault.map(|(_, at)| at);
         }
         self.device.poll(now, Some(system));
         let period = self.device.connection().map(|connection| i64::from(connection.rpi_us));

@@ -325,6 +325,12 @@ impl MotionDevice {
         }
     }
 
+    /// Raises a fault of the communications node that only the owner of the device can see. Every axis stops, and it
+    /// stays until the controller resets it.
+    pub fn raise_node_fault(&mut self, fault: NodeFault) {
+        self.node.raise(fault);
+    }
+
     /// Tells the state of the device's clock.
     pub fn set_sync(&mut self, sync: SyncState) {
         self.sync = sync;

@@ -3,9 +3,9 @@
 //! Each file has a plain value with `parse`, `buffer_len` and `emit`. `parse(emit(x)) == x` for every value,
 //! and parsing never panics and never allocates, whatever the bytes are.
 
+pub mod attributes;
 #[cfg(test)]
 mod check;
-pub mod attributes;
 pub mod class1;
 pub mod cpf;
 pub mod encapsulation;

@@ -472,10 +472,8 @@ fn a_vanished_owner_frees_the_connection_at_once() {
     );
     assert_eq!(
         rig.events().iter().map(Event::to_string).collect::<Vec<_>>(),
-        [
-            "motion connection 0x0001 of vendor 0x0001 serial 0x0000cafe of 10.0.0.1:50000 timed out: \
-             nothing O->T for 32050 us, expected within 32000 us"
-        ]
+        ["motion connection 0x0001 of vendor 0x0001 serial 0x0000cafe of 10.0.0.1:50000 timed out: \
+             nothing O->T for 32050 us, expected within 32000 us"]
     );
     assert_eq!(rig.adapter.counters().connection_timeouts, 1);
     rig.open_motion(b, 2);
