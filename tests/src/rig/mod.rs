@@ -8,6 +8,7 @@
 //! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a test that fails
 //! prints the seed.
 
+pub mod motion;
 pub mod network;
 pub mod ports;
 

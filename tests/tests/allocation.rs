@@ -1,0 +1,62 @@
+//! The cycle of the box touches no heap once the bus is in CP4: weighed with a counting allocator, the engine alone.
+
+use allocation_counter::measure;
+use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
+use axisbridge_tests::rig::network::Knobs;
+use axisbridge_tests::rig::{Rig, Settings};
+use profile_generic::fault::FaultCause;
+
+/// Weighs so many cycles and returns their allocations; `between` acts on the rig before each.
+fn weigh(rig: &mut Rig, cycles: u32, mut between: impl FnMut(&mut Rig, u32)) -> Vec<(u32, u64)> {
+    let mut found = Vec::new();
+    for number in 0..cycles {
+        between(rig, number);
+        let info = rig.cycle_in(|cycle| measure(cycle));
+        if info.count_total != 0 {
+            found.push((number, info.count_total));
+        }
+    }
+    found
+}
+
+#[test]
+fn the_scale_weighs() {
+    let info = measure(|| drop(std::hint::black_box(Box::new(1_u64))));
+    assert_eq!(info.count_total, 1);
+}
+
+#[test]
+fn cycles_with_two_axes_in_motion_allocate_nothing() {
+    let mut rig = in_motion(Settings::default());
+    assert_eq!(weigh(&mut rig, 2_000, |_, _| ()), []);
+    assert!(rig.engine.axes().iter().all(|axis| axis.counters().commands > 900), "both axes were led");
+    assert_eq!(rig.report().steps_finished, 1, "the whole time was inside of the motion");
+}
+
+#[test]
+fn neither_a_bad_network_nor_a_start_nor_a_stop_allocates() {
+    let knobs = Knobs { loss: 50, duplication: 20, reordering: 50, ..Knobs::GOOD };
+    let mut rig = Rig::ready(Settings { knobs, ..Settings::default() });
+    rig.connect(long_moves());
+    // Opening the connection, configuration, enable, motion, disable, closing.
+    assert_eq!(weigh(&mut rig, 3_000, |_, _| ()), []);
+    assert_eq!(rig.report().failure, None);
+    assert!(rig.report().steps_finished >= 2, "{}", rig.log());
+}
+
+#[test]
+fn a_fault_its_diagnosis_and_its_reset_allocate_nothing() {
+    let mut rig = in_motion(Settings::default());
+    assert!(at_full_speed(&rig));
+    let found = weigh(&mut rig, 1_000, |rig, number| match number {
+        100 => rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT),
+        300 => rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT),
+        500 => {
+            rig.kill_controller();
+        }
+        _ => {}
+    });
+    assert_eq!(found, []);
+    assert_eq!(rig.engine.axes()[0].counters().faults, 1);
+    rig.run_for(millis(10));
+}
