@@ -1,6 +1,8 @@
 //! `axisbridge run`: the box.
 
+use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tracing::{info, warn};
@@ -19,9 +21,17 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     log_to_stderr(config.log_level);
     let stop = super::signal::stop_on_signals()?;
     info!(name = config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
-    let running = runner::start(&config, arguments.capture.as_deref())?;
+    while run_once(&config, arguments.capture.as_deref(), &stop)? {
+        info!("axisbridge starts anew: a controller has reset the Identity object");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Runs the box once; `true` when it is to be started again.
+fn run_once(config: &Config, capture: Option<&Path>, stop: &AtomicBool) -> Result<bool, CliError> {
+    let running = runner::start(config, capture)?;
     let mut told = false;
-    while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+    while !stop.load(Ordering::Relaxed) && !running.wants_restart() {
         std::thread::sleep(LOOK_INTERVAL);
         if !told {
             told = true;
@@ -34,11 +44,12 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
             return Err("the cycle thread has ended by itself; see above".into());
         }
     }
+    let again = running.wants_restart() && !stop.load(Ordering::Relaxed);
     info!("axisbridge ends: axes stop, the bus goes down");
     if let Some(dropped) = running.stop()?.filter(|dropped| *dropped > 0) {
         warn!(dropped, "frames are missing in the recording");
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(again)
 }
 
 /// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file.

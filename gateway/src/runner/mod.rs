@@ -16,7 +16,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime as WallClock};
 
 use profile_cip::target::adapter::Adapter;
+use profile_cip::target::event::Event;
+use profile_cip::target::identity::Health;
 use profile_cip::target::motion_device::SyncState;
+use profile_cip::wire::motion::codes::AxisStateCode;
 use tracing::{info, warn};
 
 use self::cycle::{CycleThread, Setup};
@@ -32,7 +35,7 @@ use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::simulate::line::InProcessLine;
 use crate::simulate::setup::HOST_CLOCK;
-use crate::status::BoxStatus;
+use crate::status::{AxisStatus, BoxStatus};
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
 use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
@@ -106,6 +109,7 @@ pub struct RunningBox {
     servers: Vec<north::Handle>,
     recorder: Option<Recorder>,
     stop_notices: Arc<AtomicBool>,
+    restart: Arc<AtomicBool>,
 }
 
 /// Starts a box; `capture` records both sides.
@@ -147,10 +151,18 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
         .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })?;
     let _inside = runtime.enter();
     let mut servers = Vec::with_capacity(adapters.len());
-    for (device, (adapter_config, end)) in config.devices.iter().zip(adapters) {
+    let restart = Arc::new(AtomicBool::new(false));
+    for (number, (device, (adapter_config, end))) in config.devices.iter().zip(adapters).enumerate() {
         let adapter = Adapter::new(adapter_config)
             .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
-        let server = ExplicitServer::bind(device.listen, adapter, end, tap())?;
+        let (source, asked) = (status.clone(), Arc::clone(&restart));
+        let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
+            .attend(move |adapter| adapter.set_health(health(&source.read(), number)))
+            .on_event(move |event| {
+                if matches!(event, Event::Reset { .. }) {
+                    asked.store(true, Ordering::Relaxed);
+                }
+            });
         info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
         servers.push(north::spawn(server));
     }
@@ -174,7 +186,20 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
     let cycle = CycleThread::start(setup)
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
-    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices })
+    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
+}
+
+/// How a device is, by the mapping of axis states to the Identity object (Volume 9, table 9-1.2).
+fn health(status: &BoxStatus, device: usize) -> Health {
+    let faulted = |axis: &AxisStatus| {
+        usize::from(axis.device) == device
+            && [AxisStateCode::ABORTING.0, AxisStateCode::MAJOR_FAULTED.0].contains(&axis.cip_axis_state)
+    };
+    if status.configured_axes().iter().any(faulted) {
+        Health::MajorRecoverableFault
+    } else {
+        Health::Operational
+    }
 }
 
 fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
@@ -232,6 +257,12 @@ impl RunningBox {
     #[must_use]
     pub fn realtime_report(&self) -> String {
         self.cycle.realtime_report()
+    }
+
+    /// Whether a controller has reset the Identity object: the box is to be stopped and started again.
+    #[must_use]
+    pub fn wants_restart(&self) -> bool {
+        self.restart.load(Ordering::Relaxed)
     }
 
     /// Whether the cycle thread has ended by itself, which it should never do.
