@@ -17,7 +17,7 @@ use clap::{Args, Parser, Subcommand};
 
 /// Motion protocol gateway: to a controller it is CIP Motion drives; behind it, it masters the real ones.
 #[derive(Debug, Parser)]
-#[command(name = "axisbridge", version, about, max_term_width = 100)]
+#[command(name = "axisbridge", version, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
