@@ -303,6 +303,8 @@ impl AxisChannel {
     fn tick(&mut self, now: MonotonicTime, system: SystemTime) {
         let limit = match self.state() {
             DriveState::Starting => Some(START_TIME_OUT),
+            // A hold is a stop that has ended.
+            DriveState::FaultReaction if self.holds() => None,
             DriveState::Stopping | DriveState::FaultReaction => Some(STOP_TIME_OUT),
             _ => None,
         };
@@ -440,6 +442,9 @@ impl AxisChannel {
             self.reset = Some(Reset { id: self.reset_id, since: now, begun: false });
             self.go_on_with_reset(now, system);
         }
+        if !matches!(action, DriveAction::Enable | DriveAction::Abort) {
+            self.end_hold(now, system);
+        }
         let request = match action {
             // Without torque there is nothing to abort; the motion device keeps the fault.
             DriveAction::Abort if !self.may_have_torque() => None,
@@ -457,6 +462,22 @@ impl AxisChannel {
         self.follow(now, system, transition);
     }
 
+    /// Whether the drive stands with torque because the reaction to a fault is to hold the position.
+    fn holds(&self) -> bool {
+        self.state() == DriveState::FaultReaction
+            && self.action == Action::Halt
+            && self.feedback.report == Report::Halted
+    }
+
+    /// Takes the torque away from an axis that holds its position; the fault stays.
+    fn end_hold(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.holds() {
+            let transition = self.drive.machine.clear_faults();
+            self.follow(now, system, transition);
+            self.request(now, system, Request::FaultReset);
+        }
+    }
+
     fn clear_fault(&mut self, now: MonotonicTime, system: SystemTime) {
         self.fault = None;
         self.cause_wanted = None;
@@ -472,8 +493,12 @@ impl AxisChannel {
 
     /// A stop under way is not interrupted: faults are reset once the axis is without torque.
     fn go_on_with_reset(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.reset.is_some() {
+            self.end_hold(now, system);
+        }
         let Some(reset) = self.reset.as_mut() else { return };
-        if !reset.begun && self.drive.machine.state() != DriveState::FaultReaction {
+        let stops = matches!(self.drive.machine.state(), DriveState::FaultReaction | DriveState::Stopping);
+        if !reset.begun && !stops {
             *reset = Reset { since: now, begun: true, ..*reset };
             self.clear_fault(now, system);
         }
@@ -668,6 +693,10 @@ impl AxisChannel {
         let mut feedback = self.feedback;
         feedback.fault = self.fault.filter(|fault| fault.cause != FaultCause::CONTROLLER_ABORT);
         self.north.drive_image(&feedback, &mut image);
+        if self.cause_wanted.is_some() {
+            // The stop ends with the fault that says why, once the drive has told it.
+            image.stop_complete = false;
+        }
         image
     }
 
@@ -681,9 +710,11 @@ impl AxisChannel {
         }
     }
 
-    /// The box ends: the axis stops as on a lost command.
+    /// The box ends: the axis stops as on a lost command, but holds nothing.
     pub fn end(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.command_loss = self.command_loss.max(Reaction::DecelerateAndDisable);
         self.lose_command(now, system, Loss::End);
+        self.end_hold(now, system);
     }
 
     /// Sets what keeps the axis from starting for reasons the box knows.
