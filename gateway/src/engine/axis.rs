@@ -124,6 +124,10 @@ pub struct AxisChannel {
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
     drive_reset_wanted: bool,
+    /// An enable was rejected and is still asked for.
+    enable_pending: bool,
+    /// A connection was opened, and the axis has not been powered up on it yet.
+    new_connection: bool,
     counters: AxisCounters,
 }
 
@@ -160,6 +164,8 @@ impl AxisChannel {
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
+            enable_pending: false,
+            new_connection: false,
             counters: AxisCounters::default(),
         }
     }
@@ -258,7 +264,10 @@ impl AxisChannel {
 
     /// Takes what the drive's connection brought in this cycle.
     pub fn from_drive(&mut self, now: MonotonicTime, system: SystemTime, consumer: Option<Consumer<'_>>) {
-        let Some((program, trackers)) = self.south.as_mut() else { return };
+        let Some((program, trackers)) = self.south.as_mut() else {
+            self.tick(now, system);
+            return;
+        };
         let consumer = consumer
             .filter(|consumer| matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning));
         let Some(consumer) = consumer else {
@@ -291,7 +300,11 @@ impl AxisChannel {
     fn report(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.report = report;
         let faulted = matches!(report, Report::Faulted | Report::FaultReaction);
-        if faulted && self.fault.is_none() && self.cause_wanted.is_none() {
+        let unknown = self.fault.is_none_or(|fault| caused_by_controller(fault.cause));
+        if !faulted {
+            self.cause_wanted = None;
+        } else if unknown && self.reset.is_none() && self.cause_wanted.is_none() {
+            // While a reset is under way the drive may still show what is being reset.
             self.cause_wanted = Some(now);
         }
         let transition = self.drive.machine.report(report);
@@ -370,7 +383,8 @@ impl AxisChannel {
     ) -> bool {
         let found = self.south.as_ref().and_then(|(program, _)| program.fault(idn, word));
         match (found, self.cause_wanted) {
-            (Some((cause, reaction)), Some(_)) => {
+            // A warning is no cause of a stop.
+            (Some((cause, reaction)), Some(_)) if reaction.stops() => {
                 self.set_cause(now, system, cause, reaction, word);
                 true
             }
@@ -395,7 +409,10 @@ impl AxisChannel {
     }
 
     fn raise(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
-        if self.fault.is_none() {
+        // What the drive has is worth more to know than that the controller had stopped it.
+        let weightier =
+            |known: Fault| caused_by_controller(known.cause) && !caused_by_controller(fault.cause);
+        if self.fault.is_none_or(weightier) {
             self.fault = Some(fault);
             self.counters.faults = self.counters.faults.saturating_add(1);
         }
@@ -407,35 +424,37 @@ impl AxisChannel {
 
     /// Takes what the motion device says about this axis; to be called in every cycle after [`Self::from_drive`].
     pub fn from_controller(&mut self, now: MonotonicTime, system: SystemTime, image: &AxisCommandImage) {
+        // Before the action: a lost command stops the axis as its configuration says, whatever the device asks for then.
+        if let Command::Withheld(why) = image.command
+            && matches!(why, Withheld::Stale | Withheld::NotConnected | Withheld::NodeFault)
+        {
+            self.lose_command(now, system, Loss::Withheld(why));
+        }
         if image.action_id != self.action_id {
             self.action_id = image.action_id;
-            let before = std::mem::replace(&mut self.north_action, image.action);
-            self.take_action(now, system, before, image.action);
+            self.north_action = image.action;
+            self.enable_pending = false;
+            self.take_action(now, system, image.action);
+        }
+        if self.enable_pending && self.state() == DriveState::Ready {
+            // The enable came in the very cycle in which the drive was not ready; the controller still asks for it.
+            self.enable_pending = false;
+            self.take_action(now, system, DriveAction::Enable);
         }
         if image.reset_id != self.reset_id && self.reset.is_none_or(|reset| reset.id != image.reset_id) {
             self.begin_reset(now, system, image.reset_id);
         }
         match image.command {
             Command::Follow(set_points) => self.take_set_points(now, system, &set_points),
-            Command::Withheld(why) => {
-                self.sequence = None;
-                let lost = matches!(why, Withheld::Stale | Withheld::NotConnected | Withheld::NodeFault);
-                if lost && self.state() == DriveState::Operating {
-                    self.lose_command(now, system, Loss::Withheld(why));
-                }
-            }
+            Command::Withheld(_) => self.sequence = None,
         }
     }
 
-    fn take_action(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        before: DriveAction,
-        action: DriveAction,
-    ) {
+    fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
+        let drive_faulted = matches!(self.feedback.report, Report::Faulted | Report::FaultReaction);
         if action == DriveAction::PowerUp
-            && before == DriveAction::None
+            && std::mem::take(&mut self.new_connection)
+            && !drive_faulted
             && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
         {
             // A new connection with a new configuration; nothing moves before the controller enables the axis anew.
@@ -513,9 +532,20 @@ impl AxisChannel {
         }
     }
 
-    /// Whether the drive's own fault reset is to be executed; to be asked once a cycle.
-    pub fn take_drive_reset(&mut self) -> bool {
-        std::mem::take(&mut self.drive_reset_wanted)
+    /// Whether the drive's own fault reset is to be executed, until [`Self::drive_reset_sent`].
+    #[must_use]
+    pub fn wants_drive_reset(&self) -> bool {
+        self.drive_reset_wanted
+    }
+
+    /// The drive's own fault reset is on its way.
+    pub fn drive_reset_sent(&mut self) {
+        self.drive_reset_wanted = false;
+    }
+
+    /// A controller has opened a connection: what the last one had caused may be forgotten once the axis is powered up.
+    pub fn connection_opened(&mut self) {
+        self.new_connection = true;
     }
 
     fn take_set_points(&mut self, now: MonotonicTime, system: SystemTime, points: &SetPoints) {
@@ -533,7 +563,7 @@ impl AxisChannel {
             // show in a command that wraps.
             self.trackers = self.north.trackers();
             let counts = self.north.counts(self.feedback.position.get()).value;
-            self.trackers.set_counts(counts);
+            self.trackers.set_counts(counts.saturating_add(points.position_reference));
         }
         let mut fresh = self.command;
         let values = CyclicValues::from(&points.values);
@@ -573,6 +603,8 @@ impl AxisChannel {
             Err(UpdateError::Jump) => {
                 self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
             }
+            // Set-points overtaken by newer ones; silence is watched elsewhere.
+            Err(UpdateError::NotNewer { .. }) => {}
             Err(error) => self.lose_command(now, system, Loss::Update(error)),
         }
     }
@@ -617,6 +649,10 @@ impl AxisChannel {
         self.control_word =
             program.encode(&self.command, self.action, self.control_word, telegram, &mut conversions);
         self.count_saturated(conversions.saturated);
+        if conversions.saturated > 0 && self.state() == DriveState::Operating {
+            // The drive would be led elsewhere than the controller means.
+            self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
+        }
         true
     }
 
@@ -653,13 +689,16 @@ impl AxisChannel {
         if self.feedback.state != transition.next {
             self.drive.since = now;
             if matches!(transition.next, DriveState::Starting) {
+                // Until the controller's first set-points the axis holds its position, whatever it did last.
+                self.command.mode = OperatingMode::Position;
                 self.sequence = None;
                 self.start_interpolator();
             }
             self.feedback.state = transition.next;
         }
         match transition.action {
-            Action::None | Action::Reject => {}
+            Action::None => {}
+            Action::Reject => self.enable_pending = self.north_action == DriveAction::Enable,
             Action::ResetFault => {
                 // The reset is a pulse, here a procedure command; the control word stays without torque.
                 self.action = Action::TorqueOff;
@@ -692,6 +731,8 @@ impl AxisChannel {
         // What the controller itself asked for is no fault of the drive; the motion device knows of it.
         let mut feedback = self.feedback;
         feedback.fault = self.fault.filter(|fault| fault.cause != FaultCause::CONTROLLER_ABORT);
+        // The controller is about to end it, or has a fault that says why it cannot be ended.
+        feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
         self.north.drive_image(&feedback, &mut image);
         if self.cause_wanted.is_some() {
             // The stop ends with the fault that says why, once the drive has told it.

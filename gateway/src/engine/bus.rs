@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
-use profile_sercos::master::connection::Consumer;
+use profile_sercos::master::connection::{Consumer, ConsumerState};
 use profile_sercos::master::event::{Event, SlaveId, Ticket};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
@@ -27,6 +27,9 @@ pub const FEEDBACK_CONNECTION: u8 = 1;
 
 /// Pause before a failed phase-up is tried again.
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
+
+/// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
+const REFUSED_MAX: usize = 64;
 
 /// Service channel accesses of one drive that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 4;
@@ -96,6 +99,10 @@ pub struct SercosBus {
     retry_at: Option<MonotonicTime>,
     wanted: Option<Phase>,
     cycles_seen: u64,
+    /// Slaves that stand in the way of the others; left out until the next scan.
+    refused: ArrayVec<SlaveId, REFUSED_MAX>,
+    /// A slave that was lost is back: the bus is brought up anew once no axis has torque.
+    returned: bool,
 }
 
 impl SercosBus {
@@ -121,6 +128,8 @@ impl SercosBus {
             retry_at: None,
             wanted: Some(Phase::CP4),
             cycles_seen: 0,
+            refused: ArrayVec::new(),
+            returned: false,
         })
     }
 
@@ -154,7 +163,9 @@ impl SercosBus {
         if self.master.phase() != Some(Phase::CP4) {
             return None;
         }
-        self.master.consumer(drive.slave?, FEEDBACK_CONNECTION)
+        let consumer = self.master.consumer(drive.slave?, FEEDBACK_CONNECTION)?;
+        // Without the ATs of this cycle what is there is that of the last one.
+        Some(Consumer { fresh: consumer.fresh && self.master.cycle_complete(), ..consumer })
     }
 
     /// Lets an axis fill its values for the next cycle.
@@ -208,8 +219,18 @@ impl SercosBus {
         self.diagnose(axes);
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
-        if alone {
+        let again = self.returned && !axes.iter().any(AxisChannel::may_have_torque);
+        if alone || again {
+            self.returned = false;
             self.master.set_target_phase(Phase::CP0);
+        }
+        for (drive, axis) in self.drives.iter().zip(axes.iter()) {
+            let Some(slave) = drive.slave.filter(|_| !axis.may_have_torque()) else { continue };
+            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
+            if self.master.consumer(slave, FEEDBACK_CONNECTION).is_some_and(failed) {
+                // Too many losses in a row; without torque there is nothing to lose by listening again.
+                self.master.reset_consumer(slave, FEEDBACK_CONNECTION);
+            }
         }
         if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
             let due = *self.retry_at.get_or_insert(now + RETRY_PAUSE);
@@ -231,12 +252,19 @@ impl SercosBus {
         notice: &mut dyn FnMut(Notice),
     ) {
         match event {
+            Event::Scanned { .. } => {
+                self.refused.clear();
+                self.returned = false;
+            }
+            Event::SlaveReturned { .. } => self.returned = true,
             Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
+                self.exclude_refused();
                 for axis in 0..self.drives.len() {
                     self.begin(axis, mapping, notice);
                 }
             }
             Event::AwaitingApplication { phase } => {
+                self.exclude_refused();
                 for (axis, drive) in self.drives.iter_mut().enumerate() {
                     if drive.slave.is_some() {
                         drive.plan(axis, mapping, phase.0, notice);
@@ -256,8 +284,9 @@ impl SercosBus {
             | Event::ClassMismatch { slave }
             | Event::CheckFailed { slave, .. }
             | Event::AddressConflict { slave } => {
-                // Refused only when the master has left the phase meanwhile.
-                let _ = self.master.exclude(*slave);
+                // Left out when the master waits for its application again, which may be only after others are done.
+                let _ = self.refused.try_push(*slave);
+                self.exclude_refused();
                 for (drive, axis) in self.drives.iter_mut().zip(axes) {
                     if drive.slave == Some(*slave) {
                         drive.lose();
@@ -273,6 +302,13 @@ impl SercosBus {
         }
     }
 
+    fn exclude_refused(&mut self) {
+        for slave in &self.refused {
+            // Refused while the master does not wait for its application; it is tried again when it does.
+            let _ = self.master.exclude(*slave);
+        }
+    }
+
     fn lose_all(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
         for (drive, axis) in self.drives.iter_mut().zip(axes) {
             drive.lose();
@@ -283,7 +319,8 @@ impl SercosBus {
     /// Starts the commissioning of a drive in CP2.
     fn begin(&mut self, axis: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
         let drive = &mut self.drives[axis];
-        drive.slave = self.master.slave_by_address(drive.address);
+        let found = self.master.slave_by_address(drive.address);
+        drive.slave = found.filter(|slave| !self.refused.contains(slave));
         drive.facts = DriveFacts::new();
         if drive.slave.is_some() {
             drive.plan(axis, mapping, Phase::CP2.0, notice);
@@ -327,6 +364,7 @@ impl SercosBus {
             };
             if !taken {
                 // The others go on without it.
+                let _ = self.refused.try_push(slave);
                 let _ = self.master.exclude(slave);
                 drive.lose();
             }
@@ -340,12 +378,16 @@ impl SercosBus {
     /// Reads the diagnostic words of drives that show a fault without a cause.
     fn diagnose(&mut self, axes: &mut [AxisChannel]) {
         for (axis, channel) in axes.iter_mut().enumerate() {
-            if channel.take_drive_reset()
-                && let Some(idn) = channel
-                    .south()
-                    .and_then(|program| program.command_of(profile_generic::state::Action::ResetFault))
-            {
-                self.access(axis, SvcRequest::command(idn).urgent(), Purpose::FaultReset);
+            if channel.wants_drive_reset() {
+                let command = profile_generic::state::Action::ResetFault;
+                let sent = match channel.south().and_then(|program| program.command_of(command)) {
+                    Some(idn) => self.access(axis, SvcRequest::command(idn).urgent(), Purpose::FaultReset),
+                    None => true,
+                };
+                // Else too many accesses wait, and the next cycle tries again.
+                if sent {
+                    channel.drive_reset_sent();
+                }
             }
             let Some(drive) = self.drives.get_mut(axis) else { continue };
             if !channel.wants_cause() {
@@ -374,9 +416,11 @@ impl SercosBus {
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
-        let Some(axis) = self.drives.iter().position(|drive| drive.slave == Some(ticket.slave)) else {
-            return;
-        };
+        // An access may be answered only after its drive was lost.
+        let asked = |drive: &Drive| drive.accesses.iter().any(|(known, _)| *known == ticket);
+        let own = |drive: &Drive| drive.slave == Some(ticket.slave);
+        let axis = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
+        let Some(axis) = axis else { return };
         let drive = &mut self.drives[axis];
         if let Stage::Commissioning(work) = &mut drive.stage
             && work.handle(ticket, &outcome, &mut drive.facts)
@@ -403,7 +447,6 @@ impl Drive {
     fn lose(&mut self) {
         self.slave = None;
         self.stage = Stage::Absent;
-        self.accesses.clear();
         self.diagnosis = None;
     }
 

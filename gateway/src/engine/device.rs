@@ -6,11 +6,13 @@ use arrayvec::ArrayVec;
 use profile_cip::target::attribute::{Access, AttributeDefinition, Backing, DataType, DefaultValue, Scope};
 use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_state::AxisState;
+use profile_cip::target::drive_link::DriveAction;
 use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::motion::codes::NodeFault;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::image::Signal;
+use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
@@ -34,6 +36,20 @@ const DATAGRAMS_PER_CYCLE: usize = 16;
 /// Attributes that describe the scaling of an axis.
 const SCALING_MAX: usize = 8;
 
+/// Why the controller's scaling is not in use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ScalingRefusal {
+    /// The attributes make no sense.
+    #[error(transparent)]
+    Attributes(#[from] mapping::CipScalingError),
+    /// A ratio does not fit.
+    #[error("a ratio of the scaling cannot be expressed exactly")]
+    Inexact,
+    /// The axis still has torque.
+    #[error("the axis still has torque")]
+    Energized,
+}
+
 /// One axis of the device.
 #[derive(Debug)]
 struct Member {
@@ -46,6 +62,10 @@ struct Member {
     state: AxisState,
     /// The fault of the axis that was told as one of the node.
     node_fault: Option<SystemTime>,
+    /// The controller's scaling is known and in use on this connection.
+    scaled: bool,
+    /// The action of the device in the last exchange.
+    action: DriveAction,
 }
 
 /// What the I/O connection has counted beside the motion device.
@@ -117,6 +137,8 @@ impl DeviceChannel {
                     attributes,
                     state: AxisState::Off,
                     node_fault: None,
+                    scaled: false,
+                    action: DriveAction::None,
                 })
             })
             .collect::<Result<_, ChannelError>>()?;
@@ -215,11 +237,10 @@ impl DeviceChannel {
             {
                 let number = u8::try_from(member.axis).unwrap_or(u8::MAX);
                 notice(Notice::AxisState { axis: number, from: member.state, to: state });
-                if member.state == AxisState::Initializing && state != AxisState::MajorFaulted {
+                // Also when a fault stands and the axis goes on to Major Faulted at once.
+                if member.state == AxisState::Initializing && self.device.connection().is_some() {
                     let device = &self.device;
-                    let scaling =
-                        member.take_scaling(mapping, axis, |id| number_of(device.attribute(place, id)));
-                    if let Err(error) = scaling {
+                    if let Err(error) = member.take_scaling(mapping, axis, |id| device.attribute(place, id)) {
                         axis.refuse_configuration(now, system);
                         notice(Notice::Scaling { axis: number, error });
                     }
@@ -231,6 +252,20 @@ impl DeviceChannel {
                 axis.keep_update_period(DurationNs::from_micros(period), TargetUpdate::Interpolate);
             }
             if let Some(image) = self.device.command(place, now) {
+                let enabled = image.action == DriveAction::Enable && member.action != DriveAction::Enable;
+                member.action = image.action;
+                if enabled && member.scaled {
+                    // Scaling attributes may have been set since the configuration was complete.
+                    let device = &self.device;
+                    if let Err(error) = member.take_scaling(mapping, axis, |id| device.attribute(place, id)) {
+                        axis.refuse_configuration(now, system);
+                        let number = u8::try_from(member.axis).unwrap_or(u8::MAX);
+                        notice(Notice::Scaling { axis: number, error });
+                    }
+                }
+                let mut inhibits = Inhibits::empty();
+                inhibits.set(Inhibits::CONFIGURATION_INCOMPLETE, !member.scaled);
+                axis.set_inhibits(now, system, inhibits);
                 axis.from_controller(now, system, &image);
             }
         }
@@ -253,7 +288,11 @@ impl DeviceChannel {
                 // Refused only for an attribute that the device does not have.
                 let _ = self.device.put_attribute(place, id, &bytes[..width(entry.data_type)]);
             }
-            member.use_scaling(mapping, &mut axes[member.axis], member.configured);
+            let axis = &mut axes[member.axis];
+            axis.connection_opened();
+            // Counts from the end of the configuration on; refused while the axis still stops, and then taken again.
+            let _ = member.use_scaling(mapping, axis, member.configured);
+            member.scaled = false;
         }
     }
 
@@ -411,28 +450,40 @@ impl DeviceChannel {
 
 impl Member {
     /// The controller has finished its configuration: its scaling counts from now on.
-    fn take_scaling(
+    fn take_scaling<'d>(
         &mut self,
         mapping: &Mapping,
         axis: &mut AxisChannel,
-        get: impl Fn(u16) -> i64,
-    ) -> Result<(), mapping::CipScalingError> {
-        let scaling = CipScaling::from_attributes(&mapping.cip, get)?;
-        self.use_scaling(mapping, axis, scaling);
+        get: impl Fn(u16) -> Result<&'d [u8], GeneralStatus>,
+    ) -> Result<(), ScalingRefusal> {
+        self.scaled = false;
+        let number = |id| {
+            let signed = self.attributes.get(id).is_some_and(|entry| is_signed(entry.data_type));
+            number_of(get(id), signed)
+        };
+        let scaling = CipScaling::from_attributes(&mapping.cip, number)?;
+        self.use_scaling(mapping, axis, scaling)?;
+        self.scaled = true;
         Ok(())
     }
 
-    fn use_scaling(&mut self, mapping: &Mapping, axis: &mut AxisChannel, scaling: CipScaling) {
+    fn use_scaling(
+        &mut self,
+        mapping: &Mapping,
+        axis: &mut AxisChannel,
+        scaling: CipScaling,
+    ) -> Result<(), ScalingRefusal> {
         if scaling == self.scaling {
-            return;
+            return Ok(());
         }
-        if let Some(program) = mapping.cip_program(&scaling)
-            && let Some(attributes) = mapping.attribute_table(&scaling)
-            && axis.set_north(program)
-        {
-            self.attributes = attributes;
-            self.scaling = scaling;
+        let program = mapping.cip_program(&scaling).ok_or(ScalingRefusal::Inexact)?;
+        let attributes = mapping.attribute_table(&scaling).ok_or(ScalingRefusal::Inexact)?;
+        if !axis.set_north(program) {
+            return Err(ScalingRefusal::Energized);
         }
+        self.attributes = attributes;
+        self.scaling = scaling;
+        Ok(())
     }
 }
 
@@ -519,10 +570,16 @@ fn width(cip: CipType) -> usize {
     }
 }
 
-/// An attribute's bytes as an unsigned number; 0 where there is none.
-fn number_of(bytes: Result<&[u8], GeneralStatus>) -> i64 {
+/// Whether an integer type has a sign.
+fn is_signed(cip: CipType) -> bool {
+    matches!(cip, CipType::Sint | CipType::Int | CipType::Dint | CipType::Lint)
+}
+
+/// An attribute's bytes as a number; 0 where there is none.
+fn number_of(bytes: Result<&[u8], GeneralStatus>, signed: bool) -> i64 {
     let bytes = bytes.unwrap_or_default();
-    let mut wide = [0; 8];
+    let negative = signed && bytes.last().is_some_and(|last| last & 0x80 != 0);
+    let mut wide = [if negative { 0xFF } else { 0 }; 8];
     for (to, from) in wide.iter_mut().zip(bytes) {
         *to = *from;
     }

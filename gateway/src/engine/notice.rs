@@ -88,7 +88,7 @@ pub enum Notice {
         /// The axis.
         axis: u8,
         /// Why.
-        error: crate::mapping::CipScalingError,
+        error: super::device::ScalingRefusal,
     },
 }
 

@@ -213,7 +213,9 @@ impl CipTrackers {
 
     /// Sets the unrolled count: after the controller has redefined its position.
     pub fn set_counts(&mut self, counts: i64) {
-        self.position.set_total(counts);
+        // The first value after a restart is taken as it is.
+        self.position.restart();
+        self.position.update(counts);
     }
 }
 
