@@ -12,7 +12,9 @@ pub mod motion;
 pub mod network;
 pub mod ports;
 
+use std::cell::Cell;
 use std::net::{Ipv4Addr, SocketAddrV4};
+use std::rc::Rc;
 
 use axisbridge::config::Config;
 use axisbridge::engine::Engine;
@@ -126,12 +128,15 @@ pub struct Rig {
     pub tamper_command: Option<Tamper>,
     /// What happens to frames on their way back from the line.
     pub tamper_frame: Option<Tamper>,
+    /// Whether there is a cable between the box and the line.
+    pub cable: bool,
     /// Whether the stream of the controller still carries bytes.
     pub stream_works: bool,
     mapping: Mapping,
     config: Config,
     seed: u64,
     now: MonotonicTime,
+    clock: Rc<Cell<MonotonicTime>>,
     engine_due: MonotonicTime,
     link: AdapterEnd,
     notice_queue: rtrb::Consumer<Notice>,
@@ -164,11 +169,13 @@ impl Rig {
             knobs: settings.knobs,
             tamper_command: None,
             tamper_frame: None,
+            cable: true,
             stream_works: true,
             mapping: mapping(),
             config,
             seed: settings.seed,
             now: START,
+            clock: Rc::new(Cell::new(START)),
             engine_due: START,
             link,
             notice_queue,
@@ -197,6 +204,12 @@ impl Rig {
         self.now
     }
 
+    /// The instant that has been reached, for those that look on from a closure.
+    #[must_use]
+    pub fn clock(&self) -> Rc<Cell<MonotonicTime>> {
+        Rc::clone(&self.clock)
+    }
+
     /// System time, the same for controller and box.
     #[must_use]
     pub fn system(&self) -> SystemTime {
@@ -215,6 +228,7 @@ impl Rig {
         let due = [Some(self.engine_due), controller, self.actuals.wake_at()];
         let next = due.into_iter().flatten().min().unwrap_or(self.engine_due);
         self.now = next.clamp(self.now, self.now + STEP_MAX);
+        self.clock.set(self.now);
         self.deliver();
         if self.now >= self.engine_due {
             self.cycle();
@@ -481,7 +495,7 @@ impl Rig {
     fn after_cycle(&mut self) {
         self.line.handle_time(self.now);
         while let Some(mut frame) = self.south.outbound.pop_front() {
-            let back = self.line.handle_frame(self.now, frame.as_mut_slice());
+            let back = self.cable && self.line.handle_frame(self.now, frame.as_mut_slice());
             let kept = self.tamper_frame.as_mut().is_none_or(|tamper| tamper(&mut frame));
             if back && kept {
                 self.south.inbound.push_back(frame);
