@@ -1,0 +1,163 @@
+//! One axis through both programs, as the cycle does it: values of CIP Motion to the bytes of the drive's connection
+//! and back.
+
+use std::f64::consts::TAU;
+use std::hint::black_box;
+
+use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, SercosProgram};
+use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
+use criterion::Criterion;
+use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_generic::image::{AxisCommand, AxisFeedback};
+use profile_generic::interpolation::{
+    FineInterpolator, InterpolatorConfig, Quality, SetPoints, TargetUpdate,
+};
+use profile_generic::mode::OperatingMode;
+use profile_generic::program::{ConversionReport, Trackers};
+use profile_generic::state::Action;
+use profile_generic::time::{DurationNs, SystemTime};
+
+/// Bytes set aside for the values of a connection.
+const TELEGRAM_MAX: usize = 64;
+/// Updates of one swing to and fro: four seconds.
+const SWING: u16 = 1_000;
+/// How far it goes to either side, in counts: one revolution.
+const AMPLITUDE: f64 = 1_000_000.0;
+/// Actual Data Set: position, velocity, acceleration.
+const WANTED: u8 = 0b111;
+/// Cycle of the bus; an update lasts two of them.
+const CYCLE: DurationNs = DurationNs::from_millis(2);
+
+/// One axis with what the cycle keeps for it.
+pub struct Axis {
+    north: CipProgram,
+    trackers: CipTrackers,
+    south: SercosProgram,
+    south_trackers: Trackers,
+    interpolator: FineInterpolator,
+    period: DurationNs,
+    command: AxisCommand,
+    feedback: AxisFeedback,
+    telegram: [u8; TELEGRAM_MAX],
+    control_word: u16,
+    saturated: u32,
+    target: SystemTime,
+    swing: Vec<CommandValues>,
+    next: usize,
+}
+
+impl Axis {
+    /// The turntable of the rig, with the programs that were compiled for it.
+    #[must_use]
+    pub fn turntable() -> Self {
+        let rig = Rig::ready(Settings::default());
+        let axis = &rig.engine.axes()[0];
+        let (north, south) = (axis.north().clone(), axis.south().expect("it is commissioned").clone());
+        let period = DurationNs::from_micros(i64::from(UPDATE_PERIOD_US));
+        let config =
+            InterpolatorConfig { target_update: TargetUpdate::Interpolate, period, extrapolate_periods: 4 };
+        let mut interpolator = FineInterpolator::new(config).expect("a sound configuration");
+        interpolator.start(Some(axis.feedback().position));
+        let mut axis = Self {
+            trackers: north.trackers(),
+            north,
+            south_trackers: south.feedback.trackers(),
+            south,
+            interpolator,
+            period,
+            command: AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() },
+            feedback: *axis.feedback(),
+            telegram: [0; TELEGRAM_MAX],
+            control_word: 0,
+            saturated: 0,
+            target: rig.system(),
+            swing: (0..SWING).map(values).collect(),
+            next: 0,
+        };
+        // The first updates are a jump from rest.
+        for _ in 0..SWING {
+            axis.update();
+        }
+        axis.saturated = 0;
+        axis
+    }
+
+    /// The values of an update become the generic command.
+    pub fn decode(&mut self) {
+        let values = CyclicValues::from(black_box(&self.swing[self.next]));
+        let report = self.north.decode(&values, 0, &mut self.trackers, &mut self.command);
+        assert!(report.is_clean());
+    }
+
+    /// The generic command becomes bytes for the drive.
+    pub fn encode(&mut self) {
+        let mut report = ConversionReport::default();
+        self.control_word = self.south.encode(
+            black_box(&self.command),
+            Action::Enable,
+            self.control_word,
+            &mut self.telegram,
+            &mut report,
+        );
+        self.saturated += report.saturated;
+        black_box(&mut self.telegram);
+    }
+
+    /// One update and the two cycles of the bus that it lasts.
+    pub fn update(&mut self) {
+        self.next = (self.next + 1) % self.swing.len();
+        self.target = self.target + self.period;
+        self.decode();
+        self.interpolator.update(self.target, &SetPoints::from(&self.command)).expect("it is newer");
+        for cycle in [0, 1] {
+            let now = self.target - self.period * 2 + CYCLE * cycle;
+            let fine = self.interpolator.at(now);
+            assert_ne!(fine.quality, Quality::Lost);
+            let points = fine.set_points;
+            let all = SetPoints {
+                velocity: Some(points.velocity.unwrap_or_default()),
+                acceleration: Some(points.acceleration.unwrap_or_default()),
+                torque: Some(points.torque.unwrap_or_default()),
+                ..points
+            };
+            all.write_to(&mut self.command);
+            self.encode();
+        }
+    }
+
+    /// Bytes of the drive become the generic feedback, and that the values of an answer.
+    pub fn feedback(&mut self, telegram: &[u8]) -> CyclicValues {
+        let mut report = ConversionReport::default();
+        let word = self.south.decode(telegram, &mut self.feedback, &mut self.south_trackers, &mut report);
+        assert!(word.is_some());
+        let mut values = CyclicValues::default();
+        self.north.encode(&self.feedback, WANTED, &mut values);
+        values
+    }
+}
+
+/// An update of the swing.
+fn values(number: u16) -> CommandValues {
+    let angle = TAU * f64::from(number) / f64::from(SWING);
+    CommandValues {
+        position: Some(CommandPosition::Float(AMPLITUDE * angle.sin())),
+        velocity: Some(1.5),
+        acceleration: Some(0.0),
+        ..CommandValues::default()
+    }
+}
+
+/// Benches of this module.
+pub fn bench(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("translation");
+    let mut axis = Axis::turntable();
+    group.bench_function("values_to_generic", |bencher| bencher.iter(|| axis.decode()));
+    group.bench_function("generic_to_mdt_bytes", |bencher| bencher.iter(|| axis.encode()));
+    group.bench_function("update_and_its_two_cycles", |bencher| bencher.iter(|| axis.update()));
+    assert_eq!(axis.saturated, 0, "nothing was clamped");
+    let telegram = [0; TELEGRAM_MAX];
+    group.bench_function("at_bytes_to_values", |bencher| {
+        bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
+    });
+    group.finish();
+}
