@@ -1,7 +1,9 @@
 //! tshark as an independent reader of our frames.
 //!
-//! Judged are values and byte offsets, never labels: some of its labels are known to be wrong (see
-//! `docs/compliance-notes.md`), and it names several fields of SERCOS III after an older revision.
+//! Judged are values and byte offsets, never labels: tshark 4.0 prints some labels of SERCOS III the wrong way round, and
+//! names several fields after an older revision. It raises one warning on good frames, "CP is unknown" on telegrams with
+//! the phase-switch bit, those of a foreign master included. It checks neither the SERCOS header CRC nor anything behind
+//! the hot-plug field in CP3 and CP4.
 
 use std::path::Path;
 use std::process::Command;
