@@ -53,6 +53,10 @@ impl Frame {
     }
 }
 
+/// openSAFETY has no mark in a frame: its dissector guesses, now and then in the payload of a SERCOS telegram, and then
+/// calls it malformed. None of our frames carry it.
+const NO_GUESSING: [&str; 2] = ["--disable-protocol", "opensafety"];
+
 /// Dissects a capture file with the display `filter` and further `arguments`.
 ///
 /// # Panics
@@ -60,6 +64,7 @@ impl Frame {
 #[must_use]
 pub fn dissect(file: &Path, filter: &str, arguments: &[&str]) -> Vec<Frame> {
     let output = Command::new("tshark")
+        .args(NO_GUESSING)
         .args(["-n", "-T", "pdml", "-r"])
         .arg(file)
         .args(["-Y", filter])
@@ -85,6 +90,7 @@ pub fn dissect(file: &Path, filter: &str, arguments: &[&str]) -> Vec<Frame> {
 #[must_use]
 pub fn warnings(file: &Path) -> Vec<(usize, String)> {
     let output = Command::new("tshark")
+        .args(NO_GUESSING)
         .args(["-n", "-r"])
         .arg(file)
         .args(["-Y", "_ws.expert.severity >= \"Warning\" || _ws.malformed", "-T", "fields"])
