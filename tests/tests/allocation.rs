@@ -1,4 +1,5 @@
-//! The cycle of the box touches no heap once the bus is in CP4: weighed with a counting allocator, the engine alone.
+//! The cycle of the box touches no heap once the bus is in CP4: weighed with a counting allocator, the
+//! engine alone.
 
 use allocation_counter::measure;
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};

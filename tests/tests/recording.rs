@@ -68,7 +68,8 @@ fn every_frame_shows_its_telegram_its_phase_and_a_good_checksum() {
     let raw = raw();
     assert_eq!((printed.len(), raw.len()), (FRAMES, FRAMES));
     for (number, (text, bytes)) in (1..).zip(printed.iter().zip(&raw)) {
-        // Bit 6 of the type tells AT from MDT, its low bits number the telegram; bit 7 of the phase announces it.
+        // Bit 6 of the type tells AT from MDT, its low bits number the telegram; bit 7 of the phase
+        // announces it.
         let kind = if bytes[TYPE] & 0x40 == 0 { "MDT" } else { "AT" };
         let telegram = bytes[TYPE] & 0x0F;
         let announced = if bytes[PHASE] & 0x80 == 0 { "" } else { "switching to " };

@@ -5,7 +5,8 @@
 //!            --datagrams (Knobs)-->         (NorthQueue, SouthQueue)
 //! ```
 //!
-//! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a test that fails
+//! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a
+//! test that fails
 //! prints the seed.
 
 pub mod motion;
@@ -196,7 +197,7 @@ impl Rig {
         rig
     }
 
-    // ---- time --------------------------------------------------------------------------------------------------
+    // ---- time -----------------------------------------------------------------------------------
 
     /// The instant that has been reached.
     #[must_use]
@@ -268,7 +269,7 @@ impl Rig {
         self.now.since(start)
     }
 
-    // ---- the controller ----------------------------------------------------------------------------------------
+    // ---- the controller -------------------------------------------------------------------------
 
     /// The configuration of a controller for this box.
     #[must_use]
@@ -341,9 +342,10 @@ impl Rig {
         self.events.iter().map(|event| format!("{event}\n")).collect()
     }
 
-    // ---- the box -----------------------------------------------------------------------------------------------
+    // ---- the box --------------------------------------------------------------------------------
 
-    /// The box loses its power and starts again, as a process does that is restarted. Streams break; the drives stay
+    /// The box loses its power and starts again, as a process does that is restarted. Streams break; the
+    /// drives stay
     /// as they are.
     pub fn restart_box(&mut self) {
         self.drop_stream();
@@ -407,7 +409,8 @@ impl Rig {
         (self.commands.counts(), self.actuals.counts())
     }
 
-    /// Runs the engine's next cycle by itself and hands it to `around`, which has to call it: for whoever wants to
+    /// Runs the engine's next cycle by itself and hands it to `around`, which has to call it: for whoever
+    /// wants to
     /// weigh the cycle alone. Before it comes everything that is due until then.
     pub fn cycle_in<T>(&mut self, around: impl FnOnce(&mut dyn FnMut()) -> T) -> T {
         loop {
@@ -432,7 +435,7 @@ impl Rig {
         result
     }
 
-    // ---- the drives --------------------------------------------------------------------------------------------
+    // ---- the drives -----------------------------------------------------------------------------
 
     /// A drive, by its place in the line.
     pub fn drive(&self, place: usize) -> &Drive {
@@ -469,7 +472,7 @@ impl Rig {
         (0..self.line.slaves().len()).all(free)
     }
 
-    // ---- one step ----------------------------------------------------------------------------------------------
+    // ---- one step -------------------------------------------------------------------------------
 
     /// What the network brings now.
     fn deliver(&mut self) {
@@ -587,7 +590,7 @@ impl Rig {
         }
     }
 
-    // ---- streams of others -------------------------------------------------------------------------------------
+    // ---- streams of others ----------------------------------------------------------------------
 
     /// Opens a stream beside the controller's.
     pub fn open_stream(&mut self, from: SocketAddrV4) -> Option<SessionSlot> {

@@ -1,4 +1,5 @@
-//! A network for datagrams in virtual time: it delays, loses, doubles and overtakes them as its knobs say, the same way
+//! A network for datagrams in virtual time: it delays, loses, doubles and overtakes them as its knobs say,
+//! the same way
 //! each time for the same seed.
 
 use profile_generic::time::{DurationNs, MonotonicTime};

@@ -1,4 +1,5 @@
-//! The engine's ports as queues. They own fixed storage: what the engine does in a cycle can be weighed without them.
+//! The engine's ports as queues. They own fixed storage: what the engine does in a cycle can be weighed
+//! without them.
 
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;

@@ -14,7 +14,8 @@ use profile_cip::wire::message_router::{Reply, Request};
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 
 const MANAGER: &[u8] = &[0x20, 6, 0x24, 1];
-/// Class 0x42, configuration point 0x51, I/O point 2, configuration block of revision 1 that verifies the class ID.
+/// Class 0x42, configuration point 0x51, I/O point 2, configuration block of revision 1 that verifies the
+/// class ID.
 const PATH: &[u8] = &[0x20, 0x42, 0x2C, 0x51, 0x2C, 2, 0x80, 4, 1, 1, 0, 0, 0x0D, 0x0C, 0x0B, 0x0A];
 
 fn box_with_power_structure() -> Settings {

@@ -58,7 +58,8 @@ fn a_controller_that_vanishes_leaves_axes_that_stop_as_configured_and_stay_stopp
         writeln!(table, "{}: {off}, {rest}; {} nrev {} nmm", action.name(), way[0], way[1])
             .expect("a string takes everything");
 
-        // Silence goes on: the standard's faults are there, and nothing moves, not even where torque holds it.
+        // Silence goes on: the standard's faults are there, and nothing moves, not even where torque holds
+        // it.
         rig.run_for(millis(2_000));
         let moved = [0, 1].map(|place| (rig.position(place) - stands[place]).abs());
         assert!(moved[0] < NANO / 1_000 && moved[1] < NANO / 100, "{action:?}: {moved:?}");

@@ -154,7 +154,8 @@ fn commands_that_start_anew_after_each_revolution_lead_through_many_of_them_with
     let mut rig = Rig::ready(Settings { configuration, ..Settings::default() });
     let folded = Rc::new(Cell::new(0_u32));
     let counter = Rc::clone(&folded);
-    // The controller of the rig counts on; on the way its positions are folded into one revolution, as those of a
+    // The controller of the rig counts on; on the way its positions are folded into one revolution, as those
+    // of a
     // controller are that knows the unwind.
     rig.tamper_command = Some(Box::new(move |datagram| {
         if let Some(at) = command_position(datagram.as_slice()) {
