@@ -178,6 +178,8 @@ struct Segment {
     start: SystemTime,
     /// Above zero.
     length: DurationNs,
+    /// How long the curves count from the start on.
+    follow: DurationNs,
     position: Option<Polynomial>,
     velocity: Option<Polynomial>,
     acceleration: Option<Polynomial>,
@@ -251,7 +253,7 @@ impl FineInterpolator {
         if let Some(segment) = self.segments.last() {
             for missing in (1..periods).rev() {
                 let at = self.limit_time(segment, target - length * missing);
-                channels.0.fill(segment.position.map(|curve| segment.value(&curve, at)));
+                channels.0.fill(segment.position.map(|curve| segment.motion(&curve, at).0));
                 channels.1.fill(segment.velocity.map(|curve| segment.value(&curve, at)));
                 channels.2.fill(segment.acceleration.map(|curve| segment.value(&curve, at)));
                 channels.3.fill(segment.torque.map(|curve| segment.value(&curve, at)));
@@ -261,6 +263,7 @@ impl FineInterpolator {
         let segment = Segment {
             start: target - length,
             length,
+            follow: length + self.config.period * i64::from(self.config.target_update.usual_overrun()),
             position: channels.0.push(set_points.position.map(Position::get), immediate)?,
             velocity: channels.1.push(set_points.velocity.map(Velocity::get), immediate)?,
             acceleration: channels.2.push(set_points.acceleration.map(Acceleration::get), immediate)?,
@@ -345,13 +348,17 @@ impl FineInterpolator {
 
 impl Segment {
     fn at(&self, now: SystemTime) -> SetPoints {
-        let velocity = match (self.velocity, self.position) {
-            (Some(curve), _) => Some(Velocity(self.value(&curve, now))),
-            (None, Some(curve)) => Some(Velocity(curve.slope_per_second(now.since(self.start), self.length))),
+        let beyond = now.since(self.start) > self.follow;
+        let motion = self.position.map(|curve| self.motion(&curve, now));
+        let velocity = match (self.velocity, motion) {
+            // Beyond its curve a position goes its own way, and its velocity with it.
+            (Some(curve), None) => Some(Velocity(self.value(&curve, now))),
+            (Some(curve), Some(_)) if !beyond => Some(Velocity(self.value(&curve, now))),
+            (_, Some((_, velocity))) => Some(Velocity(velocity)),
             (None, None) => None,
         };
         SetPoints {
-            position: self.position.map(|curve| Position(self.value(&curve, now))),
+            position: motion.map(|(position, _)| Position(position)),
             velocity,
             acceleration: self.acceleration.map(|curve| Acceleration(self.value(&curve, now))),
             torque: self.torque.map(|curve| Torque(self.value(&curve, now))),
@@ -369,8 +376,39 @@ impl Segment {
         }
     }
 
+    /// How far along its curve the segment is at `at`. A curve is followed to its end and through the overrun that the
+    /// target update brings with it, no further: beyond, a polynomial of third order soon leads anywhere.
+    fn on_curve(&self, at: SystemTime) -> DurationNs {
+        at.since(self.start).min(self.follow)
+    }
+
+    /// A value that stays what it was where the curve ends.
     fn value(&self, curve: &Polynomial, at: SystemTime) -> i64 {
-        curve.value(at.since(self.start), self.length)
+        curve.value(self.on_curve(at), self.length)
+    }
+
+    /// Position and velocity. Where the curve ends the position goes on with the velocity it had; if it was slowing down
+    /// it goes on slowing down, until it stands. It never gets faster on its own.
+    fn motion(&self, curve: &Polynomial, at: SystemTime) -> (i64, i64) {
+        const SECOND: i128 = 1_000_000_000;
+        let on_curve = self.on_curve(at);
+        let position = curve.value(on_curve, self.length);
+        let velocity = curve.slope_per_second(on_curve, self.length);
+        let beyond = i128::from(at.since(self.start).0.saturating_sub(on_curve.0).max(0));
+        if beyond == 0 {
+            return (position, velocity);
+        }
+        let (speed, change) =
+            (i128::from(velocity), i128::from(curve.bend_per_second(on_curve, self.length)));
+        let slows = speed.signum() * change.signum() < 0;
+        let change = if slows { change } else { 0 };
+        let time = if slows { beyond.min(speed.abs() * SECOND / change.abs()) } else { beyond };
+        let gained = change * time / SECOND;
+        let way = (2 * speed + gained) * time / (2 * SECOND);
+        let way = i64::try_from(way).unwrap_or(if way > 0 { i64::MAX } else { i64::MIN });
+        let velocity =
+            if slows && time < beyond { 0 } else { i64::try_from(speed + gained).unwrap_or(velocity) };
+        (position.saturating_add(way), velocity)
     }
 }
 

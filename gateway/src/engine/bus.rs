@@ -70,6 +70,8 @@ pub enum Purpose {
 struct Drive {
     address: u16,
     needs: SercosAxis,
+    /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
+    allowed_losses: u16,
     slave: Option<SlaveId>,
     stage: Stage,
     facts: DriveFacts,
@@ -111,11 +113,13 @@ impl SercosBus {
     /// # Errors
     /// What the master finds wrong with its configuration.
     pub fn new(config: MasterConfig, drives: Vec<(u16, SercosAxis)>) -> Result<Self, ConfigError> {
+        let allowed_losses = config.mst_losses;
         let mut master = Master::new(config)?;
         master.set_target_phase(Phase::CP4);
         let drive = |(address, needs)| Drive {
             address,
             needs,
+            allowed_losses,
             slave: None,
             stage: Stage::Absent,
             facts: DriveFacts::new(),
@@ -485,7 +489,7 @@ impl Drive {
                 notice(Notice::Program { axis: index(axis), error });
                 return false;
             };
-            connections.push(connection);
+            connections.push(ConnectionConfig { allowed_losses: self.allowed_losses, ..connection });
         }
         master.set_connections(slave, connections).is_ok()
     }

@@ -56,6 +56,18 @@ impl Polynomial {
         let per_second = per_segment.saturating_mul(1_000_000_000);
         saturate(rounded(per_second, (6 * i128::from(length.0)) << VALUE_PLACES))
     }
+
+    /// The second derivative after `elapsed`, per second squared.
+    pub(super) fn bend_per_second(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
+        let part = part(elapsed, length);
+        let per_segment = times((6 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
+        // In two steps, each of which stays below 2^120: the value is below 2^70, a second below 2^30 nanoseconds.
+        let per_second = rounded(per_segment.saturating_mul(1_000_000_000), i128::from(length.0));
+        saturate(rounded(
+            per_second.saturating_mul(1_000_000_000),
+            (6 * i128::from(length.0)) << VALUE_PLACES,
+        ))
+    }
 }
 
 /// The part of the segment that has passed, with [`TIME_PLACES`] places.

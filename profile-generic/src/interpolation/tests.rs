@@ -181,6 +181,23 @@ fn a_loss_is_ridden_through_and_then_held() {
 }
 
 #[test]
+fn without_updates_an_axis_never_gets_faster_and_goes_on_slowing_down() {
+    // Speeding up by 1000 more each period, then silence: it goes on as fast as it was, no faster.
+    let mut rising = fed(&[0, 1_000, 3_000, 6_000, 10_000, 15_000]);
+    let end = position_at(&mut rising, time(6, 0));
+    let fastest = position_at(&mut rising, time(7, 0)) - end;
+    assert!((5_000..6_000).contains(&fastest), "{fastest}");
+    assert_eq!(position_at(&mut rising, time(8, 0)) - end, 2 * fastest);
+    // Slowing down by 1000 less each period: it stands where that leads, and does not turn back.
+    let mut falling = fed(&[0, 5_000, 9_000, 12_000, 14_000]);
+    let rest = position_at(&mut falling, time(6, 800));
+    assert!((15_000..=15_200).contains(&rest), "{rest}");
+    assert_eq!(position_at(&mut falling, time(7, 0)), rest);
+    let standing = falling.at(time(7, 0));
+    assert_eq!(standing.set_points.velocity, Some(Velocity(0)));
+}
+
+#[test]
 fn velocity_and_torque_go_to_zero_after_a_loss() {
     let mut interpolator = interpolator(TargetUpdate::Interpolate, 0);
     interpolator.start(None);
