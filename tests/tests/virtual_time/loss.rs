@@ -142,7 +142,8 @@ fn a_slave_that_vanishes_faults_its_axis_and_only_its_axis() {
     let mut rig = in_motion(Settings::default());
     rig.line.cut_behind(1);
     let found = rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[1].fault().is_some());
-    assert!(found <= millis(10), "{found}");
+    // Five losses in a row are allowed, in cycles of 2 ms.
+    assert!(found <= millis(14), "{found}");
     let fault = rig.engine.axes()[1].fault().expect("a fault");
     assert_eq!(fault.cause, FaultCause::SOUTH_SILENCE);
     assert_eq!(rig.engine.axes()[0].fault(), None);
@@ -169,6 +170,8 @@ fn a_line_that_comes_back_as_a_whole_is_brought_up_again_and_needs_a_reset() {
     rig.cable = false;
     let rest = rig.run_until(millis(1_000), "rest", at_rest);
     assert!(rest < millis(150), "the drives stop by themselves: {rest}");
+    // They may have come to rest before the box has missed more than it is allowed to.
+    rig.run_for(millis(14));
     for axis in rig.engine.axes() {
         assert_eq!(axis.fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
     }
@@ -196,6 +199,8 @@ fn a_box_that_restarts_moves_nothing_until_it_is_asked_to() {
     rig.restart_box();
     let rest = rig.run_until(millis(1_000), "rest", at_rest);
     assert!(rest < millis(150), "the drives stop by themselves: {rest}");
+    // They may have come to rest before the box has missed more than it is allowed to.
+    rig.run_for(millis(14));
     let stands = where_it_stands(&rig);
     let report = rig.run(millis(20_000));
     let Some(Failure::ConnectionTimedOut { .. }) = report.failure else { panic!("{:?}", report.failure) };
