@@ -238,6 +238,14 @@ impl AxisChannel {
         self.south = None;
     }
 
+    /// The bus is taken down while the axis is without torque: the drive is not ready, and nothing is wrong.
+    pub fn leave_south(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.feedback.fresh = false;
+        self.feedback.present = FeedbackSet::empty();
+        self.report(now, system, Report::NotReady);
+        self.south = None;
+    }
+
     /// Fine interpolation for a connection with this update period, in the way the last update asked for.
     pub fn keep_update_period(&mut self, period: DurationNs, first: TargetUpdate) {
         let present = self.interpolator.as_ref().map(FineInterpolator::config);

@@ -25,6 +25,13 @@ pub const COMMAND_CONNECTION: u8 = 0;
 /// The connection in the AT.
 pub const FEEDBACK_CONNECTION: u8 = 1;
 
+/// Pause before the bus is brought up anew for a lost drive while nobody uses the others; it doubles with every vain
+/// attempt.
+const RESCAN_PAUSE: DurationNs = DurationNs::from_secs(10);
+
+/// Longest such pause.
+const RESCAN_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
+
 /// Pause before a failed phase-up is tried again.
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
@@ -105,6 +112,11 @@ pub struct SercosBus {
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
     /// A slave that was lost is back: the bus is brought up anew once no axis has torque.
     returned: bool,
+    /// Since when a drive is lost that was there.
+    lost_since: Option<MonotonicTime>,
+    rescan_pause: DurationNs,
+    /// The bus goes down because the box wants it to: that is no fault of any axis.
+    planned: bool,
 }
 
 impl SercosBus {
@@ -134,6 +146,9 @@ impl SercosBus {
             cycles_seen: 0,
             refused: ArrayVec::new(),
             returned: false,
+            lost_since: None,
+            rescan_pause: RESCAN_PAUSE,
+            planned: false,
         })
     }
 
@@ -199,12 +214,13 @@ impl SercosBus {
         }
     }
 
-    /// Handles the master's events and drives the commissioning on. `answer` gets what accesses came to, `notice` what
+    /// Handles the master's events and drives the commissioning on. `idle` says that no controller is connected. `answer` gets what accesses came to, `notice` what
     /// people should know.
     pub fn run(
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
+        idle: bool,
         mapping: &Mapping,
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
@@ -223,9 +239,17 @@ impl SercosBus {
         self.diagnose(axes);
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
-        let again = self.returned && !axes.iter().any(AxisChannel::may_have_torque);
-        if alone || again {
+        let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
+        let rescan = idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
+        if alone || (free && (self.returned || rescan)) {
             self.returned = false;
+            self.lost_since = None;
+            self.planned = true;
+            self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
+            for slave in self.drives.iter().filter_map(|drive| drive.slave) {
+                self.master.withdraw(slave, COMMAND_CONNECTION);
+            }
+            self.lose_all(now, system, axes);
             self.master.set_target_phase(Phase::CP0);
         }
         for (drive, axis) in self.drives.iter().zip(axes.iter()) {
@@ -275,7 +299,17 @@ impl SercosBus {
                     }
                 }
             }
+            Event::Phase(phase) if *phase == Phase::CP4 => {
+                self.planned = false;
+                if self.drives.iter().all(|drive| drive.slave.is_some()) {
+                    self.rescan_pause = RESCAN_PAUSE;
+                } else if self.rescan_pause > RESCAN_PAUSE {
+                    // It was there once and is missing after a new scan: looked for again, ever more rarely.
+                    self.lost_since = Some(now);
+                }
+            }
             Event::SlaveLost { slave, .. } => {
+                self.lost_since.get_or_insert(now);
                 for (drive, axis) in self.drives.iter_mut().zip(axes) {
                     if drive.slave == Some(*slave) {
                         drive.lose();
@@ -316,7 +350,11 @@ impl SercosBus {
     fn lose_all(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
         for (drive, axis) in self.drives.iter_mut().zip(axes) {
             drive.lose();
-            axis.lose_south(now, system);
+            if self.planned {
+                axis.leave_south(now, system);
+            } else {
+                axis.lose_south(now, system);
+            }
         }
     }
 

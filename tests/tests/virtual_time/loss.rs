@@ -230,3 +230,22 @@ fn a_box_that_ends_leaves_drives_without_torque_and_a_silent_bus() {
         assert_eq!(rig.watched.iter().map(|drive| drive.on).collect::<Vec<_>>(), [false, false]);
     }
 }
+
+#[test]
+fn a_single_lost_drive_is_taken_back_once_nobody_uses_the_others() {
+    let mut rig = in_motion(Settings::default());
+    rig.line.cut_behind(1);
+    rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[1].fault().is_some());
+    rig.line.cut_behind(usize::MAX);
+    // The controller stops and disables the axis that it still has, and closes the connection.
+    rig.run_until(millis(30_000), "the end of the connection", |rig| rig.status().connections == 0);
+    assert_eq!(rig.status().phase, 4, "the bus stays up for the axis that is in use");
+    assert!(rig.engine.axes()[1].south().is_none(), "the drive does not come back by itself");
+    rig.run_until(millis(30_000), "the drive", |rig| {
+        rig.status().phase == 4 && rig.engine.axes()[1].south().is_some()
+    });
+    rig.run_for(millis(500));
+    // Taking the bus down was the box's own wish: the axis that was well is well.
+    assert_eq!(rig.engine.axes()[0].fault(), None);
+    assert!(rig.torque_free());
+}
