@@ -115,6 +115,8 @@ pub struct SercosBus {
     /// Since when a drive is lost that was there.
     lost_since: Option<MonotonicTime>,
     rescan_pause: DurationNs,
+    /// No controller is connected.
+    idle: bool,
     /// The bus goes down because the box wants it to: that is no fault of any axis.
     planned: bool,
 }
@@ -148,6 +150,7 @@ impl SercosBus {
             returned: false,
             lost_since: None,
             rescan_pause: RESCAN_PAUSE,
+            idle: true,
             planned: false,
         })
     }
@@ -161,6 +164,11 @@ impl SercosBus {
     /// The master, for its frames.
     pub fn master_mut(&mut self) -> &mut Master {
         &mut self.master
+    }
+
+    /// Tells whether no controller is connected: only then a bus that works may be taken down for a drive that does not.
+    pub fn set_idle(&mut self, idle: bool) {
+        self.idle = idle;
     }
 
     /// Ends the telegrams by way of CP0.
@@ -214,13 +222,12 @@ impl SercosBus {
         }
     }
 
-    /// Handles the master's events and drives the commissioning on. `idle` says that no controller is connected. `answer` gets what accesses came to, `notice` what
+    /// Handles the master's events and drives the commissioning on. `answer` gets what accesses came to, `notice` what
     /// people should know.
     pub fn run(
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
-        idle: bool,
         mapping: &Mapping,
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
@@ -240,7 +247,7 @@ impl SercosBus {
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
         let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
+        let rescan = self.idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
         if alone || (free && (self.returned || rescan)) {
             self.returned = false;
             self.lost_since = None;

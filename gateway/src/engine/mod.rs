@@ -223,11 +223,10 @@ impl Engine {
 
     fn run_bus(&mut self, now: MonotonicTime, system: SystemTime) {
         let Self { mapping, bus, devices, axes, notices, .. } = self;
-        let idle = devices.iter().all(|channel| channel.device().connection().is_none());
+        bus.set_idle(devices.iter().all(|channel| channel.device().connection().is_none()));
         bus.run(
             now,
             system,
-            idle,
             mapping,
             axes,
             &mut |axes, answer| match answer.purpose {
