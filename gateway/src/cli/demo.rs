@@ -65,7 +65,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let endpoints = endpoints(arguments.listen);
     let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
     let steps = program::standard(&plans, seconds);
-    let told: Vec<_> = steps.iter().map(ToString::to_string).collect();
+    let told = program::titles(&plans);
     let outcome = controller::run(endpoints, controller_config, steps, &stop, &mut |event| {
         use profile_cip::controller::Event;
         match event {

@@ -45,6 +45,24 @@ impl AxisPlan {
     }
 }
 
+/// What each step of [`standard`] does, in words.
+#[must_use]
+pub fn titles(plans: &[AxisPlan]) -> Vec<String> {
+    let each = |value: &dyn Fn(&AxisPlan) -> f64| {
+        plans.iter().map(|plan| format!("{:.3}", value(plan))).collect::<Vec<_>>().join(" and ")
+    };
+    vec![
+        "enable the axes, which hold their positions".to_owned(),
+        format!("S-curve moves to {}", each(&|plan| plan.first)),
+        "wait until the axes stand within their windows".to_owned(),
+        format!("velocity moves at {} per second, ended by controlled stops", each(&|plan| plan.velocity)),
+        format!("S-curve moves to the targets {}", each(&|plan| plan.target)),
+        "wait until the axes stand within their windows".to_owned(),
+        "rest".to_owned(),
+        "disable the axes".to_owned(),
+    ]
+}
+
 /// The steps for all axes together, taking about `seconds`.
 #[must_use]
 pub fn standard(plans: &[AxisPlan], seconds: f64) -> Vec<Step> {
@@ -92,6 +110,13 @@ pub fn standard(plans: &[AxisPlan], seconds: f64) -> Vec<Step> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_step_has_a_title() {
+        let plans = [AxisPlan::new(1, 2.0, 600.0, 0.01, 5.0), AxisPlan::new(2, 40.0, 700.0, 0.01, 5.0)];
+        assert_eq!(titles(&plans).len(), standard(&plans, 5.0).len());
+        assert_eq!(titles(&plans)[1], "S-curve moves to 5.000 and 100.000");
+    }
 
     #[test]
     fn a_plan_stays_within_its_reach_for_any_time() {
