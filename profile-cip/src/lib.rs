@@ -11,6 +11,8 @@
 //! Names are the terms of the CIP documents. Multi-byte values are little-endian on the wire unless a
 //! layout table says otherwise.
 
+#![forbid(unsafe_code)]
+
 pub mod controller;
 pub mod target;
 pub mod wire;

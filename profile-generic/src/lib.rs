@@ -43,6 +43,8 @@
 //! Every quantity is an integer in a fixed unit, every conversion a ratio of integers, rounded once and in a
 //! stated way; what does not fit is clamped and reported. Floating point and integers meet in [`cast`] only.
 
+#![forbid(unsafe_code)]
+
 pub mod capture;
 pub mod cast;
 pub mod code;

@@ -11,6 +11,8 @@
 //! the first byte behind the six-byte SERCOS header (frame byte 20) as the parameters S-0-1009, S-0-1011,
 //! S-0-1013, S-0-1014 and S-0-1050.x.3 do.
 
+#![forbid(unsafe_code)]
+
 pub mod master;
 pub mod slave;
 pub mod wire;

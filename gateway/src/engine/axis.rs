@@ -12,7 +12,7 @@ use profile_cip::target::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveImage, SetPoints, Withheld,
 };
 use profile_generic::fault::{Fault, FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
+use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::{
     FineInterpolator, InterpolatorConfig, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError,
@@ -232,17 +232,18 @@ impl AxisChannel {
 
     /// The drive is gone: until it is commissioned again there is nobody to speak to.
     pub fn lose_south(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.feedback.fresh = false;
-        self.feedback.present = FeedbackSet::empty();
-        self.report(now, system, Report::Silent);
-        self.south = None;
+        self.end_south(now, system, Report::Silent);
     }
 
     /// The bus is taken down while the axis is without torque: the drive is not ready, and nothing is wrong.
     pub fn leave_south(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.end_south(now, system, Report::NotReady);
+    }
+
+    fn end_south(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.fresh = false;
         self.feedback.present = FeedbackSet::empty();
-        self.report(now, system, Report::NotReady);
+        self.report(now, system, report);
         self.south = None;
     }
 
@@ -280,14 +281,12 @@ impl AxisChannel {
             .filter(|consumer| matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning));
         let Some(consumer) = consumer else {
             // Not connected yet, or more losses in a row than the connection bears.
-            self.feedback.fresh = false;
-            self.feedback.age_cycles = self.feedback.age_cycles.saturating_add(1);
+            self.age_feedback();
             self.report(now, system, Report::Silent);
             return;
         };
         if !consumer.fresh {
-            self.feedback.fresh = false;
-            self.feedback.age_cycles = self.feedback.age_cycles.saturating_add(1);
+            self.age_feedback();
             self.counters.lost_telegrams = self.counters.lost_telegrams.saturating_add(1);
             self.tick(now, system);
             return;
@@ -303,6 +302,11 @@ impl AxisChannel {
         let report = self.feedback.report;
         self.report(now, system, report);
         self.watch(now, system);
+    }
+
+    fn age_feedback(&mut self) {
+        self.feedback.fresh = false;
+        self.feedback.age_cycles = self.feedback.age_cycles.saturating_add(1);
     }
 
     fn report(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
@@ -783,12 +787,6 @@ impl AxisChannel {
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         self.fault
-    }
-
-    /// Status bits with those that the state machine owns.
-    #[must_use]
-    pub fn status(&self) -> StatusBits {
-        self.feedback.status
     }
 }
 

@@ -317,12 +317,7 @@ impl SercosBus {
             }
             Event::SlaveLost { slave, .. } => {
                 self.lost_since.get_or_insert(now);
-                for (drive, axis) in self.drives.iter_mut().zip(axes) {
-                    if drive.slave == Some(*slave) {
-                        drive.lose();
-                        axis.lose_south(now, system);
-                    }
-                }
+                self.lose_slave(now, system, *slave, axes);
             }
             // The master waits again for its application: the others go on without the slave that stands in the way.
             Event::StepFailed { slave, .. }
@@ -332,12 +327,7 @@ impl SercosBus {
                 // Left out when the master waits for its application again, which may be only after others are done.
                 let _ = self.refused.try_push(*slave);
                 self.exclude_refused();
-                for (drive, axis) in self.drives.iter_mut().zip(axes) {
-                    if drive.slave == Some(*slave) {
-                        drive.lose();
-                        axis.lose_south(now, system);
-                    }
-                }
+                self.lose_slave(now, system, *slave, axes);
             }
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
@@ -351,6 +341,21 @@ impl SercosBus {
         for slave in &self.refused {
             // Refused while the master does not wait for its application; it is tried again when it does.
             let _ = self.master.exclude(*slave);
+        }
+    }
+
+    fn lose_slave(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        slave: SlaveId,
+        axes: &mut [AxisChannel],
+    ) {
+        for (drive, axis) in self.drives.iter_mut().zip(axes) {
+            if drive.slave == Some(slave) {
+                drive.lose();
+                axis.lose_south(now, system);
+            }
         }
     }
 

@@ -98,7 +98,7 @@ impl Commissioning {
                 if data {
                     facts.note_data(outcome.idn, outcome.data.as_slice());
                 }
-                self.succeeded();
+                self.next_step();
             }
             Err(failure) => {
                 if failure.is_absent() {
@@ -129,10 +129,6 @@ impl Commissioning {
     fn next_step(&mut self) {
         self.at += 1;
         self.part = 0;
-    }
-
-    fn succeeded(&mut self) {
-        self.next_step();
     }
 
     fn failed(&mut self, idn: Idn, failure: SvcFailure) {

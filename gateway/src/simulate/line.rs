@@ -109,11 +109,6 @@ impl InProcessLine {
         let drives = config.sercos.drives.iter().enumerate();
         Self::new(line(drives.map(|(number, drive)| (drive.address, kind(number)))), tap)
     }
-
-    /// The drives, to raise faults and switches from outside.
-    pub fn line_mut(&mut self) -> &mut DriveLine {
-        &mut self.line
-    }
 }
 
 impl SouthPort for InProcessLine {
