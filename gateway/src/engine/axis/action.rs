@@ -1,0 +1,134 @@
+//! From the controller to the axis: actions and resets.
+
+use super::{AxisChannel, Loss, RESET_TIME_OUT, Reset, caused_by_controller};
+use profile_cip::target::drive_link::{AxisCommandImage, Command, DriveAction, Withheld};
+use profile_generic::state::{Action, DriveState, Report, Request};
+use profile_generic::time::{MonotonicTime, SystemTime};
+
+impl AxisChannel {
+    /// Takes what the motion device says about this axis; to be called in every cycle after [`Self::from_drive`].
+    pub fn from_controller(&mut self, now: MonotonicTime, system: SystemTime, image: &AxisCommandImage) {
+        // Before the action: a lost command stops the axis as its configuration says, whatever the device asks for then.
+        if let Command::Withheld(why) = image.command
+            && matches!(why, Withheld::Stale | Withheld::NotConnected | Withheld::NodeFault)
+        {
+            self.lose_command(now, system, Loss::Withheld(why));
+        }
+        if image.action_id != self.action_id {
+            self.action_id = image.action_id;
+            self.north_action = image.action;
+            self.enable_pending = false;
+            self.take_action(now, system, image.action);
+        }
+        if self.enable_pending && self.state() == DriveState::Ready {
+            // The enable came in the very cycle in which the drive was not ready; the controller still asks for it.
+            self.enable_pending = false;
+            self.take_action(now, system, DriveAction::Enable);
+        }
+        if image.reset_id != self.reset_id && self.reset.is_none_or(|reset| reset.id != image.reset_id) {
+            self.begin_reset(now, system, image.reset_id);
+        }
+        match image.command {
+            Command::Follow(set_points) => self.take_set_points(now, system, &set_points),
+            Command::Withheld(_) => self.sequence = None,
+        }
+    }
+
+    pub(super) fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
+        let drive_faulted = matches!(self.feedback.report, Report::Faulted | Report::FaultReaction);
+        if action == DriveAction::PowerUp
+            && std::mem::take(&mut self.new_connection)
+            && !drive_faulted
+            && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
+        {
+            // A new connection with a new configuration; nothing moves before the controller enables the axis anew.
+            self.reset = Some(Reset { id: self.reset_id, since: now, begun: false });
+            self.go_on_with_reset(now, system);
+        }
+        if !matches!(action, DriveAction::Enable | DriveAction::Abort) {
+            self.end_hold(now, system);
+        }
+        let request = match action {
+            // Without torque there is nothing to abort; the motion device keeps the fault.
+            DriveAction::Abort if !self.may_have_torque() => None,
+            // A connection that is gone asks for nothing, but nothing may go on moving either.
+            DriveAction::None if self.may_have_torque() => self.north.drive_request(DriveAction::Disable),
+            action => self.north.drive_request(action),
+        };
+        if let Some(request) = request {
+            self.request(now, system, request);
+        }
+    }
+
+    pub(super) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
+        let transition = self.drive.machine.request(request);
+        self.follow(now, system, transition);
+    }
+
+    /// Whether the drive stands with torque because the reaction to a fault is to hold the position.
+    pub(super) fn holds(&self) -> bool {
+        self.state() == DriveState::FaultReaction
+            && self.action == Action::Halt
+            && self.feedback.report == Report::Halted
+    }
+
+    /// Takes the torque away from an axis that holds its position; the fault stays.
+    pub(super) fn end_hold(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.holds() {
+            let transition = self.drive.machine.clear_faults();
+            self.follow(now, system, transition);
+            self.request(now, system, Request::FaultReset);
+        }
+    }
+
+    pub(super) fn clear_fault(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.fault = None;
+        self.cause_wanted = None;
+        let transition = self.drive.machine.clear_faults();
+        self.follow(now, system, transition);
+        self.request(now, system, Request::FaultReset);
+    }
+
+    pub(super) fn begin_reset(&mut self, now: MonotonicTime, system: SystemTime, id: u32) {
+        self.reset = Some(Reset { id, since: now, begun: false });
+        self.go_on_with_reset(now, system);
+    }
+
+    /// A stop under way is not interrupted: faults are reset once the axis is without torque.
+    pub(super) fn go_on_with_reset(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.reset.is_some() {
+            self.end_hold(now, system);
+        }
+        let Some(reset) = self.reset.as_mut() else { return };
+        let stops = matches!(self.drive.machine.state(), DriveState::FaultReaction | DriveState::Stopping);
+        if !reset.begun && !stops {
+            *reset = Reset { since: now, begun: true, ..*reset };
+            self.clear_fault(now, system);
+        }
+        let Some(reset) = self.reset.filter(|reset| reset.begun) else { return };
+        let late = now.since(reset.since) > RESET_TIME_OUT;
+        if self.state() != DriveState::Faulted || late {
+            if late {
+                self.drive.machine.abandon_reset();
+            }
+            self.reset = None;
+            self.reset_id = reset.id;
+        }
+    }
+
+    /// Whether the drive's own fault reset is to be executed, until [`Self::drive_reset_sent`].
+    #[must_use]
+    pub fn wants_drive_reset(&self) -> bool {
+        self.drive_reset_wanted
+    }
+
+    /// The drive's own fault reset is on its way.
+    pub fn drive_reset_sent(&mut self) {
+        self.drive_reset_wanted = false;
+    }
+
+    /// A controller has opened a connection: what the last one had caused may be forgotten once the axis is powered up.
+    pub fn connection_opened(&mut self) {
+        self.new_connection = true;
+    }
+}

@@ -1,0 +1,69 @@
+//! From the axis to the controller.
+
+use super::{AxisChannel, Loss};
+use crate::mapping::CipFault;
+use profile_cip::target::drive_link::DriveImage;
+use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::inhibit::Inhibits;
+use profile_generic::state::Report;
+use profile_generic::time::{MonotonicTime, SystemTime};
+
+impl AxisChannel {
+    /// What the motion device has to know of the drive.
+    #[must_use]
+    pub fn drive_image(&self) -> DriveImage {
+        let mut image = DriveImage {
+            online: self.south.is_some() && self.feedback.report != Report::Silent,
+            action_id: self.action_id,
+            reset_id: self.reset_id,
+            ..DriveImage::default()
+        };
+        // What the controller itself asked for is no fault of the drive; the motion device knows of it.
+        let mut feedback = self.feedback;
+        feedback.fault = self.fault.filter(|fault| fault.cause != FaultCause::CONTROLLER_ABORT);
+        // The controller is about to end it, or has a fault that says why it cannot be ended.
+        feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
+        self.north.drive_image(&feedback, &mut image);
+        if self.cause_wanted.is_some() {
+            // The stop ends with the fault that says why, once the drive has told it.
+            image.stop_complete = false;
+        }
+        image
+    }
+
+    /// The fault, where the controller knows it as one of the communications node: its code, and since when.
+    #[must_use]
+    pub fn node_fault(&self) -> Option<(u8, SystemTime)> {
+        let fault = self.fault?;
+        match self.north.fault(fault.cause) {
+            Some(CipFault::Node(code)) => Some((code, fault.at)),
+            _ => None,
+        }
+    }
+
+    /// The box ends: the axis stops as on a lost command, but holds nothing.
+    pub fn end(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.command_loss = self.command_loss.max(Reaction::DecelerateAndDisable);
+        self.lose_command(now, system, Loss::End);
+        self.end_hold(now, system);
+    }
+
+    /// Sets what keeps the axis from starting for reasons the box knows.
+    pub fn set_inhibits(&mut self, now: MonotonicTime, system: SystemTime, inhibits: Inhibits) {
+        if let Some(transition) = self.drive.machine.set_inhibits(inhibits) {
+            self.follow(now, system, transition);
+        }
+    }
+
+    /// Why the command was lost, when that is the fault.
+    #[must_use]
+    pub fn loss(&self) -> Option<Loss> {
+        self.loss.filter(|_| self.fault.is_some_and(|fault| fault.cause == FaultCause::COMMAND_LOST))
+    }
+
+    /// The fault that stands.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+}

@@ -1,0 +1,277 @@
+//! One axis between its two sides: what the controller wants goes in at the top, what the drive is told comes out at the
+//! bottom, and the same way back.
+//!
+//! ```text
+//! AxisCommandImage --CipProgram--> AxisCommand --BasicDrive, FineInterpolator--> AxisCommand --SercosProgram--> MDT
+//! DriveImage     <--CipProgram-- AxisFeedback <--BasicDrive------------------ AxisFeedback <--SercosProgram-- AT
+//! ```
+//!
+//! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
+
+mod action;
+mod feedback;
+mod image;
+mod set_point;
+
+use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
+use profile_cip::target::drive_link::{DriveAction, Withheld};
+use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
+use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
+use profile_generic::program::Trackers;
+use profile_generic::quantity::{Position, Velocity};
+use profile_generic::state::{Action, DriveState, Report};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+/// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
+pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
+
+/// How long a drive may take to come to rest before its torque is taken away.
+pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
+
+/// How long the drive may take to clear its faults after a reset.
+pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
+
+/// How long a fault of the drive waits for its cause to be read before it is reported without.
+const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
+
+/// Update periods that the interpolator goes on beyond its last target before it holds and the command counts as lost.
+/// The connection's own limit for missed updates, 4 by default (class attribute Controller Update Delay High Limit), is
+/// of the same order: whichever is reached first stops the axis.
+const EXTRAPOLATE_PERIODS: u32 = 4;
+
+/// What the box itself watches.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Limits {
+    /// Lowest position command.
+    pub position_min: Option<Position>,
+    /// Highest position command.
+    pub position_max: Option<Position>,
+    /// Highest speed of the drive, either direction, with a tenth to spare for its overshoot.
+    pub velocity: Option<Velocity>,
+    /// Largest distance of actual from commanded position.
+    pub following_error: Option<Position>,
+}
+
+/// What an axis has counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct AxisCounters {
+    /// Set-points taken from the controller.
+    pub commands: u64,
+    /// Cycles without a fresh value from the drive.
+    pub lost_telegrams: u32,
+    /// Values that were clamped in a conversion.
+    pub saturated: u32,
+    /// Faults.
+    pub faults: u32,
+}
+
+/// Why a command counts as lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Loss {
+    /// The motion device gives no set-points.
+    #[error("the motion connection gives no set-points: {0:?}")]
+    Withheld(Withheld),
+    /// No update came for longer than the interpolator can go on.
+    #[error("no update of the controller came in time")]
+    Silent,
+    /// The update does not fit those before it.
+    #[error("{0}")]
+    Update(#[from] UpdateError),
+    /// No update period is known.
+    #[error("no update period is known")]
+    NoPeriod,
+    /// The box ends.
+    #[error("the box ends")]
+    End,
+}
+
+/// A reset of faults under way.
+#[derive(Debug, Clone, Copy)]
+struct Reset {
+    id: u32,
+    /// Since it was asked for, then since it was begun.
+    since: MonotonicTime,
+    begun: bool,
+}
+
+/// One axis.
+#[derive(Debug)]
+pub struct AxisChannel {
+    north: CipProgram,
+    trackers: CipTrackers,
+    south: Option<(SercosProgram, Trackers)>,
+    limits: Limits,
+    command_loss: Reaction,
+    drive: BasicDriveClock,
+    interpolator: Option<FineInterpolator>,
+    command: AxisCommand,
+    feedback: AxisFeedback,
+    /// The action whose bits stand in the control word.
+    action: Action,
+    control_word: u16,
+    action_id: u32,
+    north_action: DriveAction,
+    reset_id: u32,
+    reset: Option<Reset>,
+    /// Set-points of this number were taken.
+    sequence: Option<u32>,
+    fault: Option<Fault>,
+    loss: Option<Loss>,
+    /// The drive shows a fault whose cause is being read since then.
+    cause_wanted: Option<MonotonicTime>,
+    drive_reset_wanted: bool,
+    /// An enable was rejected and is still asked for.
+    enable_pending: bool,
+    /// A connection was opened, and the axis has not been powered up on it yet.
+    new_connection: bool,
+    counters: AxisCounters,
+}
+
+/// The generic state machine and since when it is in its state.
+#[derive(Debug, Default)]
+struct BasicDriveClock {
+    machine: profile_generic::state::BasicDrive,
+    since: MonotonicTime,
+}
+
+impl AxisChannel {
+    /// An axis whose drive is not there yet.
+    #[must_use]
+    pub fn new(north: CipProgram, limits: Limits, command_loss: Reaction) -> Self {
+        let trackers = north.trackers();
+        Self {
+            north,
+            trackers,
+            south: None,
+            limits,
+            command_loss,
+            drive: BasicDriveClock::default(),
+            interpolator: None,
+            command: AxisCommand::default(),
+            feedback: AxisFeedback::default(),
+            action: Action::TorqueOff,
+            control_word: 0,
+            action_id: 0,
+            north_action: DriveAction::None,
+            reset_id: 0,
+            reset: None,
+            sequence: None,
+            fault: None,
+            loss: None,
+            cause_wanted: None,
+            drive_reset_wanted: false,
+            enable_pending: false,
+            new_connection: false,
+            counters: AxisCounters::default(),
+        }
+    }
+
+    /// The generic state.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        self.drive.machine.state()
+    }
+
+    /// The newest feedback.
+    #[must_use]
+    pub fn feedback(&self) -> &AxisFeedback {
+        &self.feedback
+    }
+
+    /// The command as the drive got it last.
+    #[must_use]
+    pub fn command(&self) -> &AxisCommand {
+        &self.command
+    }
+
+    /// Counters.
+    #[must_use]
+    pub fn counters(&self) -> AxisCounters {
+        self.counters
+    }
+
+    /// The program of the CIP side.
+    #[must_use]
+    pub fn north(&self) -> &CipProgram {
+        &self.north
+    }
+
+    /// The program of the drive, once it is commissioned.
+    #[must_use]
+    pub fn south(&self) -> Option<&SercosProgram> {
+        self.south.as_ref().map(|(program, _)| program)
+    }
+
+    /// Whether the torque may be on: then neither program may be replaced.
+    #[must_use]
+    pub fn may_have_torque(&self) -> bool {
+        self.state().may_have_torque()
+    }
+
+    /// Takes another scaling of the controller; `false`, and nothing done, while the torque may be on.
+    pub fn set_north(&mut self, program: CipProgram) -> bool {
+        if self.may_have_torque() {
+            return false;
+        }
+        self.trackers = program.trackers();
+        self.north = program;
+        true
+    }
+
+    /// The drive is commissioned and will be spoken to by this program.
+    pub fn set_south(&mut self, program: SercosProgram) {
+        let trackers = program.feedback.trackers();
+        self.south = Some((program, trackers));
+        self.action = Action::TorqueOff;
+        self.control_word = 0;
+    }
+
+    /// The drive is gone: until it is commissioned again there is nobody to speak to.
+    pub fn lose_south(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.end_south(now, system, Report::Silent);
+    }
+
+    /// The bus is taken down while the axis is without torque: the drive is not ready, and nothing is wrong.
+    pub fn leave_south(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.end_south(now, system, Report::NotReady);
+    }
+
+    fn end_south(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
+        self.feedback.fresh = false;
+        self.feedback.present = FeedbackSet::empty();
+        self.report(now, system, report);
+        self.south = None;
+    }
+
+    /// Fine interpolation for a connection with this update period, in the way the last update asked for.
+    pub fn keep_update_period(&mut self, period: DurationNs, first: TargetUpdate) {
+        let present = self.interpolator.as_ref().map(FineInterpolator::config);
+        if present.is_none_or(|config| config.period != period) {
+            self.set_update_period(period, present.map_or(first, |config| config.target_update));
+        }
+    }
+
+    /// The controller's configuration of this axis makes no sense.
+    pub fn refuse_configuration(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.raise(now, system, Fault::new(FaultCause::CONFIGURATION, system));
+    }
+
+    /// Fine interpolation for a connection with this update period; without one, commands act as they come.
+    fn set_update_period(&mut self, period: DurationNs, target_update: TargetUpdate) {
+        let wanted = InterpolatorConfig { target_update, period, extrapolate_periods: EXTRAPOLATE_PERIODS };
+        if self.interpolator.as_ref().is_none_or(|present| *present.config() != wanted) {
+            self.interpolator = FineInterpolator::new(wanted);
+            self.start_interpolator();
+        }
+    }
+
+    fn count_saturated(&mut self, count: u32) {
+        self.counters.saturated = self.counters.saturated.saturating_add(count);
+    }
+}
+
+/// Faults that only say what the controller did or failed to do.
+fn caused_by_controller(cause: FaultCause) -> bool {
+    matches!(cause, FaultCause::CONTROLLER_ABORT | FaultCause::COMMAND_LOST | FaultCause::CONNECTION_CLOSED)
+}

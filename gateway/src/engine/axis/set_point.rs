@@ -1,0 +1,180 @@
+//! From the controller's set-points to the telegram of the drive.
+
+use super::{AxisChannel, Loss};
+use crate::mapping::CyclicValues;
+use profile_cip::target::drive_link::{DriveAction, SetPoints};
+use profile_generic::fault::{Fault, FaultCause};
+use profile_generic::image::{AxisCommand, FeedbackSet};
+use profile_generic::interpolation::{Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
+use profile_generic::mode::OperatingMode;
+use profile_generic::program::ConversionReport;
+use profile_generic::quantity::{Torque, Velocity};
+use profile_generic::state::{Action, DriveState, Transition};
+use profile_generic::time::{MonotonicTime, SystemTime};
+
+impl AxisChannel {
+    pub(super) fn take_set_points(&mut self, now: MonotonicTime, system: SystemTime, points: &SetPoints) {
+        if self.sequence == Some(points.sequence) {
+            return;
+        }
+        let first = self.sequence.is_none();
+        self.sequence = Some(points.sequence);
+        let Some(mode) = self.north.mode(points.control_mode.0) else {
+            self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
+            return;
+        };
+        if first || self.command.mode != mode {
+            // Where the drive is now is where the controller counts from: turns made without position commands do not
+            // show in a command that wraps.
+            self.trackers = self.north.trackers();
+            let counts = self.north.counts(self.feedback.position.get()).value;
+            self.trackers.set_counts(counts.saturating_add(points.position_reference));
+        }
+        let mut fresh = self.command;
+        let values = CyclicValues::from(&points.values);
+        let conversions =
+            self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
+        self.count_saturated(conversions.saturated);
+        if conversions.not_finite > 0 || conversions.saturated > 0 {
+            // Half understood is not understood.
+            self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
+            return;
+        }
+        if let Some(cause) = self.beyond_limits(&fresh) {
+            self.raise(now, system, Fault::new(cause, system));
+            return;
+        }
+        if self.command.mode != mode || first {
+            self.start_interpolator();
+        }
+        self.command.mode = mode;
+        self.counters.commands = self.counters.commands.saturating_add(1);
+        let target_update = TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default();
+        let Some(interpolator) = self.interpolator.as_mut() else {
+            self.lose_command(now, system, Loss::NoPeriod);
+            return;
+        };
+        if interpolator.config().target_update != target_update {
+            let period = interpolator.config().period;
+            self.set_update_period(period, target_update);
+        }
+        let Some(interpolator) = self.interpolator.as_mut() else { return };
+        let target = match points.target_time {
+            Some(target) => SystemTime(target),
+            None => target_update.target(system, interpolator.config().period),
+        };
+        match interpolator.update(target, &FinePoints::from(&fresh)) {
+            Ok(()) => {}
+            Err(UpdateError::Jump) => {
+                self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
+            }
+            // Set-points overtaken by newer ones; silence is watched elsewhere.
+            Err(UpdateError::NotNewer { .. }) => {}
+            Err(error) => self.lose_command(now, system, Loss::Update(error)),
+        }
+    }
+
+    pub(super) fn beyond_limits(&self, command: &AxisCommand) -> Option<FaultCause> {
+        let position = command.present.contains(profile_generic::image::CommandSet::POSITION);
+        let below = self.limits.position_min.is_some_and(|limit| command.position < limit);
+        let above = self.limits.position_max.is_some_and(|limit| command.position > limit);
+        (position && (below || above)).then_some(FaultCause::POSITION_COMMAND_LIMIT)
+    }
+
+    pub(super) fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
+        if self.fault.is_none() && self.state().is_running() {
+            self.loss = Some(loss);
+            let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(self.command_loss);
+            self.raise(now, system, fault);
+        }
+    }
+
+    pub(super) fn start_interpolator(&mut self) {
+        let position =
+            self.feedback.present.contains(FeedbackSet::POSITION).then_some(self.feedback.position);
+        if let Some(interpolator) = self.interpolator.as_mut() {
+            interpolator.start(position);
+        }
+    }
+
+    // ---- to the drive ------------------------------------------------------------------------------------------
+
+    /// Fills the values of the drive's connection for the cycle that acts at `acts_at`; `false` when there is no program
+    /// or no place, and then nothing may be sent.
+    pub fn to_drive(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        acts_at: SystemTime,
+        telegram: Option<&mut [u8]>,
+    ) -> bool {
+        self.fine_command(now, system, acts_at);
+        let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
+        let mut conversions = ConversionReport::default();
+        self.control_word =
+            program.encode(&self.command, self.action, self.control_word, telegram, &mut conversions);
+        self.count_saturated(conversions.saturated);
+        if conversions.saturated > 0 && self.state() == DriveState::Operating {
+            // The drive would be led elsewhere than the controller means.
+            self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
+        }
+        true
+    }
+
+    /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it
+    /// begins to.
+    pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
+        let operating = self.state() == DriveState::Operating;
+        let fine = match self.interpolator.as_mut() {
+            Some(interpolator) if operating && self.sequence.is_some() => Some(interpolator.at(acts_at)),
+            _ => None,
+        };
+        let points = match fine {
+            Some(fine) => {
+                if fine.quality == Quality::Lost {
+                    self.lose_command(now, system, Loss::Silent);
+                }
+                fine.set_points
+            }
+            None => FinePoints::default(),
+        };
+        // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it.
+        let led = operating && self.command.mode == OperatingMode::Position;
+        let rest = if led { self.command.position } else { self.feedback.position };
+        let all = FinePoints {
+            position: Some(points.position.unwrap_or(rest)),
+            velocity: Some(points.velocity.unwrap_or(Velocity::ZERO)),
+            acceleration: Some(points.acceleration.unwrap_or_default()),
+            torque: Some(points.torque.unwrap_or(Torque::ZERO)),
+        };
+        all.write_to(&mut self.command);
+    }
+
+    pub(super) fn follow(&mut self, now: MonotonicTime, system: SystemTime, transition: Transition) {
+        if self.feedback.state != transition.next {
+            self.drive.since = now;
+            if matches!(transition.next, DriveState::Starting) {
+                // Until the controller's first set-points the axis holds its position, whatever it did last.
+                self.command.mode = OperatingMode::Position;
+                self.sequence = None;
+                self.start_interpolator();
+            }
+            self.feedback.state = transition.next;
+        }
+        match transition.action {
+            Action::None => {}
+            Action::Reject => self.enable_pending = self.north_action == DriveAction::Enable,
+            Action::ResetFault => {
+                // The reset is a pulse, here a procedure command; the control word stays without torque.
+                self.action = Action::TorqueOff;
+                self.drive_reset_wanted = true;
+            }
+            action => self.action = action,
+        }
+        if let Some(cause) = transition.fault
+            && self.fault.is_none()
+        {
+            self.raise(now, system, Fault::new(cause, system));
+        }
+    }
+}

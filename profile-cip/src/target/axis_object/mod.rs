@@ -1,0 +1,285 @@
+//! One axis: an instance of the Motion Device Axis Object, clauses 5-2.6.1 to 5-2.6.4.
+//!
+//! The state machine runs once per step of the device: it turns what the drive reports and what the controller asks for into
+//! events, follows [`AxisState::next`], and derives the level the drive has to keep. Nothing but an Enable request that
+//! begins in Stopped (or, with flying start, in Stopping) ever leads to Starting.
+
+mod fault;
+mod follow;
+mod request;
+
+use super::axis_control::AxisControlHandshake;
+use super::axis_state::{AxisConditions, AxisEvent, AxisState, ControlKind};
+use super::drive_link::{DriveAction, DriveAlarm, DriveFault, DriveImage, SetPoints};
+use super::event_channel::EventChannel;
+use super::status_report::{RecordLog, Reported};
+use crate::wire::motion::actual::SafetyStatus;
+use crate::wire::motion::codes::{
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventChecking,
+};
+use crate::wire::motion::{AlarmRecord, CommandBlock, CommandValues, FaultRecord};
+use profile_generic::time::MonotonicTime;
+
+/// Bit numbers of the axis faults that this module raises itself, Table 5-2.65.
+mod fault_code {
+    pub const ILLEGAL_CONTROL_MODE: u8 = 60;
+    pub const CONTROLLER_INITIATED: u8 = 62;
+    pub const EXTERNAL: u8 = 63;
+}
+
+/// Sub codes of [`fault_code::ILLEGAL_CONTROL_MODE`] and [`fault_code::EXTERNAL`].
+mod sub_code {
+    /// The Control Mode is not one of the axis.
+    pub const MODE_NOT_SUPPORTED: u8 = 1;
+    /// The update lacks the set-point of its Control Mode.
+    pub const SET_POINT_MISSING: u8 = 2;
+    /// The drive went offline while energized.
+    pub const DRIVE_LOST: u8 = 1;
+}
+
+/// Axis Fault Action, attribute 668: ramped stop, then disable.
+const RAMP_AND_DISABLE: u8 = 0x22;
+/// Axis Fault Action: coast, then disable.
+const COAST_AND_DISABLE: u8 = 0x24;
+/// State change nibble of the fault action that latches a shutdown.
+const STATE_CHANGE_SHUTDOWN: u8 = 3;
+
+/// What an axis can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct AxisConfig {
+    /// State table that the axis follows.
+    pub kind: ControlKind,
+    /// Control modes that may be enabled, as bits numbered by the mode code (bit 1 position, bit 2 velocity, ...).
+    pub control_modes: u16,
+    /// Whether an Enable in Stopping starts again.
+    pub flying_start: bool,
+    /// Whether the position may be reported as LINT when the controller asks for it.
+    pub lint_position: bool,
+    /// Events the drive can check for.
+    pub events: EventChecking,
+}
+
+impl AxisConfig {
+    fn supports(&self, mode: ControlMode) -> bool {
+        mode != ControlMode::NO_CONTROL && mode.0 < 16 && self.control_modes & (1 << mode.0) != 0
+    }
+}
+
+/// What surrounds an axis in one step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Context {
+    /// A connection is open.
+    pub connected: bool,
+    /// The controller has remote control.
+    pub remote: bool,
+    /// A node fault is active.
+    pub node_fault: bool,
+    /// System time, ns; 0 if it is not known.
+    pub system_time: u64,
+}
+
+/// The newest good cyclic block.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Held {
+    pub set_points: SetPoints,
+    pub at: MonotonicTime,
+}
+
+/// Time stamps of an update, in this device's system time, ns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct UpdateTimes {
+    pub time_stamp: Option<u64>,
+    pub period: u64,
+}
+
+/// An instance of the Motion Device Axis Object.
+pub(super) struct Axis {
+    pub(super) config: AxisConfig,
+    pub(super) state: AxisState,
+    pub(super) shutdown: bool,
+    faults: u64,
+    pub(super) drive: DriveImage,
+    seen_fault: Option<DriveFault>,
+    pub(super) handshake: AxisControlHandshake,
+    pub(super) block: CommandBlock,
+    pub(super) held: Option<Held>,
+    sequence: u32,
+    pub(super) action: DriveAction,
+    pub(super) action_id: u32,
+    pub(super) reset_id: u32,
+    /// Fault Reset or Shutdown Reset that waits for the drive.
+    reset: Option<AxisControl>,
+    /// The axis left an energized state without a stop of its own and has not stopped yet.
+    winding_down: bool,
+    pub(super) actual_reference: i64,
+    pub(super) command_reference: i64,
+    pub(super) displacement: i32,
+    alarm: Option<DriveAlarm>,
+    pub(super) fault_log: RecordLog<FaultRecord>,
+    pub(super) alarm_log: RecordLog<AlarmRecord>,
+    pub(super) axis_status: Reported<(AxisStatus, u32)>,
+    pub(super) io_status: Reported<(AxisIoStatus, u32)>,
+    pub(super) safety: Reported<SafetyStatus>,
+    pub(super) events: EventChannel,
+}
+
+/// Whether the command values hold the one that the mode needs.
+fn has_set_point(mode: ControlMode, values: &CommandValues) -> bool {
+    match mode {
+        ControlMode::POSITION => values.position.is_some(),
+        ControlMode::VELOCITY => values.velocity.is_some(),
+        ControlMode::ACCELERATION => values.acceleration.is_some(),
+        ControlMode::TORQUE => values.torque.is_some(),
+        _ => true,
+    }
+}
+
+impl Axis {
+    /// An axis after its self test: Initializing.
+    pub fn new(config: AxisConfig) -> Self {
+        Self {
+            config,
+            state: AxisState::Initializing,
+            shutdown: false,
+            faults: 0,
+            drive: DriveImage::default(),
+            seen_fault: None,
+            handshake: AxisControlHandshake::default(),
+            block: CommandBlock::default(),
+            held: None,
+            sequence: 0,
+            action: DriveAction::None,
+            action_id: 0,
+            reset_id: 0,
+            reset: None,
+            winding_down: false,
+            actual_reference: 0,
+            command_reference: 0,
+            displacement: 0,
+            alarm: None,
+            fault_log: RecordLog::new(),
+            alarm_log: RecordLog::new(),
+            axis_status: Reported::new(),
+            io_status: Reported::new(),
+            safety: Reported::new(),
+            events: EventChannel::new(config.events),
+        }
+    }
+
+    pub fn state(&self) -> AxisState {
+        self.state
+    }
+
+    /// Axis Faults, attribute 657.
+    pub fn faults(&self) -> u64 {
+        self.faults
+    }
+
+    pub fn drive(&self) -> &DriveImage {
+        &self.drive
+    }
+
+    pub fn block(&self) -> &CommandBlock {
+        &self.block
+    }
+
+    /// Command Target Time, attribute 93.
+    pub fn target_time(&self) -> u64 {
+        self.held.and_then(|held| held.set_points.target_time).unwrap_or(0)
+    }
+
+    /// Records lost because a log was full.
+    pub fn dropped_records(&self) -> u32 {
+        self.fault_log.dropped().saturating_add(self.alarm_log.dropped())
+    }
+
+    /// Whether attributes are limited to those of Table 5-2.110.
+    pub fn is_running(&self) -> bool {
+        matches!(self.state, AxisState::Starting | AxisState::Running | AxisState::Testing)
+    }
+
+    /// Whether a Fault Reset has something to reset; minor faults count, they are latched as well.
+    fn has_fault(&self) -> bool {
+        match self.state {
+            AxisState::Initializing => false,
+            AxisState::MajorFaulted | AxisState::Aborting => true,
+            _ => self.faults != 0 || self.drive.fault.is_some(),
+        }
+    }
+
+    fn conditions(&self) -> AxisConditions {
+        AxisConditions {
+            bus_up: self.drive.bus_up,
+            shutdown: self.shutdown,
+            in_process: false,
+            start_inhibited: self.inhibited(),
+            flying_start: self.config.flying_start,
+        }
+    }
+
+    fn inhibited(&self) -> bool {
+        self.drive.start_inhibits != 0 || self.drive.start_inhibits_mfg != 0
+    }
+
+    /// Follows the state table. Returns whether the event had an effect.
+    fn fire(&mut self, event: AxisEvent) -> bool {
+        let Some(next) = self.state.next(self.config.kind, event, &self.conditions()) else { return false };
+        // Close and loss take an axis out of motion without a Stopping state of its own.
+        let unconnected = matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss);
+        let moves = self.config.kind == ControlKind::Active && self.state.is_energized();
+        self.winding_down |= unconnected && moves;
+        self.state = next;
+        true
+    }
+
+    /// Whether the drive speaks of the action that is in force.
+    pub(super) fn answers(&self) -> bool {
+        self.drive.online && self.drive.action_id == self.action_id
+    }
+
+    // -- connection ---------------------------------------------------------------------------------------------
+
+    /// A connection was opened: defaults, no faults, no shutdown (clause 5-2.6.2.3).
+    pub fn open(&mut self, system_time: u64) {
+        self.fire(AxisEvent::Reconnection);
+        self.forget();
+        self.log_cleared(ClearingEvent::CONNECTION_RESET, system_time);
+    }
+
+    /// The controller closed the connection.
+    pub fn close(&mut self) {
+        self.fire(AxisEvent::ConnectionClose);
+        self.forget();
+        self.update_action();
+    }
+
+    /// The connection was lost.
+    pub fn lose(&mut self) {
+        self.fire(AxisEvent::ConnectionLoss);
+        self.handshake.reset();
+        self.held = None;
+        self.reset = None;
+        self.events.handle(None);
+        self.update_action();
+    }
+
+    fn forget(&mut self) {
+        self.shutdown = false;
+        self.faults = 0;
+        self.seen_fault = None;
+        self.reset = None;
+        self.handshake.reset();
+        self.block = CommandBlock::default();
+        self.held = None;
+        self.actual_reference = 0;
+        self.command_reference = 0;
+        self.displacement = 0;
+        self.fault_log = RecordLog::new();
+        self.alarm_log = RecordLog::new();
+        self.alarm = None;
+        self.axis_status = Reported::new();
+        self.io_status = Reported::new();
+        self.safety = Reported::new();
+        self.events.handle(None);
+    }
+}
