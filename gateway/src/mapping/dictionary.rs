@@ -1,6 +1,7 @@
 //! The dictionaries: what each profile has, looked up by name or number.
 
 mod cip;
+mod cip_codes;
 mod sercos;
 
 pub use cip::{Access, CipAttribute, CipDictionary, CipType, DataElement};
@@ -10,7 +11,7 @@ use profile_generic::image::Signal;
 use profile_generic::parameter::{Parameter, ParameterRow};
 use profile_generic::quantity::Quantity;
 
-use super::format::{EnumerationRow, GenericFile, Name};
+use super::format::{CodeRow, EnumerationRow, GenericFile, Name};
 use super::load::{Parsed, TableErrors, Tables};
 use super::resolver::Resolver;
 
@@ -93,13 +94,63 @@ pub(super) fn quantity(resolver: &mut Resolver<'_>, name: &Name) -> Option<Quant
     resolver.name("quantity", name, "a quantity of the generic model", Quantity::parse, names)
 }
 
-/// Named codes.
+/// Whether a set names codes or bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SetKind {
+    /// Codes: one of them is the value.
+    Codes,
+    /// Bits, 0 first: any of them may be set.
+    Bits {
+        /// Bits of the value.
+        width: u32,
+    },
+}
+
+/// One named code or bit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Code {
+    /// The code, or the number of the bit.
+    pub code: u32,
+    /// Its name.
+    pub name: String,
+    /// `R`, `O`, `C` or `-`; `None` where the standard prints nothing.
+    pub need: Option<char>,
+    /// To what the need applies, as the standard prints it; empty when nothing is said.
+    pub rule: String,
+    /// Anything worth knowing; mostly empty.
+    pub note: String,
+}
+
+/// Named codes or bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Enumeration {
     /// Name of the set.
     pub name: String,
-    /// Codes and names.
-    pub codes: Vec<(u32, String)>,
+    /// Codes or bits.
+    pub kind: SetKind,
+    /// Numbers of the axis attributes that hold such a value.
+    pub attributes: Vec<u16>,
+    /// Numbers of the attributes of instance 0 that do.
+    pub class_attributes: Vec<u16>,
+    /// The field or the part of the attribute that does, in words; empty when it is all of it.
+    pub element: String,
+    /// Where it comes from.
+    pub source: String,
+    /// Anything worth knowing; mostly empty.
+    pub note: String,
+    /// The codes or bits.
+    pub codes: Vec<Code>,
+}
+
+impl Enumeration {
+    /// Checks that no code and no name is there twice; `names` are those of the codes, in order.
+    fn unique<'a>(&self, names: impl Iterator<Item = &'a Name>, resolver: &mut Resolver<'_>) {
+        for (at, (code, name)) in self.codes.iter().zip(names).enumerate() {
+            if self.codes[..at].iter().any(|known| known.code == code.code || known.name == code.name) {
+                resolver.error(name.span(), "name", "the code or its name is there twice");
+            }
+        }
+    }
 }
 
 fn named_code(
@@ -110,21 +161,31 @@ fn named_code(
     resolver: &mut Resolver<'_>,
 ) -> Option<u32> {
     let codes = set.map_or(&[][..], |set| &set.codes);
-    let find = |text: &str| codes.iter().find(|(_, known)| known == text).map(|(code, _)| *code);
-    let known = codes.iter().map(|(_, name)| name.as_str());
+    let find = |text: &str| codes.iter().find(|known| known.name == text).map(|known| known.code);
+    let known = codes.iter().map(|known| known.name.as_str());
     resolver.name(key, name, &format!("a name of {set_name}"), find, known)
 }
 
 fn resolve_codes(row: &EnumerationRow, resolver: &mut Resolver<'_>) -> Enumeration {
-    let mut codes: Vec<(u32, String)> = Vec::with_capacity(row.codes.len());
-    for code in &row.codes {
-        let (number, name) = (*code.code.get_ref(), code.name.get_ref());
-        if codes.iter().any(|(known, known_name)| *known == number || known_name == name) {
-            resolver.error(code.name.span(), "name", "the code or its name is there twice");
-        }
-        codes.push((number, name.clone()));
-    }
-    Enumeration { name: row.name.get_ref().clone(), codes }
+    let code = |row: &CodeRow| Code {
+        code: *row.code.get_ref(),
+        name: row.name.get_ref().clone(),
+        need: None,
+        rule: String::new(),
+        note: String::new(),
+    };
+    let set = Enumeration {
+        name: row.name.get_ref().clone(),
+        kind: SetKind::Codes,
+        attributes: Vec::new(),
+        class_attributes: Vec::new(),
+        element: String::new(),
+        source: row.source.get_ref().clone(),
+        note: String::new(),
+        codes: row.codes.iter().map(code).collect(),
+    };
+    set.unique(row.codes.iter().map(|code| &code.name), resolver);
+    set
 }
 
 /// All dictionaries.
@@ -142,7 +203,7 @@ impl Dictionaries {
     pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
         Self {
             generic: GenericDictionary::resolve(&tables.generic, errors),
-            cip: CipDictionary::resolve(&tables.cip, errors),
+            cip: CipDictionary::resolve(tables, errors),
             sercos: SercosDictionary::resolve(&tables.sercos, errors),
         }
     }

@@ -4,10 +4,12 @@
 //! it. Names of signals, IDNs, attributes and codes are plain text here; the resolvers turn them into what
 //! they name.
 
+mod cip_dictionary;
 mod cip_generic;
 mod dictionary;
 mod generic_sercos;
 
+pub use cip_dictionary::*;
 pub use cip_generic::*;
 pub use dictionary::*;
 pub use generic_sercos::*;

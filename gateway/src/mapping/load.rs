@@ -8,7 +8,9 @@ use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use serde::de::DeserializeOwned;
 
-use super::format::{CipFile, CipGenericFile, GenericFile, GenericSercosFile, SercosFile};
+use super::format::{
+    CipAttributeFile, CipEnumerationFile, CipGenericFile, GenericFile, GenericSercosFile, SercosFile,
+};
 
 /// The file format this build understands.
 pub const FORMAT: u32 = 1;
@@ -17,9 +19,10 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 5] = [
+const FILES: [(&str, &str); 6] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
-    ("dictionary/cip-motion.toml", include_str!("../../../mappings/dictionary/cip-motion.toml")),
+    ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
+    ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
     ("dictionary/sercos.toml", include_str!("../../../mappings/dictionary/sercos.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
@@ -39,8 +42,10 @@ pub struct TableText {
 pub struct TableTexts {
     /// Generic dictionary.
     pub generic: TableText,
-    /// CIP Motion dictionary.
-    pub cip: TableText,
+    /// CIP Motion dictionary: attributes.
+    pub cip_attributes: TableText,
+    /// CIP Motion dictionary: codes and bits.
+    pub cip_enumerations: TableText,
     /// SERCOS dictionary.
     pub sercos: TableText,
     /// CIP Motion to generic.
@@ -63,8 +68,10 @@ pub struct Parsed<T> {
 pub struct Tables {
     /// Generic dictionary.
     pub generic: Parsed<GenericFile>,
-    /// CIP Motion dictionary.
-    pub cip: Parsed<CipFile>,
+    /// CIP Motion dictionary: attributes.
+    pub cip_attributes: Parsed<CipAttributeFile>,
+    /// CIP Motion dictionary: codes and bits.
+    pub cip_enumerations: Parsed<CipEnumerationFile>,
     /// SERCOS dictionary.
     pub sercos: Parsed<SercosFile>,
     /// CIP Motion to generic.
@@ -187,7 +194,7 @@ impl TableTexts {
     ///
     /// # Errors
     /// The folder cannot be read, a file is too large or not UTF-8, or there is a `.toml` file that is none
-    /// of the five: a misspelt name would otherwise be ignored without a word.
+    /// of these: a misspelt name would otherwise be ignored without a word.
     pub fn from_folder(folder: &Path) -> Result<Self, TableErrors> {
         for below in [PathBuf::new(), PathBuf::from("dictionary")] {
             refuse_strangers(folder, &below)?;
@@ -202,13 +209,15 @@ impl TableTexts {
         Ok(texts)
     }
 
-    fn from_array([generic, cip, sercos, cip_generic, generic_sercos]: [TableText; 5]) -> Self {
-        Self { generic, cip, sercos, cip_generic, generic_sercos }
+    /// The texts in the order of [`FILES`].
+    fn from_array(texts: [TableText; FILES.len()]) -> Self {
+        let [generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos] = texts;
+        Self { generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos }
     }
 
-    fn as_array_mut(&mut self) -> [&mut TableText; 5] {
-        let Self { generic, cip, sercos, cip_generic, generic_sercos } = self;
-        [generic, cip, sercos, cip_generic, generic_sercos]
+    fn as_array_mut(&mut self) -> [&mut TableText; FILES.len()] {
+        let Self { generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos } = self;
+        [generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos]
     }
 
     /// Parses all files.
@@ -218,16 +227,22 @@ impl TableTexts {
     pub fn parse(self) -> Result<Tables, TableErrors> {
         let mut errors = TableErrors::default();
         let generic = self.generic.parse(&mut errors);
-        let cip = self.cip.parse(&mut errors);
+        let cip_attributes = self.cip_attributes.parse(&mut errors);
+        let cip_enumerations = self.cip_enumerations.parse(&mut errors);
         let sercos = self.sercos.parse(&mut errors);
         let cip_generic = self.cip_generic.parse(&mut errors);
         let generic_sercos = self.generic_sercos.parse(&mut errors);
-        match (generic, cip, sercos, cip_generic, generic_sercos) {
-            (Some(generic), Some(cip), Some(sercos), Some(cip_generic), Some(generic_sercos)) => {
-                Ok(Tables { generic, cip, sercos, cip_generic, generic_sercos })
-            }
-            _ => Err(errors),
-        }
+        let tables = || {
+            Some(Tables {
+                generic: generic?,
+                cip_attributes: cip_attributes?,
+                cip_enumerations: cip_enumerations?,
+                sercos: sercos?,
+                cip_generic: cip_generic?,
+                generic_sercos: generic_sercos?,
+            })
+        };
+        tables().ok_or(errors)
     }
 }
 

@@ -43,8 +43,8 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipType, DataElement, Dictionaries, Enumeration, GenericDictionary,
-    IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word,
+    Access, CipAttribute, CipDictionary, CipType, Code, DataElement, Dictionaries, Enumeration,
+    GenericDictionary, IdnFormat, IdnUnit, SercosDictionary, SercosIdn, SetKind, Word,
 };
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};

@@ -347,7 +347,7 @@ impl Builder<'_> {
         let cip = &self.dictionaries.cip;
         let find = |set: &str, name: &str| {
             let codes = &cip.enumeration(set)?.codes;
-            codes.iter().find(|(_, known)| known == name).and_then(|(code, _)| u8::try_from(*code).ok())
+            codes.iter().find(|known| known.name == name).and_then(|known| u8::try_from(known.code).ok())
         };
         let Some(fault_type) = find("Axis Fault Type", fault) else {
             let message = format!("the dictionary has no Axis Fault Type `{fault}`");

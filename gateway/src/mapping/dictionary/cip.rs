@@ -2,9 +2,10 @@
 
 use profile_generic::program::Width;
 
-use super::{Enumeration, named_code, resolve_codes};
-use crate::mapping::format::{AttributeRow, CipFile, Name};
-use crate::mapping::load::{Parsed, TableErrors};
+use super::cip_codes::resolve_sets;
+use super::{Enumeration, named_code};
+use crate::mapping::format::{AttributeRow, CipAttributeFile, Name};
+use crate::mapping::load::{Parsed, TableErrors, Tables};
 use crate::mapping::resolver::Resolver;
 
 /// An elementary data type of CIP, as far as axis attributes use them.
@@ -147,39 +148,23 @@ pub struct CipDictionary {
 }
 
 impl CipDictionary {
-    pub(super) fn resolve(file: &Parsed<CipFile>, errors: &mut TableErrors) -> Self {
+    pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
+        let mut dictionary = Self::resolve_attribute_file(&tables.cip_attributes, errors);
+        let (enumerations, bits) = resolve_sets(&tables.cip_enumerations, &dictionary, errors);
+        dictionary.enumerations = enumerations;
+        dictionary.bits = bits;
+        dictionary
+    }
+
+    fn resolve_attribute_file(file: &Parsed<CipAttributeFile>, errors: &mut TableErrors) -> Self {
         let mut resolver = Resolver::new(&file.text, errors);
         let rows = &file.rows;
         resolver.head(&rows.format, "profile", &rows.profile, "cip-motion");
         let mut dictionary = Self {
             class_attributes: resolve_attributes(&rows.class_attribute, 1, &mut resolver),
             attributes: resolve_attributes(&rows.attribute, DEVICE_FUNCTIONS.len(), &mut resolver),
-            enumerations: rows.enumeration.iter().map(|row| resolve_codes(row, &mut resolver)).collect(),
-            bits: Vec::new(),
-            data_sets: Vec::new(),
+            ..Self::default()
         };
-        for row in &rows.enumeration {
-            if let Some(name) = &row.attribute {
-                dictionary.attribute_or_error("attribute", name, &mut resolver);
-            }
-        }
-        for row in &rows.bits {
-            if let Some(name) = &row.attribute {
-                dictionary.attribute_or_error("attribute", name, &mut resolver);
-            }
-            let mut codes: Vec<(u32, String)> = Vec::with_capacity(row.bits.len());
-            for bit in &row.bits {
-                let number = *bit.bit.get_ref();
-                if number >= row.width {
-                    let message = format!("expected a bit below {}, got {number}", row.width);
-                    resolver.error(bit.bit.span(), "bit", message);
-                } else if codes.iter().any(|(known, name)| *known == number || name == bit.name.get_ref()) {
-                    resolver.error(bit.name.span(), "name", "the bit or its name is there twice");
-                }
-                codes.push((number, bit.name.get_ref().clone()));
-            }
-            dictionary.bits.push(Enumeration { name: row.name.get_ref().clone(), codes });
-        }
         for row in &rows.data_set {
             dictionary.attribute_or_error("attribute", &row.attribute, &mut resolver);
             let mut elements = Vec::with_capacity(row.elements.len());
@@ -232,6 +217,11 @@ impl CipDictionary {
         &self.enumerations
     }
 
+    /// All sets of named bits.
+    pub fn bit_sets(&self) -> &[Enumeration] {
+        &self.bits
+    }
+
     /// The set of named bits with this name.
     pub fn bits(&self, name: &str) -> Option<&Enumeration> {
         self.bits.iter().find(|set| set.name == name)
@@ -256,6 +246,18 @@ impl CipDictionary {
     ) -> Option<&CipAttribute> {
         let known = self.attributes.iter().map(|attribute| attribute.name.as_str());
         resolver.name(key, name, "an attribute of the axis object", |text| self.attribute(text), known)
+    }
+
+    /// The attribute of instance 0 that `key` names.
+    pub(super) fn class_attribute_or_error(
+        &self,
+        key: &str,
+        name: &Name,
+        resolver: &mut Resolver<'_>,
+    ) -> Option<&CipAttribute> {
+        let find = |text: &str| self.class_attributes.iter().find(|attribute| attribute.name == text);
+        let known = self.class_attributes.iter().map(|attribute| attribute.name.as_str());
+        resolver.name(key, name, "an attribute of instance 0", find, known)
     }
 
     /// The code that `key` names in a mapping, from the enumeration `set`.

@@ -46,70 +46,12 @@ pub struct ParameterRow {
     pub access: Name,
 }
 
-/// `mappings/dictionary/cip-motion.toml`.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CipFile {
-    /// Version of the file format.
-    pub format: Spanned<u32>,
-    /// `cip-motion`.
-    pub profile: Name,
-    /// Attributes of instance 0.
-    pub class_attribute: Vec<AttributeRow>,
-    /// Attributes of the axis instances.
-    pub attribute: Vec<AttributeRow>,
-    /// Enumerated codes.
-    pub enumeration: Vec<EnumerationRow>,
-    /// Bit fields.
-    pub bits: Vec<BitsRow>,
-    /// Data sets of the cyclic data block.
-    pub data_set: Vec<DataSetRow>,
-}
-
-/// One attribute of the Motion Device Axis Object.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AttributeRow {
-    /// Attribute number.
-    pub id: Spanned<u16>,
-    /// Name in the standard.
-    pub name: Name,
-    /// CIP data type.
-    #[serde(rename = "type")]
-    pub data_type: Name,
-    /// Elements of an array; absent for a single value.
-    pub length: Option<u16>,
-    /// `get`, `set` or `set_cyclic`.
-    pub access: Name,
-    /// Whether it may be set in the Running state.
-    #[serde(default)]
-    pub running: bool,
-    /// `R`, `O`, `C` or `-` per device function B E F P V T; one letter for a class attribute.
-    pub need: Name,
-    /// Condition on the need.
-    pub condition: Option<String>,
-    /// Unit as the standard names it.
-    pub unit: Option<Name>,
-    /// Value at power-up where it is not 0.
-    pub default: Option<i64>,
-    /// How many channels repeat the attribute ("Feedback n ...").
-    pub channels: Option<u16>,
-    /// From the number of one channel to that of the next.
-    pub channel_step: Option<u16>,
-    /// Anything worth knowing.
-    pub note: Option<String>,
-    /// Table of the standard.
-    pub source: Source,
-}
-
 /// A set of named codes.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnumerationRow {
     /// Name of the set.
     pub name: Name,
-    /// Attribute that holds such a code.
-    pub attribute: Option<Name>,
     /// Where it comes from.
     pub source: Source,
     /// The codes.
@@ -124,60 +66,6 @@ pub struct CodeRow {
     pub code: Spanned<u32>,
     /// Its name.
     pub name: Name,
-}
-
-/// A set of named bits.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BitsRow {
-    /// Name of the set.
-    pub name: Name,
-    /// Attribute that holds the bits.
-    pub attribute: Option<Name>,
-    /// How many bits the value has.
-    pub width: u32,
-    /// Where it comes from.
-    pub source: Source,
-    /// The bits.
-    pub bits: Vec<BitRow>,
-}
-
-/// One named bit.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BitRow {
-    /// Number of the bit, 0 first.
-    pub bit: Spanned<u32>,
-    /// Its name.
-    pub name: Name,
-    /// Device functions it applies to.
-    pub rule: Option<String>,
-}
-
-/// A data set of the cyclic data block.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DataSetRow {
-    /// Name of the set.
-    pub name: Name,
-    /// Attribute that holds the bits of the set.
-    pub attribute: Name,
-    /// Where it comes from.
-    pub source: Source,
-    /// What the bits stand for.
-    pub elements: Vec<ElementRow>,
-}
-
-/// One element of a data set.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ElementRow {
-    /// Bit in the data set.
-    pub bit: Spanned<u8>,
-    /// Name of the element.
-    pub name: Name,
-    /// Attributes it carries.
-    pub attributes: Vec<Name>,
 }
 
 /// `mappings/dictionary/sercos.toml`.

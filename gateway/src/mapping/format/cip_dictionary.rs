@@ -1,0 +1,176 @@
+//! Rows of the CIP Motion dictionary.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Name, Source};
+
+/// `mappings/dictionary/cip-attributes.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipAttributeFile {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `cip-motion`.
+    pub profile: Name,
+    /// Attributes of instance 0.
+    pub class_attribute: Vec<AttributeRow>,
+    /// Attributes of the axis instances.
+    pub attribute: Vec<AttributeRow>,
+    /// Data sets of the cyclic data block.
+    pub data_set: Vec<DataSetRow>,
+}
+
+/// One attribute of the Motion Device Axis Object.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AttributeRow {
+    /// Attribute number.
+    pub id: Spanned<u16>,
+    /// Name in the standard.
+    pub name: Name,
+    /// CIP data type.
+    #[serde(rename = "type")]
+    pub data_type: Name,
+    /// Elements of an array; absent for a single value.
+    pub length: Option<u16>,
+    /// `get`, `set` or `set_cyclic`.
+    pub access: Name,
+    /// Whether it may be set in the Running state.
+    #[serde(default)]
+    pub running: bool,
+    /// `R`, `O`, `C` or `-` per device function B E F P V T; one letter for a class attribute.
+    pub need: Name,
+    /// Condition on the need.
+    pub condition: Option<String>,
+    /// Unit as the standard names it.
+    pub unit: Option<Name>,
+    /// Value at power-up where it is not 0.
+    pub default: Option<i64>,
+    /// How many channels repeat the attribute ("Feedback n ...").
+    pub channels: Option<u16>,
+    /// From the number of one channel to that of the next.
+    pub channel_step: Option<u16>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+    /// Table of the standard.
+    pub source: Source,
+}
+
+/// A data set of the cyclic data block.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataSetRow {
+    /// Name of the set.
+    pub name: Name,
+    /// Attribute that holds the bits of the set.
+    pub attribute: Name,
+    /// Where it comes from.
+    pub source: Source,
+    /// What the bits stand for.
+    pub elements: Vec<ElementRow>,
+}
+
+/// One element of a data set.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ElementRow {
+    /// Bit in the data set.
+    pub bit: Spanned<u8>,
+    /// Name of the element.
+    pub name: Name,
+    /// Attributes it carries.
+    pub attributes: Vec<Name>,
+}
+
+/// `mappings/dictionary/cip-enumerations.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipEnumerationFile {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `cip-motion`.
+    pub profile: Name,
+    /// Sets of named codes.
+    pub enumeration: Vec<CipEnumerationRow>,
+    /// Sets of named bits.
+    pub bits: Vec<CipBitsRow>,
+}
+
+/// A set of named codes.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipEnumerationRow {
+    /// Name of the set.
+    pub name: Name,
+    /// Attributes of the axis that hold such a code.
+    #[serde(default)]
+    pub attributes: Vec<Name>,
+    /// Attributes of instance 0 that hold such a code.
+    #[serde(default)]
+    pub class_attributes: Vec<Name>,
+    /// The field or the part of the attribute that holds it, in words.
+    pub element: Option<String>,
+    /// Where it comes from.
+    pub source: Source,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+    /// The codes.
+    pub codes: Vec<CipCodeRow>,
+}
+
+/// One named code.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipCodeRow {
+    /// The code.
+    pub code: Spanned<u32>,
+    /// Its name.
+    pub name: Name,
+    /// `R`, `O`, `C` or `-`.
+    pub need: Option<Name>,
+    /// To what the need applies.
+    pub rule: Option<String>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+}
+
+/// A set of named bits.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipBitsRow {
+    /// Name of the set.
+    pub name: Name,
+    /// Attributes of the axis that hold the bits.
+    #[serde(default)]
+    pub attributes: Vec<Name>,
+    /// Attributes of instance 0 that hold the bits.
+    #[serde(default)]
+    pub class_attributes: Vec<Name>,
+    /// The field or the part of the attribute that holds them, in words.
+    pub element: Option<String>,
+    /// How many bits the value has.
+    pub width: u32,
+    /// Where it comes from.
+    pub source: Source,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+    /// The bits.
+    pub bits: Vec<CipBitRow>,
+}
+
+/// One named bit.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipBitRow {
+    /// Number of the bit, 0 first.
+    pub bit: Spanned<u32>,
+    /// Its name.
+    pub name: Name,
+    /// `R`, `O`, `C` or `-`.
+    pub need: Option<Name>,
+    /// To what the need applies.
+    pub rule: Option<String>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+}
