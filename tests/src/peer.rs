@@ -1,6 +1,7 @@
 //! Foreign peers: present, visibly skipped, or a failure in CI.
 
-use std::process::Command;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 /// Whether the named program can be started.
 #[must_use]
@@ -35,6 +36,40 @@ pub fn namespaces_or_skip(test: &str) -> bool {
     let here = crate::namespace::available();
     if !here {
         skip(test, "network namespaces (root and iproute2)");
+    }
+    here
+}
+
+/// A Python that has `module`; without one `test` is skipped visibly (or fails in CI).
+///
+/// Asked in this order: `AXISBRIDGE_PYTHON`, the environment that `.ci/run` makes, and `python3`.
+#[must_use]
+pub fn python_or_skip(test: &str, module: &str) -> Option<PathBuf> {
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/ci-tools/bin/python");
+    let candidates = std::env::var_os("AXISBRIDGE_PYTHON").map(PathBuf::from).into_iter();
+    let found = candidates.chain([PathBuf::from(own), PathBuf::from("python3")]).find(|python| {
+        let import = Command::new(python)
+            .args(["-c", &format!("import {module}")])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
+        import.is_ok_and(|status| status.success())
+    });
+    if found.is_none() {
+        skip(test, &format!("a Python with the package {module}"));
+    }
+    found
+}
+
+/// Whether nmap with its script `enip-info` is here; if not, `test` is skipped visibly (or fails in CI).
+#[must_use]
+pub fn nmap_or_skip(test: &str) -> bool {
+    let here = Command::new("nmap")
+        .args(["--script-help", "enip-info"])
+        .output()
+        .is_ok_and(|output| output.status.success() && !output.stdout.is_empty());
+    if !here {
+        skip(test, "nmap with its script enip-info");
     }
     here
 }

@@ -1,0 +1,191 @@
+//! Clients of other makers against the box as a user starts it: pycomm3, ethernetip (both PyPI) and nmap's `enip-info`.
+//!
+//! Their scripts stand in `tests/peers/` and print what they got; what it has to be is judged here. A client that is not
+//! installed is a visible skip, in CI a failure.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axisbridge_tests::peer;
+use axisbridge_tests::process::{Running, axisbridge};
+use serde_json::{Value, json};
+
+/// The shipped example that needs no hardware, at an address of this test.
+fn start_box(address: &str, name: &str) -> Running {
+    let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let config = scratch.join(format!("{name}.toml"));
+    let example = include_str!("../../examples/two-axes-in-process.toml")
+        .replace("\"127.0.0.2\"", &format!("\"{address}\""))
+        .replace("127.0.0.1:1502", &format!("{address}:1502"));
+    std::fs::write(&config, example).expect("the scratch folder can be written");
+    let log = scratch.join(format!("{name}.log"));
+    let mut run = Command::new(axisbridge());
+    run.arg("run").arg("--config").arg(&config).env("NO_COLOR", "1");
+    run.stderr(std::fs::File::create(&log).expect("the log can be written"));
+    let mut running = Running::start("run", &mut run);
+    let end = Instant::now() + Duration::from_secs(30);
+    loop {
+        let seen = std::fs::read_to_string(&log).unwrap_or_default();
+        if seen.contains("CP4") {
+            return running;
+        }
+        assert!(running.ended().is_none(), "the box has ended: {seen}");
+        assert!(Instant::now() < end, "the drives did not come up: {seen}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Runs a client's script against the box; the JSON object that it prints.
+fn ask(python: &PathBuf, script: &str, address: &str) -> Value {
+    let script = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/peers")).join(script);
+    let output = Command::new(python)
+        .arg(&script)
+        .arg(address)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the client can be started");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{} ended with {}: {errors}", script.display(), output.status);
+    serde_json::from_slice(&output.stdout).expect("the client prints one JSON object")
+}
+
+/// Vendor 1, device type 37, product 1001, revision 1.1, status (owned or not), serial number, name.
+const IDENTITY: &str = "01002500e9030101";
+const SERIAL: &str = "40e20100";
+const NAME: &str = "13417869736272696467652074776f2061786573";
+
+/// Vendor; "attribute not supported"; Axis State Initializing.
+const PACKED: &str = "030008000e0012008e00000001008e0014008e00000000";
+
+#[test]
+fn pycomm3_reads_and_writes_by_every_way_it_knows() {
+    const ADDRESS: &str = "127.0.0.61";
+    let Some(python) = peer::python_or_skip("pycomm3_reads_and_writes_by_every_way_it_knows", "pycomm3")
+    else {
+        return;
+    };
+    let _running = start_box(ADDRESS, "foreign-pycomm3");
+    let got = ask(&python, "pycomm3_client.py", ADDRESS);
+
+    assert_eq!(got["list_identity"]["product_name"], "Axisbridge two axes");
+    assert_eq!(got["list_identity"]["product_type"], "CIP Motion Drive");
+    assert_eq!(got["list_identity"]["product_code"], 1001);
+    assert_eq!(got["list_identity"]["serial"], "0001e240");
+    assert_eq!(got["list_identity"]["revision"], json!({ "major": 1, "minor": 1 }));
+    let identity = got["identity_all"]["value"].as_str().expect("Get_Attributes_All answers");
+    assert!(identity.starts_with(IDENTITY) && identity.contains(SERIAL), "{identity}");
+
+    for (what, value) in [
+        ("product_name", NAME),
+        ("serial_number", SERIAL),
+        // 127.0.0.61, 255.0.0.0, no gateway, no name servers, no domain.
+        ("interface", "3d00007f000000ff0000000000000000000000000000"),
+        // The object's default for CIP transport class 0/1, urgent.
+        ("dscp_urgent", "37"),
+        ("axis_revision", "0400"),
+        ("axis_state", "00"),
+        ("set_shadow", ""),
+        ("get_shadow", "07000000"),
+        // Axis State 0 padded to four octets, Axis Faults 0; each behind ID, dimension and element size.
+        ("axis_list", "020000008a02000100000000910200080000000000000000"),
+        // The same answers over the class 3 connection.
+        ("connected_product_name", NAME),
+        ("connected_axis_state", "00"),
+    ] {
+        assert_eq!(got[what], json!({ "value": value, "error": null }), "{what}");
+    }
+    for (what, error) in [
+        ("axis_missing_attribute", "Attribute not supported"),
+        ("set_short", "Insufficient command data"),
+        ("set_read_only", "Attribute not settable"),
+    ] {
+        assert_eq!(got[what]["error"], error, "{what}");
+    }
+    let unknown = got["axis_missing_instance"]["error"].as_str().expect("refused");
+    assert!(unknown.starts_with("Destination unknown"), "{unknown}");
+    // Status 0x0A with the good items beside the bad one.
+    assert_eq!(got["identity_list"]["value"], "0300010000000100630014000600000040e20100");
+    for what in ["packed", "connected_packed"] {
+        assert_eq!(got[what]["value"], PACKED, "{what}");
+    }
+    assert_eq!((&got["connected"], &got["connection_size"]), (&json!(true), &json!(4000)));
+}
+
+#[test]
+fn ethernetip_opens_runs_and_closes_the_motion_connection() {
+    const ADDRESS: &str = "127.0.0.62";
+    let Some(python) =
+        peer::python_or_skip("ethernetip_opens_runs_and_closes_the_motion_connection", "ethernetip")
+    else {
+        return;
+    };
+    let _running = start_box(ADDRESS, "foreign-ethernetip");
+    let got = ask(&python, "ethernetip_client.py", ADDRESS);
+
+    assert_eq!(
+        got["list_identity"],
+        json!({ "vendor": 1, "device_type": 37, "product_code": 1001, "product_name": "Axisbridge two axes" })
+    );
+    // CIP over TCP, and class 0 and 1 over UDP.
+    assert_eq!(got["list_services"], json!({ "capability": 0x120, "name": "Communications" }));
+    assert_eq!(got["register"], 0);
+    assert_eq!(got["product_name"], json!({ "status": 0, "value": NAME }));
+    assert_eq!(got["control_mode"], json!({ "status": 0, "value": "00" }));
+    // This client writes 16-bit segments without their pad octet and rounds the length down: a segment error.
+    assert_eq!(got["unpadded_path"], json!({ "status": 4, "value": "" }));
+    assert_eq!(got["missing_class"], json!({ "status": 5, "value": "" }));
+
+    assert_eq!(got["wrong_configuration"], 0x0126, "a configuration block of half its size");
+    assert_eq!(got["too_small"], 0x0127, "no header fits in 8 octets");
+    assert_eq!(got["open"], 0);
+    assert_eq!(got["intervals_ms"], json!([8.0, 8.0]), "the intervals granted are those asked for");
+    assert_eq!(got["second_owner"], 0x0106);
+    let received = got["received"].as_array().expect("datagrams");
+    assert!(received.len() >= 4, "an answer to each update: {received:?}");
+    for datagram in received {
+        assert_eq!(datagram["from"], ADDRESS);
+        assert_eq!(datagram["mine"], true, "it carries the connection ID of this originator");
+        // Format, revision 2, and the update ID of the update before.
+        let data = datagram["data"].as_str().expect("hexadecimal");
+        assert!(data.starts_with("070201"), "{data}");
+    }
+    assert_eq!(got["close"], 0);
+    assert_eq!(got["close_again"]["status"], 1, "a connection failure");
+    let again = got["close_again"]["value"].as_str().expect("hexadecimal");
+    assert!(again.starts_with("0701"), "extended status 0x0107, no such connection: {again}");
+    assert_eq!(got["second_opens_after_close"], 0, "the connection is free at once");
+    assert_eq!(got["second_closes"], 0);
+}
+
+#[test]
+fn nmap_identifies_the_box_over_tcp_and_udp() {
+    const ADDRESS: &str = "127.0.0.63";
+    const TEST: &str = "nmap_identifies_the_box_over_tcp_and_udp";
+    if !peer::nmap_or_skip(TEST) {
+        return;
+    }
+    let _running = start_box(ADDRESS, "foreign-nmap");
+    // Without privileges nmap cannot send UDP probes of its own.
+    let udp = peer::namespaces_or_skip(TEST);
+    for scan in [&["-sT"][..], &["-sU"]].into_iter().take(if udp { 2 } else { 1 }) {
+        let output = Command::new("nmap")
+            .args(["-n", "-Pn", "-p", "44818", "--script", "enip-info"])
+            .args(scan)
+            .arg(ADDRESS)
+            .output()
+            .expect("nmap can be started");
+        let text = String::from_utf8_lossy(&output.stdout);
+        for line in [
+            "type: CIP Motion Drive (37)",
+            "(1)\n",
+            "productName: Axisbridge two axes",
+            "serialNumber: 0x0001e240",
+            "productCode: 1001",
+            "revision: 1.1",
+            "deviceIp: 127.0.0.63",
+        ] {
+            assert!(text.contains(line), "{scan:?}: expected {line:?} in\n{text}");
+        }
+    }
+}
