@@ -3,16 +3,16 @@
 //! Their scripts stand in `tests/peers/` and print what they got; what it has to be is judged here. A client that is not
 //! installed is a visible skip, in CI a failure.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::peer;
 use axisbridge_tests::process::{Running, axisbridge};
+use axisbridge_tests::{peer, tshark};
 use serde_json::{Value, json};
 
-/// The shipped example that needs no hardware, at an address of this test.
-fn start_box(address: &str, name: &str) -> Running {
+/// The shipped example that needs no hardware, at an address of this test; it records what passes.
+fn start_box(address: &str, name: &str) -> (Running, PathBuf) {
     let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let config = scratch.join(format!("{name}.toml"));
     let example = include_str!("../../examples/two-axes-in-process.toml")
@@ -21,14 +21,15 @@ fn start_box(address: &str, name: &str) -> Running {
     std::fs::write(&config, example).expect("the scratch folder can be written");
     let log = scratch.join(format!("{name}.log"));
     let mut run = Command::new(axisbridge());
-    run.arg("run").arg("--config").arg(&config).env("NO_COLOR", "1");
+    let capture = scratch.join(format!("{name}.pcapng"));
+    run.arg("run").arg("--config").arg(&config).arg("--capture").arg(&capture).env("NO_COLOR", "1");
     run.stderr(std::fs::File::create(&log).expect("the log can be written"));
     let mut running = Running::start("run", &mut run);
     let end = Instant::now() + Duration::from_secs(30);
     loop {
         let seen = std::fs::read_to_string(&log).unwrap_or_default();
         if seen.contains("CP4") {
-            return running;
+            return (running, capture);
         }
         assert!(running.ended().is_none(), "the box has ended: {seen}");
         assert!(Instant::now() < end, "the drives did not come up: {seen}");
@@ -65,7 +66,7 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
     else {
         return;
     };
-    let _running = start_box(ADDRESS, "foreign-pycomm3");
+    let (mut running, capture) = start_box(ADDRESS, "foreign-pycomm3");
     let got = ask(&python, "pycomm3_client.py", ADDRESS);
 
     assert_eq!(got["list_identity"]["product_name"], "Axisbridge two axes");
@@ -110,6 +111,38 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
         assert_eq!(got[what]["value"], PACKED, "{what}");
     }
     assert_eq!((&got["connected"], &got["connection_size"]), (&json!(true), &json!(4000)));
+
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+    if peer::tshark_or_skip("pycomm3_reads_and_writes_by_every_way_it_knows") {
+        explicit_traffic(&capture);
+    }
+}
+
+/// What tshark reads in the answers of the box: services and general statuses in their order.
+fn explicit_traffic(capture: &Path) {
+    let frames = tshark::dissect(capture, "enip && tcp", &[]);
+    let mut answers = Vec::new();
+    for frame in &frames {
+        assert!(!frame.has("_ws.malformed"), "frame {} is malformed", frame.number);
+        let statuses: Vec<_> = frame.all("cip.genstat").map(|field| field.value.clone()).collect();
+        // The service octets of answers, with the response bit.
+        let services: Vec<_> = frame.all("cip.sc").map(|field| field.value.clone()).collect();
+        if !statuses.is_empty() {
+            answers.push(format!("{} {}", services.join(","), statuses.join(",")));
+        }
+    }
+    let get = |status: &str| format!("8e {status}");
+    let packed = "8a,8e,8e,8e 1e,00,14,00".to_owned();
+    let mut wanted = vec!["81 00".to_owned()];
+    wanted.extend(std::iter::repeat_n(get("00"), 6));
+    wanted.extend([get("05"), get("14"), "90 00".to_owned(), get("00"), "90 13".to_owned()]);
+    wanted.extend(["90 0e", "83 0a", "cb 00"].map(str::to_owned));
+    wanted.extend([packed.clone(), "db 00".to_owned(), get("00"), get("00"), packed, "ce 00".to_owned()]);
+    assert_eq!(answers, wanted);
+    // What tshark says of the SERCOS side is judged where that side is.
+    let mut findings = tshark::warnings(capture);
+    findings.retain(|(_, message)| !message.contains("CP is unknown"));
+    assert_eq!(findings, [], "expert findings");
 }
 
 #[test]
@@ -120,7 +153,7 @@ fn ethernetip_opens_runs_and_closes_the_motion_connection() {
     else {
         return;
     };
-    let _running = start_box(ADDRESS, "foreign-ethernetip");
+    let _running = start_box(ADDRESS, "foreign-ethernetip").0;
     let got = ask(&python, "ethernetip_client.py", ADDRESS);
 
     assert_eq!(
@@ -165,7 +198,7 @@ fn nmap_identifies_the_box_over_tcp_and_udp() {
     if !peer::nmap_or_skip(TEST) {
         return;
     }
-    let _running = start_box(ADDRESS, "foreign-nmap");
+    let _running = start_box(ADDRESS, "foreign-nmap").0;
     // Without privileges nmap cannot send UDP probes of its own.
     let udp = peer::namespaces_or_skip(TEST);
     for scan in [&["-sT"][..], &["-sU"]].into_iter().take(if udp { 2 } else { 1 }) {
