@@ -4,6 +4,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::axis_object::{Axis, Context};
 use super::axis_state::{AxisState, ControlKind};
+use super::axis_status::allowed;
 use super::drive_link::{AxisCommandImage, Command, SetPoints, Withheld};
 use super::io_connection::missed_updates;
 use crate::wire::motion::codes::{ActualDataSet, AxisControl, AxisStatus, ControlMode, StatusDataSet};
@@ -46,59 +47,22 @@ impl Axis {
         }
     }
 
-    /// Axis Status, attribute 651: the drive's bits, masked and completed by Table 5-2.61.
+    /// Axis Status, attribute 651: the drive's bits, completed and masked by Table 5-2.61.
     pub fn status(&self, context: &Context) -> AxisStatus {
-        let loops = AxisStatus::POSITION_LOCK
-            | AxisStatus::VELOCITY_LOCK
-            | AxisStatus::VELOCITY_LIMIT
-            | AxisStatus::ACCELERATION_LIMIT
-            | AxisStatus::DECELERATION_LIMIT
-            | AxisStatus::TORQUE_THRESHOLD
-            | AxisStatus::TORQUE_LIMIT
-            | AxisStatus::CURRENT_LIMIT
-            | AxisStatus::MOTOR_FLUX_UP;
-        let owned = AxisStatus::LOCAL_CONTROL
-            | AxisStatus::ALARM
-            | AxisStatus::DC_BUS_UP
-            | AxisStatus::POWER_STRUCTURE_ENABLED
-            | AxisStatus::TRACKING_COMMAND
-            | AxisStatus::SHUTDOWN
-            | AxisStatus::IN_PROCESS
-            | AxisStatus::POSITION_CONTROL_MODE
-            | AxisStatus::VELOCITY_CONTROL_MODE
-            | AxisStatus::TORQUE_CONTROL_MODE;
-        let mut status = self.drive.axis_status - owned;
-        let standby = matches!(
-            self.state,
-            AxisState::Off
-                | AxisState::SelfTest
-                | AxisState::Initializing
-                | AxisState::PreCharge
-                | AxisState::Shutdown
-                | AxisState::StartInhibited
-        );
-        if standby {
-            status -= loops;
-        }
-        if self.state == AxisState::Initializing {
-            status -= AxisStatus::VELOCITY_STANDSTILL | AxisStatus::VELOCITY_THRESHOLD;
-        }
-        let powered = !standby && self.drive.power_enabled;
-        let active = powered && self.config.kind == ControlKind::Active;
         let mode = self.block.control_mode.0 & 0x0F;
+        let powered = self.drive.power_enabled;
+        let mut status = self.drive.axis_status;
         status.set(AxisStatus::LOCAL_CONTROL, !context.remote);
         status.set(AxisStatus::ALARM, self.drive.alarm.is_some());
-        status.set(AxisStatus::DC_BUS_UP, self.drive.bus_up && self.state != AxisState::PreCharge);
+        status.set(AxisStatus::DC_BUS_UP, self.drive.bus_up);
         status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
-        status.set(
-            AxisStatus::TRACKING_COMMAND,
-            self.state == AxisState::Running && self.answers() && self.drive.tracking,
-        );
+        status.set(AxisStatus::TRACKING_COMMAND, self.answers() && self.drive.tracking);
         status.set(AxisStatus::SHUTDOWN, self.shutdown);
-        status.set(AxisStatus::POSITION_CONTROL_MODE, active && mode == ControlMode::POSITION.0);
-        status.set(AxisStatus::VELOCITY_CONTROL_MODE, active && mode == ControlMode::VELOCITY.0);
-        status.set(AxisStatus::TORQUE_CONTROL_MODE, active && mode == ControlMode::TORQUE.0);
-        status
+        status.set(AxisStatus::IN_PROCESS, false);
+        status.set(AxisStatus::POSITION_CONTROL_MODE, powered && mode == ControlMode::POSITION.0);
+        status.set(AxisStatus::VELOCITY_CONTROL_MODE, powered && mode == ControlMode::VELOCITY.0);
+        status.set(AxisStatus::TORQUE_CONTROL_MODE, powered && mode == ControlMode::TORQUE.0);
+        status & allowed(self.config.kind, self.state, powered)
     }
 
     /// The cyclic actual block of D-to-C update `update_id`.

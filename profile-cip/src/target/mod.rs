@@ -34,6 +34,7 @@ mod status_report;
 mod time_offset;
 pub use axis_object::AxisConfig;
 mod axis_report;
+mod axis_status;
 mod explicit_queue;
 mod io_connection;
 pub mod io_counters;

@@ -2,6 +2,7 @@
 
 mod handshake;
 mod refusals;
+mod requests;
 mod robustness;
 mod services;
 mod startup;
