@@ -125,6 +125,40 @@ pub enum Quality {
     Lost,
 }
 
+/// How the command moves at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Motion {
+    /// Where it is.
+    pub position: Position,
+    /// How fast it is.
+    pub velocity: Velocity,
+    /// How the velocity changes.
+    pub acceleration: Acceleration,
+    /// The torque that is commanded.
+    pub torque: Torque,
+}
+
+impl Motion {
+    /// The same motion `after` later, or earlier, with its acceleration unchanged. Saturates.
+    #[must_use]
+    pub fn after(self, after: DurationNs) -> Self {
+        const SECOND: i128 = 1_000_000_000;
+        let time = i128::from(after.0);
+        let gained = i128::from(self.acceleration.get()) * time / SECOND;
+        let velocity = i128::from(self.velocity.get());
+        let way = (2 * velocity + gained).saturating_mul(time) / (2 * SECOND);
+        Self {
+            position: Position(saturate(i128::from(self.position.get()) + way)),
+            velocity: Velocity(saturate(velocity + gained)),
+            ..self
+        }
+    }
+}
+
+fn saturate(value: i128) -> i64 {
+    i64::try_from(value).unwrap_or(if value > 0 { i64::MAX } else { i64::MIN })
+}
+
 /// A fine set-point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FineCommand {
@@ -200,6 +234,8 @@ pub struct FineInterpolator {
     /// What is given while there is nothing to follow: before the first update and after a loss.
     held: SetPoints,
     lost: bool,
+    /// The motion that the next update goes on from, and when it was so.
+    carried: Option<(SystemTime, Motion)>,
 }
 
 impl FineInterpolator {
@@ -218,6 +254,7 @@ impl FineInterpolator {
             torque: Channel::default(),
             held: SetPoints::default(),
             lost: false,
+            carried: None,
         })
     }
 
@@ -237,6 +274,52 @@ impl FineInterpolator {
         self.torque = Channel::default();
         self.held = SetPoints { position, ..SetPoints::default() };
         self.lost = false;
+        self.carried = None;
+    }
+
+    /// Goes on in another way from the motion that the commands have at `now`: when another kind of set-point leads from
+    /// here on, or updates are meant for another instant. Until the next update takes over the motion goes on as it is,
+    /// and that update's curve begins in it: neither position nor velocity steps.
+    ///
+    /// What no curve tells of the motion is taken from `actual`. Before the first update and after a loss there is no
+    /// motion to go on with: then only the way changes.
+    pub fn change(&mut self, now: SystemTime, target_update: TargetUpdate, actual: &Motion) {
+        self.config.target_update = target_update;
+        while self.segments.get(1).is_some_and(|next| next.start <= now) {
+            self.segments.remove(0);
+        }
+        let Some(segment) = self.segments.first() else { return };
+        let motion = segment.motion_at(now, actual);
+        self.carry(now, motion);
+    }
+
+    /// Begins in a motion that is under way: until the first update it goes on as it is.
+    pub fn start_moving(&mut self, now: SystemTime, motion: &Motion) {
+        self.start(Some(motion.position));
+        self.carry(now, *motion);
+    }
+
+    fn carry(&mut self, now: SystemTime, motion: Motion) {
+        const SECOND: i128 = 1_000_000_000;
+        let length = self.config.period;
+        let per_length = |per_second: i64| saturate(i128::from(per_second) * i128::from(length.0) / SECOND);
+        let gained = per_length(motion.acceleration.get());
+        self.segments.clear();
+        self.segments.push(Segment {
+            start: now,
+            length,
+            follow: length,
+            position: Some(Polynomial::moving(
+                motion.position.get(),
+                per_length(motion.velocity.get()),
+                per_length(gained),
+            )),
+            velocity: Some(Polynomial::moving(motion.velocity.get(), gained, 0)),
+            acceleration: Some(Polynomial::moving(motion.acceleration.get(), 0, 0)),
+            torque: Some(Polynomial::moving(motion.torque.get(), 0, 0)),
+        });
+        self.last_target = Some(now);
+        self.carried = Some((now, motion));
     }
 
     /// Takes an update for the instant `target`, which may be past already.
@@ -247,10 +330,21 @@ impl FineInterpolator {
         if self.lost {
             return Err(UpdateError::Lost);
         }
-        let (periods, length) = self.spacing(target)?;
         // The channels are worked on as copies, so that a refused update leaves no trace.
         let mut channels = (self.position, self.velocity, self.acceleration, self.torque);
-        if let Some(segment) = self.segments.last() {
+        let (periods, length) =
+            if self.carried.is_some() { (1, self.config.period) } else { self.spacing(target)? };
+        if let Some((since, motion)) = self.carried {
+            // As if the updates before had led along the motion.
+            channels = Default::default();
+            for before in (1..=3).rev() {
+                let past = motion.after((target - length * before).since(since));
+                channels.0.fill(Some(past.position.get()));
+                channels.1.fill(Some(past.velocity.get()));
+                channels.2.fill(Some(past.acceleration.get()));
+                channels.3.fill(Some(past.torque.get()));
+            }
+        } else if let Some(segment) = self.segments.last() {
             for missing in (1..periods).rev() {
                 let at = self.limit_time(segment, target - length * missing);
                 channels.0.fill(segment.position.map(|curve| segment.motion(&curve, at).0));
@@ -277,6 +371,7 @@ impl FineInterpolator {
         }
         self.segments.push(segment);
         self.last_target = Some(target);
+        self.carried = None;
         Ok(())
     }
 
@@ -315,6 +410,7 @@ impl FineInterpolator {
             segment.start = segment.start + step;
         }
         self.last_target = self.last_target.map(|target| target + step);
+        self.carried = self.carried.map(|(since, motion)| (since + step, motion));
     }
 
     /// The periods from the last target to this one, and the length of one of them.
@@ -362,6 +458,24 @@ impl Segment {
             velocity,
             acceleration: self.acceleration.map(|curve| Acceleration(self.value(&curve, now))),
             torque: self.torque.map(|curve| Torque(self.value(&curve, now))),
+        }
+    }
+
+    /// The motion at `now`; what no curve tells is taken from `actual`.
+    fn motion_at(&self, now: SystemTime, actual: &Motion) -> Motion {
+        let points = self.at(now);
+        let on_curve = self.on_curve(now);
+        let acceleration = match (points.acceleration, self.position, self.velocity) {
+            (Some(acceleration), ..) => acceleration.get(),
+            (None, Some(curve), _) => curve.bend_per_second(on_curve, self.length),
+            (None, None, Some(curve)) => curve.slope_per_second(on_curve, self.length),
+            (None, None, None) => actual.acceleration.get(),
+        };
+        Motion {
+            position: points.position.unwrap_or(actual.position),
+            velocity: points.velocity.unwrap_or(actual.velocity),
+            acceleration: Acceleration(acceleration),
+            torque: points.torque.unwrap_or(actual.torque),
         }
     }
 

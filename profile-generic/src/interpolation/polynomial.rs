@@ -37,6 +37,13 @@ impl Polynomial {
         Self { base, first: 6 * d1 - 3 * d2 - d3, second: 3 * d2, third: d3 }
     }
 
+    /// From `base` with a way of `velocity` in the length of the segment, which `acceleration` makes longer by half of
+    /// itself.
+    pub(super) fn moving(base: i64, velocity: i64, acceleration: i64) -> Self {
+        let within = |value: i64| i128::from(value.clamp(-MAX_STEP, MAX_STEP));
+        Self { base, first: 6 * within(velocity), second: 3 * within(acceleration), third: 0 }
+    }
+
     /// The value `elapsed` after the start of the segment, saturated; before the start, that at the start.
     pub(super) fn value(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
         let part = part(elapsed, length);

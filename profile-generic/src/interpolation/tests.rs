@@ -319,3 +319,93 @@ proptest! {
         }
     }
 }
+
+/// A trajectory with a bounded acceleration: position, velocity and acceleration `periods` thousandths after the epoch.
+fn swing(at: SystemTime) -> Motion {
+    // One swing in 0.4 s, 0.2 units to either side: at most 49.3 units per second squared.
+    let angle = cast::f64_from_i64(at.since(EPOCH).0) / 1e9 * SWING;
+    let nano = |value: f64| cast::i64_from_f64(value * 1e9);
+    Motion {
+        position: Position(nano(0.2 * angle.sin())),
+        velocity: Velocity(nano(0.2 * SWING * angle.cos())),
+        acceleration: Acceleration(nano(-0.2 * SWING * SWING * angle.sin())),
+        torque: Torque::ZERO,
+    }
+}
+
+const SWING: f64 = std::f64::consts::TAU / 0.4;
+
+proptest! {
+    /// Control mode and Command Target Update change while the axis moves: the velocity never steps by more than the
+    /// trajectory's own acceleration allows in that time, with the factor by which a cubic through sampled values
+    /// overshoots it.
+    #[test]
+    fn changes_of_mode_and_target_on_the_move_do_not_step(
+        changes in prop::collection::vec((any::<bool>(), any::<bool>(), 1..12_i64), 1..12),
+    ) {
+        const FINE: DurationNs = DurationNs::from_micros(250);
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 4);
+        interpolator.start_moving(EPOCH, &swing(EPOCH));
+        let (mut period, mut by_velocity) = (0, false);
+        let mut last: Option<i64> = None;
+        for (velocity, extrapolate, periods) in changes {
+            let update = if extrapolate { TargetUpdate::Extrapolate } else { TargetUpdate::Interpolate };
+            for number in 0..periods {
+                // The update stamped at the start of this period arrives a little later.
+                let (stamp, arrives) = (time(period, 0), time(period, 100));
+                if number == 0 && (velocity != by_velocity || update != interpolator.config().target_update) {
+                    interpolator.change(arrives, update, &swing(arrives));
+                    by_velocity = velocity;
+                }
+                let target = update.target(stamp, PERIOD);
+                let aim = swing(target);
+                let points = SetPoints {
+                    position: (!velocity).then_some(aim.position),
+                    velocity: velocity.then_some(aim.velocity),
+                    ..SetPoints::default()
+                };
+                prop_assert!(!matches!(interpolator.update(target, &points), Err(UpdateError::Jump | UpdateError::Lost)));
+                let mut now = arrives;
+                while now < time(period + 1, 100) {
+                    let fine = interpolator.at(now);
+                    let speed = fine.set_points.velocity.unwrap().get();
+                    if let Some(last) = last {
+                        // 50 units/s2 for 0.25 ms, four times.
+                        prop_assert!((speed - last).abs() < 4 * 50_000_000_000 / 4_000, "{speed} after {last}");
+                    }
+                    let error = (speed - swing(now).velocity.get()).abs();
+                    prop_assert!(error < 100_000_000, "{error} off the trajectory");
+                    last = Some(speed);
+                    now = now + FINE;
+                }
+                period += 1;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_motion_goes_on_until_the_first_update_after_a_change() {
+    let moving = Motion { position: Position(1_000), velocity: Velocity(500_000), ..Motion::default() };
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+    interpolator.start_moving(EPOCH, &moving);
+    // 500000 a second are 1000 in a period of 2 ms.
+    assert_eq!(position_at(&mut interpolator, time(0, 500)), 1_500);
+    interpolator.update(time(2, 0), &position(3_000)).unwrap();
+    assert_eq!(position_at(&mut interpolator, time(1, 0)), 2_000);
+    assert_eq!(position_at(&mut interpolator, time(1, 500)), 2_500);
+    // Then by velocity, from the velocity that there is.
+    interpolator.change(time(1, 500), TargetUpdate::Extrapolate, &Motion::default());
+    assert_eq!(interpolator.at(time(1, 500)).set_points.velocity, Some(Velocity(500_000)));
+    let points = SetPoints { velocity: Some(Velocity(500_000)), ..SetPoints::default() };
+    interpolator.update(time(2, 0), &points).unwrap();
+    let fine = interpolator.at(time(1, 750));
+    assert_eq!((fine.set_points.velocity, fine.set_points.position), (Some(Velocity(500_000)), None));
+    // Before the first update there is nothing to carry on.
+    interpolator.start(Some(Position(7)));
+    interpolator.change(time(3, 0), TargetUpdate::Interpolate, &moving);
+    assert_eq!(
+        interpolator.at(time(3, 0)),
+        FineCommand { set_points: position(7), quality: Quality::Waiting }
+    );
+}

@@ -105,6 +105,8 @@ pub struct AxisChannel {
     command_loss: Reaction,
     drive: BasicDriveClock,
     interpolator: Option<FineInterpolator>,
+    /// The instant that the last command is for.
+    acts_at: SystemTime,
     command: AxisCommand,
     feedback: AxisFeedback,
     /// The action whose bits stand in the control word.
@@ -148,6 +150,7 @@ impl AxisChannel {
             command_loss,
             drive: BasicDriveClock::default(),
             interpolator: None,
+            acts_at: SystemTime::default(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             action: Action::TorqueOff,

@@ -5,7 +5,7 @@ use crate::mapping::CyclicValues;
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::image::{AxisCommand, FeedbackSet};
-use profile_generic::interpolation::{Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
+use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Torque, Velocity};
@@ -44,9 +44,8 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(cause, system));
             return;
         }
-        if self.command.mode != mode || first {
-            self.start_interpolator();
-        }
+        let other_mode = self.command.mode != mode;
+        let actual = self.actual_motion();
         self.command.mode = mode;
         self.counters.commands = self.counters.commands.saturating_add(1);
         let target_update = TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default();
@@ -54,11 +53,13 @@ impl AxisChannel {
             self.lose_command(now, system, Loss::NoPeriod);
             return;
         };
-        if interpolator.config().target_update != target_update {
-            let period = interpolator.config().period;
-            self.set_update_period(period, target_update);
+        if first {
+            interpolator.start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position));
         }
-        let Some(interpolator) = self.interpolator.as_mut() else { return };
+        if other_mode || interpolator.config().target_update != target_update {
+            // On the move the new command begins where the old one has led the axis.
+            interpolator.change(self.acts_at, target_update, &actual);
+        }
         let target = match points.target_time {
             Some(target) => SystemTime(target),
             None => target_update.target(system, interpolator.config().period),
@@ -87,6 +88,18 @@ impl AxisChannel {
             let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(self.command_loss);
             self.raise(now, system, fault);
         }
+    }
+
+    /// How the axis moves at the instant of its last command, as far as its drive has told.
+    fn actual_motion(&self) -> Motion {
+        let feedback = &self.feedback;
+        let seen = Motion {
+            position: feedback.position,
+            velocity: feedback.velocity,
+            torque: self.command.torque,
+            ..Motion::default()
+        };
+        seen.after(self.acts_at.since(feedback.at))
     }
 
     pub(super) fn start_interpolator(&mut self) {
@@ -124,6 +137,7 @@ impl AxisChannel {
     /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it
     /// begins to.
     pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
+        self.acts_at = acts_at;
         let operating = self.state() == DriveState::Operating;
         let fine = match self.interpolator.as_mut() {
             Some(interpolator) if operating && self.sequence.is_some() => Some(interpolator.at(acts_at)),
