@@ -19,6 +19,7 @@
 //! | [`state`], precedence after a fault reset | CIP Volume 9, 5-2.6.1, table 5-2.97, generalised |
 //! | [`fault`], [`inhibit`] | CIP Volume 9, tables 5-2.65, 5-2.72 and 5-2.74, and what other profiles raise |
 //! | [`interpolation`] | CIP Volume 9, 5-2.6.5.2 and table 6-2.24 |
+//! | [`sequence`] | CIP Volume 9, 5-2.3.9.1 |
 //! | [`mode`] | IEC 61800-7-202, 4.2 |
 //! | [`capture`] | CIP Volume 9, the events of the Motion Device Axis Object |
 //! | [`quantity`], [`ratio`], [`scaling`], [`program`], [`parameter`], [`servo`] | our own design |
@@ -30,7 +31,7 @@
 //! | device identification | [`parameter`] (group 0x01xx) |
 //! | communication | [`time`], [`interpolation`], [`program`] |
 //! | device control | [`mode`], requests and reports in [`state`] |
-//! | basic drive | [`state`], [`image`], [`fault`], [`inhibit`], [`scaling`], [`quantity`], [`ratio`] |
+//! | basic drive | [`state`], [`sequence`], [`image`], [`fault`], [`inhibit`], [`scaling`], [`quantity`], [`ratio`] |
 //! | application functions | [`capture`] |
 //!
 //! And the terms of the interface: commands are [`state::Request`]s, status is [`image::StatusBits`] and
@@ -59,6 +60,7 @@ pub mod program;
 pub mod quantity;
 pub mod ratio;
 pub mod scaling;
+pub mod sequence;
 pub mod servo;
 pub mod state;
 pub mod time;

@@ -54,7 +54,8 @@ impl AxisChannel {
             return;
         };
         if first {
-            interpolator.start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position));
+            interpolator
+                .start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position));
         }
         if other_mode || interpolator.config().target_update != target_update {
             // On the move the new command begins where the old one has led the axis.
