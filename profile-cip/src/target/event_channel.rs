@@ -177,8 +177,8 @@ mod tests {
             (EventType::HOME_NEGATIVE, "Home Switch Neg Edge"),
             (EventType::HOME_MARKER_NN, "Home Switch-Marker --"),
             (EventType::HOME_TORQUE, "Home Torque Threshold"),
-            (EventType::WATCH_1_FORWARD, "Watch 1 Fwd"),
-            (EventType::WATCH_2_REVERSE, "Watch 2 Rev"),
+            (EventType::WATCH_1_FORWARD, "Watch Position 1 Fwd"),
+            (EventType::WATCH_2_REVERSE, "Watch Position 2 Rev"),
         ];
         for (event, name) in pairs {
             assert_eq!(checking_bit(event).and_then(named).as_deref(), Some(name));

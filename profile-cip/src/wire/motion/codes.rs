@@ -13,13 +13,13 @@ open_code! {
     /// Connection Type of the connection header, Table 6-2.9.
     pub struct ConnectionFormat(u8) {
         /// Fixed Controller-to-Device.
-        FIXED_COMMAND = 2 => "Fixed Controller-to-Device",
+        FIXED_COMMAND = 2 => "Fixed Controller-to-Device Connection",
         /// Fixed Device-to-Controller.
-        FIXED_ACTUAL = 3 => "Fixed Device-to-Controller",
+        FIXED_ACTUAL = 3 => "Fixed Device-to-Controller Connection",
         /// Variable Controller-to-Device.
-        VARIABLE_COMMAND = 6 => "Variable Controller-to-Device",
+        VARIABLE_COMMAND = 6 => "Variable Controller-to-Device Connection",
         /// Variable Device-to-Controller.
-        VARIABLE_ACTUAL = 7 => "Variable Device-to-Controller",
+        VARIABLE_ACTUAL = 7 => "Variable Device-to-Controller Connection",
     }
 }
 
@@ -90,9 +90,9 @@ open_code! {
         /// Immediate.
         IMMEDIATE = 0 => "Immediate",
         /// Extrapolate (+1 update period).
-        EXTRAPOLATE = 1 => "Extrapolate (+1 update period)",
+        EXTRAPOLATE = 1 => "Extrapolate (+1 UP)",
         /// Interpolate (+2 update periods).
-        INTERPOLATE = 2 => "Interpolate (+2 update periods)",
+        INTERPOLATE = 2 => "Interpolate (+2 UP)",
     }
 }
 

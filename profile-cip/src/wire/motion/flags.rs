@@ -18,7 +18,8 @@ macro_rules! bit_field {
         }
 
         impl $name {
-            const TEXTS: &'static [($name, &'static str)] = &[$(($name::$flag, $text)),*];
+            /// Every named bit with its name, in the order of declaration.
+            pub const NAMED: &'static [($name, &'static str)] = &[$(($name::$flag, $text)),*];
             const KNOWN: $repr = 0 $(| (1 << $bit))*;
 
             /// The bits that have no name in the standard.
@@ -34,7 +35,7 @@ macro_rules! bit_field {
                     return f.write_str("none");
                 }
                 let mut separator = "";
-                for (flag, text) in Self::TEXTS {
+                for (flag, text) in Self::NAMED {
                     if self.contains(*flag) {
                         write!(f, "{separator}{text}")?;
                         separator = ", ";
@@ -152,7 +153,7 @@ bit_field! {
         /// Axis I/O Status and its manufacturer word.
         IO_STATUS = 3, "Axis I/O Status";
         /// Safety status words and the safety state.
-        SAFETY_STATUS = 4, "Axis Safety Status";
+        SAFETY_STATUS = 4, "Axis Safety";
         /// Vendor specific.
         VENDOR_A = 6, "Vendor Specific 6";
         /// Vendor specific.
@@ -228,17 +229,17 @@ bit_field! {
         /// Level of registration input 2.
         REGISTRATION_2_INPUT = 3, "Registration 2 Input";
         /// The positive limit switch is free.
-        POSITIVE_OVERTRAVEL_OK = 4, "Positive Overtravel OK";
+        POSITIVE_OVERTRAVEL_OK = 4, "Positive Overtravel OK Input";
         /// The negative limit switch is free.
-        NEGATIVE_OVERTRAVEL_OK = 5, "Negative Overtravel OK";
+        NEGATIVE_OVERTRAVEL_OK = 5, "Negative Overtravel OK Input";
         /// The thermostat of feedback 1 is closed.
-        FEEDBACK_1_THERMOSTAT_OK = 6, "Feedback 1 Thermostat OK";
+        FEEDBACK_1_THERMOSTAT_OK = 6, "Feedback 1 Thermostat OK Input";
         /// The resistive brake is released.
-        RESISTIVE_BRAKE_RELEASE = 7, "Resistive Brake Release";
+        RESISTIVE_BRAKE_RELEASE = 7, "Resistive Brake Release Output";
         /// The mechanical brake is released.
-        MECHANICAL_BRAKE_RELEASE = 8, "Mechanical Brake Release";
+        MECHANICAL_BRAKE_RELEASE = 8, "Mechanical Brake Release Output";
         /// The motor thermostat is closed.
-        MOTOR_THERMOSTAT_OK = 9, "Motor Thermostat OK";
+        MOTOR_THERMOSTAT_OK = 9, "Motor Thermostat OK Input";
     }
 }
 
@@ -271,13 +272,13 @@ bit_field! {
         /// Keep checking after an event.
         REG_2_NEGATIVE_REARM = 11, "Reg 2 Neg Auto-rearm";
         /// Extended format only.
-        WATCH_1_FORWARD = 12, "Watch 1 Fwd";
+        WATCH_1_FORWARD = 12, "Watch Position 1 Fwd";
         /// Extended format only.
-        WATCH_1_REVERSE = 13, "Watch 1 Rev";
+        WATCH_1_REVERSE = 13, "Watch Position 1 Rev";
         /// Extended format only.
-        WATCH_2_FORWARD = 14, "Watch 2 Fwd";
+        WATCH_2_FORWARD = 14, "Watch Position 2 Fwd";
         /// Extended format only.
-        WATCH_2_REVERSE = 15, "Watch 2 Rev";
+        WATCH_2_REVERSE = 15, "Watch Position 2 Rev";
         /// Check the marker, positive edge.
         MARKER_POSITIVE = 16, "Marker Pos Edge";
         /// Check the marker, negative edge.
