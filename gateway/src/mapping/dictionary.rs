@@ -2,9 +2,11 @@
 
 mod cip;
 mod cip_codes;
+mod cip_faults;
 mod sercos;
 
 pub use cip::{Access, CipAttribute, CipDictionary, CipType, DataElement};
+pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use sercos::{IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word};
 
 use profile_generic::image::Signal;
@@ -119,6 +121,48 @@ pub struct Code {
     pub rule: String,
     /// Anything worth knowing; mostly empty.
     pub note: String,
+    /// Numbers of the attributes that say when a condition is met, of instance 0 where the set belongs to it.
+    pub limits: Vec<u16>,
+}
+
+/// What codes without a name of their own are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RangeKind {
+    /// For later editions: not to be used.
+    Reserved,
+    /// For the maker of the device.
+    Vendor,
+    /// For the device, by its profile.
+    Device,
+    /// The code is a number.
+    Number,
+}
+
+impl RangeKind {
+    /// Every kind with its word in the files.
+    pub const NAMED: &'static [(&'static str, Self)] = &[
+        ("reserved", Self::Reserved),
+        ("vendor", Self::Vendor),
+        ("device", Self::Device),
+        ("number", Self::Number),
+    ];
+}
+
+/// Codes or bits without a name of their own.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CodeRange {
+    /// The first of them.
+    pub first: u32,
+    /// The last of them.
+    pub last: u32,
+    /// What they are for.
+    pub kind: RangeKind,
+    /// What such a code means; mostly empty.
+    pub name: String,
+    /// `R`, `O`, `C` or `-`; `None` where the standard prints nothing.
+    pub need: Option<char>,
+    /// Anything worth knowing; mostly empty.
+    pub note: String,
 }
 
 /// Named codes or bits.
@@ -138,8 +182,12 @@ pub struct Enumeration {
     pub source: String,
     /// Anything worth knowing; mostly empty.
     pub note: String,
+    /// First and last bit of the code where it is only a part of the value.
+    pub field: Option<(u32, u32)>,
     /// The codes or bits.
     pub codes: Vec<Code>,
+    /// Codes or bits without a name of their own.
+    pub ranges: Vec<CodeRange>,
 }
 
 impl Enumeration {
@@ -173,6 +221,7 @@ fn resolve_codes(row: &EnumerationRow, resolver: &mut Resolver<'_>) -> Enumerati
         need: None,
         rule: String::new(),
         note: String::new(),
+        limits: Vec::new(),
     };
     let set = Enumeration {
         name: row.name.get_ref().clone(),
@@ -182,7 +231,9 @@ fn resolve_codes(row: &EnumerationRow, resolver: &mut Resolver<'_>) -> Enumerati
         element: String::new(),
         source: row.source.get_ref().clone(),
         note: String::new(),
+        field: None,
         codes: row.codes.iter().map(code).collect(),
+        ranges: Vec::new(),
     };
     set.unique(row.codes.iter().map(|code| &code.name), resolver);
     set

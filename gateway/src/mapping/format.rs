@@ -5,11 +5,13 @@
 //! they name.
 
 mod cip_dictionary;
+mod cip_faults;
 mod cip_generic;
 mod dictionary;
 mod generic_sercos;
 
 pub use cip_dictionary::*;
+pub use cip_faults::*;
 pub use cip_generic::*;
 pub use dictionary::*;
 pub use generic_sercos::*;

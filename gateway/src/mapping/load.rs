@@ -9,7 +9,8 @@ use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use serde::de::DeserializeOwned;
 
 use super::format::{
-    CipAttributeFile, CipEnumerationFile, CipGenericFile, GenericFile, GenericSercosFile, SercosFile,
+    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, GenericFile, GenericSercosFile,
+    SercosFile,
 };
 
 /// The file format this build understands.
@@ -19,10 +20,11 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
+    ("dictionary/cip-faults.toml", include_str!("../../../mappings/dictionary/cip-faults.toml")),
     ("dictionary/sercos.toml", include_str!("../../../mappings/dictionary/sercos.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
@@ -46,6 +48,8 @@ pub struct TableTexts {
     pub cip_attributes: TableText,
     /// CIP Motion dictionary: codes and bits.
     pub cip_enumerations: TableText,
+    /// CIP Motion dictionary: faults, alarms and inhibits.
+    pub cip_faults: TableText,
     /// SERCOS dictionary.
     pub sercos: TableText,
     /// CIP Motion to generic.
@@ -72,6 +76,8 @@ pub struct Tables {
     pub cip_attributes: Parsed<CipAttributeFile>,
     /// CIP Motion dictionary: codes and bits.
     pub cip_enumerations: Parsed<CipEnumerationFile>,
+    /// CIP Motion dictionary: faults, alarms and inhibits.
+    pub cip_faults: Parsed<CipFaultFile>,
     /// SERCOS dictionary.
     pub sercos: Parsed<SercosFile>,
     /// CIP Motion to generic.
@@ -211,13 +217,22 @@ impl TableTexts {
 
     /// The texts in the order of [`FILES`].
     fn from_array(texts: [TableText; FILES.len()]) -> Self {
-        let [generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos] = texts;
-        Self { generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos }
+        let [generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos] =
+            texts;
+        Self { generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos }
     }
 
     fn as_array_mut(&mut self) -> [&mut TableText; FILES.len()] {
-        let Self { generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos } = self;
-        [generic, cip_attributes, cip_enumerations, sercos, cip_generic, generic_sercos]
+        let Self {
+            generic,
+            cip_attributes,
+            cip_enumerations,
+            cip_faults,
+            sercos,
+            cip_generic,
+            generic_sercos,
+        } = self;
+        [generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos]
     }
 
     /// Parses all files.
@@ -229,6 +244,7 @@ impl TableTexts {
         let generic = self.generic.parse(&mut errors);
         let cip_attributes = self.cip_attributes.parse(&mut errors);
         let cip_enumerations = self.cip_enumerations.parse(&mut errors);
+        let cip_faults = self.cip_faults.parse(&mut errors);
         let sercos = self.sercos.parse(&mut errors);
         let cip_generic = self.cip_generic.parse(&mut errors);
         let generic_sercos = self.generic_sercos.parse(&mut errors);
@@ -237,6 +253,7 @@ impl TableTexts {
                 generic: generic?,
                 cip_attributes: cip_attributes?,
                 cip_enumerations: cip_enumerations?,
+                cip_faults: cip_faults?,
                 sercos: sercos?,
                 cip_generic: cip_generic?,
                 generic_sercos: generic_sercos?,

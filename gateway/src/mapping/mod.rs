@@ -43,8 +43,9 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipType, Code, DataElement, Dictionaries, Enumeration,
-    GenericDictionary, IdnFormat, IdnUnit, SercosDictionary, SercosIdn, SetKind, Word,
+    Access, CipAttribute, CipDictionary, CipType, Clearing, Code, CodeRange, DataElement, Dictionaries,
+    Enumeration, ExceptionAction, FaultRecord, GenericDictionary, IdnFormat, IdnUnit, RangeKind,
+    SercosDictionary, SercosIdn, SetKind, StatusCode, Word,
 };
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};

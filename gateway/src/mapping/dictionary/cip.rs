@@ -2,9 +2,10 @@
 
 use profile_generic::program::Width;
 
-use super::cip_codes::resolve_sets;
-use super::{Enumeration, named_code};
-use crate::mapping::format::{AttributeRow, CipAttributeFile, Name};
+use super::cip_codes::{resolve_data_set_bits, resolve_sets};
+use super::cip_faults::resolve_faults;
+use super::{Enumeration, ExceptionAction, FaultRecord, StatusCode, named_code};
+use crate::mapping::format::{AttributeRow, CipAttributeFile, CipEnumerationFile, Name};
 use crate::mapping::load::{Parsed, TableErrors, Tables};
 use crate::mapping::resolver::Resolver;
 
@@ -83,6 +84,11 @@ impl CipType {
         })
     }
 
+    /// Bits of a value of this type; `None` for strings.
+    pub fn bits(self) -> Option<u32> {
+        if self == Self::Bool { Some(1) } else { self.width().map(Width::bits) }
+    }
+
     /// The name in the standard.
     pub fn name(self) -> &'static str {
         Self::NAMED.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
@@ -142,18 +148,27 @@ pub struct DataElement {
 pub struct CipDictionary {
     class_attributes: Vec<CipAttribute>,
     attributes: Vec<CipAttribute>,
-    enumerations: Vec<Enumeration>,
-    bits: Vec<Enumeration>,
+    pub(super) enumerations: Vec<Enumeration>,
+    pub(super) bits: Vec<Enumeration>,
+    pub(super) fault_records: Vec<FaultRecord>,
+    pub(super) exception_actions: Vec<ExceptionAction>,
+    pub(super) status_codes: Vec<StatusCode>,
     data_sets: Vec<(String, Vec<DataElement>)>,
 }
 
 impl CipDictionary {
     pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
         let mut dictionary = Self::resolve_attribute_file(&tables.cip_attributes, errors);
-        let (enumerations, bits) = resolve_sets(&tables.cip_enumerations, &dictionary, errors);
-        dictionary.enumerations = enumerations;
-        dictionary.bits = bits;
+        dictionary.resolve_enumeration_file(&tables.cip_enumerations, errors);
+        resolve_faults(&tables.cip_faults, &mut dictionary, errors);
         dictionary
+    }
+
+    fn resolve_enumeration_file(&mut self, file: &Parsed<CipEnumerationFile>, errors: &mut TableErrors) {
+        let mut resolver = Resolver::new(&file.text, errors);
+        let rows = &file.rows;
+        resolver.head(&rows.format, "profile", &rows.profile, "cip-motion");
+        resolve_sets(&rows.enumeration, &rows.bits, self, &mut resolver);
     }
 
     fn resolve_attribute_file(file: &Parsed<CipAttributeFile>, errors: &mut TableErrors) -> Self {
@@ -166,13 +181,11 @@ impl CipDictionary {
             ..Self::default()
         };
         for row in &rows.data_set {
-            dictionary.attribute_or_error("attribute", &row.attribute, &mut resolver);
+            let bits = resolve_data_set_bits(row, &dictionary, &mut resolver);
+            dictionary.bits.push(bits);
             let mut elements = Vec::with_capacity(row.elements.len());
             for element in &row.elements {
                 let bit = *element.bit.get_ref();
-                if bit >= 8 {
-                    resolver.error(element.bit.span(), "bit", format!("expected a bit below 8, got {bit}"));
-                }
                 let attributes = element
                     .attributes
                     .iter()
@@ -207,6 +220,11 @@ impl CipDictionary {
         self.attributes.get(at)
     }
 
+    /// The attribute of instance 0 with this number.
+    pub fn class_attribute_by_id(&self, id: u16) -> Option<&CipAttribute> {
+        self.class_attributes.iter().find(|attribute| attribute.id == id)
+    }
+
     /// The set of named codes with this name.
     pub fn enumeration(&self, name: &str) -> Option<&Enumeration> {
         self.enumerations.iter().find(|set| set.name == name)
@@ -225,6 +243,21 @@ impl CipDictionary {
     /// The set of named bits with this name.
     pub fn bits(&self, name: &str) -> Option<&Enumeration> {
         self.bits.iter().find(|set| set.name == name)
+    }
+
+    /// What the types of faults and alarms mean.
+    pub fn fault_records(&self) -> &[FaultRecord] {
+        &self.fault_records
+    }
+
+    /// What the exception actions do.
+    pub fn exception_actions(&self) -> &[ExceptionAction] {
+        &self.exception_actions
+    }
+
+    /// The general status codes the standard says something of.
+    pub fn status_codes(&self) -> &[StatusCode] {
+        &self.status_codes
     }
 
     /// The elements of the data set with this name.

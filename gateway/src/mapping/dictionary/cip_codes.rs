@@ -1,119 +1,226 @@
-//! The codes and bits of CIP Motion attributes.
+//! The codes and bits of CIP Motion attributes, of its connection and of its services.
 
 use super::cip::CipDictionary;
-use super::{Code, Enumeration, SetKind};
-use crate::mapping::format::{CipBitsRow, CipEnumerationFile, CipEnumerationRow, Name};
-use crate::mapping::load::{Parsed, TableErrors};
+use super::{Code, CodeRange, Enumeration, RangeKind, SetKind};
+use crate::mapping::format::{CipBitsRow, CipEnumerationRow, CipRangeRow, DataSetRow, Name, Source};
 use crate::mapping::resolver::Resolver;
 
 /// A set that belongs to nothing is of no use to a reader.
 const NO_HOLDER: &str = "expected `attributes`, `class_attributes` or `element`, got none of them";
 
-/// Sets of codes and sets of bits. `attributes` has the attributes already.
-pub(super) fn resolve_sets(
-    file: &Parsed<CipEnumerationFile>,
-    attributes: &CipDictionary,
-    errors: &mut TableErrors,
-) -> (Vec<Enumeration>, Vec<Enumeration>) {
-    let mut resolver = Resolver::new(&file.text, errors);
-    resolver.head(&file.rows.format, "profile", &file.rows.profile, "cip-motion");
-    let codes: Vec<_> =
-        file.rows.enumeration.iter().map(|row| resolve_codes(row, attributes, &mut resolver)).collect();
-    let bits: Vec<_> =
-        file.rows.bits.iter().map(|row| resolve_bits(row, attributes, &mut resolver)).collect();
-    let names = file.rows.enumeration.iter().map(|row| &row.name);
-    unique_names(names, &mut resolver);
-    unique_names(file.rows.bits.iter().map(|row| &row.name), &mut resolver);
-    (codes, bits)
-}
+/// Fields of the connection and of services that hold a code are octets.
+const ELEMENT_BITS: u32 = 8;
 
-fn unique_names<'a>(names: impl Iterator<Item = &'a Name>, resolver: &mut Resolver<'_>) {
-    let mut seen: Vec<&str> = Vec::new();
-    for name in names {
-        if seen.contains(&name.get_ref().as_str()) {
-            resolver.error(name.span(), "name", "the set is there twice");
+/// Reads sets of codes and of bits into the dictionary, which has the attributes already.
+pub(super) fn resolve_sets(
+    enumerations: &[CipEnumerationRow],
+    bits: &[CipBitsRow],
+    dictionary: &mut CipDictionary,
+    resolver: &mut Resolver<'_>,
+) {
+    for row in enumerations {
+        if dictionary.enumeration(row.name.get_ref()).is_some() {
+            resolver.error(row.name.span(), "name", "the set is there twice");
         }
-        seen.push(name.get_ref());
+        let set = resolve_codes(row, dictionary, resolver);
+        dictionary.enumerations.push(set);
+    }
+    for row in bits {
+        if dictionary.bits(row.name.get_ref()).is_some() {
+            resolver.error(row.name.span(), "name", "the set is there twice");
+        }
+        let set = resolve_bits(row, dictionary, resolver);
+        dictionary.bits.push(set);
     }
 }
 
 fn resolve_codes(
     row: &CipEnumerationRow,
-    attributes: &CipDictionary,
+    dictionary: &CipDictionary,
     resolver: &mut Resolver<'_>,
 ) -> Enumeration {
-    let mut set = Enumeration {
-        name: row.name.get_ref().clone(),
-        kind: SetKind::Codes,
-        attributes: ids(&row.attributes, |name| {
-            attributes.attribute_or_error("attributes", name, resolver).map(|row| row.id)
-        }),
-        class_attributes: ids(&row.class_attributes, |name| {
-            attributes.class_attribute_or_error("class_attributes", name, resolver).map(|row| row.id)
-        }),
-        element: row.element.clone().unwrap_or_default(),
-        source: row.source.get_ref().clone(),
-        note: row.note.clone().unwrap_or_default(),
-        codes: Vec::with_capacity(row.codes.len()),
-    };
-    if row.attributes.is_empty() && row.class_attributes.is_empty() && row.element.is_none() {
-        resolver.error(row.name.span(), "name", NO_HOLDER);
+    let mut set = empty(&row.name, SetKind::Codes, &row.source);
+    set.element = row.element.clone().unwrap_or_default();
+    set.note = row.note.clone().unwrap_or_default();
+    hold(&mut set, &row.name, [&row.attributes, &row.class_attributes], dictionary, resolver);
+    let whole = value_bits(&set, dictionary).unwrap_or(ELEMENT_BITS);
+    let mut width = whole;
+    if let Some(field) = &row.field {
+        let [first, last] = *field.get_ref();
+        if first > last || last >= whole {
+            let message = format!("expected first and last bit below {whole}, got [{first}, {last}]");
+            resolver.error(field.span(), "field", message);
+        } else {
+            width = last - first + 1;
+        }
+        set.field = Some((first, last));
     }
+    // A set with a field of an attribute and a whole octet elsewhere is as wide as the field.
+    let beyond = 1_u64.checked_shl(width).unwrap_or(u64::MAX);
     for code in &row.codes {
-        let need = resolve_need(code.need.as_ref(), resolver);
-        let code = Code {
-            code: *code.code.get_ref(),
+        let number = *code.code.get_ref();
+        below(beyond, number, code.code.span(), "code", resolver);
+        set.codes.push(Code {
+            code: number,
             name: code.name.get_ref().clone(),
-            need,
+            need: resolve_need(code.need.as_ref(), resolver),
             rule: code.rule.clone().unwrap_or_default(),
             note: code.note.clone().unwrap_or_default(),
-        };
-        set.codes.push(code);
+            limits: limits(&code.limits, &set, dictionary, resolver),
+        });
     }
     set.unique(row.codes.iter().map(|code| &code.name), resolver);
+    ranges(&mut set, &row.ranges, beyond, resolver);
     set
 }
 
-fn resolve_bits(row: &CipBitsRow, attributes: &CipDictionary, resolver: &mut Resolver<'_>) -> Enumeration {
-    let mut set = Enumeration {
-        name: row.name.get_ref().clone(),
-        kind: SetKind::Bits { width: row.width },
-        attributes: ids(&row.attributes, |name| {
-            attributes.attribute_or_error("attributes", name, resolver).map(|row| row.id)
-        }),
-        class_attributes: ids(&row.class_attributes, |name| {
-            attributes.class_attribute_or_error("class_attributes", name, resolver).map(|row| row.id)
-        }),
-        element: row.element.clone().unwrap_or_default(),
-        source: row.source.get_ref().clone(),
-        note: row.note.clone().unwrap_or_default(),
-        codes: Vec::with_capacity(row.bits.len()),
-    };
-    if row.attributes.is_empty() && row.class_attributes.is_empty() && row.element.is_none() {
-        resolver.error(row.name.span(), "name", NO_HOLDER);
+fn resolve_bits(row: &CipBitsRow, dictionary: &CipDictionary, resolver: &mut Resolver<'_>) -> Enumeration {
+    let mut set = empty(&row.name, SetKind::Bits { width: row.width }, &row.source);
+    set.element = row.element.clone().unwrap_or_default();
+    set.note = row.note.clone().unwrap_or_default();
+    hold(&mut set, &row.name, [&row.attributes, &row.class_attributes], dictionary, resolver);
+    if let Some(width) = value_bits(&set, dictionary)
+        && width != row.width
+    {
+        let message = format!("expected width {width}, as its attribute has, got {}", row.width);
+        resolver.error(row.name.span(), "width", message);
     }
+    let beyond = u64::from(row.width);
     for bit in &row.bits {
         let number = *bit.bit.get_ref();
-        if number >= row.width {
-            let message = format!("expected a bit below {}, got {number}", row.width);
-            resolver.error(bit.bit.span(), "bit", message);
-        }
-        let need = resolve_need(bit.need.as_ref(), resolver);
-        let code = Code {
+        below(beyond, number, bit.bit.span(), "bit", resolver);
+        set.codes.push(Code {
             code: number,
             name: bit.name.get_ref().clone(),
-            need,
+            need: resolve_need(bit.need.as_ref(), resolver),
             rule: bit.rule.clone().unwrap_or_default(),
             note: bit.note.clone().unwrap_or_default(),
-        };
-        set.codes.push(code);
+            limits: limits(&bit.limits, &set, dictionary, resolver),
+        });
     }
     set.unique(row.bits.iter().map(|bit| &bit.name), resolver);
+    ranges(&mut set, &row.ranges, beyond, resolver);
     set
 }
 
-fn ids(names: &[Name], find: impl FnMut(&Name) -> Option<u16>) -> Vec<u16> {
-    names.iter().filter_map(find).collect()
+/// The bits of a data set, beside what its elements carry.
+pub(super) fn resolve_data_set_bits(
+    row: &DataSetRow,
+    dictionary: &CipDictionary,
+    resolver: &mut Resolver<'_>,
+) -> Enumeration {
+    let mut set = empty(&row.name, SetKind::Bits { width: ELEMENT_BITS }, &row.source);
+    set.attributes
+        .extend(dictionary.attribute_or_error("attribute", &row.attribute, resolver).map(|row| row.id));
+    for element in &row.elements {
+        let bit = u32::from(*element.bit.get_ref());
+        below(u64::from(ELEMENT_BITS), bit, element.bit.span(), "bit", resolver);
+        set.codes.push(Code {
+            code: bit,
+            name: element.name.get_ref().clone(),
+            need: resolve_need(element.need.as_ref(), resolver),
+            rule: element.rule.clone().unwrap_or_default(),
+            note: element.note.clone().unwrap_or_default(),
+            limits: Vec::new(),
+        });
+    }
+    set.unique(row.elements.iter().map(|element| &element.name), resolver);
+    ranges(&mut set, &row.ranges, u64::from(ELEMENT_BITS), resolver);
+    set
+}
+
+fn empty(name: &Name, kind: SetKind, source: &Source) -> Enumeration {
+    Enumeration {
+        name: name.get_ref().clone(),
+        kind,
+        attributes: Vec::new(),
+        class_attributes: Vec::new(),
+        element: String::new(),
+        source: source.get_ref().clone(),
+        note: String::new(),
+        field: None,
+        codes: Vec::new(),
+        ranges: Vec::new(),
+    }
+}
+
+/// Notes the attributes and attributes of instance 0 that hold such a value.
+fn hold(
+    set: &mut Enumeration,
+    name: &Name,
+    [attributes, class_attributes]: [&[Name]; 2],
+    dictionary: &CipDictionary,
+    resolver: &mut Resolver<'_>,
+) {
+    for name in attributes {
+        let found = dictionary.attribute_or_error("attributes", name, resolver);
+        set.attributes.extend(found.map(|row| row.id));
+    }
+    for name in class_attributes {
+        let found = dictionary.class_attribute_or_error("class_attributes", name, resolver);
+        set.class_attributes.extend(found.map(|row| row.id));
+    }
+    if attributes.is_empty() && class_attributes.is_empty() && set.element.is_empty() {
+        resolver.error(name.span(), "name", NO_HOLDER);
+    }
+}
+
+/// Bits of the smallest attribute that holds such a value; `None` when no attribute does.
+fn value_bits(set: &Enumeration, dictionary: &CipDictionary) -> Option<u32> {
+    let of_axis = set.attributes.iter().filter_map(|id| dictionary.attribute_by_id(*id));
+    let of_class = set.class_attributes.iter().filter_map(|id| dictionary.class_attribute_by_id(*id));
+    of_axis.chain(of_class).filter_map(|row| row.data_type.bits()).min()
+}
+
+fn limits(
+    names: &[Name],
+    set: &Enumeration,
+    dictionary: &CipDictionary,
+    resolver: &mut Resolver<'_>,
+) -> Vec<u16> {
+    let of_class = !set.class_attributes.is_empty();
+    let mut ids = Vec::with_capacity(names.len());
+    for name in names {
+        let found = if of_class {
+            dictionary.class_attribute_or_error("limits", name, resolver)
+        } else {
+            dictionary.attribute_or_error("limits", name, resolver)
+        };
+        ids.extend(found.map(|row| row.id));
+    }
+    ids
+}
+
+/// Reads the ranges: within the value, clear of the named codes and of each other.
+fn ranges(set: &mut Enumeration, rows: &[CipRangeRow], beyond: u64, resolver: &mut Resolver<'_>) {
+    for row in rows {
+        let (first, last) = (*row.from.get_ref(), *row.to.get_ref());
+        below(beyond, last, row.to.span(), "to", resolver);
+        if first > last {
+            resolver.error(row.from.span(), "from", format!("expected at most {last}, got {first}"));
+            continue;
+        }
+        let named = set.codes.iter().any(|code| (first..=last).contains(&code.code));
+        let taken = set.ranges.iter().any(|other| first <= other.last && other.first <= last);
+        if named || taken {
+            resolver.error(row.from.span(), "from", "the range takes in a code that is there already");
+        }
+        let Some(kind) = resolver.word("kind", &row.kind, RangeKind::NAMED) else { continue };
+        set.ranges.push(CodeRange {
+            first,
+            last,
+            kind,
+            name: row.name.clone().unwrap_or_default(),
+            need: resolve_need(row.need.as_ref(), resolver),
+            note: row.note.clone().unwrap_or_default(),
+        });
+    }
+}
+
+fn below(beyond: u64, number: u32, span: std::ops::Range<usize>, key: &str, resolver: &mut Resolver<'_>) {
+    if u64::from(number) >= beyond {
+        resolver.error(span, key, format!("expected a number below {beyond}, got {number}"));
+    }
 }
 
 fn resolve_need(need: Option<&Name>, resolver: &mut Resolver<'_>) -> Option<char> {

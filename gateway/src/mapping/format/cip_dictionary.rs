@@ -69,6 +69,9 @@ pub struct DataSetRow {
     pub source: Source,
     /// What the bits stand for.
     pub elements: Vec<ElementRow>,
+    /// Bits without a name of their own.
+    #[serde(default)]
+    pub ranges: Vec<CipRangeRow>,
 }
 
 /// One element of a data set.
@@ -81,6 +84,12 @@ pub struct ElementRow {
     pub name: Name,
     /// Attributes it carries.
     pub attributes: Vec<Name>,
+    /// `R`, `O`, `C` or `-`.
+    pub need: Option<Name>,
+    /// To what the need applies.
+    pub rule: Option<String>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
 }
 
 /// `mappings/dictionary/cip-enumerations.toml`.
@@ -111,12 +120,17 @@ pub struct CipEnumerationRow {
     pub class_attributes: Vec<Name>,
     /// The field or the part of the attribute that holds it, in words.
     pub element: Option<String>,
+    /// First and last bit of the code where it is only a part of the value.
+    pub field: Option<Spanned<[u32; 2]>>,
     /// Where it comes from.
     pub source: Source,
     /// Anything worth knowing.
     pub note: Option<String>,
     /// The codes.
     pub codes: Vec<CipCodeRow>,
+    /// Codes without a name of their own.
+    #[serde(default)]
+    pub ranges: Vec<CipRangeRow>,
 }
 
 /// One named code.
@@ -131,6 +145,9 @@ pub struct CipCodeRow {
     pub need: Option<Name>,
     /// To what the need applies.
     pub rule: Option<String>,
+    /// Attributes that say when the condition is met, for sets of faults and alarms.
+    #[serde(default)]
+    pub limits: Vec<Name>,
     /// Anything worth knowing.
     pub note: Option<String>,
 }
@@ -157,6 +174,27 @@ pub struct CipBitsRow {
     pub note: Option<String>,
     /// The bits.
     pub bits: Vec<CipBitRow>,
+    /// Bits without a name of their own.
+    #[serde(default)]
+    pub ranges: Vec<CipRangeRow>,
+}
+
+/// Codes or bits without a name of their own.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipRangeRow {
+    /// The first of them.
+    pub from: Spanned<u32>,
+    /// The last of them.
+    pub to: Spanned<u32>,
+    /// `reserved`, `vendor`, `device` or `number`.
+    pub kind: Name,
+    /// What such a code means, where the standard says it.
+    pub name: Option<String>,
+    /// `R`, `O`, `C` or `-`.
+    pub need: Option<Name>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
 }
 
 /// One named bit.
@@ -171,6 +209,9 @@ pub struct CipBitRow {
     pub need: Option<Name>,
     /// To what the need applies.
     pub rule: Option<String>,
+    /// Attributes that say when the condition is met, for sets of faults and alarms.
+    #[serde(default)]
+    pub limits: Vec<Name>,
     /// Anything worth knowing.
     pub note: Option<String>,
 }
