@@ -86,6 +86,8 @@ macro_rules! fault_catalogue {
 fault_catalogue! {
     /// The drive reports a fault that has no generic name; the vendor code tells it.
     DRIVE_SPECIFIC = 0x0001, "drive_specific", Axis, DecelerateAndDisable;
+    /// The drive warns of something that has no generic name; the vendor code tells it.
+    DRIVE_WARNING = 0x0002, "drive_warning", Alarm, Alarm;
 
     /// The motor current exceeded its peak limit.
     MOTOR_OVER_CURRENT = 0x0101, "motor_over_current", Axis, CoastAndDisable;
@@ -132,6 +134,8 @@ fault_catalogue! {
     GROUND_CURRENT = 0x0207, "ground_current", Axis, CoastAndDisable;
     /// The cooling (fan, water) failed.
     COOLING = 0x0208, "cooling", Axis, DecelerateAndDisable;
+    /// The cooling fails; the drive still goes on.
+    COOLING_WARNING = 0x0209, "cooling_warning", Alarm, Alarm;
 
     /// The DC bus voltage is above its limit.
     OVER_VOLTAGE = 0x0301, "over_voltage", Axis, CoastAndDisable;
@@ -203,6 +207,10 @@ fault_catalogue! {
     HOMING = 0x050A, "homing", Axis, DecelerateAndDisable;
     /// The axis moves although it should stand.
     STANDSTILL_MOVEMENT = 0x050B, "standstill_movement", Axis, DecelerateAndDisable;
+    /// The drive was given a target outside its travel range and does not go there.
+    POSITION_COMMAND_WARNING = 0x050C, "position_command_warning", Alarm, Alarm;
+    /// The drive was given a positioning velocity above its limit and keeps to the limit.
+    VELOCITY_COMMAND_WARNING = 0x050D, "velocity_command_warning", Alarm, Alarm;
 
     /// The motor moved while the brake was closed.
     BRAKE_SLIP = 0x0601, "brake_slip", Axis, HoldPosition;

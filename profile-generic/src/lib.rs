@@ -50,6 +50,7 @@ pub mod capture;
 pub mod cast;
 pub mod code;
 pub mod fault;
+pub mod fault_set;
 pub mod functional_element;
 pub mod image;
 pub mod inhibit;

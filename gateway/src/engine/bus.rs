@@ -66,8 +66,8 @@ pub enum Purpose {
         /// Whether it writes.
         write: bool,
     },
-    /// A diagnostic word, to find the cause of a fault: its place in the order.
-    Diagnosis(usize),
+    /// A diagnostic word, to find the cause of a fault or a warning.
+    Diagnosis,
     /// The drive's fault reset.
     FaultReset,
 }
@@ -83,8 +83,6 @@ struct Drive {
     stage: Stage,
     facts: DriveFacts,
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
-    /// The diagnostic word to be read next while a cause is wanted.
-    diagnosis: Option<usize>,
 }
 
 /// An answer to an access.
@@ -138,7 +136,6 @@ impl SercosBus {
             stage: Stage::Absent,
             facts: DriveFacts::new(),
             accesses: ArrayVec::new(),
-            diagnosis: None,
         };
         Ok(Self {
             master,
@@ -243,7 +240,7 @@ impl SercosBus {
             }
         }
         self.commission(mapping, axes, notice);
-        self.diagnose(axes);
+        self.diagnose(now, axes);
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
         let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
@@ -429,8 +426,8 @@ impl SercosBus {
         }
     }
 
-    /// Reads the diagnostic words of drives that show a fault without a cause.
-    fn diagnose(&mut self, axes: &mut [AxisChannel]) {
+    /// Reads the diagnostic words of drives that show an error or a warning, and sends their fault resets.
+    fn diagnose(&mut self, now: MonotonicTime, axes: &mut [AxisChannel]) {
         for (axis, channel) in axes.iter_mut().enumerate() {
             if channel.wants_drive_reset() {
                 let command = profile_generic::state::Action::ResetFault;
@@ -443,23 +440,11 @@ impl SercosBus {
                     channel.drive_reset_sent();
                 }
             }
-            let Some(drive) = self.drives.get_mut(axis) else { continue };
-            if !channel.wants_cause() {
-                drive.diagnosis = None;
-                continue;
+            if let Some(idn) = channel.wants_word(now)
+                && self.access(axis, SvcRequest::read(idn).urgent(), Purpose::Diagnosis)
+            {
+                channel.word_asked(now, idn);
             }
-            if drive.diagnosis.is_some() {
-                continue;
-            }
-            drive.diagnosis = Some(0);
-            self.read_diagnosis(axis, channel, 0);
-        }
-    }
-
-    fn read_diagnosis(&mut self, axis: usize, channel: &AxisChannel, place: usize) {
-        let idn = channel.south().and_then(|program| program.diagnostic_words().nth(place));
-        if let Some(idn) = idn {
-            self.access(axis, SvcRequest::read(idn).urgent(), Purpose::Diagnosis(place));
         }
     }
 
@@ -489,11 +474,6 @@ impl SercosBus {
             Err(failure) => Err(failure),
         };
         answer(axes, Answer { axis, purpose, idn, result });
-        if let Purpose::Diagnosis(place) = purpose
-            && axes[axis].wants_cause()
-        {
-            self.read_diagnosis(axis, &axes[axis], place + 1);
-        }
     }
 }
 
@@ -501,7 +481,6 @@ impl Drive {
     fn lose(&mut self) {
         self.slave = None;
         self.stage = Stage::Absent;
-        self.diagnosis = None;
     }
 
     fn plan(&mut self, axis: usize, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {

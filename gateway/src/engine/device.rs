@@ -3,13 +3,16 @@
 use std::net::SocketAddrV4;
 
 use arrayvec::ArrayVec;
-use profile_cip::target::attribute::{Access, AttributeDefinition, Backing, DataType, DefaultValue, Scope};
+use profile_cip::target::attribute::{
+    self, Access, AttributeDefinition, Backing, DataType, DefaultValue, Scope,
+};
 use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::drive_link::DriveAction;
+use profile_cip::target::fault_log::FaultLog;
 use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
-use profile_cip::wire::motion::codes::NodeFault;
+use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::image::Signal;
 use profile_generic::inhibit::Inhibits;
@@ -87,6 +90,8 @@ pub struct DeviceChannel {
     counters: DatagramCounters,
     /// The connection for which the scaling attributes were preset.
     preset: Option<u32>,
+    /// Fault and alarm of the node that were told last.
+    node: (NodeFault, NodeAlarm),
 }
 
 impl std::fmt::Debug for DeviceChannel {
@@ -150,6 +155,7 @@ impl DeviceChannel {
             encapsulation_sequence: 0,
             counters: DatagramCounters::default(),
             preset: None,
+            node: (NodeFault::NONE, NodeAlarm::NONE),
         })
     }
 
@@ -269,6 +275,30 @@ impl DeviceChannel {
                 axis.from_controller(now, system, &image);
             }
         }
+        self.tell(axes, notice);
+    }
+
+    /// Tells what came into the logs, and how the node is.
+    fn tell(&mut self, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) {
+        let node = (self.device.node_fault(), self.device.node_alarm());
+        if node != self.node {
+            self.node = node;
+            notice(Notice::Node { device: self.number, fault: node.0, alarm: node.1 });
+        }
+        for (place, member) in self.members.iter().enumerate() {
+            while let Some(entry) = self.device.poll_fault_log(place) {
+                let axis = u8::try_from(member.axis).unwrap_or(u8::MAX);
+                let cause = axes[member.axis].north().cause_of(entry.kind, entry.code);
+                notice(Notice::Logged { axis, entry, cause });
+            }
+        }
+    }
+
+    /// The log of an axis of the engine; `None` when the axis is not one of this device.
+    #[must_use]
+    pub fn fault_log(&self, axis: usize) -> Option<&FaultLog> {
+        let place = self.members.iter().position(|member| member.axis == axis)?;
+        self.device.fault_log(place)
     }
 
     /// A new connection finds the scaling attributes as the configuration of the box has them.
@@ -524,6 +554,7 @@ fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeD
             backing: Backing::Stored,
             default: DefaultValue::Integer(row.default),
             range: None,
+            element_rules: Vec::new(),
             name: row.name.clone(),
         })
     });
@@ -546,6 +577,11 @@ fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeD
                 _ => entry.default,
             }),
             range: None,
+            element_rules: match entry.id {
+                attribute::id::AXIS_EXCEPTION_ACTION => mapping.exception_rules(false),
+                attribute::id::AXIS_EXCEPTION_ACTION_MFG => mapping.exception_rules(true),
+                _ => Vec::new(),
+            },
             name,
         })
     });

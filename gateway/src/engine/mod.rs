@@ -237,11 +237,10 @@ impl Engine {
                         }
                     }
                 }
-                Purpose::Diagnosis(_) => {
+                Purpose::Diagnosis => {
                     let word = answer.result.as_ref().ok().and_then(|data| data.unsigned());
-                    if let Some(word) = word.and_then(|word| u32::try_from(word).ok()) {
-                        axes[answer.axis].diagnostic_word(now, system, answer.idn, word);
-                    }
+                    let word = word.and_then(|word| u32::try_from(word).ok());
+                    axes[answer.axis].diagnostic_word(now, system, answer.idn, word);
                 }
                 // Whether it helped shows in the drive's status word.
                 Purpose::FaultReset => {}

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use profile_cip::target::axis_state::AxisState;
-use profile_generic::fault::Fault;
+use profile_cip::target::fault_log::{LogEntry, LogKind};
+use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
+use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::state::DriveState;
 use profile_sercos::master::event::Event;
 
@@ -83,6 +85,24 @@ pub enum Notice {
         /// Why the command was lost, when that is the fault.
         loss: Option<Loss>,
     },
+    /// A fault or alarm came into the log of an axis, or ended there.
+    Logged {
+        /// The axis.
+        axis: u8,
+        /// The entry.
+        entry: LogEntry,
+        /// Its generic cause; a start inhibit has none.
+        cause: Option<FaultCause>,
+    },
+    /// The communications node of a device has another fault or alarm.
+    Node {
+        /// The device, from 0.
+        device: u8,
+        /// The fault that stands.
+        fault: NodeFault,
+        /// The alarm.
+        alarm: NodeAlarm,
+    },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
         /// The axis.
@@ -100,6 +120,8 @@ impl Notice {
             Self::State { .. }
             | Self::AxisState { .. }
             | Self::PassedOver { .. }
+            | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
+            | Self::Node { fault: NodeFault::NONE, alarm: NodeAlarm::NONE, .. }
             | Self::Sercos(
                 Event::Phase(_)
                 | Event::Stopped
@@ -116,7 +138,7 @@ impl Notice {
     #[must_use]
     pub fn axis(&self) -> Option<u8> {
         match self {
-            Self::Sercos(_) | Self::Retry => None,
+            Self::Sercos(_) | Self::Retry | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
             | Self::PassedOver { axis, .. }
@@ -124,6 +146,7 @@ impl Notice {
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
             | Self::Fault { axis, .. }
+            | Self::Logged { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
         }
     }
@@ -146,7 +169,32 @@ impl fmt::Display for Notice {
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
             Self::Fault { fault, loss: None, .. } => write!(f, "{fault}"),
+            Self::Logged { entry, cause, .. } => logged(f, entry, *cause),
+            Self::Node { device, fault, alarm } => {
+                write!(f, "device {device}: {fault} ({}), {alarm} ({})", fault.0, alarm.0)
+            }
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }
     }
+}
+
+/// `Axis Fault 54 (excessive_position_error): Major Fault ...`.
+fn logged(f: &mut fmt::Formatter<'_>, entry: &LogEntry, cause: Option<FaultCause>) -> fmt::Result {
+    match entry.kind {
+        LogKind::Fault(kind) => write!(f, "{kind} {}", entry.code)?,
+        LogKind::Alarm(kind) => write!(f, "{kind} {}", entry.code)?,
+    }
+    if let Some(cause) = cause {
+        write!(f, " ({cause})")?;
+    }
+    match entry.ended {
+        None if entry.action != 0 => write!(f, " in {}, fault action {:#04x}", entry.state, entry.action)?,
+        None => write!(f, " in {}", entry.state)?,
+        Some((ClearingEvent::NONE, _)) => f.write_str(" is over")?,
+        Some((by, _)) => write!(f, " ended by {by}")?,
+    }
+    if entry.detail != 0 {
+        write!(f, ", vendor code {:#010x}", entry.detail)?;
+    }
+    Ok(())
 }

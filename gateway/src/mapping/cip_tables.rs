@@ -147,6 +147,23 @@ pub struct ServedAttribute {
     pub served: Served,
 }
 
+/// What the controller may set for an exception.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExceptionRow {
+    /// The cause that the exception stands for.
+    pub cause: FaultCause,
+    /// Whether it is one of the manufacturer's.
+    pub manufacturer: bool,
+    /// Its bit.
+    pub bit: u8,
+    /// Whether the box or its device finds it.
+    pub found_here: bool,
+    /// The least severe Axis Exception Action.
+    pub least: u8,
+    /// The Axis Exception Action until another is set.
+    pub default: u8,
+}
+
 /// The mapping of CIP Motion to the generic model.
 #[derive(Debug, Clone, Default)]
 pub struct CipTables {
@@ -166,6 +183,8 @@ pub struct CipTables {
     pub(super) states: [CipState; DriveState::ALL.len()],
     pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<(FaultCause, CipFault)>,
+    /// Exceptions and their actions.
+    pub exceptions: Vec<ExceptionRow>,
     pub(super) reactions: [u8; Reaction::ALL.len()],
     pub(super) inhibits: Vec<InhibitRule>,
     pub(super) stoppings: Vec<CipStopping>,

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 use bitflags::bitflags;
 use profile_cip::target::drive_link::DriveAction;
+use profile_cip::target::fault_log::LogKind;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
@@ -127,6 +128,16 @@ pub enum CipFault {
     },
     /// Node Fault Code: a fault of all axes of the device.
     Node(u8),
+}
+
+impl CipFault {
+    /// Whether it is the fault of an axis with this Axis Fault Type and code.
+    pub const fn is(self, wanted_type: u8, wanted_code: u8) -> bool {
+        match self {
+            Self::Axis { fault_type, code, .. } => fault_type == wanted_type && code == wanted_code,
+            Self::Node(_) => false,
+        }
+    }
 }
 
 /// A stopping action.
@@ -415,6 +426,36 @@ impl CipProgram {
     pub fn fault(&self, cause: FaultCause) -> Option<CipFault> {
         let at = self.faults.binary_search_by_key(&cause, |(known, _)| *known).ok()?;
         self.faults.get(at).map(|(_, fault)| *fault)
+    }
+
+    /// The cause that CIP reports as this fault type and code; the first one where several share it.
+    pub fn cause(&self, fault_type: u8, code: u8) -> Option<FaultCause> {
+        self.faults.iter().find(|(_, fault)| fault.is(fault_type, code)).map(|(cause, _)| *cause)
+    }
+
+    /// The cause of an entry of the log. An alarm has the bits of the fault of its table; start inhibits are no causes.
+    pub fn cause_of(&self, kind: LogKind, code: u8) -> Option<FaultCause> {
+        match kind {
+            LogKind::Fault(fault_type) => self.cause(fault_type.0, code),
+            LogKind::Alarm(wanted) => {
+                let is = |fault: &CipFault| match *fault {
+                    CipFault::Axis { alarm_type, code: bit, .. } => {
+                        alarm_type == Some(wanted.0) && bit == code
+                    }
+                    CipFault::Node(_) => false,
+                };
+                self.faults.iter().find(|(_, fault)| is(fault)).map(|(cause, _)| *cause)
+            }
+        }
+    }
+
+    /// The reaction that carries out an Axis Fault Action: the mildest one that gives up as much control in each nibble.
+    pub fn reaction(&self, action: u8) -> Reaction {
+        let enough = |reaction: &&Reaction| {
+            let known = self.fault_action(**reaction);
+            reaction.stops() && known & 0x0F >= action & 0x0F && known >> 4 >= action >> 4
+        };
+        Reaction::ALL.iter().find(enough).copied().unwrap_or(Reaction::Shutdown)
     }
 
     /// The Axis Fault Action (attribute 668) of a reaction.

@@ -409,16 +409,25 @@ impl SercosProgram {
         rows.fold(StatusBits::empty(), |bits, (_, bit)| bits | *bit)
     }
 
-    /// The first fault or warning that a diagnostic word shows.
-    pub fn fault(&self, idn: Idn, word: u32) -> Option<(FaultCause, Reaction)> {
-        let row = self.faults.iter().find(|row| row.word == idn && row.pattern.matches(word))?;
-        Some((row.cause, row.reaction))
+    /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.
+    pub fn faults(&self, idn: Idn, word: u32) -> impl Iterator<Item = (FaultCause, Reaction)> + '_ {
+        let mut used = 0;
+        let rows = self.faults.iter().filter(move |row| row.word == idn && row.pattern.matches(word));
+        rows.filter_map(move |row| {
+            let free = row.pattern.mask & used == 0;
+            used |= row.pattern.mask;
+            free.then_some((row.cause, row.reaction))
+        })
     }
 
-    /// The diagnostic words in the order in which they should be read.
-    pub fn diagnostic_words(&self) -> impl Iterator<Item = Idn> + '_ {
-        let first = |at: usize, idn: Idn| !self.faults[..at].iter().any(|row| row.word == idn);
-        self.faults.iter().enumerate().filter(move |(at, row)| first(*at, row.word)).map(|(_, row)| row.word)
+    /// The diagnostic words that can show a fault, or a warning, in the order in which they should be read.
+    pub fn diagnostic_words(&self, stops: bool) -> impl Iterator<Item = Idn> + '_ {
+        let counts = move |row: &FaultRule| row.reaction.stops() == stops;
+        let first =
+            move |at: usize, idn: Idn| !self.faults[..at].iter().any(|row| counts(row) && row.word == idn);
+        let rows =
+            self.faults.iter().enumerate().filter(move |(at, row)| counts(row) && first(*at, row.word));
+        rows.map(|(_, row)| row.word)
     }
 
     /// The procedure command that belongs to an action.

@@ -1,10 +1,13 @@
 //! Between the compiled tables and the CIP Motion device: its images and its attribute definitions.
 
 use profile_cip::target::attribute::{self, AttributeDefinition, DataType, DefaultValue, Scope};
-use profile_cip::target::drive_link::{DriveAction, DriveAlarm, DriveFault, DriveImage};
-use profile_cip::wire::motion::codes::{AlarmType, AxisStatus, FaultType};
+use profile_cip::target::drive_link::{
+    DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
+};
+use profile_cip::wire::motion::codes::{AxisStatus, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::Reaction;
+use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
 use profile_generic::image::{AxisFeedback, StatusBits};
 use profile_generic::state::Request;
 
@@ -56,9 +59,14 @@ impl CipProgram {
     }
 
     /// Puts what is known of an axis into the image for the device: actual values, conditions, status,
-    /// inhibits and fault. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay as
-    /// they are.
-    pub fn drive_image(&self, feedback: &AxisFeedback, image: &mut DriveImage) -> CipReport {
+    /// inhibits and what is wrong. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay
+    /// as they are.
+    pub fn drive_image(
+        &self,
+        feedback: &AxisFeedback,
+        faults: &FaultSet,
+        image: &mut DriveImage,
+    ) -> CipReport {
         let mut report = CipReport::default();
         image.position = self.actual_counts(bit::POSITION, feedback, &mut report);
         image.velocity = self.actual_real(bit::VELOCITY, feedback, &mut report);
@@ -71,29 +79,36 @@ impl CipProgram {
         image.tracking = feedback.status.contains(StatusBits::TRACKING);
         image.axis_status = AxisStatus::from_bits_retain(self.axis_status(feedback));
         (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
-        (image.fault, image.alarm) = self.fault_or_alarm(feedback);
+        image.conditions = self.conditions(faults);
         image.captured_at = feedback.at.0;
         report
     }
 
-    fn fault_or_alarm(&self, feedback: &AxisFeedback) -> (Option<DriveFault>, Option<DriveAlarm>) {
-        let Some(fault) = feedback.fault else { return (None, None) };
-        let Some(CipFault::Axis { fault_type, alarm_type, code }) = self.fault(fault.cause) else {
-            return (None, None);
-        };
-        // The vendor's code does not fit a byte; its low byte is what a controller can be shown.
-        let sub_code = fault.vendor_code.to_le_bytes()[0];
-        match fault.reaction {
-            Reaction::Ignore => (None, None),
-            Reaction::Alarm => {
-                let alarm_type = alarm_type.map(AlarmType);
-                (None, alarm_type.map(|alarm_type| DriveAlarm { alarm_type, code, sub_code }))
-            }
-            reaction => {
-                let fault_type = FaultType(fault_type);
-                (Some(DriveFault { fault_type, code, sub_code, action: self.fault_action(reaction) }), None)
-            }
+    fn conditions(&self, faults: &FaultSet) -> DriveConditions {
+        let mut conditions = DriveConditions::default();
+        for condition in faults.iter().filter_map(|active| self.condition(active)) {
+            conditions.push(condition);
         }
+        conditions
+    }
+
+    /// A fault as a condition of the axis; `None` for one of the communications node.
+    fn condition(&self, active: &ActiveFault) -> Option<DriveCondition> {
+        let fault = active.fault;
+        let CipFault::Axis { fault_type, code, .. } = self.fault(fault.cause)? else { return None };
+        // The best stop that is left also for a warning that the controller wants to be a major fault.
+        let stop = if fault.reaction.stops() { fault.reaction } else { Reaction::DecelerateAndDisable };
+        let acted = matches!(active.origin, Origin::Drive | Origin::Event) && fault.reaction.stops();
+        Some(DriveCondition {
+            fault_type: FaultType(fault_type),
+            code,
+            // The vendor's code does not fit a byte; its low byte is what a controller can be shown.
+            sub_code: fault.vendor_code.to_le_bytes()[0],
+            detail: fault.vendor_code,
+            action: self.fault_action(stop),
+            least: if acted { ExceptionAction::MAJOR_FAULT } else { ExceptionAction::IGNORE },
+            at: fault.at.0,
+        })
     }
 }
 

@@ -34,7 +34,7 @@ use std::path::Path;
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
-    CipTables, CipUnit, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times,
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, Served, ServedAttribute, Times,
 };
 pub use commissioning::{CommissioningPlan, Refused, Step};
 pub use compile_cip::{
@@ -53,6 +53,11 @@ pub use scaling::{AxisUnits, DriveFacts, Lsb, Reference, ScalingError, ScalingRu
 pub use sercos_tables::{FaultRule, SercosTables};
 
 use load::Tables;
+use profile_cip::target::attribute::{DefaultValue, ElementRule};
+use profile_cip::target::exception::ExceptionAction;
+
+/// Bits of Axis Exceptions.
+const EXCEPTION_BITS: u8 = 64;
 
 /// All tables, read and resolved.
 #[derive(Debug, Clone)]
@@ -92,13 +97,35 @@ impl Mapping {
         let mut errors = TableErrors::default();
         let dictionaries = Dictionaries::resolve(&tables, &mut errors);
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut errors);
-        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &mut errors);
+        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, &mut errors);
         errors.into_result(Self { dictionaries, cip, sercos, tables })
     }
 
     /// The program of an axis on the CIP side. `None` when a ratio of the scaling does not fit 64 bits.
     pub fn cip_program(&self, scaling: &CipScaling) -> Option<CipProgram> {
         CipProgram::compile(&self.cip, scaling)
+    }
+
+    /// Default and range of each element of Axis Exception Action, or of that of the manufacturer: an exception that nobody
+    /// finds, neither the box nor a drive by its table, is Unsupported.
+    pub fn exception_rules(&self, manufacturer: bool) -> Vec<ElementRule> {
+        let rows = |bit: u8| {
+            let found = |cause| self.sercos.faults.iter().any(|row| row.cause == cause);
+            let exceptions = self.cip.exceptions.iter();
+            exceptions.filter(move |row| {
+                row.manufacturer == manufacturer && row.bit == bit && (row.found_here || found(row.cause))
+            })
+        };
+        let rule = |bit| {
+            let unsupported = ExceptionAction::UNSUPPORTED.0;
+            // Where several causes share a bit, the strictest counts.
+            let default = rows(bit).map(|row| row.default).max().unwrap_or(unsupported);
+            let least = rows(bit).map(|row| row.least).max().unwrap_or(unsupported);
+            let most = if least == unsupported { unsupported } else { ExceptionAction::MAJOR_FAULT.0 };
+            let range = (f64::from(least), f64::from(most));
+            ElementRule { default: DefaultValue::Integer(i64::from(default)), range }
+        };
+        (0..EXCEPTION_BITS).map(rule).collect()
     }
 
     /// The attributes of an axis. `None` when a ratio of the scaling does not fit 64 bits.

@@ -10,9 +10,10 @@ use std::fmt::Write as _;
 use std::sync::LazyLock;
 
 use profile_cip::target::attribute::{AttributeTable as DeviceTable, Backing as DeviceBacking, Scope};
-use profile_cip::target::drive_link::{DriveAction, DriveImage};
+use profile_cip::target::drive_link::{DriveAction, DriveCondition, DriveImage};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::fault_set::{FaultSet, Origin};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::mode::OperatingMode;

@@ -71,12 +71,64 @@ pub mod id {
     pub const AXIS_IO_STATUS: u16 = 653;
     /// Axis I/O Status - Mfg.
     pub const AXIS_IO_STATUS_MFG: u16 = 654;
+    /// Axis Exceptions.
+    pub const AXIS_EXCEPTIONS: u16 = 655;
+    /// Axis Exceptions - Mfg.
+    pub const AXIS_EXCEPTIONS_MFG: u16 = 656;
     /// Axis Faults.
     pub const AXIS_FAULTS: u16 = 657;
+    /// Axis Faults - Mfg.
+    pub const AXIS_FAULTS_MFG: u16 = 658;
+    /// Axis Alarms.
+    pub const AXIS_ALARMS: u16 = 659;
+    /// Axis Alarms - Mfg.
+    pub const AXIS_ALARMS_MFG: u16 = 660;
+    /// Axis Fault Code of the newest record.
+    pub const AXIS_FAULT_CODE: u16 = 661;
+    /// Axis Fault Type of the newest record.
+    pub const AXIS_FAULT_TYPE: u16 = 662;
+    /// Axis Fault Time Stamp of the newest record, ns of system time.
+    pub const AXIS_FAULT_TIME_STAMP: u16 = 663;
+    /// Axis Alarm Code of the newest record.
+    pub const AXIS_ALARM_CODE: u16 = 664;
+    /// Axis Alarm Type of the newest record.
+    pub const AXIS_ALARM_TYPE: u16 = 665;
+    /// Axis Fault Sub Code of the newest record.
+    pub const AXIS_FAULT_SUB_CODE: u16 = 666;
+    /// Axis Alarm Sub Code of the newest record.
+    pub const AXIS_ALARM_SUB_CODE: u16 = 667;
+    /// Axis Fault Action of the newest record.
+    pub const AXIS_FAULT_ACTION: u16 = 668;
+    /// Axis Alarm State of the newest record.
+    pub const AXIS_ALARM_STATE: u16 = 669;
+    /// Axis Alarm Time Stamp of the newest record, ns of system time.
+    pub const AXIS_ALARM_TIME_STAMP: u16 = 670;
+    /// Axis Exception Action, 64 elements.
+    pub const AXIS_EXCEPTION_ACTION: u16 = 672;
+    /// Axis Exception Action - Mfg, 64 elements.
+    pub const AXIS_EXCEPTION_ACTION_MFG: u16 = 673;
+    /// Initialization Faults.
+    pub const INITIALIZATION_FAULTS: u16 = 674;
+    /// Initialization Faults - Mfg.
+    pub const INITIALIZATION_FAULTS_MFG: u16 = 675;
     /// Start Inhibits.
     pub const START_INHIBITS: u16 = 676;
     /// Start Inhibits - Mfg.
     pub const START_INHIBITS_MFG: u16 = 677;
+    /// APR Faults. This and those below are there only where the device is built with them.
+    pub const APR_FAULTS: u16 = 756;
+    /// APR Faults - Mfg.
+    pub const APR_FAULTS_MFG: u16 = 757;
+    /// Axis Safety State.
+    pub const AXIS_SAFETY_STATE: u16 = 760;
+    /// Axis Safety Status.
+    pub const AXIS_SAFETY_STATUS: u16 = 761;
+    /// Axis Safety Status - Mfg.
+    pub const AXIS_SAFETY_STATUS_MFG: u16 = 762;
+    /// Axis Safety Faults.
+    pub const AXIS_SAFETY_FAULTS: u16 = 763;
+    /// Axis Safety Faults - Mfg.
+    pub const AXIS_SAFETY_FAULTS_MFG: u16 = 764;
 }
 
 /// CIP data type of an attribute element.
@@ -240,8 +292,20 @@ pub struct AttributeDefinition {
     pub default: DefaultValue,
     /// Permitted values, ends included.
     pub range: Option<(f64, f64)>,
+    /// What holds for single elements of an array in place of `default` and `range`: one rule for each element from the
+    /// first; empty where all are alike.
+    pub element_rules: Vec<ElementRule>,
     /// Name of the standard.
     pub name: String,
+}
+
+/// Default and permitted values of one element of an array.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElementRule {
+    /// Its default.
+    pub default: DefaultValue,
+    /// Its permitted values, ends included.
+    pub range: (f64, f64),
 }
 
 impl AttributeDefinition {
@@ -258,6 +322,7 @@ impl AttributeDefinition {
             backing: Backing::Stored,
             default: DefaultValue::Integer(0),
             range: None,
+            element_rules: Vec::new(),
             name: name.to_owned(),
         }
     }
@@ -305,7 +370,24 @@ const ENGINE: &[(Scope, u16, DataType, Access, i64, &str)] = {
         (Instance, id::AXIS_STATUS_MFG, Dword, Get, 0, "Axis Status - Mfg"),
         (Instance, id::AXIS_IO_STATUS, Dword, Get, 0, "Axis I/O Status"),
         (Instance, id::AXIS_IO_STATUS_MFG, Dword, Get, 0, "Axis I/O Status - Mfg"),
+        (Instance, id::AXIS_EXCEPTIONS, Lword, Get, 0, "Axis Exceptions"),
+        (Instance, id::AXIS_EXCEPTIONS_MFG, Lword, Get, 0, "Axis Exceptions - Mfg"),
         (Instance, id::AXIS_FAULTS, Lword, Get, 0, "Axis Faults"),
+        (Instance, id::AXIS_FAULTS_MFG, Lword, Get, 0, "Axis Faults - Mfg"),
+        (Instance, id::AXIS_ALARMS, Lword, Get, 0, "Axis Alarms"),
+        (Instance, id::AXIS_ALARMS_MFG, Lword, Get, 0, "Axis Alarms - Mfg"),
+        (Instance, id::AXIS_FAULT_CODE, Usint, Get, 0, "Axis Fault Code"),
+        (Instance, id::AXIS_FAULT_TYPE, Usint, Get, 0, "Axis Fault Type"),
+        (Instance, id::AXIS_FAULT_TIME_STAMP, Lint, Get, 0, "Axis Fault Time Stamp"),
+        (Instance, id::AXIS_ALARM_CODE, Usint, Get, 0, "Axis Alarm Code"),
+        (Instance, id::AXIS_ALARM_TYPE, Usint, Get, 0, "Axis Alarm Type"),
+        (Instance, id::AXIS_FAULT_SUB_CODE, Usint, Get, 0, "Axis Fault Sub Code"),
+        (Instance, id::AXIS_ALARM_SUB_CODE, Usint, Get, 0, "Axis Alarm Sub Code"),
+        (Instance, id::AXIS_FAULT_ACTION, Usint, Get, 0, "Axis Fault Action"),
+        (Instance, id::AXIS_ALARM_STATE, Usint, Get, 0, "Axis Alarm State"),
+        (Instance, id::AXIS_ALARM_TIME_STAMP, Lint, Get, 0, "Axis Alarm Time Stamp"),
+        (Instance, id::INITIALIZATION_FAULTS, Dword, Get, 0, "Initialization Faults"),
+        (Instance, id::INITIALIZATION_FAULTS_MFG, Dword, Get, 0, "Initialization Faults - Mfg"),
         (Instance, id::START_INHIBITS, Word, Get, 0, "Start Inhibits"),
         (Instance, id::START_INHIBITS_MFG, Word, Get, 0, "Start Inhibits - Mfg"),
     ]
@@ -352,6 +434,8 @@ pub struct Entry {
     pub definition: AttributeDefinition,
     offset: usize,
     default: [u8; 8],
+    /// Defaults of the elements that have a rule of their own.
+    element_defaults: Vec<[u8; 8]>,
 }
 
 /// The sorted attributes of one scope.
@@ -361,9 +445,13 @@ pub struct AttributeTable {
     octets: usize,
 }
 
-fn encode_default(definition: &AttributeDefinition) -> Option<[u8; 8]> {
+fn encode_default(
+    definition: &AttributeDefinition,
+    default: DefaultValue,
+    range: Option<(f64, f64)>,
+) -> Option<[u8; 8]> {
     let size = usize::from(definition.data_type.size());
-    let octets = match (definition.data_type, definition.default) {
+    let octets = match (definition.data_type, default) {
         (DataType::Real, DefaultValue::Real(value)) => {
             let narrow = narrow(value);
             let mut octets = [0; 8];
@@ -384,7 +472,7 @@ fn encode_default(definition: &AttributeDefinition) -> Option<[u8; 8]> {
             octets
         }
     };
-    check_value(definition, &octets[..size]).ok()?;
+    check_value(definition.data_type, range, &octets[..size]).ok()?;
     Some(octets)
 }
 
@@ -394,9 +482,9 @@ fn narrow(value: f64) -> f32 {
 }
 
 /// Checks one element: finite and within the range.
-fn check_value(definition: &AttributeDefinition, element: &[u8]) -> Result<(), GeneralStatus> {
-    let value = definition.data_type.to_f64(element).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?;
-    let (low, high) = definition.range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+fn check_value(data_type: DataType, range: Option<(f64, f64)>, element: &[u8]) -> Result<(), GeneralStatus> {
+    let value = data_type.to_f64(element).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?;
+    let (low, high) = range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     if value.is_finite() && value >= low && value <= high {
         Ok(())
     } else {
@@ -436,9 +524,17 @@ impl AttributeTable {
         let mut entries = Vec::with_capacity(all.len());
         let mut octets = 0;
         for definition in all {
-            let default = encode_default(&definition).ok_or(TableError::Default(scope, definition.id))?;
+            let wrong = TableError::Default(scope, definition.id);
+            if definition.element_rules.len() > usize::from(definition.elements.unwrap_or(0)) {
+                return Err(wrong);
+            }
+            let default =
+                encode_default(&definition, definition.default, definition.range).ok_or(wrong.clone())?;
+            let encode = |rule: &ElementRule| encode_default(&definition, rule.default, Some(rule.range));
+            let element_defaults: Option<Vec<_>> = definition.element_rules.iter().map(encode).collect();
+            let element_defaults = element_defaults.ok_or(wrong)?;
             let size = definition.size();
-            entries.push(Entry { definition, offset: octets, default });
+            entries.push(Entry { definition, offset: octets, default, element_defaults });
             octets += size;
         }
         Ok(Self { entries, octets })
@@ -503,7 +599,9 @@ impl Entry {
         }
         let size = usize::from(definition.data_type.size());
         for (index, element) in (part.start..).zip(value.chunks_exact(size)) {
-            check_value(definition, element).map_err(|status| (status, index))?;
+            let rule = definition.element_rules.get(usize::from(index));
+            let range = rule.map_or(definition.range, |rule| Some(rule.range));
+            check_value(definition.data_type, range, element).map_err(|status| (status, index))?;
         }
         Ok(())
     }
@@ -528,10 +626,10 @@ impl AttributeStore {
     pub fn reset(&mut self, table: &AttributeTable) {
         for entry in &table.entries {
             let size = usize::from(entry.definition.data_type.size());
-            for element in
-                self.octets[entry.offset..entry.offset + entry.definition.size()].chunks_exact_mut(size)
-            {
-                element.copy_from_slice(&entry.default[..size]);
+            let place = entry.offset..entry.offset + entry.definition.size();
+            for (index, element) in self.octets[place].chunks_exact_mut(size).enumerate() {
+                let default = entry.element_defaults.get(index).unwrap_or(&entry.default);
+                element.copy_from_slice(&default[..size]);
             }
         }
     }

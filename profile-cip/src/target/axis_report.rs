@@ -5,7 +5,7 @@ use profile_generic::time::MonotonicTime;
 use super::axis_object::{Axis, Context};
 use super::axis_state::{AxisState, ControlKind};
 use super::axis_status::allowed;
-use super::drive_link::{AxisCommandImage, Command, SetPoints, Withheld};
+use super::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, SetPoints, Withheld};
 use super::io_connection::missed_updates;
 use crate::wire::motion::codes::{ActualDataSet, AxisControl, AxisStatus, ControlMode, StatusDataSet};
 use crate::wire::motion::{ActualBlock, ActualPosition, ActualValues, StatusValues};
@@ -38,11 +38,17 @@ impl Axis {
                 }
             }
         };
+        let abort = self.faults.abort().filter(|_| self.action == DriveAction::Abort);
         AxisCommandImage {
             state: self.state,
             action: self.action,
             action_id: self.action_id,
             reset_id: self.reset_id,
+            abort: abort.map(|fault| AbortOrder {
+                action: fault.action,
+                fault_type: fault.fault_type,
+                code: fault.code,
+            }),
             command,
         }
     }
@@ -53,7 +59,7 @@ impl Axis {
         let powered = self.drive.power_enabled;
         let mut status = self.drive.axis_status;
         status.set(AxisStatus::LOCAL_CONTROL, !context.remote);
-        status.set(AxisStatus::ALARM, self.drive.alarm.is_some());
+        status.set(AxisStatus::ALARM, self.faults.any_axis_alarm());
         status.set(AxisStatus::DC_BUS_UP, self.drive.bus_up);
         status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
         status.set(AxisStatus::TRACKING_COMMAND, self.answers() && self.drive.tracking);
@@ -62,6 +68,14 @@ impl Axis {
         status.set(AxisStatus::POSITION_CONTROL_MODE, powered && mode == ControlMode::POSITION.0);
         status.set(AxisStatus::VELOCITY_CONTROL_MODE, powered && mode == ControlMode::VELOCITY.0);
         status.set(AxisStatus::TORQUE_CONTROL_MODE, powered && mode == ControlMode::TORQUE.0);
+        if !self.drive.online {
+            // Nobody sees the axis: nothing is said about how it moves.
+            status &= AxisStatus::LOCAL_CONTROL
+                | AxisStatus::ALARM
+                | AxisStatus::DC_BUS_UP
+                | AxisStatus::POWER_STRUCTURE_ENABLED
+                | AxisStatus::SHUTDOWN;
+        }
         status & allowed(self.config.kind, self.state, powered)
     }
 
@@ -98,10 +112,10 @@ impl Axis {
         let asked = self.block.status_data_set;
         let mut values = StatusValues::default();
         if asked.contains(StatusDataSet::FAULT) {
-            values.fault = self.fault_log.due(update_id);
+            values.fault = self.faults.fault_records.due(update_id);
         }
         if asked.contains(StatusDataSet::ALARM) {
-            values.alarm = self.alarm_log.due(update_id);
+            values.alarm = self.faults.alarm_records.due(update_id);
         }
         if asked.contains(StatusDataSet::AXIS_STATUS) {
             let status = (self.status(context), self.drive.axis_status_mfg);

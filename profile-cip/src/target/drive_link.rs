@@ -14,10 +14,11 @@
 use crate::wire::motion::CommandValues;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AlarmType, AxisIoStatus, AxisStatus, CommandTarget, ControlMode, FaultType, FeedbackMode,
+    AxisIoStatus, AxisStatus, CommandTarget, ControlMode, FaultType, FeedbackMode,
 };
 
 use super::axis_state::AxisState;
+pub use super::exception::{DriveCondition, DriveConditions, ExceptionAction};
 
 /// What the drive has to do now, and to keep doing until it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -99,33 +100,21 @@ pub struct AxisCommandImage {
     /// Changes whenever the drive has to reset its faults; to be returned in [`DriveImage::reset_id`] once it has
     /// tried, with success or not.
     pub reset_id: u32,
+    /// With [`DriveAction::Abort`]: how to stop. It may become more severe while the axis stops.
+    pub abort: Option<AbortOrder>,
     /// Set-points.
     pub command: Command,
 }
 
-/// A fault of the drive.
+/// How an axis has to stop for a major fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DriveFault {
-    /// Source.
-    pub fault_type: FaultType,
-    /// Bit number of the fault in the table of its source.
-    pub code: u8,
-    /// Sub code.
-    pub sub_code: u8,
-    /// Axis Fault Action, attribute 668: stopping action in the low nibble, state change in the high one. State change
-    /// 0 makes it a minor fault that only reports; 3 latches a shutdown.
+pub struct AbortOrder {
+    /// Axis Fault Action, attribute 668: the worst of all major faults that stand.
     pub action: u8,
-}
-
-/// An alarm of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DriveAlarm {
-    /// Source.
-    pub alarm_type: AlarmType,
-    /// Bit number of the alarm in the table of its source.
+    /// Type of the fault that came first.
+    pub fault_type: FaultType,
+    /// Its bit number.
     pub code: u8,
-    /// Sub code.
-    pub sub_code: u8,
 }
 
 /// What the drive of an axis reports each cycle.
@@ -141,16 +130,15 @@ pub struct DriveImage {
     pub bus_up: bool,
     /// The start asked for by `action_id` has ended: the drive follows set-points.
     pub start_complete: bool,
-    /// The stop asked for by `action_id` has ended: the axis stands, or its time limit has run out.
+    /// The stop asked for by `action_id` has ended: the axis stands, or its time limit has run out. It counts also when
+    /// the drive is not online.
     pub stop_complete: bool,
     /// The power structure is energized.
     pub power_enabled: bool,
     /// The drive tracks the command.
     pub tracking: bool,
-    /// Fault that is present.
-    pub fault: Option<DriveFault>,
-    /// Alarm that is present.
-    pub alarm: Option<DriveAlarm>,
+    /// Conditions that are there; what follows from them is for the controller to say.
+    pub conditions: DriveConditions,
     /// Start Inhibits, attribute 676.
     pub start_inhibits: u16,
     /// Start Inhibits - Mfg, attribute 677.

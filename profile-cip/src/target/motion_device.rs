@@ -20,11 +20,13 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::{AttributeDefinition, AttributeStore, AttributeTable, Scope, TableError, id};
 use super::attribute_worker::{AttributeAccess, AttributeSpace};
-use super::axis_object::{Axis, AxisConfig, Context};
+use super::axis_object::{Axis, AxisConfig, Context, FaultWords};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
 use super::drive_link::{AxisCommandImage, DriveImage};
+use super::exception::ExceptionActions;
 use super::explicit_queue::ExplicitQueue;
+use super::fault_log::{FaultLog, LogEntry};
 use super::io_connection::{IoConnection, Mode};
 use super::io_counters::MotionCounters;
 use super::motion_class::NodeHealth;
@@ -33,7 +35,7 @@ use super::service_channel::ServiceChannel;
 use super::status_report::Reported;
 use super::time_offset::OffsetCompensation;
 use crate::wire::Error;
-use crate::wire::motion::codes::{EventChecking, EventType, NodeAlarm, NodeControl, NodeFault};
+use crate::wire::motion::codes::{EventChecking, EventType, FaultType, NodeAlarm, NodeControl, NodeFault};
 use crate::wire::motion::event::ExtendedEventData;
 use crate::wire::motion::{FORMAT_REVISION, WriteBlock};
 use crate::wire::status::GeneralStatus;
@@ -214,10 +216,27 @@ impl MotionDevice {
         self.slots.get(axis).map(|slot| slot.axis.state())
     }
 
+    /// Exceptions, faults and alarms of an axis.
+    #[must_use]
+    pub fn fault_words(&self, axis: usize) -> Option<&FaultWords> {
+        self.slots.get(axis).map(|slot| slot.axis.fault_words())
+    }
+
     /// Axis Faults (attribute 657) of an axis.
     #[must_use]
     pub fn axis_faults(&self, axis: usize) -> Option<u64> {
-        self.slots.get(axis).map(|slot| slot.axis.faults())
+        self.fault_words(axis).map(|words| words.fault(FaultType::AXIS))
+    }
+
+    /// The log of faults and alarms of an axis.
+    #[must_use]
+    pub fn fault_log(&self, axis: usize) -> Option<&FaultLog> {
+        self.slots.get(axis).map(|slot| slot.axis.log())
+    }
+
+    /// The next entry that came into the log of an axis or ended there.
+    pub fn poll_fault_log(&mut self, axis: usize) -> Option<LogEntry> {
+        self.slots.get_mut(axis).and_then(|slot| slot.axis.faults.log.poll())
     }
 
     /// Fault and alarm records of an axis that were lost because the controller did not take them.
@@ -408,7 +427,7 @@ impl MotionDevice {
                 self.reply(MotionReply::Opened { token: parameters.token, outcome });
             }
             MotionRequest::Close(parameters) => {
-                self.close(&parameters);
+                self.close(system_time, &parameters);
                 self.reply(MotionReply::Closed { token: parameters.token });
             }
             MotionRequest::Explicit(request) => self.queue_explicit(request),
@@ -455,14 +474,15 @@ impl MotionDevice {
         Ok(())
     }
 
-    fn close(&mut self, parameters: &CloseParameters) {
+    fn close(&mut self, system_time: Option<SystemTime>, parameters: &CloseParameters) {
         let same = self.connection.as_ref().is_some_and(|c| {
             c.parameters.triad == parameters.triad && c.parameters.o_to_t_id == parameters.o_to_t_id
         });
         if same {
             self.connection = None;
             self.start_over();
-            self.slots.iter_mut().for_each(|slot| slot.axis.close());
+            let system_time = system_time.map_or(0, |t| t.0);
+            self.slots.iter_mut().for_each(|slot| slot.axis.close(system_time));
         }
     }
 
@@ -527,7 +547,10 @@ impl MotionDevice {
 
     pub(super) fn step(&mut self, system_time: Option<SystemTime>) {
         let context = self.context(system_time);
-        self.slots.iter_mut().for_each(|slot| slot.axis.step(&context));
+        for slot in &mut self.slots {
+            let actions = ExceptionActions::of(&self.axis_table, &slot.store);
+            slot.axis.step(&context, &actions);
+        }
     }
 }
 

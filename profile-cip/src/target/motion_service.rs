@@ -15,7 +15,7 @@ use super::motion_device::MotionDevice;
 use super::motion_link::{EXPLICIT_DATA_MAX, ExplicitReply, ExplicitRequest, MotionReply};
 use super::time_offset::Offsets;
 use crate::wire::motion::ServiceRequest;
-use crate::wire::motion::codes::{MotionService, SyncStatus};
+use crate::wire::motion::codes::{AlarmType, FaultType, MotionService, SyncStatus};
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::status::GeneralStatus;
 
@@ -208,6 +208,10 @@ impl MotionDevice {
             Some(axis) => {
                 let Some(slot) = self.slots.get_mut(axis) else { return };
                 let (block, drive) = (slot.axis.block(), slot.axis.drive());
+                let words = slot.axis.fault_words();
+                let fault = slot.axis.faults.newest_fault();
+                let alarm = slot.axis.faults.newest_alarm();
+                let safety = drive.safety.unwrap_or_default();
                 let integer =
                     matches!(block.values.position, Some(crate::wire::motion::CommandPosition::Integer(_)));
                 let values = [
@@ -226,7 +230,31 @@ impl MotionDevice {
                     (id::AXIS_STATUS_MFG, u64::from(drive.axis_status_mfg)),
                     (id::AXIS_IO_STATUS, u64::from(drive.io_status.bits())),
                     (id::AXIS_IO_STATUS_MFG, u64::from(drive.io_status_mfg)),
-                    (id::AXIS_FAULTS, slot.axis.faults()),
+                    (id::AXIS_EXCEPTIONS, words.exceptions[0]),
+                    (id::AXIS_EXCEPTIONS_MFG, words.exceptions[1]),
+                    (id::AXIS_FAULTS, words.fault(FaultType::AXIS)),
+                    (id::AXIS_FAULTS_MFG, words.fault(FaultType::AXIS_MFG)),
+                    (id::AXIS_ALARMS, words.alarm(AlarmType::AXIS)),
+                    (id::AXIS_ALARMS_MFG, words.alarm(AlarmType::AXIS_MFG)),
+                    (id::AXIS_FAULT_CODE, u64::from(fault.code)),
+                    (id::AXIS_FAULT_TYPE, u64::from(fault.fault_type.0)),
+                    (id::AXIS_FAULT_TIME_STAMP, fault.time_stamp),
+                    (id::AXIS_ALARM_CODE, u64::from(alarm.code)),
+                    (id::AXIS_ALARM_TYPE, u64::from(alarm.alarm_type.0)),
+                    (id::AXIS_FAULT_SUB_CODE, u64::from(fault.sub_code)),
+                    (id::AXIS_ALARM_SUB_CODE, u64::from(alarm.sub_code)),
+                    (id::AXIS_FAULT_ACTION, u64::from(fault.action)),
+                    (id::AXIS_ALARM_STATE, u64::from(alarm.state)),
+                    (id::AXIS_ALARM_TIME_STAMP, alarm.time_stamp),
+                    (id::INITIALIZATION_FAULTS, words.fault(FaultType::INITIALIZATION)),
+                    (id::INITIALIZATION_FAULTS_MFG, words.fault(FaultType::INITIALIZATION_MFG)),
+                    (id::APR_FAULTS, words.fault(FaultType::APR)),
+                    (id::APR_FAULTS_MFG, words.fault(FaultType::APR_MFG)),
+                    (id::AXIS_SAFETY_STATE, u64::from(safety.state)),
+                    (id::AXIS_SAFETY_STATUS, u64::from(safety.status)),
+                    (id::AXIS_SAFETY_STATUS_MFG, u64::from(safety.manufacturer)),
+                    (id::AXIS_SAFETY_FAULTS, words.fault(FaultType::SAFETY)),
+                    (id::AXIS_SAFETY_FAULTS_MFG, words.fault(FaultType::SAFETY_MFG)),
                     (id::START_INHIBITS, u64::from(drive.start_inhibits)),
                     (id::START_INHIBITS_MFG, u64::from(drive.start_inhibits_mfg)),
                 ];

@@ -1,6 +1,6 @@
 //! Status values and log records on their way to the controller, clause 6-2.7.1.2.2 (Status Data Set).
 //!
-//! A value is sent when it has changed, in every update until the controller's Last Received ID reaches an update that
+//! A value is sent when it has changed, in every update until the controller's Last Received ID names an update that
 //! carried it. Records of a log go one after the other, the next one only when the one before it has arrived.
 
 use arrayvec::ArrayVec;
@@ -8,16 +8,40 @@ use arrayvec::ArrayVec;
 /// Records that a log keeps for transmission, clause 5-2.3.14.
 pub(super) const LOG_MAX: usize = 25;
 
-/// Whether Update ID `received` is at or behind `sent`, on the circle of 256.
-fn reached(received: u8, sent: u8) -> bool {
-    received.wrapping_sub(sent) < 128
+/// The unbroken run of updates that carried something, by their Update IDs on the circle of 256.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Flight {
+    first: u8,
+    last: u8,
+}
+
+/// Longest run that counts: on a circle of 256 older updates could be taken for newer ones.
+const FLIGHT_MAX: u8 = 127;
+
+impl Flight {
+    /// Update `id` carries it as well. A gap begins a new run: only an update that carried it proves anything.
+    fn carry(flight: Option<Self>, id: u8) -> Self {
+        match flight {
+            Some(known) if id == known.last => known,
+            Some(Self { first, last }) if id == last.wrapping_add(1) => {
+                let full = id.wrapping_sub(first) > FLIGHT_MAX;
+                Self { first: if full { first.wrapping_add(1) } else { first }, last: id }
+            }
+            _ => Self { first: id, last: id },
+        }
+    }
+
+    /// Whether update `received` carried it.
+    fn holds(self, received: u8) -> bool {
+        received.wrapping_sub(self.first) <= self.last.wrapping_sub(self.first)
+    }
 }
 
 /// A value that is reported when it changes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reported<T> {
     arrived: Option<T>,
-    in_flight: Option<(u8, T)>,
+    in_flight: Option<(Flight, T)>,
 }
 
 impl<T: Copy + PartialEq> Reported<T> {
@@ -36,16 +60,15 @@ impl<T: Copy + PartialEq> Reported<T> {
             self.in_flight = None;
             return None;
         }
-        if !matches!(self.in_flight, Some((_, sent)) if sent == value) {
-            self.in_flight = Some((update_id, value));
-        }
+        let flight = self.in_flight.filter(|(_, sent)| *sent == value).map(|(flight, _)| flight);
+        self.in_flight = Some((Flight::carry(flight, update_id), value));
         Some(value)
     }
 
     /// The controller has processed update `received`.
     pub fn acknowledge(&mut self, received: u8) {
-        if let Some((sent, value)) = self.in_flight
-            && reached(received, sent)
+        if let Some((flight, value)) = self.in_flight
+            && flight.holds(received)
         {
             self.arrived = Some(value);
             self.in_flight = None;
@@ -57,7 +80,7 @@ impl<T: Copy + PartialEq> Reported<T> {
 #[derive(Debug, Clone)]
 pub(super) struct RecordLog<T> {
     records: ArrayVec<T, LOG_MAX>,
-    in_flight: Option<u8>,
+    in_flight: Option<Flight>,
     dropped: u32,
 }
 
@@ -78,16 +101,22 @@ impl<T: Copy> RecordLog<T> {
     /// The record to put into update `update_id`.
     pub fn due(&mut self, update_id: u8) -> Option<T> {
         let record = self.records.first().copied()?;
-        self.in_flight.get_or_insert(update_id);
+        self.in_flight = Some(Flight::carry(self.in_flight, update_id));
         Some(record)
     }
 
     /// The controller has processed update `received`.
     pub fn acknowledge(&mut self, received: u8) {
-        if self.in_flight.is_some_and(|sent| reached(received, sent)) {
+        if self.in_flight.is_some_and(|flight| flight.holds(received)) {
             self.records.remove(0);
             self.in_flight = None;
         }
+    }
+
+    /// Forgets the records: another controller is told from the beginning.
+    pub fn clear(&mut self) {
+        self.records.clear();
+        self.in_flight = None;
     }
 
     /// Records lost because the log was full.
@@ -106,8 +135,9 @@ mod tests {
         assert_eq!(value.due(7, 254), Some(7));
         value.acknowledge(253);
         assert_eq!(value.due(7, 255), Some(7), "253 is before the first update with it");
+        assert_eq!(value.due(7, 0), Some(7));
         value.acknowledge(0);
-        assert_eq!(value.due(7, 1), None, "0 is behind 254");
+        assert_eq!(value.due(7, 1), None, "0 carried it, behind 254 on the circle");
         assert_eq!(value.due(8, 2), Some(8));
         assert_eq!(value.due(9, 3), Some(9));
         value.acknowledge(2);
@@ -125,12 +155,43 @@ mod tests {
         assert_eq!(log.due(11), Some('a'));
         log.acknowledge(9);
         assert_eq!(log.due(12), Some('a'));
+        log.acknowledge(13);
+        assert_eq!(log.due(12), Some('a'), "13 was not sent yet");
+        log.acknowledge(10);
         log.acknowledge(10);
         assert_eq!(log.due(13), Some('b'));
         log.acknowledge(12);
         assert_eq!(log.due(14), Some('b'), "12 carried the record before");
         log.acknowledge(13);
         assert_eq!(log.due(15), None);
+    }
+
+    #[test]
+    fn an_update_without_the_record_proves_nothing() {
+        let mut log = RecordLog::new();
+        log.push('a');
+        assert_eq!(log.due(20), Some('a'));
+        // 21 to 24 went out without the Fault element: the controller did not ask for it.
+        log.acknowledge(24);
+        assert_eq!(log.due(25), Some('a'));
+        log.acknowledge(20);
+        assert_eq!(log.due(26), Some('a'), "20 belongs to the run before the gap");
+        log.acknowledge(25);
+        assert_eq!(log.due(27), None);
+    }
+
+    #[test]
+    fn a_record_survives_a_controller_that_hears_nothing_for_long() {
+        let mut log = RecordLog::new();
+        log.push('a');
+        let mut id = 0_u8;
+        for _ in 0..1000 {
+            assert_eq!(log.due(id), Some('a'));
+            log.acknowledge(id.wrapping_sub(200));
+            id = id.wrapping_add(1);
+        }
+        log.acknowledge(id.wrapping_sub(1));
+        assert_eq!(log.due(id), None);
     }
 
     #[test]

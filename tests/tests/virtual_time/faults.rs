@@ -1,9 +1,13 @@
 //! Something is wrong with a drive, or with a command.
 
+use axisbridge::engine::axis::STOP_TIME_OUT;
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, both, in_motion, millis};
-use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::controller::{AxisSet, Failure, Step};
-use profile_cip::wire::motion::codes::{AxisStateCode, FaultType};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cip::controller::{AttributeSet, AxisSet, Failure, Step};
+use profile_cip::target::exception::ExceptionAction;
+use profile_cip::target::fault_log::LogKind;
+use profile_cip::wire::motion::attribute_list::{AttributeSelector, Range};
+use profile_cip::wire::motion::codes::{AlarmType, AxisStateCode, ClearingEvent, FaultType};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::{DriveState, Report};
 
@@ -160,4 +164,225 @@ fn a_jump_of_the_command_is_a_fault_and_is_not_followed() {
     assert!(farthest < NANO / 100, "{farthest}");
     rig.run_until(millis(1_000), "rest", at_rest);
     assert_ne!(rig.engine.axes()[0].state(), DriveState::Operating);
+}
+
+/// Alarm type, code and state of each entry of an axis' alarm log that the controller got.
+fn alarms(rig: &Rig, place: usize) -> Vec<(AlarmType, u8, u8)> {
+    let kept = rig.report().axes[place].alarms.kept().to_vec();
+    kept.iter().map(|alarm| (alarm.alarm_type, alarm.code, alarm.state)).collect()
+}
+
+#[test]
+fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
+    let mut rig = in_motion(Settings::default());
+    // Motor overtemperature warning: Motor Overtemperature UL.
+    rig.drive_mut(0).set_warnings(1 << 2);
+    rig.run_for(millis(100));
+    let came = (AlarmType::AXIS, 6, 1);
+    assert_eq!(alarms(&rig, 0), [came]);
+    // Another one while the first stands: the status word does not change, the word is read again.
+    rig.drive_mut(0).set_warnings(1 << 2 | 1 << 15);
+    rig.run_for(millis(400));
+    let second = (AlarmType::AXIS_MFG, 29, 1);
+    assert_eq!(alarms(&rig, 0), [came, second]);
+    rig.drive_mut(0).set_warnings(1 << 15);
+    rig.run_for(millis(400));
+    assert_eq!(alarms(&rig, 0), [came, second, (AlarmType::AXIS, 6, 0)]);
+    rig.drive_mut(0).set_warnings(0);
+    rig.run_for(millis(50));
+    assert_eq!(
+        alarms(&rig, 0).last(),
+        Some(&(AlarmType::AXIS_MFG, 29, 0)),
+        "gone with the bit of the status word"
+    );
+    assert_eq!(rig.report().axes[0].state, Some(AxisStateCode::RUNNING));
+    assert_eq!(codes(&rig, 0), []);
+    let words = *rig.engine.devices()[0].device().fault_words(0).expect("an axis");
+    assert_eq!((words.exceptions, words.alarms), ([0, 0], [0; 4]));
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}", rig.log());
+}
+
+/// Sets one element of Axis Exception Action.
+fn action_of(axis: u8, exception: u16, action: ExceptionAction) -> Step {
+    let range = Range { start: exception, count: 1 };
+    let selector = AttributeSelector::array(672, 1, &[range]).expect("one dimension");
+    let set = AttributeSet { selector, value: vec![action.0], required: true };
+    Step::SetAttributes { axis, attributes: vec![set] }
+}
+
+/// The turntable turns faster than the box is told to let it.
+fn too_fast() -> Settings {
+    let configuration = BOX.replace("following_error = 0.5", "following_error = 0.5\nvelocity = 3.0");
+    Settings { configuration, ..Settings::default() }
+}
+
+fn turn(action: ExceptionAction) -> Vec<Step> {
+    vec![
+        action_of(1, 4, action),
+        Step::Enable(TURNTABLE_ONLY),
+        Step::MoveAbsolute { axis: 1, position: 4.0, limits: TURNTABLE },
+        Step::Disable(TURNTABLE_ONLY),
+    ]
+}
+
+#[test]
+fn what_the_box_watches_is_ignored_told_or_obeyed_as_the_controller_says() {
+    // Motor Overspeed UL, bit 4.
+    let cases = [
+        (ExceptionAction::IGNORE, vec![], 0),
+        (ExceptionAction::ALARM, vec![], 2),
+        (ExceptionAction::MINOR_FAULT, vec![(FaultType::AXIS, 4)], 0),
+    ];
+    for (action, faults, records) in cases {
+        let mut rig = Rig::ready(too_fast());
+        rig.connect(turn(action));
+        let mut seen = 0;
+        rig.run_until(millis(20_000), "the end", |rig| {
+            seen |= rig.engine.devices()[0].device().fault_words(0).expect("an axis").exceptions[0];
+            rig.report().steps_finished == 4
+        });
+        assert_eq!(seen, 1 << 4, "{action}: seen in Axis Exceptions");
+        assert_eq!(rig.report().failure, None, "{action}: {}", rig.log());
+        assert_eq!((codes(&rig, 0), alarms(&rig, 0).len()), (faults, records), "{action}");
+        assert!((rig.position(0) - 4 * NANO).abs() < NANO / 100, "{action}: {}", rig.position(0));
+    }
+    let mut rig = Rig::ready(too_fast());
+    rig.connect(turn(ExceptionAction::MAJOR_FAULT));
+    let report = rig.run(millis(20_000));
+    assert!(matches!(report.failure, Some(Failure::AxisNotRunning { axis: 1, .. })), "{report}");
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 4)]);
+    // Stopped under control: a current limited stop (3), then disabled (2).
+    assert_eq!(rig.report().axes[0].faults.kept()[0].action, 0x23);
+    rig.run_until(millis(3_000), "rest", at_rest);
+    assert!(rig.torque_free());
+    assert_eq!(
+        rig.engine.axes()[0].fault().map(|fault| fault.cause),
+        Some(FaultCause::MOTOR_OVER_SPEED_USER_LIMIT)
+    );
+}
+
+/// Excessive Position Error that the box finds, because its tolerance is narrower than the drive's.
+fn astray(action: ExceptionAction) -> Rig {
+    let configuration = BOX.replace("following_error = 0.5", "following_error = 0.00001");
+    let mut rig = Rig::ready(Settings { configuration, ..Settings::default() });
+    // The drive is told to look away: Position Error Tolerance.
+    let tolerance = vec![AttributeSet::real(444, 500_000.0)];
+    rig.connect(vec![
+        Step::SetAttributes { axis: 1, attributes: tolerance },
+        action_of(1, 54, action),
+        Step::Enable(TURNTABLE_ONLY),
+        Step::MoveAbsolute { axis: 1, position: 4.0, limits: TURNTABLE },
+        Step::Disable(TURNTABLE_ONLY),
+    ]);
+    rig.run(millis(20_000));
+    rig
+}
+
+#[test]
+fn an_excessive_position_error_that_the_box_finds_can_be_ignored_and_one_of_the_drive_cannot() {
+    let rig = astray(ExceptionAction::IGNORE);
+    assert_eq!((rig.report().failure, codes(&rig, 0)), (None, vec![]), "{}", rig.log());
+    let rig = astray(ExceptionAction::MAJOR_FAULT);
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 54)]);
+    assert!(matches!(rig.report().failure, Some(Failure::AxisNotRunning { axis: 1, .. })));
+
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        action_of(1, 54, ExceptionAction::IGNORE),
+        Step::Enable(TURNTABLE_ONLY),
+        Step::Dwell { seconds: 5.0 },
+    ]);
+    rig.run_until(millis(5_000), "the enable", |rig| rig.report().steps_finished == 2);
+    rig.drive_mut(0).raise_fault(FaultCause::EXCESSIVE_POSITION_ERROR);
+    rig.run_for(millis(500));
+    assert_eq!(rig.report().axes[0].state, Some(AxisStateCode::MAJOR_FAULTED));
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 54)], "the drive is off, whatever the attribute says");
+}
+
+#[test]
+fn an_action_that_the_drive_would_not_obey_is_refused() {
+    let mut rig = Rig::ready(Settings::default());
+    // Bus Undervoltage FL: the drive switches itself off.
+    rig.connect(vec![action_of(1, 33, ExceptionAction::MINOR_FAULT)]);
+    let report = rig.run(millis(20_000));
+    let failure = report.failure.expect("a refusal").to_string();
+    assert!(failure.contains("672"), "{failure}");
+}
+
+#[test]
+fn two_faults_at_once_are_both_told_and_one_reset_ends_both() {
+    let mut rig = in_motion(Settings::default());
+    // Undervoltage besides the overcurrent, then overvoltage a second later.
+    rig.drive_mut(0).set_further_errors(1 << 9);
+    rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
+    rig.run_for(millis(200));
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 10), (FaultType::AXIS, 33)]);
+    rig.drive_mut(0).set_further_errors(1 << 9 | 1 << 8);
+    rig.run_for(millis(400));
+    // The controller has given up by now; the box still sees it.
+    let there: Vec<_> = rig.engine.axes()[0].faults().map(|active| active.fault.cause).collect();
+    let expected = [FaultCause::OVER_CURRENT, FaultCause::UNDER_VOLTAGE, FaultCause::OVER_VOLTAGE];
+    assert_eq!(there, expected);
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::OVER_CURRENT));
+    rig.run(millis(30_000));
+    rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT);
+    rig.drive_mut(0).set_further_errors(0);
+    rig.connect(vec![
+        Step::Dwell { seconds: 0.1 },
+        Step::FaultReset(both()),
+        Step::Enable(both()),
+        Step::Disable(both()),
+    ]);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}", rig.log());
+}
+
+#[test]
+fn a_reset_with_the_condition_still_there_is_a_fault_again_with_a_record_of_its_own() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        Step::Enable(TURNTABLE_ONLY),
+        Step::Dwell { seconds: 0.3 },
+        Step::FaultReset(TURNTABLE_ONLY),
+        Step::Dwell { seconds: 1.0 },
+    ]);
+    rig.run_until(millis(5_000), "the enable", |rig| rig.report().steps_finished == 1);
+    rig.drive_mut(0).raise_fault(FaultCause::OVER_VOLTAGE);
+    rig.run(millis(30_000));
+    let fault = (FaultType::AXIS, 35);
+    let cleared = (FaultType::CLEARED, ClearingEvent::FAULT_RESET.0);
+    let told: Vec<_> =
+        rig.report().axes[0].faults.kept().iter().map(|record| (record.fault_type, record.code)).collect();
+    assert!(told == [fault, cleared, fault] || told == [fault, fault], "{told:?}");
+    let log = rig.engine.devices()[0].fault_log(0).expect("an axis");
+    let entries: Vec<_> =
+        log.entries().map(|entry| (entry.kind, entry.code, entry.ended.map(|(by, _)| by))).collect();
+    let kind = LogKind::Fault(FaultType::AXIS);
+    assert_eq!(entries.len(), 2);
+    assert_eq!(entries[1], (kind, 35, Some(ClearingEvent::FAULT_RESET)));
+    assert_eq!(
+        rig.axis_states(0).last().map(ToString::to_string).as_deref(),
+        Some("Initializing"),
+        "closed by now"
+    );
+}
+
+#[test]
+fn a_lost_drive_is_major_faulted_when_the_time_for_its_stop_is_over_and_a_reset_does_not_help() {
+    let slide_only = AxisSet::one(2);
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![Step::Enable(slide_only), Step::Dwell { seconds: 60.0 }]);
+    rig.run_until(millis(5_000), "the enable", |rig| rig.report().steps_finished == 1);
+    rig.line.cut_behind(1);
+    let device = |rig: &Rig| rig.engine.devices()[0].device().axis_state(1).expect("an axis").to_string();
+    rig.run_until(millis(200), "the fault", |rig| device(rig) == "Aborting");
+    let since = rig.now();
+    rig.run_until(STOP_TIME_OUT + millis(500), "the time limit", |rig| device(rig) != "Aborting");
+    assert!(rig.now().since(since) > STOP_TIME_OUT - millis(500), "not before: nobody has seen it stop");
+    assert_eq!(device(&rig), "Major Faulted");
+    let log = rig.engine.devices()[0].fault_log(1).expect("an axis");
+    let silence =
+        log.entries().filter(|entry| entry.kind == LogKind::Fault(FaultType::AXIS_MFG) && entry.code == 17);
+    assert_eq!(silence.count(), 1, "one cause, one entry");
 }

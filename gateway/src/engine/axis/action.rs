@@ -1,7 +1,9 @@
 //! From the controller to the axis: actions and resets.
 
 use super::{AxisChannel, Loss, RESET_TIME_OUT, Reset, caused_by_controller};
-use profile_cip::target::drive_link::{AxisCommandImage, Command, DriveAction, Withheld};
+use profile_cip::target::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
+use profile_generic::fault::{Fault, FaultCause};
+use profile_generic::fault_set::{ActiveFault, Origin};
 use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
@@ -14,6 +16,8 @@ impl AxisChannel {
         {
             self.lose_command(now, system, Loss::Withheld(why));
         }
+        // Before the action: a stop that is ordered in a particular way is under way when the action asks for any.
+        self.take_abort(now, system, image.abort);
         if image.action_id != self.action_id {
             self.action_id = image.action_id;
             self.north_action = image.action;
@@ -60,6 +64,19 @@ impl AxisChannel {
         }
     }
 
+    /// The motion device wants the axis stopped for a fault, or stopped harder than before.
+    fn take_abort(&mut self, now: MonotonicTime, system: SystemTime, order: Option<AbortOrder>) {
+        let new = order.filter(|order| self.abort.is_none_or(|known| known.action != order.action));
+        self.abort = order;
+        let Some(order) = new.filter(|_| self.may_have_torque()) else { return };
+        let there = |active: &&ActiveFault| {
+            self.north.fault(active.fault.cause).is_some_and(|fault| fault.is(order.fault_type.0, order.code))
+        };
+        let cause = self.faults.iter().find(there).map(|active| active.fault);
+        let fault = cause.unwrap_or_else(|| Fault::new(FaultCause::CONTROLLER_ABORT, system));
+        self.take_fault(now, system, fault.with_reaction(self.north.reaction(order.action)));
+    }
+
     pub(super) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
         let transition = self.drive.machine.request(request);
         self.follow(now, system, transition);
@@ -84,6 +101,9 @@ impl AxisChannel {
     pub(super) fn clear_fault(&mut self, now: MonotonicTime, system: SystemTime) {
         self.fault = None;
         self.cause_wanted = None;
+        // A drive that is not there is no event: it is still not there.
+        let silent = self.feedback.report == Report::Silent;
+        self.faults.clear_all(Origin::Event, |cause| silent && cause == FaultCause::SOUTH_SILENCE);
         let transition = self.drive.machine.clear_faults();
         self.follow(now, system, transition);
         self.request(now, system, Request::FaultReset);
@@ -130,5 +150,10 @@ impl AxisChannel {
     /// A controller has opened a connection: what the last one had caused may be forgotten once the axis is powered up.
     pub fn connection_opened(&mut self) {
         self.new_connection = true;
+        if let Some(fault) = self.fault.filter(|fault| !caused_by_controller(fault.cause)) {
+            // Its condition may be over, but the axis is still stopped for it: the device, which has forgotten it, has to
+            // know what a reset is for.
+            self.faults.raise(fault, Origin::Event);
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! From the drive to the axis: feedback, limits that the box watches, faults and their causes.
 
-use super::{AxisChannel, CAUSE_TIME_OUT, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
-use profile_generic::fault::{Fault, FaultCause, Reaction};
+use super::diagnosis::CAUSE_TIME_OUT;
+use super::{AxisChannel, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
+use profile_generic::fault::{Fault, FaultCause};
+use profile_generic::fault_set::Origin;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
@@ -40,7 +42,7 @@ impl AxisChannel {
         self.feedback.at = system;
         let report = self.feedback.report;
         self.report(now, system, report);
-        self.watch(now, system);
+        self.watch(system);
     }
 
     pub(super) fn age_feedback(&mut self) {
@@ -50,6 +52,11 @@ impl AxisChannel {
 
     pub(super) fn report(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.report = report;
+        self.end_drive_faults();
+        if report == Report::Silent && self.state() != DriveState::NotReady {
+            // Also when another fault has stopped it: the drive cannot be reset before it is back.
+            self.faults.raise(Fault::new(FaultCause::SOUTH_SILENCE, system), Origin::Event);
+        }
         let faulted = matches!(report, Report::Faulted | Report::FaultReaction);
         let unknown = self.fault.is_none_or(|fault| caused_by_controller(fault.cause));
         if !faulted {
@@ -77,13 +84,8 @@ impl AxisChannel {
             self.follow(now, system, transition);
         }
         if self.cause_wanted.is_some_and(|since| now.since(since) > CAUSE_TIME_OUT) {
-            self.set_cause(
-                now,
-                system,
-                FaultCause::DRIVE_SPECIFIC,
-                FaultCause::DRIVE_SPECIFIC.default_reaction(),
-                0,
-            );
+            let cause = FaultCause::DRIVE_SPECIFIC;
+            self.drive_fault(now, system, cause, cause.default_reaction(), 0);
         }
         self.go_on_with_reset(now, system);
         self.feedback.state = self.state();
@@ -91,75 +93,54 @@ impl AxisChannel {
         self.feedback.fault = self.fault;
     }
 
-    /// The limits that the box itself watches.
-    pub(super) fn watch(&mut self, now: MonotonicTime, system: SystemTime) {
-        if self.state() != DriveState::Operating || self.fault.is_some() {
-            return;
-        }
-        let speed = self.feedback.velocity.get().unsigned_abs();
+    /// The limits that the box itself watches while it leads the axis. Passing one stops nothing by itself: it is a
+    /// condition, and the controller has said what is to be done about it. It is over when the axis is not led any more.
+    pub(super) fn watch(&mut self, system: SystemTime) {
+        let operating = self.state() == DriveState::Operating;
+        let (position, velocity) = (self.feedback.position, self.feedback.velocity);
+        let speed = velocity.get().unsigned_abs();
         let too_fast = |limit: Velocity| {
             speed > limit.get().unsigned_abs().saturating_add(limit.get().unsigned_abs() / 10)
         };
-        if self.limits.velocity.is_some_and(too_fast) {
-            self.raise(now, system, Fault::new(FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, system));
-        }
-        if self.command.mode == OperatingMode::Position {
-            let error = self.command.position.get().saturating_sub(self.feedback.position.get());
+        let too_fast = self.limits.velocity.is_some_and(too_fast);
+        // Beyond the limit and on the way out: an axis that stands there or comes back may do so.
+        let above =
+            self.limits.position_max.is_some_and(|limit| position > limit) && velocity > Velocity::ZERO;
+        let below =
+            self.limits.position_min.is_some_and(|limit| position < limit) && velocity < Velocity::ZERO;
+        let mut astray = false;
+        if operating && self.command.mode == OperatingMode::Position {
+            let error = self.command.position.get().saturating_sub(position.get());
             if self.feedback.get(profile_generic::image::Signal::FollowingError).is_none() {
                 self.feedback.following_error = Position(error);
             }
-            if self
-                .limits
-                .following_error
-                .is_some_and(|limit| error.unsigned_abs() > limit.get().unsigned_abs())
-            {
-                self.raise(now, system, Fault::new(FaultCause::EXCESSIVE_POSITION_ERROR, system));
+            let limit = self.limits.following_error;
+            astray = limit.is_some_and(|limit| error.unsigned_abs() > limit.get().unsigned_abs());
+        }
+        for (cause, there) in [
+            (FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, too_fast),
+            (FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, above),
+            (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below),
+            (FaultCause::EXCESSIVE_POSITION_ERROR, astray),
+        ] {
+            if operating && there {
+                self.faults.raise(Fault::new(cause, system), Origin::Watch);
+            } else {
+                self.faults.clear(cause, Origin::Watch);
             }
         }
     }
 
-    /// Whether the drive's diagnostic words should be read now, urgently.
-    #[must_use]
-    pub fn wants_cause(&self) -> bool {
-        self.cause_wanted.is_some()
-    }
-
-    /// A diagnostic word of the drive has been read; `true` when it names the cause.
-    pub fn diagnostic_word(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        idn: profile_sercos::wire::idn::Idn,
-        word: u32,
-    ) -> bool {
-        let found = self.south.as_ref().and_then(|(program, _)| program.fault(idn, word));
-        match (found, self.cause_wanted) {
-            // A warning is no cause of a stop.
-            (Some((cause, reaction)), Some(_)) if reaction.stops() => {
-                self.set_cause(now, system, cause, reaction, word);
-                true
-            }
-            _ => false,
-        }
-    }
-
-    pub(super) fn set_cause(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        cause: FaultCause,
-        reaction: Reaction,
-        vendor_code: u32,
-    ) {
-        self.cause_wanted = None;
-        self.raise(
-            now,
-            system,
-            Fault::new(cause, system).with_reaction(reaction).with_vendor_code(vendor_code),
-        );
-    }
-
+    /// A fault that the gateway itself has found, and for which it stops the axis whatever the controller wants.
     pub(super) fn raise(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
+        if !caused_by_controller(fault.cause) {
+            self.faults.raise(fault, Origin::Event);
+        }
+        self.take_fault(now, system, fault);
+    }
+
+    /// Stops the axis for a fault.
+    pub(super) fn take_fault(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
         // What the drive has is worth more to know than that the controller had stopped it.
         let weightier =
             |known: Fault| caused_by_controller(known.cause) && !caused_by_controller(fault.cause);

@@ -18,12 +18,10 @@ impl AxisChannel {
             reset_id: self.reset_id,
             ..DriveImage::default()
         };
-        // What the controller itself asked for is no fault of the drive; the motion device knows of it.
         let mut feedback = self.feedback;
-        feedback.fault = self.fault.filter(|fault| fault.cause != FaultCause::CONTROLLER_ABORT);
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
-        self.north.drive_image(&feedback, &mut image);
+        self.north.drive_image(&feedback, &self.faults, &mut image);
         if self.cause_wanted.is_some() {
             // The stop ends with the fault that says why, once the drive has told it.
             image.stop_complete = false;

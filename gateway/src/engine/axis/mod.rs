@@ -9,13 +9,15 @@
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
 
 mod action;
+mod diagnosis;
 mod feedback;
 mod image;
 mod set_point;
 
 use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
-use profile_cip::target::drive_link::{DriveAction, Withheld};
+use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
 use profile_generic::program::Trackers;
@@ -32,9 +34,6 @@ pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
 /// How long the drive may take to clear its faults after a reset.
 pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 
-/// How long a fault of the drive waits for its cause to be read before it is reported without.
-const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
-
 /// Update periods that the interpolator goes on beyond its last target before it holds and the command counts as lost.
 /// The connection's own limit for missed updates, 4 by default (class attribute Controller Update Delay High Limit), is
 /// of the same order: whichever is reached first stops the axis.
@@ -49,7 +48,7 @@ pub struct Limits {
     pub position_max: Option<Position>,
     /// Highest speed of the drive, either direction, with a tenth to spare for its overshoot.
     pub velocity: Option<Velocity>,
-    /// Largest distance of actual from commanded position.
+    /// Largest distance of actual from commanded position. What follows from it is for the controller to say.
     pub following_error: Option<Position>,
 }
 
@@ -114,11 +113,17 @@ pub struct AxisChannel {
     control_word: u16,
     action_id: u32,
     north_action: DriveAction,
+    /// How the device wants the axis stopped for a fault.
+    abort: Option<AbortOrder>,
     reset_id: u32,
     reset: Option<Reset>,
     /// Set-points of this number were taken.
     sequence: Option<u32>,
+    /// The fault that has stopped the axis: the first one, until a reset.
     fault: Option<Fault>,
+    /// Everything that is wrong now.
+    faults: FaultSet,
+    diagnosis: diagnosis::Diagnosis,
     loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
@@ -157,10 +162,13 @@ impl AxisChannel {
             control_word: 0,
             action_id: 0,
             north_action: DriveAction::None,
+            abort: None,
             reset_id: 0,
             reset: None,
             sequence: None,
             fault: None,
+            faults: FaultSet::new(),
+            diagnosis: diagnosis::Diagnosis::default(),
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
@@ -174,6 +182,11 @@ impl AxisChannel {
     #[must_use]
     pub fn state(&self) -> DriveState {
         self.drive.machine.state()
+    }
+
+    /// Everything that is wrong now.
+    pub fn faults(&self) -> impl Iterator<Item = &ActiveFault> {
+        self.faults.iter()
     }
 
     /// The newest feedback.
@@ -243,6 +256,7 @@ impl AxisChannel {
     fn end_south(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.fresh = false;
         self.feedback.present = FeedbackSet::empty();
+        self.end_diagnosis();
         self.report(now, system, report);
         self.south = None;
     }

@@ -1,5 +1,6 @@
 //! CIP Motion <-> generic: from rows to the resolved mapping.
 
+use profile_cip::target::exception::ExceptionAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::StatusBits;
 use profile_generic::inhibit::Inhibits;
@@ -8,8 +9,8 @@ use profile_generic::quantity::Quantity;
 use profile_generic::state::{DriveState, Request};
 
 use super::{
-    CipTables, CipUnit, CyclicElement, DisplacementUnit, ScalingAttributes, Served, ServedAttribute, Times,
-    action, has_direction, operating_mode, signal, unit_kind,
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, Served,
+    ServedAttribute, Times, action, has_direction, operating_mode, signal, unit_kind,
 };
 use crate::mapping::compile_cip::{
     CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
@@ -333,7 +334,47 @@ impl Builder<'_> {
                 self.resolver.error(row.cause.span(), "cause", "the cause is there twice");
             }
             self.tables.faults.push((cause, *fault));
+            self.exception(row, cause, *fault);
         }
+    }
+
+    /// What the controller may set for an exception.
+    fn exception(&mut self, row: &CipFaultRow, cause: FaultCause, fault: CipFault) {
+        let words = [("box", true), ("device", true)];
+        let found_by = row.found_by.as_ref();
+        let found_here = found_by.is_some_and(|name| self.resolver.word("found_by", name, &words).is_some());
+        let major = ExceptionAction::MAJOR_FAULT.0;
+        let mut action = |key: &str, name: &Option<Name>| {
+            name.as_ref().map_or(Some(major), |name| self.byte_code("Axis Exception Action", key, name))
+        };
+        let (Some(least), Some(default)) = (action("least", &row.least), action("default", &row.default))
+        else {
+            return;
+        };
+        let manufacturer = row.manufacturer.is_some();
+        let (CipFault::Axis { code, .. }, true) = (fault, manufacturer || row.exception.is_some()) else {
+            for (key, name) in [("found_by", &row.found_by), ("least", &row.least), ("default", &row.default)]
+            {
+                if let Some(name) = name {
+                    let message = "only an exception has it: this cause is another kind of fault";
+                    self.resolver.error(name.span(), key, message);
+                }
+            }
+            return;
+        };
+        if least > major || default > major || default < least {
+            let key = if row.default.is_some() { "default" } else { "least" };
+            let message = "expected an action that is at least as severe as `least`, at most Major Fault";
+            return self.resolver.error(row.cause.span(), key, message);
+        }
+        self.tables.exceptions.push(ExceptionRow {
+            cause,
+            manufacturer,
+            bit: code,
+            found_here,
+            least,
+            default,
+        });
     }
 
     /// A fault of the axis whose types have these names in the dictionary.

@@ -227,6 +227,12 @@ pub struct CipFaultRow {
     pub initialization: Option<Name>,
     /// Standard fault of the absolute position recovery.
     pub apr: Option<Name>,
+    /// Who finds an exception besides the drive: `box` or `device`.
+    pub found_by: Option<Name>,
+    /// The least severe action that may be set for an exception; Major Fault where it is absent.
+    pub least: Option<Name>,
+    /// The action until another is set; Major Fault where it is absent.
+    pub default: Option<Name>,
     /// Where it comes from.
     pub source: Source,
 }

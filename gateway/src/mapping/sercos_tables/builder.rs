@@ -1,5 +1,6 @@
 //! Generic <-> SERCOS: from rows to the resolved mapping.
 
+use profile_cip::target::exception::ExceptionAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::parameter::Parameter;
@@ -9,6 +10,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
 
 use super::{FaultRule, ModeRule, ParameterRule, SercosTables, SignalRule, SlotRule, StepKind, StepRule};
+use crate::mapping::cip_tables::{CipTables, ExceptionRow};
 use crate::mapping::cip_tables::{action, operating_mode, signal, unit_kind};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::format::{
@@ -23,11 +25,16 @@ impl SercosTables {
     pub(in crate::mapping) fn resolve(
         file: &Parsed<GenericSercosFile>,
         dictionaries: &Dictionaries,
+        cip: &CipTables,
         errors: &mut TableErrors,
     ) -> Self {
         let rows = &file.rows;
-        let mut builder =
-            Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
+        let mut builder = Builder {
+            resolver: Resolver::new(&file.text, errors),
+            dictionaries,
+            exceptions: &cip.exceptions,
+            tables: Self::default(),
+        };
         builder.resolver.head(&rows.format, "mapping", &rows.mapping, "generic to sercos");
         builder.units(rows);
         for row in &rows.scaling {
@@ -56,6 +63,7 @@ impl SercosTables {
 struct Builder<'a> {
     resolver: Resolver<'a>,
     dictionaries: &'a Dictionaries,
+    exceptions: &'a [ExceptionRow],
     tables: SercosTables,
 }
 
@@ -314,6 +322,13 @@ impl<'a> Builder<'a> {
         let Some(word) = self.word("word", &row.word) else { return };
         let pattern = self.pattern(word, &row.pattern);
         if let (Some(cause), Some(reaction), Some(pattern)) = (cause, reaction, pattern) {
+            let severe =
+                |known: &&ExceptionRow| known.cause == cause && known.default > ExceptionAction::ALARM.0;
+            if !reaction.stops() && self.exceptions.iter().any(|row| severe(&row)) {
+                let message =
+                    "the drive only warns: expected a cause whose exception has default = \"Alarm\"";
+                self.resolver.error(row.cause.span(), "cause", message);
+            }
             self.tables.faults.push(FaultRule { word: word.idn, pattern, cause, reaction });
         }
     }

@@ -26,6 +26,14 @@ const CASES: &[Case] = &[
     ("no TOML", |t| &mut t.cip_generic, "[scaling]", "[scaling"),
     ("unknown key", |t| &mut t.cip_generic, "wraps = true", "wrap = true"),
     ("wrong type", |t| &mut t.sercos, "length = 2,", "length = \"two\","),
+    ("warning that stops", |t| &mut t.generic_sercos, "cause = \"cooling_warning\"", "cause = \"cooling\""),
+    ("no such action", |t| &mut t.cip_generic, "least = \"Ignore\"", "least = \"Ignored\""),
+    (
+        "default below the least",
+        |t| &mut t.cip_generic,
+        "least = \"Ignore\"\ndefault = \"Alarm\"",
+        "default = \"Alarm\"",
+    ),
     ("unknown signal", |t| &mut t.cip_generic, "\"position_command\"", "\"position_comand\""),
     (
         "unknown IDN",

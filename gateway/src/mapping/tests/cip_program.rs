@@ -77,34 +77,63 @@ fn fills_the_image_of_the_device() {
     feedback.set(Signal::PositionActual, 3_000_000_000_000);
     feedback.set(Signal::VelocityActual, -500_000_000);
     let mut image = DriveImage { action_id: 7, ..DriveImage::default() };
-    let report = program.drive_image(&feedback, &mut image);
+    let report = program.drive_image(&feedback, &FaultSet::new(), &mut image);
     assert_eq!((image.position, image.action_id, report.missing), (3_000_000_000, 7, 1));
     assert_eq!((image.velocity.to_bits(), image.captured_at), ((-0.5_f32).to_bits(), 42));
     assert!(image.bus_up && image.start_complete && !image.stop_complete);
     // Bits 2, 3, 5, 17 and 22 (Table 5-2.60).
     assert_eq!(image.axis_status.bits(), 0x0042_002C);
     assert_eq!((image.start_inhibits, image.start_inhibits_mfg), (1 << 1, 1 << 5));
-    assert_eq!((image.fault, image.alarm), (None, None));
+    assert!(image.conditions.as_slice().is_empty());
 }
 
 #[test]
-fn reports_faults_and_alarms_by_type_and_code() {
+fn reports_conditions_by_type_and_code() {
     let program = shipped().cip_program(&rotary_counts()).unwrap();
-    let report = |cause, reaction| {
-        let fault = Fault::new(cause, SystemTime(0)).with_vendor_code(0x0203).with_reaction(reaction);
+    let report = |cause, reaction, origin| {
+        let fault = Fault::new(cause, SystemTime(17)).with_vendor_code(0x0203).with_reaction(reaction);
+        let mut faults = FaultSet::new();
+        faults.raise(fault, origin);
         let mut image = DriveImage::default();
-        program.drive_image(&AxisFeedback { fault: Some(fault), ..AxisFeedback::default() }, &mut image);
-        let fault = image.fault.map(|fault| (fault.fault_type.0, fault.code, fault.sub_code, fault.action));
-        (fault, image.alarm.map(|alarm| (alarm.alarm_type.0, alarm.code)))
+        program.drive_image(&AxisFeedback::default(), &faults, &mut image);
+        let conditions = image.conditions.as_slice().iter();
+        let as_numbers = |c: &DriveCondition| (c.fault_type.0, c.code, c.sub_code, c.action, c.least.0);
+        conditions.map(as_numbers).collect::<Vec<_>>()
     };
     // Excessive Position Error is bit 54; a current limited stop (3) and disable (2).
     let cause = FaultCause::EXCESSIVE_POSITION_ERROR;
-    assert_eq!(report(cause, Reaction::DecelerateAndDisable), (Some((3, 54, 3, 0x23)), None));
-    assert_eq!(report(cause, Reaction::Alarm), (None, Some((3, 54))));
-    assert_eq!(report(cause, Reaction::Ignore), (None, None));
-    assert_eq!(report(FaultCause::DRIVE_SPECIFIC, Reaction::CoastAndDisable), (Some((4, 1, 3, 0x24)), None));
-    assert_eq!(report(FaultCause::MEMORY, Reaction::Shutdown), (Some((1, 3, 3, 0x34)), None));
+    let decelerate = Reaction::DecelerateAndDisable;
+    assert_eq!(report(cause, decelerate, Origin::Watch), [(3, 54, 3, 0x23, 0)], "the box can do anything");
+    assert_eq!(report(cause, decelerate, Origin::Drive), [(3, 54, 3, 0x23, 3)], "the drive is off already");
+    let warning = FaultCause::MOTOR_OVERLOAD_USER_LIMIT;
+    assert_eq!(report(warning, Reaction::Alarm, Origin::Warning), [(3, 8, 3, 0x23, 0)]);
+    let specific = FaultCause::DRIVE_SPECIFIC;
+    assert_eq!(report(specific, Reaction::CoastAndDisable, Origin::Drive), [(4, 1, 3, 0x24, 3)]);
+    assert_eq!(report(FaultCause::MEMORY, Reaction::Shutdown, Origin::Event), [(1, 3, 3, 0x34, 3)]);
+    assert_eq!(
+        report(FaultCause::COMMAND_LOST, decelerate, Origin::Event),
+        [],
+        "told as a fault of the node"
+    );
     assert_eq!(program.fault(FaultCause::CONNECTION_CLOSED), Some(CipFault::Node(6)));
+}
+
+#[test]
+fn a_fault_action_finds_the_mildest_reaction_that_gives_up_as_much() {
+    let program = shipped().cip_program(&rotary_counts()).unwrap();
+    for (action, reaction) in [
+        (0x13, Reaction::HoldPosition),
+        (0x22, Reaction::DecelerateAndDisable),
+        (0x23, Reaction::DecelerateAndDisable),
+        (0x14, Reaction::CoastAndDisable),
+        (0x24, Reaction::CoastAndDisable),
+        (0x33, Reaction::Shutdown),
+        (0xFF, Reaction::Shutdown),
+    ] {
+        assert_eq!(program.reaction(action), reaction, "{action:#04x}");
+    }
+    assert_eq!(program.cause(3, 54), Some(FaultCause::EXCESSIVE_POSITION_ERROR));
+    assert_eq!(program.cause(3, 26), None);
 }
 
 #[test]

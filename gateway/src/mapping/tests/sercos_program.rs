@@ -142,19 +142,21 @@ fn diagnostic_words_tell_causes() {
     let mapping = shipped();
     let axis = rotary_axis(true);
     let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
-    let words: Vec<_> = program.diagnostic_words().collect();
-    assert_eq!(words, [Idn::standard(11), Idn::standard(12), Idn::standard(390)]);
-    let cause = |idn, word| program.fault(Idn::standard(idn), word);
-    assert_eq!(
-        cause(11, 1 << 11),
-        Some((FaultCause::EXCESSIVE_POSITION_ERROR, Reaction::DecelerateAndDisable))
-    );
-    assert_eq!(cause(11, 1 << 9 | 1 << 7), Some((FaultCause::OVER_CURRENT, Reaction::CoastAndDisable)));
-    assert_eq!(cause(11, 1 << 14), None, "reserved");
-    let warning = Some((FaultCause::MOTOR_OVER_TEMPERATURE_USER_LIMIT, Reaction::Alarm));
-    assert_eq!(cause(12, 1 << 2), warning);
-    assert_eq!(cause(390, 0xC30F_4001).map(|(cause, _)| cause), Some(FaultCause::COMMUNICATION_LOSS));
-    assert_eq!(cause(390, 0xC00A_0012), None, "class A: no error");
+    let words: Vec<_> = program.diagnostic_words(true).collect();
+    assert_eq!(words, [Idn::standard(11), Idn::standard(390)]);
+    assert_eq!(program.diagnostic_words(false).collect::<Vec<_>>(), [Idn::standard(12)]);
+    let causes = |idn, word| program.faults(Idn::standard(idn), word).collect::<Vec<_>>();
+    assert_eq!(causes(11, 1 << 11), [(FaultCause::EXCESSIVE_POSITION_ERROR, Reaction::DecelerateAndDisable)]);
+    let both = [
+        (FaultCause::OVER_CURRENT, Reaction::CoastAndDisable),
+        (FaultCause::UNDER_VOLTAGE, Reaction::CoastAndDisable),
+    ];
+    assert_eq!(causes(11, 1 << 9 | 1 << 7), both, "the row that explains the other stands first");
+    assert_eq!(causes(11, 1 << 14), [], "reserved");
+    assert_eq!(causes(12, 1 << 2), [(FaultCause::MOTOR_OVER_TEMPERATURE_USER_LIMIT, Reaction::Alarm)]);
+    let number = |word| causes(390, word).iter().map(|(cause, _)| *cause).collect::<Vec<_>>();
+    assert_eq!(number(0xC30F_4001), [FaultCause::COMMUNICATION_LOSS], "not drive specific as well");
+    assert_eq!(number(0xC00A_0012), [], "class A: no error");
 }
 
 #[test]

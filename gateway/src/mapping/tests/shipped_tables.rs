@@ -1,5 +1,8 @@
 //! The shipped tables are complete, and their examples come out.
 
+use profile_cip::target::attribute::DefaultValue;
+use profile_cip::target::exception::ExceptionAction;
+
 use super::*;
 
 #[test]
@@ -70,4 +73,45 @@ fn give_the_device_a_table_it_accepts() {
     assert_eq!(backing(1319), Some(DeviceBacking::Stored), "rated current: the drive lets it be read only");
     assert_eq!(backing(641), None, "Inverter Temperature: rejected where the drive lacks it");
     assert_eq!(backing(1310), None, "strings are left out");
+}
+
+/// What can be set for each exception, from the rows of both tables.
+#[test]
+fn say_what_the_controller_may_set_for_each_exception() {
+    let mapping = shipped();
+    let mut text = String::new();
+    for (manufacturer, set) in [(false, "Axis Fault"), (true, "Axis Fault - Mfg")] {
+        let rules = mapping.exception_rules(manufacturer);
+        assert_eq!(rules.len(), 64);
+        let program = mapping.cip_program(&rotary_counts()).unwrap();
+        for (bit, rule) in (0_u8..).zip(&rules) {
+            let DefaultValue::Integer(default) = rule.default else { panic!("an integer") };
+            let (least, most) = rule.range;
+            if most > 254.0 {
+                assert_eq!((least, default), (255.0, 255));
+                continue;
+            }
+            let fault_type = if manufacturer { 4 } else { 3 };
+            let cause = program.cause(fault_type, bit).expect("a row");
+            let default = ExceptionAction(u8::try_from(default).unwrap());
+            let least =
+                (0..4).find(|code| f64::from(*code) >= least).map(ExceptionAction).expect("an action");
+            writeln!(text, "{set} {bit}: {cause}, {default}, at least {least}").unwrap();
+        }
+    }
+    insta::assert_snapshot!(text);
+}
+
+/// A warning is no reason to stop unless the controller says so.
+#[test]
+fn let_a_drive_that_only_warns_go_on() {
+    let mapping = shipped();
+    for row in mapping.sercos.faults.iter().filter(|row| !row.reaction.stops()) {
+        let exception = mapping.cip.exceptions.iter().find(|known| known.cause == row.cause);
+        let exception = exception.unwrap_or_else(|| panic!("{}: no exception", row.cause));
+        assert_eq!((exception.least, exception.default), (0, 1), "{}", row.cause);
+        let trips =
+            mapping.sercos.faults.iter().any(|other| other.cause == row.cause && other.reaction.stops());
+        assert!(!trips, "{}: a cause of its own tells a warning from an error", row.cause);
+    }
 }

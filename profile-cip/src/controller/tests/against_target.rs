@@ -18,7 +18,9 @@ use crate::target::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
-use crate::target::drive_link::{AxisCommandImage, Command, DriveAction, DriveFault, DriveImage};
+use crate::target::drive_link::{
+    AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
+};
 use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use crate::target::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
@@ -42,7 +44,7 @@ struct Plant {
     sequence: u32,
     action: (u32, u64),
     reset_id: u32,
-    fault: Option<DriveFault>,
+    fault: Option<DriveCondition>,
     inhibits: u16,
     /// Largest change of position in one drive cycle, counts.
     step_max: f64,
@@ -108,7 +110,7 @@ impl Plant {
             stop_complete: stopped,
             power_enabled: enabled || !stopped,
             tracking: started,
-            fault: self.fault,
+            conditions: DriveConditions::of(self.fault.as_slice()),
             start_inhibits: self.inhibits,
             position: crate::controller::number::counts(self.position),
             captured_at: system,
@@ -509,6 +511,11 @@ fn forward_open_is_refused_for_key_power_structure_and_interval() {
     }
 }
 
+fn drive_fault(code: u8, sub_code: u8, action: u8) -> DriveCondition {
+    let (fault_type, least) = (FaultType::AXIS, ExceptionAction::MAJOR_FAULT);
+    DriveCondition { fault_type, code, sub_code, action, least, ..DriveCondition::default() }
+}
+
 #[test]
 fn a_drive_fault_amid_a_move_is_in_the_failure() {
     let mut pair = Pair::new(
@@ -518,8 +525,7 @@ fn a_drive_fault_amid_a_move_is_in_the_failure() {
     );
     pair.script = Box::new(|report, plants| {
         if report.axes[0].commanded.is_some_and(|p| p > 20.0) && report.failure.is_none() {
-            plants[0].fault =
-                Some(DriveFault { fault_type: FaultType::AXIS, code: 34, sub_code: 2, action: 0x22 });
+            plants[0].fault = Some(drive_fault(34, 2, 0x22));
         }
     });
     let report = pair.run(30);
@@ -551,8 +557,7 @@ fn fault_reset_brings_a_faulted_axis_back() {
     pair.script = Box::new(move |report, plants| {
         if report.steps_finished == 1 && !raised {
             raised = true;
-            plants[0].fault =
-                Some(DriveFault { fault_type: FaultType::AXIS, code: 11, sub_code: 0, action: 0x22 });
+            plants[0].fault = Some(drive_fault(11, 0, 0x22));
         }
     });
     let report = pair.run(30);

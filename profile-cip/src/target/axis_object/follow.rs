@@ -1,21 +1,22 @@
 //! The axis follows its drive, its connection and the requests in progress.
 
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
-use super::super::drive_link::{DriveAction, DriveFault};
+use super::super::drive_link::DriveAction;
+use super::super::exception::ExceptionActions;
 use super::{Axis, COAST_AND_DISABLE, Context, fault_code, sub_code};
-use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlStatus, FaultType};
+use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlStatus};
 use crate::wire::status::GeneralStatus;
 
 /// Most transitions in one step; more would be a circle.
 const TRANSITIONS_MAX: usize = 8;
 
 impl Axis {
-    /// Lets the state follow the drive, the connection and the requests in progress.
-    pub fn step(&mut self, context: &Context) {
-        self.log_alarm(context.system_time);
+    /// Lets the state follow the drive, the connection and the requests in progress. `actions` are what the controller
+    /// wants done about exceptions.
+    pub fn step(&mut self, context: &Context, actions: &ExceptionActions<'_>) {
         for _ in 0..TRANSITIONS_MAX {
             let before = self.state;
-            self.follow(context);
+            self.follow(context, actions);
             self.update_action();
             if self.state == before {
                 break;
@@ -24,9 +25,12 @@ impl Axis {
         self.complete_request();
     }
 
-    pub(super) fn follow(&mut self, context: &Context) {
-        if self.answers() && self.drive.stop_complete {
+    pub(super) fn follow(&mut self, context: &Context, actions: &ExceptionActions<'_>) {
+        if self.has_stopped() {
             self.winding_down = false;
+        }
+        if self.state == AxisState::Initializing {
+            self.look_at_conditions(actions, context.system_time);
         }
         if self.state == AxisState::Initializing {
             let configured = self.block.control_status.contains(ControlStatus::CONFIGURATION_COMPLETE);
@@ -36,49 +40,43 @@ impl Axis {
             }
             return;
         }
-        self.follow_faults(context);
-        self.follow_drive(context);
-    }
-
-    pub(super) fn follow_faults(&mut self, context: &Context) {
-        if let Some(request) = self.reset
-            && self.drive.online
-            && self.drive.reset_id == self.reset_id
-            && !self.winding_down
-        {
-            self.reset = None;
-            self.faults = 0;
-            self.seen_fault = None;
-            let (event, cleared) = if request == AxisControl::SHUTDOWN_RESET {
-                self.shutdown = false;
-                (AxisEvent::ShutdownReset, ClearingEvent::SHUTDOWN_RESET)
-            } else {
-                (AxisEvent::FaultReset, ClearingEvent::FAULT_RESET)
-            };
-            self.log_cleared(cleared, context.system_time);
-            self.fire(event);
-            if self.handshake.executing() == Some(request) {
-                self.handshake.complete(GeneralStatus::SUCCESS);
-            }
-        }
-        // An axis that already stops for a fault does not get another one for going silent.
+        self.follow_reset(context);
+        self.look_at_conditions(actions, context.system_time);
+        // One cause, one fault: an axis that already stops for a fault, perhaps for this one, does not get another for
+        // going silent.
         if self.state.is_energized() && !self.drive.online && self.state != AxisState::Aborting {
-            let fault = DriveFault {
-                fault_type: FaultType::AXIS,
-                code: fault_code::EXTERNAL,
-                sub_code: sub_code::DRIVE_LOST,
-                action: COAST_AND_DISABLE,
-            };
-            self.raise(fault, context.system_time);
-        }
-        if self.drive.fault != self.seen_fault {
-            self.seen_fault = self.drive.fault;
-            if let Some(fault) = self.drive.fault {
-                self.raise(fault, context.system_time);
-            }
+            let code = fault_code::EXTERNAL;
+            self.raise(code, sub_code::DRIVE_LOST, COAST_AND_DISABLE, context.system_time);
         }
         if context.node_fault {
             self.fire(AxisEvent::MajorFault);
+        }
+        self.follow_drive(context);
+    }
+
+    /// Ends a reset that the drive has carried out, or that its time limit has ended.
+    pub(super) fn follow_reset(&mut self, context: &Context) {
+        let Some(request) = self.reset else { return };
+        if self.drive.reset_id != self.reset_id || self.winding_down {
+            return;
+        }
+        self.reset = None;
+        let (event, cleared) = if request == AxisControl::SHUTDOWN_RESET {
+            self.shutdown = false;
+            (AxisEvent::ShutdownReset, ClearingEvent::SHUTDOWN_RESET)
+        } else {
+            (AxisEvent::FaultReset, ClearingEvent::FAULT_RESET)
+        };
+        self.faults.clear(cleared, context.system_time);
+        let status = if self.faults.any_unrecoverable() {
+            // Only a restart of the device clears an initialization fault (clause 5-2.6.3.6).
+            GeneralStatus::OBJECT_STATE_CONFLICT
+        } else {
+            self.fire(event);
+            GeneralStatus::SUCCESS
+        };
+        if self.handshake.executing() == Some(request) {
+            self.handshake.complete(status);
         }
     }
 
@@ -106,7 +104,7 @@ impl Axis {
             AxisState::Running if self.config.kind == ControlKind::Converter && !self.drive.bus_up => {
                 self.fire(AxisEvent::BusDown)
             }
-            AxisState::Stopping | AxisState::Aborting if self.answers() && self.drive.stop_complete => {
+            AxisState::Stopping | AxisState::Aborting if self.has_stopped() => {
                 self.fire(AxisEvent::StopComplete)
             }
             _ => false,

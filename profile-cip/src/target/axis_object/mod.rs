@@ -8,16 +8,21 @@ mod fault;
 mod follow;
 mod request;
 
+pub use fault::FaultWords;
+pub(super) use fault::Faults;
+
 use super::axis_control::AxisControlHandshake;
 use super::axis_state::{AxisConditions, AxisEvent, AxisState, ControlKind};
-use super::drive_link::{DriveAction, DriveAlarm, DriveFault, DriveImage, SetPoints};
+use super::drive_link::{DriveAction, DriveImage, SetPoints};
 use super::event_channel::EventChannel;
-use super::status_report::{RecordLog, Reported};
+use super::exception::DriveCondition;
+use super::fault_log::FaultLog;
+use super::status_report::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
     AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventChecking,
 };
-use crate::wire::motion::{AlarmRecord, CommandBlock, CommandValues, FaultRecord};
+use crate::wire::motion::{CommandBlock, CommandValues};
 use profile_generic::time::MonotonicTime;
 
 /// Bit numbers of the axis faults that this module raises itself, Table 5-2.65.
@@ -97,9 +102,8 @@ pub(super) struct Axis {
     pub(super) config: AxisConfig,
     pub(super) state: AxisState,
     pub(super) shutdown: bool,
-    faults: u64,
+    pub(super) faults: Faults,
     pub(super) drive: DriveImage,
-    seen_fault: Option<DriveFault>,
     pub(super) handshake: AxisControlHandshake,
     pub(super) block: CommandBlock,
     pub(super) held: Option<Held>,
@@ -114,9 +118,6 @@ pub(super) struct Axis {
     pub(super) actual_reference: i64,
     pub(super) command_reference: i64,
     pub(super) displacement: i32,
-    alarm: Option<DriveAlarm>,
-    pub(super) fault_log: RecordLog<FaultRecord>,
-    pub(super) alarm_log: RecordLog<AlarmRecord>,
     pub(super) axis_status: Reported<(AxisStatus, u32)>,
     pub(super) io_status: Reported<(AxisIoStatus, u32)>,
     pub(super) safety: Reported<SafetyStatus>,
@@ -141,9 +142,8 @@ impl Axis {
             config,
             state: AxisState::Initializing,
             shutdown: false,
-            faults: 0,
+            faults: Faults::new(),
             drive: DriveImage::default(),
-            seen_fault: None,
             handshake: AxisControlHandshake::default(),
             block: CommandBlock::default(),
             held: None,
@@ -156,9 +156,6 @@ impl Axis {
             actual_reference: 0,
             command_reference: 0,
             displacement: 0,
-            alarm: None,
-            fault_log: RecordLog::new(),
-            alarm_log: RecordLog::new(),
             axis_status: Reported::new(),
             io_status: Reported::new(),
             safety: Reported::new(),
@@ -170,9 +167,14 @@ impl Axis {
         self.state
     }
 
-    /// Axis Faults, attribute 657.
-    pub fn faults(&self) -> u64 {
-        self.faults
+    /// Exceptions, faults and alarms.
+    pub fn fault_words(&self) -> &FaultWords {
+        self.faults.words()
+    }
+
+    /// The log for people.
+    pub fn log(&self) -> &FaultLog {
+        &self.faults.log
     }
 
     pub fn drive(&self) -> &DriveImage {
@@ -190,7 +192,7 @@ impl Axis {
 
     /// Records lost because a log was full.
     pub fn dropped_records(&self) -> u32 {
-        self.fault_log.dropped().saturating_add(self.alarm_log.dropped())
+        self.faults.fault_records.dropped().saturating_add(self.faults.alarm_records.dropped())
     }
 
     /// Whether attributes are limited to those of Table 5-2.110.
@@ -203,7 +205,7 @@ impl Axis {
         match self.state {
             AxisState::Initializing => false,
             AxisState::MajorFaulted | AxisState::Aborting => true,
-            _ => self.faults != 0 || self.drive.fault.is_some(),
+            _ => self.faults.any() || self.drive.conditions.as_slice().iter().any(DriveCondition::stops),
         }
     }
 
@@ -237,19 +239,25 @@ impl Axis {
         self.drive.online && self.drive.action_id == self.action_id
     }
 
+    /// Whether the stop that is in force has ended. Also of a drive that is gone: nobody sees it come to rest, but the
+    /// time limit of its stop runs out, and that ends Aborting as well (clause 5-2.6.2.11).
+    pub(super) fn has_stopped(&self) -> bool {
+        self.drive.action_id == self.action_id && self.drive.stop_complete
+    }
+
     // -- connection ---------------------------------------------------------------------------------------------
 
     /// A connection was opened: defaults, no faults, no shutdown (clause 5-2.6.2.3).
     pub fn open(&mut self, system_time: u64) {
         self.fire(AxisEvent::Reconnection);
-        self.forget();
-        self.log_cleared(ClearingEvent::CONNECTION_RESET, system_time);
+        self.forget(system_time);
+        self.faults.record_cleared(ClearingEvent::CONNECTION_RESET, system_time);
     }
 
     /// The controller closed the connection.
-    pub fn close(&mut self) {
+    pub fn close(&mut self, system_time: u64) {
         self.fire(AxisEvent::ConnectionClose);
-        self.forget();
+        self.forget(system_time);
         self.update_action();
     }
 
@@ -263,10 +271,9 @@ impl Axis {
         self.update_action();
     }
 
-    fn forget(&mut self) {
+    fn forget(&mut self, system_time: u64) {
         self.shutdown = false;
-        self.faults = 0;
-        self.seen_fault = None;
+        self.faults.forget(system_time);
         self.reset = None;
         self.handshake.reset();
         self.block = CommandBlock::default();
@@ -274,9 +281,6 @@ impl Axis {
         self.actual_reference = 0;
         self.command_reference = 0;
         self.displacement = 0;
-        self.fault_log = RecordLog::new();
-        self.alarm_log = RecordLog::new();
-        self.alarm = None;
         self.axis_status = Reported::new();
         self.io_status = Reported::new();
         self.safety = Reported::new();

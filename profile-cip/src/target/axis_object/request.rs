@@ -1,10 +1,10 @@
 //! What the controller asks of an axis: its cyclic block and the requests of Axis Control (clause 5-2.6.4).
 
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
-use super::super::drive_link::{DriveFault, SetPoints};
+use super::super::drive_link::SetPoints;
 use super::{Axis, Context, Held, RAMP_AND_DISABLE, UpdateTimes, fault_code, has_set_point, sub_code};
 use crate::wire::motion::CommandBlock;
-use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode, FaultType};
+use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode};
 use crate::wire::status::GeneralStatus;
 use profile_generic::time::MonotonicTime;
 
@@ -54,21 +54,15 @@ impl Axis {
 
     /// Takes the controller's Last Received ID.
     pub fn acknowledge(&mut self, received: u8) {
-        self.fault_log.acknowledge(received);
-        self.alarm_log.acknowledge(received);
+        self.faults.fault_records.acknowledge(received);
+        self.faults.alarm_records.acknowledge(received);
         self.axis_status.acknowledge(received);
         self.io_status.acknowledge(received);
         self.safety.acknowledge(received);
     }
 
     pub(super) fn raise_illegal_mode(&mut self, sub_code: u8, context: &Context) {
-        let fault = DriveFault {
-            fault_type: FaultType::AXIS,
-            code: fault_code::ILLEGAL_CONTROL_MODE,
-            sub_code,
-            action: RAMP_AND_DISABLE,
-        };
-        self.raise(fault, context.system_time);
+        self.raise(fault_code::ILLEGAL_CONTROL_MODE, sub_code, RAMP_AND_DISABLE, context.system_time);
     }
 
     pub(super) fn begin(&mut self, request: AxisControl, block: &CommandBlock, context: &Context) {
@@ -89,14 +83,14 @@ impl Axis {
             AxisControl::SHUTDOWN_RESET if self.state == AxisState::Shutdown => {
                 self.shutdown = false;
                 self.fire(AxisEvent::ShutdownReset);
-                self.log_cleared(ClearingEvent::SHUTDOWN_RESET, context.system_time);
+                self.faults.record_cleared(ClearingEvent::SHUTDOWN_RESET, context.system_time);
                 Some(GeneralStatus::SUCCESS)
             }
             AxisControl::SHUTDOWN_RESET if self.state != AxisState::MajorFaulted => {
                 Some(GeneralStatus::SUCCESS)
             }
             AxisControl::FAULT_RESET if !self.has_fault() => {
-                self.log_cleared(ClearingEvent::FAULT_RESET, context.system_time);
+                self.faults.record_cleared(ClearingEvent::FAULT_RESET, context.system_time);
                 Some(GeneralStatus::SUCCESS)
             }
             AxisControl::SHUTDOWN_RESET | AxisControl::FAULT_RESET => {
@@ -108,13 +102,7 @@ impl Axis {
                 Some(GeneralStatus::OBJECT_STATE_CONFLICT)
             }
             AxisControl::ABORT => {
-                let fault = DriveFault {
-                    fault_type: FaultType::AXIS,
-                    code: fault_code::CONTROLLER_INITIATED,
-                    sub_code: 0,
-                    action: RAMP_AND_DISABLE,
-                };
-                self.raise(fault, context.system_time);
+                self.raise(fault_code::CONTROLLER_INITIATED, 0, RAMP_AND_DISABLE, context.system_time);
                 None
             }
             AxisControl::STOP_PROCESS => Some(GeneralStatus::SUCCESS),

@@ -1,7 +1,7 @@
 //! Axis Control requests on a living device: completion criteria and errors of Tables 5-2.103 and 5-2.104.
 
 use super::super::axis_state::AxisState;
-use super::super::drive_link::{DriveAction, Withheld};
+use super::super::drive_link::{DriveAction, DriveConditions, Withheld};
 use super::*;
 use crate::wire::motion::codes::{AxisStatus, ClearingEvent, FaultType};
 
@@ -91,7 +91,7 @@ fn a_fault_goes_through_aborting_and_only_a_reset_clears_it() {
     rig.cycles(4);
     assert_eq!((rig.state(0), rig.state(1)), (AxisState::MajorFaulted, AxisState::Running));
     assert_eq!(rig.device.axis_faults(0), Some(1 << 54));
-    rig.drives[0].image.fault = None;
+    rig.drives[0].image.conditions = DriveConditions::default();
     rig.cycles(3);
     assert_eq!(rig.state(0), AxisState::MajorFaulted, "latched");
     assert_eq!(ask(&mut rig, AxisControl::ENABLE, 3), (AxisControl::ENABLE, 0x0C));
@@ -148,7 +148,7 @@ fn shutdown_under_a_fault_is_a_sub_state() {
         let mut rig = Rig::running();
         rig.raise(0, 54, 0x32);
         rig.cycles(4);
-        rig.drives[0].image.fault = None;
+        rig.drives[0].image.conditions = DriveConditions::default();
         assert_eq!(rig.state(0), AxisState::MajorFaulted);
         assert_eq!(ask(&mut rig, reset, 3), (reset, 0));
         assert_eq!(rig.state(0), end);

@@ -1,5 +1,6 @@
 //! Tests of the motion device in virtual time, with a controller and drives that are as simple as can be.
 
+mod faults;
 mod handshake;
 mod refusals;
 mod requests;
@@ -16,7 +17,8 @@ use super::AxisConfig;
 use super::attribute::{Access, AttributeDefinition, Backing, DataType, Scope};
 use super::axis_state::{AxisState, ControlKind};
 use super::drive_link::{
-    AxisCommandImage, Command, DriveAction, DriveFault, DriveImage, SetPoints, Withheld,
+    AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
+    SetPoints, Withheld,
 };
 use super::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use super::motion_link::{
@@ -59,7 +61,7 @@ impl FakeDrive {
         if command.reset_id != self.image.reset_id {
             self.image.reset_id = command.reset_id;
             if !self.sticky {
-                self.image.fault = None;
+                self.image.conditions = DriveConditions::default();
             }
         }
         if command.action_id != self.image.action_id {
@@ -105,6 +107,7 @@ pub(super) fn definitions() -> Vec<AttributeDefinition> {
     vec![
         AttributeDefinition { settable_in_running: true, ..new(461, DataType::Real) },
         AttributeDefinition { elements: Some(64), ..new(672, DataType::Usint) },
+        AttributeDefinition { elements: Some(64), ..new(673, DataType::Usint) },
         AttributeDefinition { backing: Backing::Drive, ..new(1316, DataType::Udint) },
         AttributeDefinition { range: Some((0.0, 4.0)), ..new(610, DataType::Usint) },
     ]
@@ -112,6 +115,11 @@ pub(super) fn definitions() -> Vec<AttributeDefinition> {
 
 impl Rig {
     pub fn new() -> Self {
+        Self::with(definitions())
+    }
+
+    /// A device with these attributes.
+    pub fn with(attributes: Vec<AttributeDefinition>) -> Self {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
@@ -120,7 +128,7 @@ impl Rig {
         };
         let config = DeviceConfig {
             axes: vec![axis, axis],
-            attributes: definitions(),
+            attributes,
             power_structure_class_id: 0x1234,
             supports_sync: true,
             transmission_processing_ns: 100_000,
@@ -360,8 +368,15 @@ impl Rig {
         rig
     }
 
+    /// The drive has a fault of its own, and has acted on it.
     pub fn raise(&mut self, axis: usize, code: u8, action: u8) {
-        let fault_type = crate::wire::motion::codes::FaultType::AXIS;
-        self.drives[axis].image.fault = Some(DriveFault { fault_type, code, sub_code: 0, action });
+        let condition = DriveCondition {
+            fault_type: crate::wire::motion::codes::FaultType::AXIS,
+            code,
+            action,
+            least: ExceptionAction::MAJOR_FAULT,
+            ..DriveCondition::default()
+        };
+        self.drives[axis].image.conditions = DriveConditions::of(&[condition]);
     }
 }

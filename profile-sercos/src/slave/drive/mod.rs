@@ -54,6 +54,8 @@ pub struct Drive {
     main_power: bool,
     /// Warnings raised from outside, bits of S-0-0012.
     warnings: u16,
+    /// Errors shown besides the one that has stopped the drive, bits of S-0-0011.
+    further_errors: u16,
     control: DriveControl,
     actual: ServoActual,
     /// Operation mode code in effect, and the number that selects it.
@@ -83,6 +85,7 @@ impl Drive {
             scales,
             main_power: true,
             warnings: 0,
+            further_errors: 0,
             control: DriveControl::empty(),
             actual: ServoActual::default(),
             mode: MODES[2],
@@ -129,6 +132,11 @@ impl Drive {
     /// Sets the warnings that come from outside, bits of S-0-0012.
     pub fn set_warnings(&mut self, bits: u16) {
         self.warnings = bits;
+    }
+
+    /// Sets errors that are shown together with the one that has stopped the drive, bits of S-0-0011.
+    pub fn set_further_errors(&mut self, bits: u16) {
+        self.further_errors = bits;
     }
 
     /// Says whether the position refers to the machine's zero point (S-0-0403).
@@ -479,7 +487,7 @@ impl Application for Drive {
         };
         let bit = fault::class_1_bit(cause);
         Diagnosis {
-            errors: 1 << bit,
+            errors: 1 << bit | self.further_errors,
             warnings,
             number: fault::number(0xF, u32::from(bit)),
             text: fault::CLASS_1_TEXTS[usize::from(bit & 15)],
