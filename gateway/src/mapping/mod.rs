@@ -54,7 +54,7 @@ pub use sercos_tables::{FaultRule, SercosTables};
 
 use load::Tables;
 use profile_cip::target::attribute::{DefaultValue, ElementRule};
-use profile_cip::target::exception::ExceptionAction;
+use profile_cip::target::exception;
 
 /// Bits of Axis Exceptions.
 const EXCEPTION_BITS: u8 = 64;
@@ -117,11 +117,12 @@ impl Mapping {
             })
         };
         let rule = |bit| {
-            let unsupported = ExceptionAction::UNSUPPORTED.0;
+            let unsupported = exception::ExceptionAction::UNSUPPORTED.0;
             // Where several causes share a bit, the strictest counts.
             let default = rows(bit).map(|row| row.default).max().unwrap_or(unsupported);
             let least = rows(bit).map(|row| row.least).max().unwrap_or(unsupported);
-            let most = if least == unsupported { unsupported } else { ExceptionAction::MAJOR_FAULT.0 };
+            let most =
+                if least == unsupported { unsupported } else { exception::ExceptionAction::MAJOR_FAULT.0 };
             let range = (f64::from(least), f64::from(most));
             ElementRule { default: DefaultValue::Integer(i64::from(default)), range }
         };

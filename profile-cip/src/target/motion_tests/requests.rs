@@ -39,7 +39,7 @@ fn rig_in(state: AxisState) -> Rig {
         _ => {}
     }
     rig.cycles(4);
-    rig.drives[0].image.fault = None;
+    rig.drives[0].image.conditions = DriveConditions::default();
     rig.blocks[0].axis_control = AxisControl::NONE;
     rig.cycles(2);
     assert_eq!(rig.state(0), state);
