@@ -552,7 +552,7 @@ fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeD
             access: access(row.access),
             settable_in_running: row.running,
             backing: Backing::Stored,
-            default: DefaultValue::Integer(row.default),
+            default: DefaultValue::Integer(row.default.unwrap_or(0)),
             range: None,
             element_rules: Vec::new(),
             name: row.name.clone(),

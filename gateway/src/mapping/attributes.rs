@@ -131,7 +131,7 @@ fn entry(row: &ServedAttribute, scaling: &CipScaling) -> Option<AttributeEntry> 
         length: attribute.length,
         access: attribute.access,
         running: attribute.running,
-        default: attribute.default,
+        default: attribute.default.unwrap_or(0),
         backing,
     })
 }

@@ -1,11 +1,13 @@
 //! The dictionaries: what each profile has, looked up by name or number.
 
 mod cip;
+mod cip_attributes;
 mod cip_codes;
 mod cip_faults;
 mod sercos;
 
-pub use cip::{Access, CipAttribute, CipDictionary, CipType, DataElement};
+pub use cip::{CipDictionary, DataElement};
+pub use cip_attributes::{Access, CipAttribute, CipType, DEVICE_FUNCTIONS, PolarityEffect};
 pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use sercos::{IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word};
 

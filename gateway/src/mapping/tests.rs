@@ -2,6 +2,7 @@
 
 mod broken_tables;
 mod cip_codes;
+mod cip_dictionary;
 mod cip_program;
 mod sercos_program;
 mod shipped_tables;

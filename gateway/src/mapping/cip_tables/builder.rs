@@ -481,7 +481,7 @@ impl Builder<'_> {
             (Some(name), None, None) => self.parameter(row, attribute, name),
             (None, Some(name), None) => self.signal_attribute(attribute, name),
             (None, None, Some(name)) => {
-                let value = row.value.unwrap_or(attribute.default);
+                let value = row.value.or(attribute.default).unwrap_or(0);
                 let words = [
                     ("device", Served::Device),
                     ("connection", Served::Connection),

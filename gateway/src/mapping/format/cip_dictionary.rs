@@ -13,12 +13,38 @@ pub struct CipAttributeFile {
     pub format: Spanned<u32>,
     /// `cip-motion`.
     pub profile: Name,
+    /// How the attributes of the feedback channels repeat.
+    pub feedback_channels: ChannelsRow,
+    /// Where the sources stand in the standard.
+    pub clauses: Vec<ClauseRow>,
     /// Attributes of instance 0.
     pub class_attribute: Vec<AttributeRow>,
     /// Attributes of the axis instances.
     pub attribute: Vec<AttributeRow>,
     /// Data sets of the cyclic data block.
     pub data_set: Vec<DataSetRow>,
+}
+
+/// How the attributes of the feedback channels repeat.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelsRow {
+    /// How many channels there are.
+    pub count: u16,
+    /// From the number of an attribute of one channel to that of the next.
+    pub step: u16,
+}
+
+/// Where a source stands in the standard.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClauseRow {
+    /// The source as rows name it.
+    pub source: String,
+    /// The clause.
+    pub clause: String,
+    /// What it lists.
+    pub title: String,
 }
 
 /// One attribute of the Motion Device Axis Object.
@@ -29,6 +55,9 @@ pub struct AttributeRow {
     pub id: Spanned<u16>,
     /// Name in the standard.
     pub name: Name,
+    /// Whether each feedback channel has it ("Feedback n ...").
+    #[serde(default)]
+    pub per_channel: bool,
     /// CIP data type.
     #[serde(rename = "type")]
     pub data_type: Name,
@@ -45,12 +74,18 @@ pub struct AttributeRow {
     pub condition: Option<String>,
     /// Unit as the standard names it.
     pub unit: Option<Name>,
-    /// Value at power-up where it is not 0.
+    /// Value at power-up where the standard states one.
     pub default: Option<i64>,
-    /// How many channels repeat the attribute ("Feedback n ...").
-    pub channels: Option<u16>,
-    /// From the number of one channel to that of the next.
-    pub channel_step: Option<u16>,
+    /// Least value.
+    pub min: Option<Spanned<i64>>,
+    /// Greatest value.
+    pub max: Option<Spanned<i64>>,
+    /// What the standard says about the range in words.
+    pub range: Option<String>,
+    /// `sign`: Motion Polarity turns the sign.
+    pub polarity: Option<Name>,
+    /// The attribute with which Motion Polarity exchanges the value.
+    pub swaps_with: Option<Name>,
     /// Anything worth knowing.
     pub note: Option<String>,
     /// Table of the standard.
