@@ -4,6 +4,7 @@
 
 mod decode;
 mod demo;
+mod dictionary;
 mod progress;
 mod report;
 mod run;
@@ -31,6 +32,8 @@ enum Command {
     Run(RunArguments),
     /// Print the frames of a capture file as an indented tree.
     Decode(DecodeArguments),
+    /// Print what a profile has: attributes, parameters, codes, services.
+    Dictionary(DictionaryArguments),
     /// Run the other side of a protocol as a process of its own.
     #[command(subcommand)]
     Simulate(Simulate),
@@ -87,6 +90,68 @@ enum Side {
     Sercos,
     /// EtherNet/IP, CIP and CIP Motion.
     Cip,
+}
+
+/// Arguments of `dictionary`.
+#[derive(Debug, Args)]
+struct DictionaryArguments {
+    /// Whose dictionary.
+    #[arg(value_enum)]
+    profile: DictionaryProfile,
+    /// How to print it.
+    #[arg(long, value_enum, default_value_t = DictionaryFormat::Csv)]
+    format: DictionaryFormat,
+    /// What of it; `instance` when it is not given. sercos has instance and enums, generic has instance.
+    #[arg(long, value_enum)]
+    part: Option<DictionaryPart>,
+    /// A folder of mapping tables; a file that is not there is taken from the binary.
+    #[arg(long, value_name = "DIR")]
+    mappings: Option<PathBuf>,
+}
+
+/// Whose dictionary `dictionary` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum DictionaryProfile {
+    /// CIP Motion: the Motion Device Axis Object.
+    Cip,
+    /// SERCOS: the parameters of a drive.
+    Sercos,
+    /// The generic drive model between them.
+    Generic,
+}
+
+/// How `dictionary` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum DictionaryFormat {
+    /// Comma separated values, with the names of the columns first.
+    Csv,
+    /// An array of objects with the names of the columns as keys.
+    Json,
+}
+
+/// What `dictionary` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum DictionaryPart {
+    /// What an axis or a drive has: attributes, IDNs, parameters and signals.
+    Instance,
+    /// Attributes of instance 0.
+    Class,
+    /// Codes and bits.
+    Enums,
+    /// Services.
+    Services,
+}
+
+impl DictionaryPart {
+    /// As the command line has it.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Instance => "instance",
+            Self::Class => "class",
+            Self::Enums => "enums",
+            Self::Services => "services",
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -163,6 +228,7 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
+        Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),
     };

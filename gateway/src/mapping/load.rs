@@ -9,8 +9,8 @@ use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use serde::de::DeserializeOwned;
 
 use super::format::{
-    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, GenericFile, GenericSercosFile,
-    SercosFile,
+    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipServiceFile, GenericFile,
+    GenericSercosFile, SercosFile,
 };
 
 /// The file format this build understands.
@@ -20,11 +20,12 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 8] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
     ("dictionary/cip-faults.toml", include_str!("../../../mappings/dictionary/cip-faults.toml")),
+    ("dictionary/cip-services.toml", include_str!("../../../mappings/dictionary/cip-services.toml")),
     ("dictionary/sercos.toml", include_str!("../../../mappings/dictionary/sercos.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
@@ -50,6 +51,8 @@ pub struct TableTexts {
     pub cip_enumerations: TableText,
     /// CIP Motion dictionary: faults, alarms and inhibits.
     pub cip_faults: TableText,
+    /// CIP Motion dictionary: services.
+    pub cip_services: TableText,
     /// SERCOS dictionary.
     pub sercos: TableText,
     /// CIP Motion to generic.
@@ -78,6 +81,8 @@ pub struct Tables {
     pub cip_enumerations: Parsed<CipEnumerationFile>,
     /// CIP Motion dictionary: faults, alarms and inhibits.
     pub cip_faults: Parsed<CipFaultFile>,
+    /// CIP Motion dictionary: services.
+    pub cip_services: Parsed<CipServiceFile>,
     /// SERCOS dictionary.
     pub sercos: Parsed<SercosFile>,
     /// CIP Motion to generic.
@@ -217,9 +222,26 @@ impl TableTexts {
 
     /// The texts in the order of [`FILES`].
     fn from_array(texts: [TableText; FILES.len()]) -> Self {
-        let [generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos] =
-            texts;
-        Self { generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos }
+        let [
+            generic,
+            cip_attributes,
+            cip_enumerations,
+            cip_faults,
+            cip_services,
+            sercos,
+            cip_generic,
+            generic_sercos,
+        ] = texts;
+        Self {
+            generic,
+            cip_attributes,
+            cip_enumerations,
+            cip_faults,
+            cip_services,
+            sercos,
+            cip_generic,
+            generic_sercos,
+        }
     }
 
     fn as_array_mut(&mut self) -> [&mut TableText; FILES.len()] {
@@ -228,11 +250,21 @@ impl TableTexts {
             cip_attributes,
             cip_enumerations,
             cip_faults,
+            cip_services,
             sercos,
             cip_generic,
             generic_sercos,
         } = self;
-        [generic, cip_attributes, cip_enumerations, cip_faults, sercos, cip_generic, generic_sercos]
+        [
+            generic,
+            cip_attributes,
+            cip_enumerations,
+            cip_faults,
+            cip_services,
+            sercos,
+            cip_generic,
+            generic_sercos,
+        ]
     }
 
     /// Parses all files.
@@ -245,6 +277,7 @@ impl TableTexts {
         let cip_attributes = self.cip_attributes.parse(&mut errors);
         let cip_enumerations = self.cip_enumerations.parse(&mut errors);
         let cip_faults = self.cip_faults.parse(&mut errors);
+        let cip_services = self.cip_services.parse(&mut errors);
         let sercos = self.sercos.parse(&mut errors);
         let cip_generic = self.cip_generic.parse(&mut errors);
         let generic_sercos = self.generic_sercos.parse(&mut errors);
@@ -254,6 +287,7 @@ impl TableTexts {
                 cip_attributes: cip_attributes?,
                 cip_enumerations: cip_enumerations?,
                 cip_faults: cip_faults?,
+                cip_services: cip_services?,
                 sercos: sercos?,
                 cip_generic: cip_generic?,
                 generic_sercos: generic_sercos?,

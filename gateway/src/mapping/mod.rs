@@ -43,9 +43,9 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipType, Clearing, Code, CodeRange, DEVICE_FUNCTIONS, DataElement,
-    Dictionaries, Enumeration, ExceptionAction, FaultRecord, GenericDictionary, IdnFormat, IdnUnit,
-    PolarityEffect, RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word,
+    Access, CipAttribute, CipDictionary, CipService, CipType, Clearing, Code, CodeRange, DEVICE_FUNCTIONS,
+    DataElement, Dictionaries, Enumeration, ExceptionAction, FaultRecord, GenericDictionary, IdnFormat,
+    IdnUnit, PolarityEffect, RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word,
 };
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};

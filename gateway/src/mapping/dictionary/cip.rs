@@ -3,6 +3,7 @@
 use super::cip_attributes::{CipAttribute, resolve_class_attributes, resolve_instance_attributes};
 use super::cip_codes::{resolve_data_set_bits, resolve_sets};
 use super::cip_faults::resolve_faults;
+use super::cip_services::{CipService, resolve_services};
 use super::{Enumeration, ExceptionAction, FaultRecord, StatusCode, named_code};
 use crate::mapping::format::{CipAttributeFile, CipEnumerationFile, Name};
 use crate::mapping::load::{Parsed, TableErrors, Tables};
@@ -29,6 +30,7 @@ pub struct CipDictionary {
     pub(super) fault_records: Vec<FaultRecord>,
     pub(super) exception_actions: Vec<ExceptionAction>,
     pub(super) status_codes: Vec<StatusCode>,
+    services: Vec<CipService>,
     data_sets: Vec<(String, Vec<DataElement>)>,
 }
 
@@ -37,6 +39,7 @@ impl CipDictionary {
         let mut dictionary = Self::resolve_attribute_file(&tables.cip_attributes, errors);
         dictionary.resolve_enumeration_file(&tables.cip_enumerations, errors);
         resolve_faults(&tables.cip_faults, &mut dictionary, errors);
+        dictionary.services = resolve_services(&tables.cip_services, errors);
         dictionary
     }
 
@@ -134,6 +137,11 @@ impl CipDictionary {
     /// The general status codes the standard says something of.
     pub fn status_codes(&self) -> &[StatusCode] {
         &self.status_codes
+    }
+
+    /// The services, by code.
+    pub fn services(&self) -> &[CipService] {
+        &self.services
     }
 
     /// The elements of the data set with this name.

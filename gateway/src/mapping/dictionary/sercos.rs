@@ -24,6 +24,23 @@ pub enum IdnFormat {
     Idn,
 }
 
+impl IdnFormat {
+    /// Every format with its word in the files.
+    pub const NAMED: &'static [(&'static str, Self)] = &[
+        ("binary", Self::Binary),
+        ("unsigned", Self::Unsigned),
+        ("signed", Self::Signed),
+        ("hexadecimal", Self::Hexadecimal),
+        ("text", Self::Text),
+        ("idn", Self::Idn),
+    ];
+
+    /// The word in the files.
+    pub fn name(self) -> &'static str {
+        Self::NAMED.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
+    }
+}
+
 /// What one unit in the last place of an IDN is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum IdnUnit {
@@ -59,6 +76,12 @@ pub struct SercosIdn {
     pub unit: IdnUnit,
     /// Communication phases in which it can be written; `None` when not known.
     pub write: Option<Vec<u8>>,
+    /// Keys of the documents it was read in.
+    pub source: String,
+    /// How far to trust it: `high`, `medium`, `low` or `none`.
+    pub confidence: String,
+    /// Anything worth knowing; mostly empty.
+    pub note: String,
 }
 
 /// A word with named fields.
@@ -70,6 +93,8 @@ pub struct Word {
     pub idn: Idn,
     /// Fields: name, first bit, last bit.
     pub fields: Vec<(String, u32, u32)>,
+    /// Where it comes from.
+    pub source: String,
 }
 
 impl Word {
@@ -129,7 +154,8 @@ impl SercosDictionary {
                 }
                 fields.push((field.name.get_ref().clone(), low, high));
             }
-            dictionary.words.push(Word { name: row.name.get_ref().clone(), idn, fields });
+            let (name, source) = (row.name.get_ref().clone(), row.source.get_ref().clone());
+            dictionary.words.push(Word { name, idn, fields, source });
         }
         dictionary
     }
@@ -158,6 +184,11 @@ impl SercosDictionary {
     /// All words.
     pub fn words(&self) -> &[Word] {
         &self.words
+    }
+
+    /// All sets of named codes.
+    pub fn enumerations(&self) -> &[Enumeration] {
+        &self.enumerations
     }
 
     /// The set of named codes with this name.
@@ -203,18 +234,10 @@ fn parse_idn(key: &str, name: &Name, resolver: &mut Resolver<'_>) -> Option<Idn>
 }
 
 fn resolve_idn(row: &IdnRow, resolver: &mut Resolver<'_>) -> Option<SercosIdn> {
-    const FORMATS: [(&str, IdnFormat); 6] = [
-        ("binary", IdnFormat::Binary),
-        ("unsigned", IdnFormat::Unsigned),
-        ("signed", IdnFormat::Signed),
-        ("hexadecimal", IdnFormat::Hexadecimal),
-        ("text", IdnFormat::Text),
-        ("idn", IdnFormat::Idn),
-    ];
     const CONFIDENCES: [(&str, ()); 4] = [("high", ()), ("medium", ()), ("low", ()), ("none", ())];
     let idn = parse_idn("idn", &row.idn, resolver)?;
     let format = match &row.format {
-        Some(name) => Some(resolver.word("format", name, &FORMATS)?),
+        Some(name) => Some(resolver.word("format", name, IdnFormat::NAMED)?),
         None => None,
     };
     resolver.word("confidence", &row.confidence, &CONFIDENCES)?;
@@ -242,5 +265,8 @@ fn resolve_idn(row: &IdnRow, resolver: &mut Resolver<'_>) -> Option<SercosIdn> {
         command: row.command,
         unit,
         write: row.write.clone(),
+        source: row.source.get_ref().clone(),
+        confidence: row.confidence.get_ref().clone(),
+        note: row.note.clone().unwrap_or_default(),
     })
 }

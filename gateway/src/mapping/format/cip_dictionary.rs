@@ -250,3 +250,45 @@ pub struct CipBitRow {
     /// Anything worth knowing.
     pub note: Option<String>,
 }
+
+/// `mappings/dictionary/cip-services.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipServiceFile {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `cip-motion`.
+    pub profile: Name,
+    /// The services.
+    pub service: Vec<ServiceRow>,
+}
+
+/// One service.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ServiceRow {
+    /// Service code.
+    pub code: Spanned<u8>,
+    /// Name in the standard.
+    pub name: Name,
+    /// `R`, `O`, `C` or `-` for instance 0.
+    pub class: Name,
+    /// `R`, `O`, `C` or `-` for an axis, per device function B E F P V T.
+    pub instance: Name,
+    /// `explicit`, `service_data_block`: what may carry it.
+    pub via: Vec<Name>,
+    /// Fields of the request data, in words.
+    pub request: Vec<String>,
+    /// Fields of the response data, in words.
+    pub response: Vec<String>,
+    /// Axis states in which it is taken, in words.
+    pub states: Option<String>,
+    /// What a bad request is answered, in words.
+    pub errors: Option<String>,
+    /// Anything worth knowing.
+    pub note: Option<String>,
+    /// Table of the standard.
+    pub source: Source,
+    /// Clause that describes it.
+    pub clause: String,
+}

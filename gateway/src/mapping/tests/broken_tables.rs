@@ -94,6 +94,11 @@ const CASES: &[Case] = &[
     ),
     ("channels that overlap", |t| &mut t.cip_attributes, "step = 50", "step = 34"),
     ("channel above the last number", |t| &mut t.cip_attributes, "{ id = 1435,", "{ id = 65535,"),
+    ("service code", |t| &mut t.cip_services, "code = 0x4B", "code = 0x9B"),
+    ("service twice", |t| &mut t.cip_services, "code = 0x4B", "code = 0x4C"),
+    ("service need", |t| &mut t.cip_services, "instance = \"--OOOO\"", "instance = \"--XXXX\""),
+    ("service carrier", |t| &mut t.cip_services, "via = [\"explicit\"]", "via = [\"implicit\"]"),
+    ("service without a carrier", |t| &mut t.cip_services, "via = [\"explicit\"]", "via = []"),
     ("codes of nothing", |t| &mut t.cip_enumerations, "attributes = [\"Control Mode\"]\n", ""),
     (
         "codes of an unknown attribute",

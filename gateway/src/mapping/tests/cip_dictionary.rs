@@ -265,3 +265,41 @@ fn every_set_of_codes_belongs_to_an_attribute_or_says_to_what() {
         assert!(!nothing || !set.element.is_empty(), "{}", set.name);
     }
 }
+
+/// Tables 5-2.82 and 5-2.85.
+#[test]
+fn has_every_service() {
+    let got: Vec<_> = cip()
+        .services()
+        .iter()
+        .map(|row| (row.code, row.name.as_str(), row.class, row.instance.as_str(), row.service_data_block))
+        .collect();
+    let expected = [
+        (0x03, "Get_Attributes_List", 'R', "RRRRRR", false),
+        (0x04, "Set_Attributes_List", 'R', "RRRRRR", false),
+        (0x0E, "Get_Attribute_Single", 'R', "RRRRRR", false),
+        (0x10, "Set_Attribute_Single", 'R', "RRRRRR", false),
+        (0x1C, "Group_Sync", 'C', "------", false),
+        (0x4B, "Get_Axis_Attributes_List", '-', "RRRRRR", true),
+        (0x4C, "Set_Axis_Attributes_List", '-', "RRRRRR", true),
+        (0x4D, "Set_Cyclic_Write_List", '-', "RRRRRR", true),
+        (0x4E, "Set_Cyclic_Read_List", '-', "RRRRRR", true),
+        (0x4F, "Run_Motor_Test", '-', "--OOOO", true),
+        (0x50, "Get_Motor_Test_Data", '-', "--OOOO", true),
+        (0x51, "Run_Inertia_Test", '-', "---RRR", true),
+        (0x52, "Get_Inertia_Test_Data", '-', "---RRR", true),
+        (0x53, "Run_Hookup_Test", '-', "RRRRRR", true),
+        (0x54, "Get_Hookup_Test_Data", '-', "RRRRRR", true),
+    ];
+    assert_eq!(got, expected);
+    for row in cip().services() {
+        assert!(row.explicit && !row.clause.is_empty(), "{}", row.name);
+        // Only tests depend on the state.
+        assert_eq!(row.states.is_empty(), !row.name.starts_with("Run_"), "{}", row.name);
+    }
+    // What the documents leave in doubt.
+    for code in [0x1C, 0x4C, 0x4D, 0x4E, 0x50] {
+        let row = cip().services().iter().find(|row| row.code == code).unwrap();
+        assert!(!row.note.is_empty(), "{}", row.name);
+    }
+}
