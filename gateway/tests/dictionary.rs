@@ -106,6 +106,7 @@ fn every_part_of_every_profile_says_the_same_in_csv_and_json() {
         ("cip", "class", 24),
         ("cip", "enums", codes(&dictionaries())),
         ("cip", "services", 15),
+        ("cip", "faults", faults(&dictionaries())),
         ("sercos", "instance", dictionaries().sercos.idns().len()),
         ("sercos", "enums", sercos_codes(&dictionaries())),
         ("generic", "instance", 18 + dictionaries().generic.parameters().len()),
@@ -135,7 +136,17 @@ fn every_part_of_every_profile_says_the_same_in_csv_and_json() {
 
 fn codes(dictionaries: &Dictionaries) -> usize {
     let sets = dictionaries.cip.enumerations().iter().chain(dictionaries.cip.bit_sets());
-    sets.map(|set: &Enumeration| set.codes.len()).sum()
+    sets.map(rows_of).sum()
+}
+
+fn rows_of(set: &Enumeration) -> usize {
+    set.codes.len() + set.ranges.len()
+}
+
+fn faults(dictionaries: &Dictionaries) -> usize {
+    let cip = &dictionaries.cip;
+    let set = |name: &str| cip.bits(name).or_else(|| cip.enumeration(name)).expect("a set of conditions");
+    cip.fault_records().iter().map(|record| rows_of(set(&record.conditions))).sum()
 }
 
 fn sercos_codes(dictionaries: &Dictionaries) -> usize {
@@ -158,6 +169,8 @@ fn rows_read_as_the_standards_print_them() {
         row(&["cip", "--part", "services"], "code", "0x1C"),
         row(&["cip", "--part", "enums"], "name", "Position Control"),
         row(&["cip", "--part", "enums"], "name", "Motor Overcurrent"),
+        row(&["cip", "--part", "faults"], "name", "Motor Overspeed UL"),
+        row(&["cip", "--part", "faults"], "set", "Start Inhibits - Mfg"),
         row(&["sercos"], "idn", "S-0-0047"),
         row(&["sercos", "--part", "enums"], "name", "Drive on"),
         row(&["generic"], "name", "torque_limit_positive"),

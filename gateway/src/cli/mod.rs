@@ -140,6 +140,8 @@ enum DictionaryPart {
     Enums,
     /// Services.
     Services,
+    /// Conditions of faults, alarms and inhibits, and what they do.
+    Faults,
 }
 
 impl DictionaryPart {
@@ -150,6 +152,7 @@ impl DictionaryPart {
             Self::Class => "class",
             Self::Enums => "enums",
             Self::Services => "services",
+            Self::Faults => "faults",
         }
     }
 }

@@ -1,7 +1,9 @@
 //! The CIP Motion dictionary as tables.
 
 use super::sheet::{Cell, Sheet};
-use crate::mapping::{CipAttribute, CipDictionary, CipService, Enumeration, PolarityEffect, SetKind};
+use crate::mapping::{
+    CipAttribute, CipDictionary, CipService, Clearing, Enumeration, PolarityEffect, RangeKind, SetKind,
+};
 
 /// Attributes of an axis.
 pub fn instance(dictionary: &CipDictionary) -> Sheet {
@@ -104,7 +106,7 @@ pub fn class(dictionary: &CipDictionary) -> Sheet {
     Sheet::new(COLUMNS, dictionary.class_attributes().iter().map(row).collect())
 }
 
-/// Codes and bits.
+/// Codes and bits, each set with what it keeps free behind what it names.
 pub fn enums(dictionary: &CipDictionary) -> Sheet {
     const COLUMNS: &[&str] = &[
         "set",
@@ -113,41 +115,145 @@ pub fn enums(dictionary: &CipDictionary) -> Sheet {
         "kind",
         "need",
         "source",
+        "last",
+        "free_for",
         "rule",
+        "limits",
         "attributes",
         "class_attributes",
         "element",
+        "field",
         "note",
     ];
     let sets = dictionary.enumerations().iter().chain(dictionary.bit_sets());
-    Sheet::new(COLUMNS, sets.flat_map(codes).collect())
+    let rows = sets.flat_map(|set| {
+        let kind = match set.kind {
+            SetKind::Codes => "enum",
+            SetKind::Bits { .. } => "bit",
+        };
+        values(set).map(move |value| {
+            vec![
+                (&set.name).into(),
+                value.first.into(),
+                value.name.into(),
+                kind.into(),
+                value.need.map_or("".into(), Cell::from),
+                (&set.source).into(),
+                value.last.into(),
+                value.free_for.into(),
+                value.rule.into(),
+                numbers(value.limits).into(),
+                numbers(&set.attributes).into(),
+                numbers(&set.class_attributes).into(),
+                (&set.element).into(),
+                set.field.map_or("".into(), |(low, high)| format!("{low}-{high}").into()),
+                joined(&[&set.note, value.note]).into(),
+            ]
+        })
+    });
+    Sheet::new(COLUMNS, rows.collect())
 }
 
-fn codes(set: &Enumeration) -> impl Iterator<Item = Vec<Cell>> {
-    let kind = match set.kind {
-        SetKind::Codes => "enum",
-        SetKind::Bits { .. } => "bit",
-    };
-    let ids = |ids: &[u16]| ids.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");
-    set.codes.iter().map(move |code| {
-        vec![
-            (&set.name).into(),
-            code.code.into(),
-            (&code.name).into(),
-            kind.into(),
-            code.need.map_or("".into(), Cell::from),
-            (&set.source).into(),
-            (&code.rule).into(),
-            ids(&set.attributes).into(),
-            ids(&set.class_attributes).into(),
-            (&set.element).into(),
-            joined(&[&set.note, &code.note]).into(),
-        ]
-    })
+/// A code, a bit or a range of them.
+struct Value<'a> {
+    first: u32,
+    /// The last of a range.
+    last: Option<u32>,
+    name: &'a str,
+    /// What a range is free for; empty for a single code.
+    free_for: &'static str,
+    need: Option<char>,
+    rule: &'a str,
+    limits: &'a [u16],
+    note: &'a str,
 }
 
-fn joined(notes: &[&String]) -> String {
-    let said: Vec<&str> = notes.iter().map(|note| note.as_str()).filter(|note| !note.is_empty()).collect();
+fn values(set: &Enumeration) -> impl Iterator<Item = Value<'_>> {
+    let named = set.codes.iter().map(|code| Value {
+        first: code.code,
+        last: None,
+        name: &code.name,
+        free_for: "",
+        need: code.need,
+        rule: &code.rule,
+        limits: &code.limits,
+        note: &code.note,
+    });
+    let free = set.ranges.iter().map(|range| Value {
+        first: range.first,
+        last: Some(range.last),
+        name: &range.name,
+        free_for: word(RangeKind::NAMED, range.kind),
+        need: range.need,
+        rule: "",
+        limits: &[],
+        note: &range.note,
+    });
+    named.chain(free)
+}
+
+/// The word of the files for `value`.
+fn word<T: PartialEq>(words: &[(&'static str, T)], value: T) -> &'static str {
+    words.iter().find(|(_, known)| *known == value).map_or("", |(word, _)| word)
+}
+
+fn numbers(ids: &[u16]) -> String {
+    ids.iter().map(u16::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Conditions of every type of fault, alarm and inhibit, and of the node.
+pub fn faults(dictionary: &CipDictionary) -> Sheet {
+    const COLUMNS: &[&str] = &[
+        "code",
+        "name",
+        "set",
+        "fault_type",
+        "alarm_type",
+        "latched",
+        "configurable",
+        "major",
+        "cleared_by",
+        "rule",
+        "limits",
+        "seven_segment",
+        "display",
+        "source",
+        "last",
+        "free_for",
+        "note",
+    ];
+    let mut rows = Vec::new();
+    for record in dictionary.fault_records() {
+        let set = dictionary.bits(&record.conditions).or_else(|| dictionary.enumeration(&record.conditions));
+        let Some(set) = set else { continue };
+        let cleared: Vec<&str> = record.cleared_by.iter().map(|way| word(Clearing::NAMED, *way)).collect();
+        rows.extend(values(set).map(|value| {
+            vec![
+                value.first.into(),
+                value.name.into(),
+                (&set.name).into(),
+                record.fault_type.into(),
+                record.alarm_type.into(),
+                record.latched.into(),
+                record.configurable.into(),
+                record.major.into(),
+                cleared.join(" ").into(),
+                value.rule.into(),
+                numbers(value.limits).into(),
+                (&record.seven_segment).into(),
+                (&record.display).into(),
+                joined(&[&set.source, &record.source]).into(),
+                value.last.into(),
+                value.free_for.into(),
+                joined(&[value.note, &record.note]).into(),
+            ]
+        }));
+    }
+    Sheet::new(COLUMNS, rows)
+}
+
+fn joined(texts: &[&str]) -> String {
+    let said: Vec<&str> = texts.iter().copied().filter(|text| !text.is_empty()).collect();
     said.join("; ")
 }
 
