@@ -160,6 +160,11 @@ impl Sequencer {
         self.step
     }
 
+    /// Since when it is in its step.
+    pub const fn since(&self) -> MonotonicTime {
+        self.since
+    }
+
     /// Whether the start has ended and no stop has begun.
     pub const fn is_running(&self) -> bool {
         matches!(self.step, SequenceStep::Running)
@@ -221,6 +226,15 @@ impl Sequencer {
         };
         self.enter(now, step);
         Some(order)
+    }
+
+    /// The drive was told to stop and end its torque by somebody else.
+    pub fn drive_stops(&mut self, now: MonotonicTime) {
+        if !matches!(self.step, SequenceStep::Off | SequenceStep::Coasting | SequenceStep::SwitchingOff) {
+            self.stop_begun = now;
+            self.slow_since = None;
+            self.enter(now, SequenceStep::SwitchingOff);
+        }
     }
 
     /// The torque was taken away by somebody else, or the drive itself stops: what is left is to wait for rest.

@@ -26,12 +26,13 @@
 //! any other       Enable, Test                 (see below)             same           Reject
 //! Operating       Enable                       nothing forbids it      same           Enable (ends a halt)
 //! running         Disable                                              Stopping       Disable
+//! running, Stopping Coast                                              Stopping       TorqueOff
 //! Starting        Stop                                                 Stopping       Disable
 //! Testing         Stop                                                 Stopping       Disable
 //! Operating       Stop                                                 same           Halt
 //! Starting,Testing TestStop, TestComplete      test active             Stopping       Disable
 //! idle            Shutdown                                             Shutdown       TorqueOff, latch
-//! running         Shutdown                                             Stopping       Disable, latch
+//! running         Shutdown                                             Stopping       TorqueOff, latch
 //! Stopping, FaultReaction, Faulted  Shutdown                           same           None, latch
 //! Shutdown        ShutdownReset                                        standby        Energize, unlatch
 //! Faulted         FaultReset                   drive has torque        same           Reject
@@ -77,6 +78,9 @@
 //! 2. With the action TorqueOff, \[unexpected_torque\].
 //! 3. Testing when a test is active.
 //! 4. But NotReady stays: a drive that was never heard is not lost.
+//!
+//! Enabling is no fault of an Operating drive that was told to halt and is on its way: not following is what it
+//! was told, and so it is until it follows again after an enable.
 //!
 //! A drive that decelerates unasked is left to its controlled stop. One in its own fault reaction is told to
 //! disable all the same, so that it does not find itself enabled when the reaction ends.
@@ -133,9 +137,11 @@ named_enum! {
         Enable = "enable",
         /// Stop and switch the torque off.
         Disable = "disable",
+        /// Switch the torque off at once.
+        Coast = "coast",
         /// Stop under control and keep the torque.
         Stop = "stop",
-        /// Stop, switch the torque off, and latch that.
+        /// Switch the torque off at once, and latch that.
         Shutdown = "shutdown",
         /// End the shutdown.
         ShutdownReset = "shutdown_reset",
@@ -288,6 +294,8 @@ pub struct Conditions {
     pub halted: bool,
     /// Whether the drive's last report says that it has torque, see [`Report::has_torque`].
     pub torque: bool,
+    /// Whether the drive was told to halt and has not followed set-points since it was told to go on.
+    pub halting: bool,
     /// Whether a fault reset was asked for and not yet answered.
     pub reset_pending: bool,
 }

@@ -17,8 +17,8 @@ use super::file::{
     UpdatePeriodTable,
 };
 use super::{
-    AXES_MAX, Axis, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link, LogLevel, Modbus,
-    Sercos, StoppingAction, TimeSource,
+    AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link,
+    LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
 };
 use crate::sys::realtime::{self, PRIORITY_MAX};
 
@@ -373,6 +373,7 @@ impl Checker {
         if drive.is_none() {
             self.unknown("drive", &table.drive, drives.iter().map(|drive| drive.get_ref().name.get_ref()));
         }
+        let function = self.function(table);
         let kind = match table.unit.get_ref().as_str() {
             "revolution" => Some(AxisKind::Rotary),
             "millimetre" => Some(AxisKind::Linear),
@@ -409,6 +410,7 @@ impl Checker {
             instance: instance?,
             device: device?,
             drive: drive?,
+            function: function?,
             kind: kind?,
             motion_resolution: motion_resolution?,
             unwind_counts: unwind_counts?,
@@ -416,6 +418,50 @@ impl Checker {
             limits: limits?,
             on_command_loss: on_command_loss?,
         })
+    }
+
+    /// What the axis is, and whether that goes with the rest of its table.
+    fn function(&mut self, table: &AxisTable) -> Option<AxisFunction> {
+        let Some(name) = &table.function else { return Some(AxisFunction::Drive) };
+        let Some(function) = AxisFunction::ALL.into_iter().find(|known| known.name() == name.get_ref())
+        else {
+            let known: Vec<String> =
+                AxisFunction::ALL.iter().map(|known| format!("\"{}\"", known.name())).collect();
+            return self.report(
+                name.span(),
+                format_args!("unknown axis function `{}`", name.get_ref()),
+                format_args!("expected one of {}", known.join(", ")),
+            );
+        };
+        if function == AxisFunction::Drive {
+            return Some(function);
+        }
+        let limits = table.limits.as_ref().and_then(LimitsTable::first);
+        let misfits = [
+            (limits, "it is never moved"),
+            (
+                table.on_command_loss.as_ref().map(|value| ("on_command_loss", value.span())),
+                "it is never moved",
+            ),
+            (
+                table
+                    .unwind_counts
+                    .as_ref()
+                    .filter(|_| function == AxisFunction::Converter)
+                    .map(|value| ("unwind_counts", value.span())),
+                "it has no position",
+            ),
+        ];
+        let before = self.problems.len();
+        for ((key, span), why) in misfits.into_iter().filter_map(|(found, why)| Some((found?, why))) {
+            self.problems.push(Problem {
+                span,
+                title: format!("an axis of function \"{}\" has no {key}", function.name()),
+                expected: format!("expected no {key}: {why}"),
+                related: Some((name.span(), "the function of the axis".to_owned())),
+            });
+        }
+        (self.problems.len() == before).then_some(function)
     }
 
     fn stopping_action(&mut self, name: Option<&Spanned<String>>) -> Option<StoppingAction> {

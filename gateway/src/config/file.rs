@@ -92,7 +92,8 @@ pub struct DeviceTable {
     pub update_period: Option<UpdatePeriodTable>,
 }
 
-/// `identity` of a `[[device]]`; the device type is always 37, CIP Motion Drive.
+/// `identity` of a `[[device]]`; its device type follows from its axes: 47, CIP Motion Encoder, where all of them are
+/// encoders; 48, CIP Motion Converter, where all are converters; else 37, CIP Motion Drive.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityTable {
@@ -128,6 +129,9 @@ pub struct AxisTable {
     pub instance: Spanned<i64>,
     /// Name of the drive behind it; each drive serves one axis.
     pub drive: Spanned<String>,
+    /// What it is: `"drive"`, controlled in motion; `"encoder"`, seen but never switched on; `"converter"`, a supply of
+    /// the DC bus, without motion. Encoder and converter take neither `limits` nor `on_command_loss`. Default: `"drive"`.
+    pub function: Option<Spanned<String>>,
     /// `"revolution"` for a rotary axis, `"millimetre"` for a linear one.
     pub unit: Spanned<String>,
     /// Position counts of the controller in one unit, 1 to 2147483647. Default: 1000000.
@@ -161,6 +165,21 @@ pub struct LimitsTable {
     pub torque_percent: Option<Spanned<f64>>,
     /// Largest distance of actual from commanded position, in axis units.
     pub following_error: Option<Spanned<f64>>,
+}
+
+impl LimitsTable {
+    /// The first limit that is given, and where.
+    pub(super) fn first(&self) -> Option<(&'static str, std::ops::Range<usize>)> {
+        let all = [
+            ("position_min", &self.position_min),
+            ("position_max", &self.position_max),
+            ("velocity", &self.velocity),
+            ("acceleration", &self.acceleration),
+            ("torque_percent", &self.torque_percent),
+            ("following_error", &self.following_error),
+        ];
+        all.into_iter().find_map(|(key, value)| Some((key, value.as_ref()?.span())))
+    }
 }
 
 /// `[south]`

@@ -148,7 +148,7 @@ pub struct Device {
     pub update_period_max: DurationNs,
 }
 
-/// The Identity object of a device; its device type is always CIP Motion Drive.
+/// The Identity object of a device; its device type follows from what its axes are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     /// Vendor number given by ODVA.
@@ -174,6 +174,32 @@ pub enum AxisKind {
     Linear,
 }
 
+/// What an axis is (the state tables of the Motion Device Axis Object, clause 5-2.6.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisFunction {
+    /// Controlled in motion.
+    Drive,
+    /// A feedback device, or the feedback of a drive that is never switched on.
+    Encoder,
+    /// A supply of the DC bus, without motion.
+    Converter,
+}
+
+impl AxisFunction {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Drive, Self::Encoder, Self::Converter];
+
+    /// The name in the file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Drive => "drive",
+            Self::Encoder => "encoder",
+            Self::Converter => "converter",
+        }
+    }
+}
+
 /// An axis: one instance of the Motion Device Axis Object in front, one drive behind.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axis {
@@ -185,6 +211,8 @@ pub struct Axis {
     pub device: usize,
     /// Index in [`Sercos::drives`]; no two axes share one.
     pub drive: usize,
+    /// What it is.
+    pub function: AxisFunction,
     /// Rotary or linear.
     pub kind: AxisKind,
     /// Position counts of the controller for one axis unit.

@@ -13,22 +13,27 @@ use profile_cip::wire::motion::codes::EventChecking;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
+use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
 use profile_sercos::master::config::{Connections, MasterConfig, SlaveConfig};
 
 use super::axis::{AxisChannel, Limits};
 use super::bus::SercosBus;
-use super::device::DeviceChannel;
+use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
-use crate::config::{Axis, AxisKind, Config, Device, StoppingAction};
+use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, StoppingAction};
 use crate::latest::{self, Reader};
 use crate::mapping::{AxisUnits, CipScaling, Mapping, Reference, SercosAxis};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
 
-/// CIP Motion Drive.
-const DEVICE_TYPE: u16 = 0x25;
+/// Device types of clause 6-2: CIP Motion Drive, Encoder and Converter.
+mod device_type {
+    pub const DRIVE: u16 = 0x25;
+    pub const ENCODER: u16 = 0x2F;
+    pub const CONVERTER: u16 = 0x30;
+}
 
 /// Notices kept until the supervisor takes them.
 const NOTICES: usize = 1024;
@@ -104,10 +109,11 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let mut members: Vec<_> = config.axes_of(number).collect();
         members.sort_by_key(|(_, axis)| axis.instance);
         let (adapter_end, device_end) = motion_link();
-        let scalings: Vec<_> = members.iter().map(|(number, axis)| (*number, scaling(axis))).collect();
+        let scalings: Vec<_> =
+            members.iter().map(|(number, axis)| (*number, scaling(axis), stop_defaults(axis))).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel =
-            DeviceChannel::new(number, device_config(device, members.len()), device_end, &scalings, &mapping)
+            DeviceChannel::new(number, device_config(device, &members), device_end, &scalings, &mapping)
                 .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
         devices.push(channel);
         adapters.push((adapter_config(device, &members, host), adapter_end));
@@ -167,9 +173,15 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
     limit(Parameter::POSITION_ERROR_TOLERANCE, limits.following_error.map(|value| value.0));
     SercosAxis {
         units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated_torque: None },
-        modes: [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
-            .into_iter()
-            .collect(),
+        // A drive that is only looked at is set up in one mode, because its telegram belongs to one; it is never on.
+        modes: match axis.function {
+            AxisFunction::Drive => [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
+                .into_iter()
+                .collect(),
+            AxisFunction::Encoder | AxisFunction::Converter => {
+                [OperatingMode::Position].into_iter().collect()
+            }
+        },
         modulo: false,
         set_scaling,
         parameters,
@@ -197,7 +209,19 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
         velocity: axis.limits.velocity,
         following_error: axis.limits.following_error,
     };
-    Ok(AxisChannel::new(program, limits, reaction(axis.on_command_loss)))
+    let moves = axis.function == AxisFunction::Drive;
+    Ok(AxisChannel::new(program, limits, reaction(axis.on_command_loss), moves))
+}
+
+/// A hundredth of the highest speed counts as standing, as the standard takes it of the rated one; where no limit is
+/// given, 6 revolutions a minute or 1 mm/s.
+fn stop_defaults(axis: &Axis) -> StopDefaults {
+    let usual = match axis.kind {
+        AxisKind::Rotary => 100_000_000,
+        AxisKind::Linear => 1_000_000_000,
+    };
+    let zero_speed = axis.limits.velocity.map_or(usual, |limit| (limit.0 / 100).max(1));
+    StopDefaults { zero_speed: Velocity(zero_speed), deceleration: axis.limits.acceleration }
 }
 
 /// What a lost command makes of the configured stopping action.
@@ -211,17 +235,33 @@ fn reaction(action: StoppingAction) -> Reaction {
     }
 }
 
-fn device_config(device: &Device, axes: usize) -> DeviceConfig {
-    let axis = AxisConfig {
-        kind: ControlKind::Active,
-        // Position, velocity and torque.
-        control_modes: 1 << 1 | 1 << 2 | 1 << 4,
-        flying_start: false,
+/// A device is what all of its axes are; one with several kinds is a drive with feedback-only axes or a converter of its
+/// own.
+fn device_type(members: &[(usize, &Axis)]) -> u16 {
+    let all = |function| members.iter().all(|(_, axis)| axis.function == function);
+    if all(AxisFunction::Encoder) {
+        device_type::ENCODER
+    } else if all(AxisFunction::Converter) {
+        device_type::CONVERTER
+    } else {
+        device_type::DRIVE
+    }
+}
+
+fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
+    let axis = |(_, axis): &(usize, &Axis)| AxisConfig {
+        kind: match axis.function {
+            AxisFunction::Drive => ControlKind::Active,
+            AxisFunction::Encoder => ControlKind::FeedbackOnly,
+            AxisFunction::Converter => ControlKind::Converter,
+        },
+        // Position, velocity and torque; nothing can be enabled that is no drive.
+        control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
         lint_position: false,
         events: EventChecking::empty(),
     };
     DeviceConfig {
-        axes: vec![axis; axes],
+        axes: members.iter().map(axis).collect(),
         attributes: Vec::new(),
         power_structure_class_id: device.power_structure_class_id,
         supports_sync: true,
@@ -241,7 +281,7 @@ fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ad
     AdapterConfig {
         identity: IdentityConfig {
             vendor: identity.vendor_id,
-            device_type: DEVICE_TYPE,
+            device_type: device_type(members),
             product_code: identity.product_code,
             major: identity.revision_major,
             minor: identity.revision_minor,

@@ -10,21 +10,25 @@ use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::drive_link::DriveAction;
 use profile_cip::target::fault_log::FaultLog;
-use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
+use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice, SequenceSettings};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
+use profile_generic::fault::Reaction;
 use profile_generic::image::Signal;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::{Acceleration, Velocity};
+use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
 
-use super::axis::AxisChannel;
+use super::axis::{AxisChannel, StopSettings};
 use super::bus::{Answer, Purpose, SercosBus};
 use super::notice::Notice;
 use super::port::{FRAME_MAX, NorthPort};
-use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping};
+use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping, SequenceAttributes};
 use crate::north::DeviceEnd;
 
 /// Attribute accesses handled in one cycle; the rest waits for the next.
@@ -35,6 +39,9 @@ const REQUESTS_PER_CYCLE: usize = 4;
 
 /// Datagrams taken in one cycle: at most this many are believed to be no storm.
 const DATAGRAMS_PER_CYCLE: usize = 16;
+
+/// Writes to the drive that may be under way for one axis.
+const WRITES_MAX: usize = 8;
 
 /// Attributes that describe the scaling of an axis.
 const SCALING_MAX: usize = 8;
@@ -69,6 +76,20 @@ struct Member {
     scaled: bool,
     /// The action of the device in the last exchange.
     action: DriveAction,
+    /// What a stop falls back to where the controller has set nothing.
+    stops: StopDefaults,
+    /// Attributes of the sequences that are being written to the drive: ticket, attribute and bytes. What the drive has
+    /// taken is kept here as well, because the box goes by it.
+    writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
+}
+
+/// What a stop falls back to where the controller has set nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StopDefaults {
+    /// Speed of an axis that stands.
+    pub zero_speed: Velocity,
+    /// Deceleration of a ramp.
+    pub deceleration: Option<Acceleration>,
 }
 
 /// What the I/O connection has counted beside the motion device.
@@ -123,7 +144,7 @@ impl DeviceChannel {
         number: u8,
         mut config: DeviceConfig,
         link: DeviceEnd,
-        axes: &[(usize, CipScaling)],
+        axes: &[(usize, CipScaling, StopDefaults)],
         mapping: &Mapping,
     ) -> Result<Self, ChannelError> {
         config.attributes =
@@ -131,7 +152,7 @@ impl DeviceChannel {
         let device = MotionDevice::new(config)?;
         let members = axes
             .iter()
-            .map(|(axis, scaling)| {
+            .map(|(axis, scaling, stops)| {
                 let attributes =
                     mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
                 let (scaling, configured) = (*scaling, *scaling);
@@ -144,6 +165,8 @@ impl DeviceChannel {
                     node_fault: None,
                     scaled: false,
                     action: DriveAction::None,
+                    stops: *stops,
+                    writes: ArrayVec::new(),
                 })
             })
             .collect::<Result<_, ChannelError>>()?;
@@ -224,6 +247,11 @@ impl DeviceChannel {
         self.preset_scaling(mapping, axes);
         for (place, member) in self.members.iter().enumerate() {
             self.device.set_drive(place, axes[member.axis].drive_image());
+            let settings = member.stop_settings(mapping, &self.device, place, &axes[member.axis]);
+            let abort = axes[member.axis].north().fault_action(settings.1);
+            self.device
+                .set_sequence(place, SequenceSettings { flying_start: settings.0.flying_start, abort });
+            axes[member.axis].set_stop_settings(settings.0);
         }
         for member in &mut self.members {
             let fault = axes[member.axis].node_fault();
@@ -327,10 +355,10 @@ impl DeviceChannel {
     }
 
     /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
-    pub fn attributes(&mut self, axes: &[AxisChannel], bus: &mut SercosBus) {
+    pub fn attributes(&mut self, mapping: &Mapping, axes: &[AxisChannel], bus: &mut SercosBus) {
         for _ in 0..ACCESSES_PER_CYCLE {
             let Some(access) = self.device.poll_attribute_access() else { break };
-            if let Err(status) = self.access(&access, axes, bus) {
+            if let Err(status) = self.access(&access, axes, bus, &mapping.cip.sequence) {
                 self.device.complete_attribute(access.ticket, Err(status));
             }
         }
@@ -341,10 +369,11 @@ impl DeviceChannel {
         access: &AttributeAccess,
         axes: &[AxisChannel],
         bus: &mut SercosBus,
+        sequence: &SequenceAttributes,
     ) -> Result<(), GeneralStatus> {
         let place =
             usize::from(access.instance).checked_sub(1).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
-        let member = self.members.get(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let member = self.members.get_mut(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
         let entry = *member.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let axis = &axes[member.axis];
         match entry.backing {
@@ -383,6 +412,7 @@ impl DeviceChannel {
                     write,
                 };
                 if bus.access(member.axis, request, purpose) {
+                    member.note_write(access, sequence);
                     Ok(())
                 } else {
                     Err(GeneralStatus::RESOURCE_UNAVAILABLE)
@@ -419,7 +449,17 @@ impl DeviceChannel {
         if device != self.number {
             return false;
         }
-        let member = self.members.iter().find(|member| member.axis == answer.axis);
+        let place = self.members.iter().position(|member| member.axis == answer.axis);
+        if let Some(place) = place
+            && let Some(at) = self.members[place].writes.iter().position(|(of, ..)| *of == ticket)
+        {
+            let (_, id, value) = self.members[place].writes.remove(at);
+            if answer.result.is_ok() {
+                // It was checked against the type of the attribute when it was encoded.
+                let _ = self.device.put_attribute(place, id, &value);
+            }
+        }
+        let member = place.map(|place| &self.members[place]);
         let mut bytes = [0; 8];
         let result = match (&answer.result, member) {
             (Err(failure), _) => Err(refusal(*failure)),
@@ -479,6 +519,67 @@ impl DeviceChannel {
 }
 
 impl Member {
+    /// How the axis is to start and stop by the attributes that the controller has set, and the reaction to an Abort.
+    fn stop_settings(
+        &self,
+        mapping: &Mapping,
+        device: &MotionDevice,
+        place: usize,
+        axis: &AxisChannel,
+    ) -> (StopSettings, Reaction) {
+        let rows = &mapping.cip.sequence;
+        let raw = |id| number_of(device.attribute(place, id), false);
+        let value = |id| {
+            let entry = self.attributes.get(id)?;
+            let generic = entry.to_generic(device.attribute(place, id).ok()?).ok()?;
+            (generic > 0).then_some(generic)
+        };
+        let time = |id| value(id).map(DurationNs);
+        // A delay that the drive waits out by itself is not waited twice.
+        let delay = |id| {
+            let by_drive = match self.attributes.get(id).map(|entry| entry.backing) {
+                Some(mapping::Backing::Parameter { parameter, .. }) => {
+                    axis.south().is_some_and(|program| program.parameter(parameter).is_some())
+                }
+                _ => false,
+            };
+            if by_drive { DurationNs::ZERO } else { time(id).unwrap_or_default() }
+        };
+        let stopping = u8::try_from(raw(rows.stopping_action)).ok();
+        let stopping = stopping.and_then(|code| axis.north().stopping(code));
+        let stopping_limit = time(rows.stopping_time_limit).unwrap_or(SequenceTimes::FACTORY_LIMIT);
+        let by_velocity = device.control_mode(place).and_then(|mode| axis.north().mode(mode.0))
+            == Some(OperatingMode::Velocity);
+        let settings = StopSettings {
+            plan: stopping.map(|row| row.plan).unwrap_or_default(),
+            times: SequenceTimes {
+                brake_release_delay: delay(rows.brake_release_delay),
+                brake_engage_delay: delay(rows.brake_engage_delay),
+                stopping_limit,
+                // Where it is not set the stopping time limit applies (attribute 617).
+                coasting_limit: time(rows.coasting_time_limit).unwrap_or(stopping_limit),
+                zero_speed: value(rows.zero_speed).map_or(self.stops.zero_speed, Velocity),
+                zero_speed_time: time(rows.zero_speed_time).unwrap_or_default(),
+            },
+            deceleration: value(rows.ramp_deceleration).map(Acceleration).or(self.stops.deceleration),
+            flying_start: raw(rows.flying_start) != 0 && by_velocity,
+        };
+        (settings, stopping.map(|row| row.abort).unwrap_or_default())
+    }
+
+    /// Remembers what is written to the drive for an attribute that the sequences go by.
+    fn note_write(&mut self, access: &AttributeAccess, sequence: &SequenceAttributes) {
+        if let AccessOperation::Write(bytes) = &access.operation
+            && [sequence.zero_speed, sequence.ramp_deceleration].contains(&access.id)
+            && let Ok(value) = ArrayVec::try_from(&bytes[..])
+        {
+            if self.writes.is_full() {
+                self.writes.remove(0);
+            }
+            self.writes.push((access.ticket, access.id, value));
+        }
+    }
+
     /// The controller has finished its configuration: its scaling counts from now on.
     fn take_scaling<'d>(
         &mut self,
@@ -576,7 +677,7 @@ fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeD
                 mapping::Backing::Constant(value) => value,
                 _ => entry.default,
             }),
-            range: None,
+            range: entry.range.map(|(low, high)| (f64::from(low), f64::from(high))),
             element_rules: match entry.id {
                 attribute::id::AXIS_EXCEPTION_ACTION => mapping.exception_rules(false),
                 attribute::id::AXIS_EXCEPTION_ACTION_MFG => mapping.exception_rules(true),

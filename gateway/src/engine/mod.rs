@@ -176,7 +176,7 @@ impl Engine {
             let Self { devices, mapping, axes, bus, notices, .. } = self;
             for channel in devices {
                 channel.exchange(now, system, mapping, axes, &mut |notice| tell(notices, notice));
-                channel.attributes(axes, bus);
+                channel.attributes(mapping, axes, bus);
             }
         }
         let acts_at = system + self.cycle_time;

@@ -54,6 +54,8 @@ pub struct AttributeEntry {
     pub running: bool,
     /// Value at power-up.
     pub default: i64,
+    /// Least and greatest value that may be set.
+    pub range: Option<(i32, i32)>,
     /// Who answers.
     pub backing: Backing,
 }
@@ -132,6 +134,7 @@ fn entry(row: &ServedAttribute, scaling: &CipScaling) -> Option<AttributeEntry> 
         access: attribute.access,
         running: attribute.running,
         default: attribute.default.unwrap_or(0),
+        range: row.range,
         backing,
     })
 }

@@ -96,6 +96,29 @@ impl ScalingAttributes {
     }
 }
 
+/// The attributes that say how the start and stop sequences run, by number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SequenceAttributes {
+    /// Stopping action.
+    pub stopping_action: u16,
+    /// Longest time to zero speed with torque.
+    pub stopping_time_limit: u16,
+    /// Longest time to zero speed without.
+    pub coasting_time_limit: u16,
+    /// From torque to the first command that is followed.
+    pub brake_release_delay: u16,
+    /// From rest to the end of the torque.
+    pub brake_engage_delay: u16,
+    /// Speed of an axis that stands.
+    pub zero_speed: u16,
+    /// How long it has to be so slow.
+    pub zero_speed_time: u16,
+    /// Deceleration of a ramped stop.
+    pub ramp_deceleration: u16,
+    /// Whether an axis may be started while it moves.
+    pub flying_start: u16,
+}
+
 #[derive(Debug, Clone)]
 pub(super) struct CyclicElement {
     pub bit: u8,
@@ -145,6 +168,8 @@ pub struct ServedAttribute {
     pub attribute: CipAttribute,
     /// Who answers for it.
     pub served: Served,
+    /// Least and greatest value that may be set.
+    pub range: Option<(i32, i32)>,
 }
 
 /// What the controller may set for an exception.
@@ -169,6 +194,8 @@ pub struct ExceptionRow {
 pub struct CipTables {
     /// The attributes that define the scaling.
     pub scaling: ScalingAttributes,
+    /// The attributes of the start and stop sequences.
+    pub sequence: SequenceAttributes,
     /// What Motion Unit may be.
     pub motion_units: Vec<DisplacementUnit>,
     /// What Feedback n Unit may be.

@@ -11,7 +11,8 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::program::Conversion;
 use profile_generic::ratio::{Outcome, Ratio};
 use profile_generic::scaling::{WrapTracker, fold};
-use profile_generic::state::{Action, DriveState, Request};
+use profile_generic::sequence::StopPlan;
+use profile_generic::state::{DriveState, Request};
 
 use super::cip_scaling::CipScaling;
 use super::cip_tables::CipTables;
@@ -145,10 +146,10 @@ impl CipFault {
 pub struct CipStopping {
     /// Stopping Action code (attribute 610).
     pub code: u8,
-    /// What the drive is told.
-    pub action: Action,
-    /// Whether the axis is held with torque at the end (category 2 stop).
-    pub holds: bool,
+    /// How the axis stops.
+    pub plan: StopPlan,
+    /// The reaction to an Abort request.
+    pub abort: Reaction,
 }
 
 /// What happens when a value is not there.

@@ -34,7 +34,8 @@ use std::path::Path;
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
-    CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, Served, ServedAttribute, Times,
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes, Served,
+    ServedAttribute, Times,
 };
 pub use commissioning::{CommissioningPlan, Refused, Step};
 pub use compile_cip::{

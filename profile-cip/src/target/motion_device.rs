@@ -35,7 +35,9 @@ use super::service_channel::ServiceChannel;
 use super::status_report::Reported;
 use super::time_offset::OffsetCompensation;
 use crate::wire::Error;
-use crate::wire::motion::codes::{EventChecking, EventType, FaultType, NodeAlarm, NodeControl, NodeFault};
+use crate::wire::motion::codes::{
+    ControlMode, EventChecking, EventType, FaultType, NodeAlarm, NodeControl, NodeFault,
+};
 use crate::wire::motion::event::ExtendedEventData;
 use crate::wire::motion::{FORMAT_REVISION, WriteBlock};
 use crate::wire::status::GeneralStatus;
@@ -95,6 +97,15 @@ impl From<TableError> for DeviceError {
     fn from(error: TableError) -> Self {
         Self::Attributes(error)
     }
+}
+
+/// How the drive of an axis starts and stops, as far as the axis has to know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SequenceSettings {
+    /// An Enable in Stopping starts again (Flying Start Enable, attribute 380).
+    pub flying_start: bool,
+    /// Axis Fault Action (attribute 668) of an Abort request: the configured Stopping Action.
+    pub abort: u8,
 }
 
 /// State of the device's clock, from its Time Sync object.
@@ -222,6 +233,12 @@ impl MotionDevice {
         self.slots.get(axis).map(|slot| slot.axis.fault_words())
     }
 
+    /// Control Mode of the last update of an axis, or `None` if there is no such axis.
+    #[must_use]
+    pub fn control_mode(&self, axis: usize) -> Option<ControlMode> {
+        self.slots.get(axis).map(|slot| ControlMode(slot.axis.block().control_mode.0 & 0x0F))
+    }
+
     /// Axis Faults (attribute 657) of an axis.
     #[must_use]
     pub fn axis_faults(&self, axis: usize) -> Option<u64> {
@@ -341,6 +358,13 @@ impl MotionDevice {
     pub fn set_drive(&mut self, axis: usize, image: DriveImage) {
         if let Some(slot) = self.slots.get_mut(axis) {
             slot.axis.set_drive(image);
+        }
+    }
+
+    /// Says how the drive of an axis starts and stops from now on.
+    pub fn set_sequence(&mut self, axis: usize, settings: SequenceSettings) {
+        if let Some(slot) = self.slots.get_mut(axis) {
+            slot.axis.set_sequence(settings);
         }
     }
 

@@ -348,6 +348,10 @@ catalogue! {
         "Reaction to a limit switch, numbered as the reactions.";
     SOFTWARE_OVERTRAVEL_ACTION = 0x0B0A, "software_overtravel_action", BasicDrive, None, Integer, Write,
         "Reaction to a software limit, numbered as the reactions.";
+    COASTING_TIME_LIMIT = 0x0B0B, "coasting_time_limit", BasicDrive, Time, Integer, Write,
+        "How long an axis without torque is waited for until it counts as stopped.";
+    ZERO_SPEED_TIME = 0x0B0C, "zero_speed_time", BasicDrive, Time, Integer, Write,
+        "How long an axis has to be slow until it counts as standing.";
 
     HOMING_METHOD = 0x0C01, "homing_method", ApplicationFunction, None, Integer, Write,
         "How the drive homes, as its profile numbers it.";

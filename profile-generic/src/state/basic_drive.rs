@@ -16,6 +16,8 @@ pub struct BasicDrive {
     raised: bool,
     /// The last report was Faulted or FaultReaction.
     drive_faulted: bool,
+    /// A halt was ended by an enable that the drive has not answered yet.
+    resuming: bool,
 }
 
 impl BasicDrive {
@@ -104,6 +106,9 @@ impl BasicDrive {
                 conditions.initialised = !matches!(report, Report::NotReady | Report::Silent);
                 conditions.halted = report == Report::Halted;
                 conditions.torque = report.has_torque();
+                if report == Report::Operating && core::mem::take(&mut self.resuming) {
+                    conditions.halting = false;
+                }
                 match report {
                     Report::Ready | Report::Enabling | Report::Operating | Report::Halted => {
                         conditions.power = true;
@@ -127,6 +132,12 @@ impl BasicDrive {
         self.state = transition.next;
         let conditions = &mut self.conditions;
         conditions.shutdown_latched = transition.shutdown.unwrap_or(conditions.shutdown_latched);
+        match transition.action {
+            Action::Halt => (conditions.halting, self.resuming) = (true, false),
+            Action::Enable => self.resuming = conditions.halting,
+            _ => {}
+        }
+        conditions.halting &= self.state == DriveState::Operating;
         conditions.test_active &= matches!(self.state, DriveState::Starting | DriveState::Testing);
         conditions.reset_pending &= self.state == DriveState::Faulted && transition.action != Action::Reject;
         if !conditions.fault_active && !matches!(self.state, DriveState::FaultReaction | DriveState::Faulted)

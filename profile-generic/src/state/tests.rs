@@ -6,7 +6,7 @@ use super::*;
 type Variable = (&'static [&'static str], fn(&mut Conditions, usize));
 
 /// In the order in which the table splits its rows.
-const VARIABLES: [Variable; 10] = [
+const VARIABLES: [Variable; 11] = [
     (&["no torque", "torque"], |conditions, value| conditions.torque = value == 1),
     (&["no fault", "fault"], |conditions, value| conditions.fault_active = value == 1),
     (&["no shutdown", "shutdown"], |conditions, value| conditions.shutdown_latched = value == 1),
@@ -17,6 +17,7 @@ const VARIABLES: [Variable; 10] = [
     }),
     (&["no test", "test"], |conditions, value| conditions.test_active = value == 1),
     (&["not halted", "halted"], |conditions, value| conditions.halted = value == 1),
+    (&["no halt", "halt ordered"], |conditions, value| conditions.halting = value == 1),
     (&["no reset", "reset"], |conditions, value| conditions.reset_pending = value == 1),
     (&["ignore", "alarm", "hold", "decelerate", "coast", "shut down"], |conditions, value| {
         conditions.reaction = Reaction::ALL[value];
@@ -335,7 +336,7 @@ fn a_reset_that_was_given_up_or_overtaken_does_not_clear_later() {
 #[test]
 fn a_shutdown_outlasts_a_fault() {
     let mut drive = operating();
-    assert_eq!(drive.request(Request::Shutdown).action, Action::Disable);
+    assert_eq!(drive.request(Request::Shutdown).action, Action::TorqueOff);
     drive.report(Report::Faulted);
     drive.report(Report::Ready);
     assert_eq!(drive.request(Request::ShutdownReset).action, Action::Reject);

@@ -131,6 +131,10 @@ impl DriveState {
             Request::Enable | Request::Test => self.on_enable(request, conditions),
             Request::Disable if self.is_running() => Transition::to(Self::Stopping, Action::Disable),
             Request::Disable => self.stay(),
+            Request::Coast if self.is_running() || matches!(self, Self::Stopping) => {
+                Transition::to(Self::Stopping, Action::TorqueOff)
+            }
+            Request::Coast => self.stay(),
             Request::Stop => match self {
                 Self::Operating => Transition::to(Self::Operating, Action::Halt),
                 Self::Starting | Self::Testing => Transition::to(Self::Stopping, Action::Disable),
@@ -140,7 +144,7 @@ impl DriveState {
                 Transition::to(Self::Shutdown, Action::TorqueOff).latching()
             }
             Request::Shutdown if self.is_running() => {
-                Transition::to(Self::Stopping, Action::Disable).latching()
+                Transition::to(Self::Stopping, Action::TorqueOff).latching()
             }
             Request::Shutdown => self.stay().latching(),
             Request::ShutdownReset => self.on_shutdown_reset(conditions),
@@ -330,7 +334,7 @@ impl DriveState {
                 Transition::to(next, Action::None)
             }
             Self::Operating | Self::Testing => match report {
-                Report::Enabling => {
+                Report::Enabling if !conditions.halting => {
                     Transition::to(Self::FaultReaction, Action::Disable).because(FaultCause::LEFT_OPERATION)
                 }
                 _ => self.catch_up(conditions),
@@ -352,7 +356,7 @@ impl DriveState {
         } else if conditions.inhibits.intersects(Inhibits::REMOVE_TORQUE) {
             self.on_inhibit_raised(conditions)
         } else if conditions.shutdown_latched {
-            Transition::to(Self::Stopping, Action::Disable)
+            Transition::to(Self::Stopping, Action::TorqueOff)
         } else {
             self.stay()
         }

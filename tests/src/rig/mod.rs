@@ -127,6 +127,8 @@ pub struct Rig {
     pub knobs: Knobs,
     /// What happens to datagrams from the controller.
     pub tamper_command: Option<Tamper>,
+    /// What happens to datagrams from the box.
+    pub tamper_actual: Option<Tamper>,
     /// What happens to frames on their way back from the line.
     pub tamper_frame: Option<Tamper>,
     /// Whether there is a cable between the box and the line.
@@ -169,6 +171,7 @@ impl Rig {
             line,
             knobs: settings.knobs,
             tamper_command: None,
+            tamper_actual: None,
             tamper_frame: None,
             cable: true,
             stream_works: true,
@@ -504,8 +507,10 @@ impl Rig {
                 self.south.inbound.push_back(frame);
             }
         }
-        while let Some((datagram, _)) = self.north.outbound.pop_front() {
-            self.actuals.send(self.now, &self.knobs, datagram);
+        while let Some((mut datagram, _)) = self.north.outbound.pop_front() {
+            if self.tamper_actual.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
+                self.actuals.send(self.now, &self.knobs, datagram);
+            }
         }
         while let Ok(notice) = self.notice_queue.pop() {
             self.notices.push(notice);

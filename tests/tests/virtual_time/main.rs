@@ -4,4 +4,5 @@ mod faults;
 mod loss;
 mod network;
 mod programs;
+mod stopping;
 mod torque;

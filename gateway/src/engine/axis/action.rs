@@ -4,6 +4,7 @@ use super::{AxisChannel, Loss, RESET_TIME_OUT, Reset, caused_by_controller};
 use profile_cip::target::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::{ActiveFault, Origin};
+use profile_generic::sequence::StopPlan;
 use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
@@ -52,11 +53,23 @@ impl AxisChannel {
         if !matches!(action, DriveAction::Enable | DriveAction::Abort) {
             self.end_hold(now, system);
         }
+        if action == DriveAction::Enable && self.state() == DriveState::Operating {
+            // Out of a hold, or of a stop that has not ended: the torque is there already.
+            self.prepare_start(now);
+        }
         let request = match action {
+            DriveAction::Enable if !self.moves => None,
+            DriveAction::Disable if self.may_have_torque() => {
+                self.begin_stop(now, system, self.stop_settings.plan);
+                None
+            }
+            // Neither a connection that is gone nor a standby state of the axis leaves it with torque.
+            DriveAction::None | DriveAction::PowerUp if self.may_have_torque() => {
+                self.begin_stop(now, system, StopPlan::default());
+                None
+            }
             // Without torque there is nothing to abort; the motion device keeps the fault.
             DriveAction::Abort if !self.may_have_torque() => None,
-            // A connection that is gone asks for nothing, but nothing may go on moving either.
-            DriveAction::None if self.may_have_torque() => self.north.drive_request(DriveAction::Disable),
             action => self.north.drive_request(action),
         };
         if let Some(request) = request {
@@ -78,6 +91,9 @@ impl AxisChannel {
     }
 
     pub(super) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
+        if !self.moves && matches!(request, Request::Enable | Request::Test) {
+            return;
+        }
         let transition = self.drive.machine.request(request);
         self.follow(now, system, transition);
     }

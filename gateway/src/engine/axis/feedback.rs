@@ -87,6 +87,7 @@ impl AxisChannel {
             let cause = FaultCause::DRIVE_SPECIFIC;
             self.drive_fault(now, system, cause, cause.default_reaction(), 0);
         }
+        self.go_on_with_sequence(now, system);
         self.go_on_with_reset(now, system);
         self.feedback.state = self.state();
         self.feedback.inhibits = self.drive.machine.conditions().inhibits;

@@ -22,6 +22,7 @@ impl AxisChannel {
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
         self.north.drive_image(&feedback, &self.faults, &mut image);
+        self.sequence_image(&mut image);
         if self.cause_wanted.is_some() {
             // The stop ends with the fault that says why, once the drive has told it.
             image.stop_complete = false;

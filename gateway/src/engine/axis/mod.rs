@@ -12,6 +12,7 @@ mod action;
 mod diagnosis;
 mod feedback;
 mod image;
+mod sequence;
 mod set_point;
 
 use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
@@ -22,6 +23,7 @@ use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
 use profile_generic::program::Trackers;
 use profile_generic::quantity::{Position, Velocity};
+use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
@@ -65,6 +67,8 @@ pub struct AxisCounters {
     pub faults: u32,
 }
 
+pub use sequence::StopSettings;
+
 /// Why a command counts as lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Loss {
@@ -102,10 +106,19 @@ pub struct AxisChannel {
     south: Option<(SercosProgram, Trackers)>,
     limits: Limits,
     command_loss: Reaction,
+    /// It may be switched on.
+    moves: bool,
     drive: BasicDriveClock,
     interpolator: Option<FineInterpolator>,
-    /// The instant that the last command is for.
+    sequencer: Sequencer,
+    stop_settings: StopSettings,
+    /// The command's way to rest, in a ramped stop.
+    ramp: Option<StopRamp>,
+    /// The speed at which the axis was started on the move, until its first set-points.
+    caught: Option<Velocity>,
+    /// The instant that the last command is for, and when it was made.
     acts_at: SystemTime,
+    made_at: MonotonicTime,
     command: AxisCommand,
     feedback: AxisFeedback,
     /// The action whose bits stand in the control word.
@@ -144,8 +157,9 @@ struct BasicDriveClock {
 
 impl AxisChannel {
     /// An axis whose drive is not there yet.
+    /// `moves` is whether it may ever be switched on: an encoder or a converter may not, whoever asks.
     #[must_use]
-    pub fn new(north: CipProgram, limits: Limits, command_loss: Reaction) -> Self {
+    pub fn new(north: CipProgram, limits: Limits, command_loss: Reaction, moves: bool) -> Self {
         let trackers = north.trackers();
         Self {
             north,
@@ -153,9 +167,15 @@ impl AxisChannel {
             south: None,
             limits,
             command_loss,
+            moves,
             drive: BasicDriveClock::default(),
             interpolator: None,
+            sequencer: Sequencer::default(),
+            stop_settings: StopSettings::default(),
+            ramp: None,
+            caught: None,
             acts_at: SystemTime::default(),
+            made_at: MonotonicTime::default(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             action: Action::TorqueOff,

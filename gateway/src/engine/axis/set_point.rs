@@ -54,8 +54,12 @@ impl AxisChannel {
             return;
         };
         if first {
-            interpolator
-                .start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position));
+            match self.caught.take() {
+                // From the speed that it has, as the ramp generator would begin there (clause 5-2.6.5.4).
+                Some(velocity) => interpolator.start_moving(self.acts_at, &Motion { velocity, ..actual }),
+                None => interpolator
+                    .start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position)),
+            }
         }
         if other_mode || interpolator.config().target_update != target_update {
             // On the move the new command begins where the old one has led the axis.
@@ -125,8 +129,13 @@ impl AxisChannel {
         self.fine_command(now, system, acts_at);
         let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
         let mut conversions = ConversionReport::default();
-        self.control_word =
-            program.encode(&self.command, self.action, self.control_word, telegram, &mut conversions);
+        self.control_word = program.encode(
+            &self.command,
+            if self.moves { self.action } else { Action::TorqueOff },
+            self.control_word,
+            telegram,
+            &mut conversions,
+        );
         self.count_saturated(conversions.saturated);
         if conversions.saturated > 0 && self.state() == DriveState::Operating {
             // The drive would be led elsewhere than the controller means.
@@ -139,6 +148,7 @@ impl AxisChannel {
     /// begins to.
     pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
         self.acts_at = acts_at;
+        self.made_at = now;
         let operating = self.state() == DriveState::Operating;
         let fine = match self.interpolator.as_mut() {
             Some(interpolator) if operating && self.sequence.is_some() => Some(interpolator.at(acts_at)),
@@ -151,10 +161,10 @@ impl AxisChannel {
                 }
                 fine.set_points
             }
-            None => FinePoints::default(),
+            None => self.led_by_box(now),
         };
         // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it.
-        let led = operating && self.command.mode == OperatingMode::Position;
+        let led = operating && self.command.mode == OperatingMode::Position && !self.drive_leads();
         let rest = if led { self.command.position } else { self.feedback.position };
         let all = FinePoints {
             position: Some(points.position.unwrap_or(rest)),
@@ -168,12 +178,7 @@ impl AxisChannel {
     pub(super) fn follow(&mut self, now: MonotonicTime, system: SystemTime, transition: Transition) {
         if self.feedback.state != transition.next {
             self.drive.since = now;
-            if matches!(transition.next, DriveState::Starting) {
-                // Until the controller's first set-points the axis holds its position, whatever it did last.
-                self.command.mode = OperatingMode::Position;
-                self.sequence = None;
-                self.start_interpolator();
-            }
+            self.follow_sequence(now, transition.next);
             self.feedback.state = transition.next;
         }
         match transition.action {

@@ -6,11 +6,12 @@ use profile_generic::image::StatusBits;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::parameter::ParameterType;
 use profile_generic::quantity::Quantity;
+use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
 
 use super::{
-    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, Served,
-    ServedAttribute, Times, action, has_direction, operating_mode, signal, unit_kind,
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes,
+    Served, ServedAttribute, Times, has_direction, operating_mode, signal, unit_kind,
 };
 use crate::mapping::compile_cip::{
     CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
@@ -53,6 +54,7 @@ impl CipTables {
         builder.reactions(rows);
         builder.inhibits(rows);
         builder.stoppings(rows);
+        builder.sequence(rows);
         for row in &rows.attribute {
             builder.attribute(row);
         }
@@ -466,11 +468,31 @@ impl Builder<'_> {
     fn stoppings(&mut self, rows: &CipGenericFile) {
         for row in &rows.stopping {
             let code = self.byte_code("Stopping Action", "stopping_action", &row.stopping_action);
-            let action = action(&mut self.resolver, &row.action);
-            if let (Some(code), Some(action)) = (code, action) {
-                self.tables.stoppings.push(CipStopping { code, action, holds: row.holds });
+            let methods = StopMethod::ALL.iter().map(|method| method.name());
+            let what = "a way to stop of the generic model";
+            let method = self.resolver.name("method", &row.method, what, StopMethod::parse, methods);
+            let reactions = Reaction::ALL.iter().map(|reaction| reaction.name());
+            let abort = self.resolver.name("abort", &row.abort, "a reaction", Reaction::parse, reactions);
+            if let (Some(code), Some(method), Some(abort)) = (code, method, abort) {
+                let plan = StopPlan { method, hold: row.holds };
+                self.tables.stoppings.push(CipStopping { code, plan, abort });
             }
         }
+    }
+
+    fn sequence(&mut self, rows: &CipGenericFile) {
+        let row = &rows.sequence;
+        self.tables.sequence = SequenceAttributes {
+            stopping_action: self.attribute_id("stopping_action", &row.stopping_action),
+            stopping_time_limit: self.attribute_id("stopping_time_limit", &row.stopping_time_limit),
+            coasting_time_limit: self.attribute_id("coasting_time_limit", &row.coasting_time_limit),
+            brake_release_delay: self.attribute_id("brake_release_delay", &row.brake_release_delay),
+            brake_engage_delay: self.attribute_id("brake_engage_delay", &row.brake_engage_delay),
+            zero_speed: self.attribute_id("zero_speed", &row.zero_speed),
+            zero_speed_time: self.attribute_id("zero_speed_time", &row.zero_speed_time),
+            ramp_deceleration: self.attribute_id("ramp_deceleration", &row.ramp_deceleration),
+            flying_start: self.attribute_id("flying_start", &row.flying_start),
+        };
     }
 
     fn attribute(&mut self, row: &CipAttributeRow) {
@@ -500,7 +522,8 @@ impl Builder<'_> {
         if self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id) {
             self.resolver.error(row.attribute.span(), "attribute", "the attribute is there twice");
         }
-        self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served });
+        let range = row.range.map(|[low, high]| (low, high));
+        self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
     }
 
     fn parameter(&mut self, row: &CipAttributeRow, attribute: &CipAttribute, name: &Name) -> Option<Served> {

@@ -39,6 +39,8 @@ pub struct CipGenericFile {
     pub inhibit: Vec<InhibitRow>,
     /// Stopping actions.
     pub stopping: Vec<StoppingRow>,
+    /// Attributes of the start and stop sequences.
+    pub sequence: SequenceRow,
     /// Attributes.
     pub attribute: Vec<CipAttributeRow>,
 }
@@ -271,10 +273,38 @@ pub struct InhibitRow {
 pub struct StoppingRow {
     /// Stopping Action code.
     pub stopping_action: Name,
-    /// Generic action.
-    pub action: Name,
+    /// How the axis is brought to rest: `coast`, `decelerate` or `ramp`.
+    pub method: Name,
     /// Whether the axis is held with torque at the end.
     pub holds: bool,
+    /// Reaction to an Abort request.
+    pub abort: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// The attributes that say how the start and stop sequences run.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SequenceRow {
+    /// Chooses a `[[stopping]]` row.
+    pub stopping_action: Name,
+    /// Longest time to zero speed with torque.
+    pub stopping_time_limit: Name,
+    /// Longest time to zero speed without.
+    pub coasting_time_limit: Name,
+    /// From torque to the first command that is followed.
+    pub brake_release_delay: Name,
+    /// From rest to the end of the torque.
+    pub brake_engage_delay: Name,
+    /// Speed of an axis that stands.
+    pub zero_speed: Name,
+    /// How long it has to be so slow.
+    pub zero_speed_time: Name,
+    /// Deceleration of a ramped stop.
+    pub ramp_deceleration: Name,
+    /// Whether an axis may be started while it moves.
+    pub flying_start: Name,
     /// Where it comes from.
     pub source: Source,
 }
@@ -295,6 +325,8 @@ pub struct CipAttributeRow {
     pub value: Option<i64>,
     /// What happens when the drive has no such parameter: `shadow` or `reject`.
     pub missing: Option<Name>,
+    /// Least and greatest value that may be set; others are refused.
+    pub range: Option<[i32; 2]>,
     /// Where it comes from.
     pub source: Source,
     /// Worked examples.

@@ -139,6 +139,7 @@ impl Axis {
             AxisState::Off | AxisState::SelfTest => DriveAction::None,
             AxisState::Initializing if self.winding_down => DriveAction::Disable,
             AxisState::Initializing => DriveAction::None,
+            AxisState::Stopped if self.holding => DriveAction::Disable,
             AxisState::PreCharge | AxisState::Stopped | AxisState::StartInhibited => DriveAction::PowerUp,
             // Only an axis that controls motion is energized by Running.
             AxisState::Running if self.config.kind != ControlKind::Active => DriveAction::PowerUp,

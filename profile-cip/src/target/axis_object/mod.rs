@@ -17,6 +17,7 @@ use super::drive_link::{DriveAction, DriveImage, SetPoints};
 use super::event_channel::EventChannel;
 use super::exception::DriveCondition;
 use super::fault_log::FaultLog;
+use super::motion_device::SequenceSettings;
 use super::status_report::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
@@ -56,8 +57,6 @@ pub struct AxisConfig {
     pub kind: ControlKind,
     /// Control modes that may be enabled, as bits numbered by the mode code (bit 1 position, bit 2 velocity, ...).
     pub control_modes: u16,
-    /// Whether an Enable in Stopping starts again.
-    pub flying_start: bool,
     /// Whether the position may be reported as LINT when the controller asks for it.
     pub lint_position: bool,
     /// Events the drive can check for.
@@ -108,6 +107,9 @@ pub(super) struct Axis {
     pub(super) block: CommandBlock,
     pub(super) held: Option<Held>,
     sequence: u32,
+    sequence_settings: SequenceSettings,
+    /// Stopped with torque: a category 2 stop has ended.
+    holding: bool,
     pub(super) action: DriveAction,
     pub(super) action_id: u32,
     pub(super) reset_id: u32,
@@ -148,6 +150,8 @@ impl Axis {
             block: CommandBlock::default(),
             held: None,
             sequence: 0,
+            sequence_settings: SequenceSettings { flying_start: false, abort: RAMP_AND_DISABLE },
+            holding: false,
             action: DriveAction::None,
             action_id: 0,
             reset_id: 0,
@@ -161,6 +165,10 @@ impl Axis {
             safety: Reported::new(),
             events: EventChannel::new(config.events),
         }
+    }
+
+    pub fn set_sequence(&mut self, settings: SequenceSettings) {
+        self.sequence_settings = settings;
     }
 
     pub fn state(&self) -> AxisState {
@@ -215,7 +223,7 @@ impl Axis {
             shutdown: self.shutdown,
             in_process: false,
             start_inhibited: self.inhibited(),
-            flying_start: self.config.flying_start,
+            flying_start: self.sequence_settings.flying_start,
         }
     }
 
@@ -230,6 +238,9 @@ impl Axis {
         let unconnected = matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss);
         let moves = self.config.kind == ControlKind::Active && self.state.is_energized();
         self.winding_down |= unconnected && moves;
+        // A category 2 stop ends with the power structure on, and the drive goes on doing what Disable asked for.
+        self.holding =
+            event == AxisEvent::StopComplete && next == AxisState::Stopped && self.drive.power_enabled;
         self.state = next;
         true
     }

@@ -102,7 +102,8 @@ impl Axis {
                 Some(GeneralStatus::OBJECT_STATE_CONFLICT)
             }
             AxisControl::ABORT => {
-                self.raise(fault_code::CONTROLLER_INITIATED, 0, RAMP_AND_DISABLE, context.system_time);
+                let stop = self.sequence_settings.abort;
+                self.raise(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
                 None
             }
             AxisControl::STOP_PROCESS => Some(GeneralStatus::SUCCESS),

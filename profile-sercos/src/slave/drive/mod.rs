@@ -114,6 +114,12 @@ impl Drive {
         &self.actual
     }
 
+    /// Whether the brake of the motor is open: it opens with the torque and closes at the end of a stop, S-0-0207 before
+    /// the torque ends.
+    pub fn brake_released(&self) -> bool {
+        self.in_operation() && self.off_for == DurationNs::ZERO
+    }
+
     /// Switches main power.
     pub fn set_main_power(&mut self, on: bool) {
         self.main_power = on;

@@ -1,0 +1,195 @@
+//! How the axis starts and stops: the steps of [`Sequencer`], carried out by the state machine and the command.
+//!
+//! ```text
+//! step          control word      who brings the axis to rest
+//! energizing    enable            - (the drive: flux, commutation, its own release of the brake)
+//! releasing     enable            - (the box waits at a static command where the drive has no delay of its own)
+//! running       enable            -
+//! ramping       enable            the box: its command goes to rest at the configured deceleration
+//! braking       halt              the drive, by its own halt
+//! engaging      enable or halt    - (the box waits where the drive has no delay of its own)
+//! switching off disable           the drive, by its best possible deceleration; then it closes its brake
+//! holding       halt              -
+//! coasting      torque off        nobody
+//! ```
+
+use super::{AxisChannel, START_TIME_OUT};
+use profile_cip::target::drive_link::DriveImage;
+use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::image::FeedbackSet;
+use profile_generic::interpolation::SetPoints as FinePoints;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::{Acceleration, Torque, Velocity};
+use profile_generic::sequence::{Order, Sensed, SequenceStep, SequenceTimes, StopPlan, StopRamp};
+use profile_generic::state::{Action, DriveState, Report, Request};
+use profile_generic::time::{MonotonicTime, SystemTime};
+
+/// How an axis is to start and stop, as controller and configuration have it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StopSettings {
+    /// How a disable stops it.
+    pub plan: StopPlan,
+    /// Delays and limits.
+    pub times: SequenceTimes,
+    /// Deceleration of a ramped stop; without one the drive decelerates by itself.
+    pub deceleration: Option<Acceleration>,
+    /// It may be started while it moves, at the speed it has.
+    pub flying_start: bool,
+}
+
+impl AxisChannel {
+    /// Says how the axis is to start and stop from now on. A stop under way keeps its method.
+    pub fn set_stop_settings(&mut self, settings: StopSettings) {
+        self.stop_settings = settings;
+    }
+
+    /// Where in a start or stop the axis is.
+    #[must_use]
+    pub fn sequence_step(&self) -> SequenceStep {
+        self.sequencer.step()
+    }
+
+    fn sensed(&self) -> Sensed {
+        let report = self.feedback.report;
+        let heard = report != Report::Silent && self.feedback.present.contains(FeedbackSet::VELOCITY);
+        Sensed {
+            torque: self.may_have_torque() || report.has_torque(),
+            follows: self.state() == DriveState::Operating && report == Report::Operating,
+            halted: report == Report::Halted && self.action == Action::Halt,
+            velocity: heard.then_some(self.feedback.velocity),
+        }
+    }
+
+    /// The axis begins to start: it stands where it is, or goes on as fast as it is, until the controller's first
+    /// set-points.
+    pub(super) fn prepare_start(&mut self, now: MonotonicTime) {
+        self.sequencer.start(now);
+        self.ramp = None;
+        self.sequence = None;
+        self.start_interpolator();
+        let velocity = self.feedback.velocity;
+        let stands =
+            velocity.get().unsigned_abs() <= self.stop_settings.times.zero_speed.get().unsigned_abs();
+        let catches = self.stop_settings.flying_start && !stands;
+        self.caught = catches.then_some(velocity);
+        self.command.mode = if catches { OperatingMode::Velocity } else { OperatingMode::Position };
+    }
+
+    pub(super) fn begin_stop(&mut self, now: MonotonicTime, system: SystemTime, plan: StopPlan) {
+        match self.sequencer.stop(now, plan, &self.sensed(), &self.stop_settings.times) {
+            Some(order) => self.carry_out(now, system, order),
+            // The state machine may know of torque that no sequence does.
+            None => self.request(now, system, Request::Disable),
+        }
+    }
+
+    /// Time passes in a start or stop.
+    pub(super) fn go_on_with_sequence(&mut self, now: MonotonicTime, system: SystemTime) {
+        let late = now.since(self.sequencer.since()) > START_TIME_OUT;
+        if self.sequencer.step() == SequenceStep::Energizing && self.state() == DriveState::Operating && late
+        {
+            // Out of a hold, where the state machine waits for nothing: the drive does not follow again.
+            let fault = Fault::new(FaultCause::START_TIME_OUT, system);
+            self.raise(now, system, fault.with_reaction(Reaction::DecelerateAndDisable));
+        }
+        if let Some(order) = self.sequencer.poll(now, &self.sensed(), &self.stop_settings.times) {
+            self.carry_out(now, system, order);
+        }
+    }
+
+    fn carry_out(&mut self, now: MonotonicTime, system: SystemTime, order: Order) {
+        match order {
+            Order::Enable => self.request(now, system, Request::Enable),
+            Order::TorqueOff => self.request(now, system, Request::Coast),
+            Order::Disable => self.request(now, system, Request::Disable),
+            Order::Halt => self.request(now, system, Request::Stop),
+            Order::Ramp => self.begin_ramp(now, system),
+            Order::TimeOut => {
+                let fault = Fault::new(FaultCause::STOP_TIME_OUT, system);
+                self.raise(now, system, fault.with_reaction(Reaction::CoastAndDisable));
+            }
+        }
+    }
+
+    fn begin_ramp(&mut self, now: MonotonicTime, system: SystemTime) {
+        // From the last command, not from what the drive has made of it: the command does not step.
+        let velocity = match self.command.mode {
+            OperatingMode::Position | OperatingMode::Velocity => self.command.velocity,
+            _ => {
+                self.command.mode = OperatingMode::Velocity;
+                self.feedback.velocity
+            }
+        };
+        let deceleration = self.stop_settings.deceleration.unwrap_or_default();
+        self.ramp = StopRamp::new(self.made_at, self.command.position, velocity, deceleration);
+        if self.ramp.is_none() {
+            let plan = StopPlan {
+                method: profile_generic::sequence::StopMethod::Decelerate,
+                ..self.stop_settings.plan
+            };
+            self.begin_stop(now, system, plan);
+        }
+    }
+
+    /// The command while no controller leads the axis.
+    pub(super) fn led_by_box(&mut self, now: MonotonicTime) -> FinePoints {
+        // What the controller had added to its set-points ends with them.
+        self.command.velocity_offset = Velocity::ZERO;
+        self.command.torque_offset = Torque::ZERO;
+        match (self.ramp, self.caught) {
+            (Some(ramp), _) => {
+                let (position, velocity) = ramp.at(now);
+                FinePoints { position: Some(position), velocity: Some(velocity), ..FinePoints::default() }
+            }
+            (None, velocity) => FinePoints { velocity, ..FinePoints::default() },
+        }
+    }
+
+    /// Whether the drive moves the axis by itself, or nobody does: the command follows it.
+    pub(super) fn drive_leads(&self) -> bool {
+        match self.sequencer.step() {
+            SequenceStep::Energizing
+            | SequenceStep::Releasing
+            | SequenceStep::Running
+            | SequenceStep::Ramping => false,
+            SequenceStep::Engaging => self.action != Action::Enable,
+            SequenceStep::Off
+            | SequenceStep::Coasting
+            | SequenceStep::Braking
+            | SequenceStep::SwitchingOff
+            | SequenceStep::Holding => true,
+        }
+    }
+
+    /// The state machine goes to another state: a sequence that it does not fit into ends.
+    pub(super) fn follow_sequence(&mut self, now: MonotonicTime, next: DriveState) {
+        match next {
+            DriveState::Starting => self.prepare_start(now),
+            DriveState::Operating | DriveState::Testing => {}
+            DriveState::Stopping => {
+                self.ramp = None;
+                self.caught = None;
+                self.sequencer.drive_stops(now);
+            }
+            _ => {
+                self.ramp = None;
+                self.caught = None;
+                if self.sequencer.step() != SequenceStep::SwitchingOff {
+                    self.sequencer.lose_torque(now);
+                }
+            }
+        }
+    }
+
+    /// What the sequence says about start and stop.
+    pub(super) fn sequence_image(&self, image: &mut DriveImage) {
+        let step = self.sequencer.step();
+        image.start_complete &= step == SequenceStep::Running;
+        image.tracking &= step == SequenceStep::Running;
+        image.stop_complete = match step {
+            SequenceStep::Holding => true,
+            SequenceStep::Off => image.stop_complete,
+            _ => false,
+        };
+    }
+}
