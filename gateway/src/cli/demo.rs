@@ -5,6 +5,7 @@
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::progress::Progress;
@@ -13,6 +14,7 @@ use super::{CliError, DemoArguments, signal};
 use crate::config::Config;
 use crate::mapping::Mapping;
 use crate::runner::{self, RunningBox, StartError};
+use crate::settings::Store;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
@@ -53,8 +55,8 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         .collect();
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
-    let running =
-        runner::start(&config, Some(&arguments.capture)).map_err(|error| in_use(error, arguments.listen))?;
+    let running = runner::start(&config, Some(&arguments.capture), &Arc::new(Store::open(None)?))
+        .map_err(|error| in_use(error, arguments.listen))?;
     progress.step(&format!(
         "gateway on {}, a simulated line of {} drives behind",
         arguments.listen,

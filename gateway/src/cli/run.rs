@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -11,6 +12,7 @@ use tracing_subscriber::EnvFilter;
 use super::{CliError, RunArguments};
 use crate::config::{Config, LogLevel};
 use crate::runner;
+use crate::settings::Store;
 
 /// How often the box is looked after.
 const LOOK_INTERVAL: Duration = Duration::from_millis(200);
@@ -21,15 +23,21 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     log_to_stderr(config.log_level);
     let stop = super::signal::stop_on_signals()?;
     info!(name = config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
-    while run_once(&config, arguments.capture.as_deref(), &stop)? {
+    let settings = Arc::new(Store::open(config.settings_file.as_deref())?);
+    while run_once(&config, arguments.capture.as_deref(), &settings, &stop)? {
         info!("axisbridge starts anew: a controller has reset the Identity object");
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Runs the box once; `true` when it is to be started again.
-fn run_once(config: &Config, capture: Option<&Path>, stop: &AtomicBool) -> Result<bool, CliError> {
-    let running = runner::start(config, capture)?;
+fn run_once(
+    config: &Config,
+    capture: Option<&Path>,
+    settings: &Arc<Store>,
+    stop: &AtomicBool,
+) -> Result<bool, CliError> {
+    let running = runner::start(config, capture, settings)?;
     let mut told = false;
     while !stop.load(Ordering::Relaxed) && !running.wants_restart() {
         std::thread::sleep(LOOK_INTERVAL);

@@ -112,6 +112,14 @@ impl Checker {
             None => None,
         };
 
+        let settings_file = match &file.the_box.settings_file {
+            Some(path) if path.get_ref().is_empty() => {
+                return self.report(path.span(), "the settings file has no name", "expected a path");
+            }
+            Some(path) => Some(PathBuf::from(path.get_ref())),
+            None => None,
+        };
+
         let sercos = self.sercos(&file.south.sercos);
         let cycle_time = sercos.as_ref().map_or(DurationNs(0), |sercos| sercos.cycle_time);
 
@@ -139,6 +147,7 @@ impl Checker {
             log_level: log_level?,
             modbus,
             mappings_dir,
+            settings_file,
             devices: devices.into_iter().collect::<Option<_>>()?,
             axes: axes.into_iter().collect::<Option<_>>()?,
             sercos: sercos?,

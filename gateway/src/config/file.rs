@@ -35,6 +35,9 @@ pub struct File {
 pub struct BoxTable {
     /// Name of the box in logs, recordings and the status block.
     pub name: Spanned<String>,
+    /// A file in which the box keeps what controllers set over the network; counts from the folder of this file.
+    /// Default: none, and settings last until the process ends.
+    pub settings_file: Option<Spanned<String>>,
 }
 
 /// `[time]`

@@ -41,6 +41,8 @@ pub struct Config {
     pub modbus: Option<Modbus>,
     /// A folder of mapping tables in place of the built-in ones.
     pub mappings_dir: Option<PathBuf>,
+    /// Where what controllers set is kept; `None` keeps it until the process ends.
+    pub settings_file: Option<PathBuf>,
     /// The CIP Motion devices seen by controllers.
     pub devices: Vec<Device>,
     /// All axes, in the order of the file.
@@ -63,8 +65,10 @@ impl Config {
         }
         let source = std::fs::read_to_string(path).map_err(unreadable)?;
         let mut config = Self::parse(&source, &name)?;
-        if let (Some(dir), Some(folder)) = (&mut config.mappings_dir, path.parent()) {
-            *dir = folder.join(&*dir);
+        if let Some(folder) = path.parent() {
+            for path in config.mappings_dir.iter_mut().chain(&mut config.settings_file) {
+                *path = folder.join(&*path);
+            }
         }
         Ok(config)
     }

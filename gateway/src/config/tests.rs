@@ -59,7 +59,7 @@ fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
     assert_eq!((config.time, config.log_level, config.modbus), (TimeSource::Host, LogLevel::Info, None));
-    assert_eq!(config.mappings_dir, None);
+    assert_eq!((&config.mappings_dir, &config.settings_file), (&None, &None));
     let device = &config.devices[0];
     assert_eq!(
         (device.update_period_min, device.update_period_max),
@@ -322,14 +322,18 @@ fn every_example_loads() {
 }
 
 #[test]
-fn the_mappings_folder_counts_from_the_file() {
+fn paths_count_from_the_file() {
     let folder = std::env::temp_dir().join(format!("axisbridge-config-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("box.toml");
-    std::fs::write(&path, GOOD.replace("[[device]]", "[mappings]\ndir = \"maps\"\n[[device]]")).unwrap();
+    let text = GOOD
+        .replace("[[device]]", "[mappings]\ndir = \"maps\"\n[[device]]")
+        .replace("[box]", "[box]\nsettings_file = \"set.toml\"");
+    std::fs::write(&path, text).unwrap();
     let config = Config::load(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(config.mappings_dir, Some(folder.join("maps")));
+    assert_eq!(config.settings_file, Some(folder.join("set.toml")));
 }
 
 #[test]

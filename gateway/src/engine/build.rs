@@ -1,6 +1,8 @@
 //! From a configuration to an engine and the adapters beside it.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::net::Ipv4Addr;
+use std::sync::Arc;
 
 use arrayvec::{ArrayString, ArrayVec};
 use profile_cip::target::axis_object::AxisConfig;
@@ -8,6 +10,7 @@ use profile_cip::target::axis_state::ControlKind;
 use profile_cip::target::config::{
     AdapterConfig, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
 };
+use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
 use profile_cip::wire::motion::codes::EventChecking;
 use profile_generic::fault::Reaction;
@@ -269,10 +272,19 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
     }
 }
 
+/// A number that differs between two configurations of a device and its axes.
+fn configuration(device: &Device, members: &[(usize, &Axis)]) -> u16 {
+    let mut hasher = DefaultHasher::new();
+    format!("{device:?} {members:?}").hash(&mut hasher);
+    let [low, high, ..] = hasher.finish().to_le_bytes();
+    u16::from_le_bytes([low, high])
+}
+
 fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
     let identity = &device.identity;
     let us =
         |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos() / 1000).unwrap_or(u32::MAX);
+    // The host knows the mask; without one, that of the class of old.
     let netmask = if device.listen.is_loopback() {
         Ipv4Addr::new(255, 0, 0, 0)
     } else {
@@ -287,13 +299,15 @@ fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ad
             minor: identity.revision_minor,
             serial_number: identity.serial_number,
             product_name: ArrayString::from(&identity.product_name).unwrap_or_default(),
+            configuration: configuration(device, members),
         },
         interface: InterfaceConfig::new(device.listen, netmask),
+        // The host knows more of it; it is told where there is a host.
         link: LinkConfig {
-            mac: host.mac,
-            speed_mbit: 100,
-            full_duplex: true,
+            mac: [0; 6],
             label: ArrayString::from(&device.name).unwrap_or_default(),
+            interface_type: InterfaceType::Unknown,
+            state: LinkState::default(),
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
@@ -308,6 +322,7 @@ fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ad
                 .map(|(_, axis)| axis.power_structure_axis_id)
                 .collect::<ArrayVec<_, 16>>(),
         },
+        eds: Arc::new([]),
         incarnation: host.incarnation,
     }
 }

@@ -21,6 +21,8 @@ mod statistics;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::test_adapter_config;
 
 use std::net::SocketAddrV4;
 

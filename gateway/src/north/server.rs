@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use profile_cip::target::adapter::{Adapter, DEVICE_TIMEOUT};
 use profile_cip::target::event::Event;
-use profile_cip::target::motion_link::{MotionReply, MotionRequest};
+use profile_cip::target::motion_link::{MotionReply, MotionRequest, OpenParameters};
 use profile_generic::time::{DurationNs, MonotonicTime};
 use tokio::net::{TcpStream, UdpSocket};
 use tokio::sync::{mpsc, watch};
@@ -60,6 +60,7 @@ const RETRY: Duration = Duration::from_millis(100);
 
 type Attend = Box<dyn FnMut(&mut Adapter) + Send>;
 type OnEvent = Box<dyn FnMut(&Event) + Send>;
+type OnOpen = Box<dyn FnMut(&OpenParameters) + Send>;
 
 /// The server of one device: listens once bound, answers in [`ExplicitServer::run`].
 pub struct ExplicitServer {
@@ -88,6 +89,7 @@ struct Core {
     link: AdapterEnd,
     tap: Option<Tap>,
     on_event: Option<OnEvent>,
+    on_open: Option<OnOpen>,
     /// Where answers to datagrams come from.
     address: SocketAddrV4,
     connections: HashMap<Id, Connection>,
@@ -137,6 +139,7 @@ impl ExplicitServer {
             link,
             tap,
             on_event: None,
+            on_open: None,
             connections: HashMap::with_capacity(STREAMS_MAX),
             held: None,
             owed: 0,
@@ -170,6 +173,14 @@ impl ExplicitServer {
     #[must_use]
     pub fn on_event(mut self, on_event: impl FnMut(&Event) + Send + 'static) -> Self {
         self.core.on_event = Some(Box::new(on_event));
+        self
+    }
+
+    /// Calls `on_open` with every motion connection before the motion device is asked to take it: the place to prepare the
+    /// socket it will use.
+    #[must_use]
+    pub fn on_open(mut self, on_open: impl FnMut(&OpenParameters) + Send + 'static) -> Self {
+        self.core.on_open = Some(Box::new(on_open));
         self
     }
 
@@ -390,6 +401,9 @@ impl Core {
     fn send_requests(&mut self, now: MonotonicTime) {
         let mut was_held = self.held.is_some();
         while let Some(request) = self.held.take().or_else(|| self.adapter.poll_motion()) {
+            if let (MotionRequest::Open(open), Some(on_open)) = (&request, &mut self.on_open) {
+                on_open(open);
+            }
             if let Err(request) = self.link.request(request) {
                 self.statistics.motion_requests_held += u64::from(!was_held);
                 self.held = Some(request);
@@ -452,7 +466,12 @@ impl Core {
             _ => {}
         }
         match event {
-            Event::MotionLost { .. } | Event::OpenRefused { .. } | Event::Reset { .. } => {
+            Event::MotionLost { .. }
+            | Event::ExplicitLost { .. }
+            | Event::SessionLost { .. }
+            | Event::DeviceSilent { .. }
+            | Event::OpenRefused { .. }
+            | Event::Reset { .. } => {
                 tracing::warn!("{event}");
             }
             _ => tracing::info!("{event}"),

@@ -1,6 +1,7 @@
 //! The server on loopback addresses, as clients and the cycle thread see it.
 
 mod client;
+mod marking;
 mod streams;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
@@ -15,6 +16,7 @@ use profile_cip::target::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
+use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::event::Event;
 use profile_cip::target::identity::Health;
 use profile_cip::target::motion_link::{ExplicitReply, MotionReply, MotionRequest, ObjectPath, OpenRefusal};
@@ -32,7 +34,12 @@ use client::{Client, PATH_AXIS_1, PATH_IDENTITY, motion_open};
 const LIMIT: Duration = Duration::from_secs(10);
 
 fn adapter(address: Ipv4Addr) -> Adapter {
-    Adapter::new(AdapterConfig {
+    Adapter::new(test_adapter_config(address)).unwrap()
+}
+
+/// A device with one axis.
+pub(crate) fn test_adapter_config(address: Ipv4Addr) -> AdapterConfig {
+    AdapterConfig {
         identity: IdentityConfig {
             vendor: 0x1234,
             device_type: DEVICE_TYPE_CIP_MOTION_DRIVE,
@@ -41,13 +48,20 @@ fn adapter(address: Ipv4Addr) -> Adapter {
             minor: 3,
             serial_number: 0xDEAD_BEEF,
             product_name: ArrayString::from("Axisbridge").unwrap(),
+            configuration: 0,
         },
         interface: InterfaceConfig::new(address, Ipv4Addr::new(255, 0, 0, 0)),
         link: LinkConfig {
             mac: [2, 0, 0, 0, 0, 9],
-            speed_mbit: 100,
-            full_duplex: true,
             label: ArrayString::from("north").unwrap(),
+            interface_type: InterfaceType::TwistedPair,
+            state: LinkState {
+                up: true,
+                enabled: true,
+                speed_mbit: 100,
+                full_duplex: true,
+                ..LinkState::default()
+            },
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
@@ -59,9 +73,9 @@ fn adapter(address: Ipv4Addr) -> Adapter {
             power_structure_class_id: 0x0A0B_0C0D,
             power_structure_axis_ids: ArrayVec::from_iter([0x11]),
         },
+        eds: Arc::new([]),
         incarnation: 0x7A00,
-    })
-    .unwrap()
+    }
 }
 
 /// A server at a free port of 127.0.0.`last`, and the device's end of its link.
@@ -111,6 +125,7 @@ fn willing(request: &MotionRequest) -> MotionReply {
     match request {
         MotionRequest::Open(open) => MotionReply::Opened { token: open.token, outcome: Ok(()) },
         MotionRequest::Close(close) => MotionReply::Closed { token: close.token },
+        MotionRequest::PrepareReset(token) => MotionReply::ResetPrepared { token: *token, granted: true },
         MotionRequest::Explicit(explicit) => MotionReply::Explicit(ExplicitReply {
             data: explicit.data.clone(),
             ..ExplicitReply::status(explicit.token, 0)
@@ -121,7 +136,9 @@ fn willing(request: &MotionRequest) -> MotionReply {
 #[tokio::test]
 async fn sessions_identity_and_lists_over_tcp_and_udp() {
     let (server, _device) = bind(61);
-    let handle = spawn(server.attend(|adapter| adapter.set_health(Health::MinorRecoverableFault)));
+    let handle = spawn(
+        server.attend(|adapter| adapter.set_health(Health { minor_recoverable: true, ..Health::default() })),
+    );
     let mut client = Client::register(handle.address()).await;
     // Vendor ID, product name, status: no I/O connection (3 in bits 7..4), minor recoverable fault (bit 8).
     assert_eq!(client.get(PATH_IDENTITY, 1).await, [0x34, 0x12]);
@@ -224,7 +241,7 @@ async fn a_refusal_and_the_loss_of_the_connection_come_from_the_device() {
     // Nobody waits for anything now; still the notice is seen, and the connection is free again.
     end.reply(MotionReply::ConnectionLost { o_to_t_id: open.o_to_t_id, silent_us: 32_000 }).unwrap();
     let lost = async {
-        while client.get(PATH_IDENTITY, 5).await != [0x30, 0] {
+        while client.get(PATH_IDENTITY, 5).await != [0x20, 0] {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     };

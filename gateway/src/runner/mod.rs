@@ -17,9 +17,10 @@ use std::time::{Duration, SystemTime as WallClock};
 
 use profile_cip::target::adapter::Adapter;
 use profile_cip::target::event::Event;
-use profile_cip::target::identity::Health;
+use profile_cip::target::identity::{Health, ModuleState};
 use profile_cip::target::motion_device::SyncState;
 use profile_cip::wire::motion::codes::AxisStateCode;
+use profile_generic::fault::FaultClass;
 use tracing::{info, warn};
 
 use self::cycle::{CycleThread, Setup};
@@ -29,15 +30,17 @@ use crate::config::{Config, Link};
 use crate::engine::build::{BuildError, Built, Host, build};
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::SouthPort;
+use crate::host::HostPort;
 use crate::latest::Reader;
 use crate::mapping::{Mapping, TableErrors};
 use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
+use crate::settings::Store;
 use crate::simulate::line::InProcessLine;
 use crate::simulate::setup::HOST_CLOCK;
 use crate::status::{AxisStatus, BoxStatus};
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
-use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
+use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 
 /// Ethernet address of the master on simulated drives: locally administered.
 const SIMULATED_MAC: [u8; 6] = [0x02, 0x41, 0x42, 0x00, 0x00, 0x01];
@@ -112,11 +115,15 @@ pub struct RunningBox {
     restart: Arc<AtomicBool>,
 }
 
-/// Starts a box; `capture` records both sides.
+/// Starts a box; `capture` records both sides, and `settings` has what controllers set.
 ///
 /// # Errors
 /// [`StartError`]; nothing runs then.
-pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, StartError> {
+pub fn start(
+    config: &Config,
+    capture: Option<&Path>,
+    settings: &Arc<Store>,
+) -> Result<RunningBox, StartError> {
     let mapping = match &config.mappings_dir {
         Some(dir) => Mapping::from_folder(dir)?,
         None => Mapping::embedded()?,
@@ -126,7 +133,7 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
         Link::InProcess => None,
     };
     let mac = socket.as_ref().map_or(SIMULATED_MAC, PacketSocket::mac);
-    let Built { mut engine, adapters, notices, status } =
+    let Built { mut engine, mut adapters, notices, status } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
     engine.set_sync(SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 });
@@ -138,8 +145,17 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
         None => Box::new(InProcessLine::of(config, tap())),
     };
     let mut north = Vec::with_capacity(config.devices.len());
-    for device in &config.devices {
-        let socket = IoSocket::bind(SocketAddrV4::new(device.listen, PORT_IO), DSCP_URGENT)?;
+    let mut markers = Vec::with_capacity(config.devices.len());
+    let ports: Vec<_> = config.devices.iter().map(|device| HostPort::find(device.listen)).collect();
+    for ((device, (adapter, _)), port) in config.devices.iter().zip(&mut adapters).zip(&ports) {
+        if let Some(port) = port {
+            port.describe(adapter);
+        }
+        settings.apply(&device.name, adapter);
+        let address = SocketAddrV4::new(device.listen, PORT_IO);
+        let socket = IoSocket::bind(address, adapter.qos.urgent)?;
+        let system = |source| BindError::System { address, step: "dup", source };
+        markers.push(socket.marker().map_err(system)?);
         north.push(UdpPort::new(socket, tap()));
     }
 
@@ -152,13 +168,34 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
     let _inside = runtime.enter();
     let mut servers = Vec::with_capacity(adapters.len());
     let restart = Arc::new(AtomicBool::new(false));
-    for (number, (device, (adapter_config, end))) in config.devices.iter().zip(adapters).enumerate() {
+    let parts = adapters.into_iter().zip(ports).zip(markers);
+    for (number, (device, (((adapter_config, end), port), marker))) in
+        config.devices.iter().zip(parts).enumerate()
+    {
         let adapter = Adapter::new(adapter_config)
             .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
         let (source, asked) = (status.clone(), Arc::clone(&restart));
+        let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
-            .attend(move |adapter| adapter.set_health(health(&source.read(), number)))
+            .attend(move |adapter| {
+                adapter.set_health(Health {
+                    minor_recoverable: kept.is_unsaved(),
+                    ..health(&source.read(), number)
+                });
+                if let Some(port) = &port {
+                    adapter.set_link(port.state());
+                }
+            })
+            .on_open(move |open| {
+                // Data are sent unmarked rather than not at all.
+                if let Err(error) = marker.mark(open.t_to_o_dscp) {
+                    warn!(dscp = open.t_to_o_dscp, %error, "the data of the connection are not marked");
+                }
+            })
             .on_event(move |event| {
+                if let Err(error) = keeper.note(&name, event) {
+                    warn!(device = name, %error, "what was set cannot be written; it counts until the box ends");
+                }
                 if matches!(event, Event::Reset { .. }) {
                     asked.store(true, Ordering::Relaxed);
                 }
@@ -189,16 +226,18 @@ pub fn start(config: &Config, capture: Option<&Path>) -> Result<RunningBox, Star
     Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
 }
 
-/// How a device is, by the mapping of axis states to the Identity object (Volume 9, table 9-1.2).
+/// How a device is, by the states of its axes.
 fn health(status: &BoxStatus, device: usize) -> Health {
-    let faulted = |axis: &AxisStatus| {
-        usize::from(axis.device) == device
-            && [AxisStateCode::ABORTING.0, AxisStateCode::MAJOR_FAULTED.0].contains(&axis.cip_axis_state)
+    let axes = || status.configured_axes().iter().filter(|axis| usize::from(axis.device) == device);
+    let state = |axis: &AxisStatus| {
+        let initialization = axis.fault.is_some_and(|cause| cause.class() == FaultClass::Initialization);
+        ModuleState::of_axis(AxisStateCode(axis.cip_axis_state), initialization)
     };
-    if status.configured_axes().iter().any(faulted) {
-        Health::MajorRecoverableFault
-    } else {
-        Health::Operational
+    Health {
+        state: ModuleState::of_axes(axes().map(state)),
+        // A controller has given every axis its attributes.
+        configured: axes().all(|axis| axis.cip_axis_state != AxisStateCode::INITIALIZING.0),
+        ..Health::default()
     }
 }
 

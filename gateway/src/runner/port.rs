@@ -10,7 +10,7 @@ use crate::capture::recorder::Tap;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock;
 use crate::sys::packet_socket::PacketSocket;
-use crate::sys::udp::{DSCP_URGENT, IoSocket};
+use crate::sys::udp::IoSocket;
 
 /// The UDP socket of one motion device.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl NorthPort for UdpPort {
             if let Some(tap) = self.tap.as_mut() {
                 let at = datagram.at.unwrap_or_else(clock::realtime_now);
                 let payload = &buffer[..datagram.len];
-                tap.datagram(at, datagram.from, self.socket.local_address(), DSCP_URGENT << 2, payload);
+                tap.datagram(at, datagram.from, self.socket.local_address(), datagram.dscp << 2, payload);
             }
             return Some((datagram.len, datagram.from));
         }
@@ -46,7 +46,8 @@ impl NorthPort for UdpPort {
 
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
         if let Some(tap) = self.tap.as_mut() {
-            tap.datagram(clock::realtime_now(), self.socket.local_address(), to, DSCP_URGENT << 2, datagram);
+            let tos = self.socket.dscp() << 2;
+            tap.datagram(clock::realtime_now(), self.socket.local_address(), to, tos, datagram);
         }
         self.socket.send_to(datagram, to).is_ok()
     }

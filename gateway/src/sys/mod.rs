@@ -7,6 +7,7 @@
 //! Linux only: packet sockets, kernel time stamps and absolute sleeps are taken as Linux has them.
 
 pub mod clock;
+pub mod interfaces;
 pub mod packet_socket;
 pub mod realtime;
 pub mod udp;

@@ -16,9 +16,11 @@ pub(super) struct Message {
     pub truncated: bool,
     /// When the kernel took the message from the network.
     pub at: Option<KernelTime>,
+    /// Type of service octet of an IPv4 datagram: code point and congestion bits.
+    pub tos: Option<u8>,
 }
 
-/// Space for one `SCM_TIMESTAMPNS` control message, aligned as `cmsghdr` asks.
+/// Space for one `SCM_TIMESTAMPNS` and one `IP_TOS` control message, aligned as `cmsghdr` asks.
 #[repr(C, align(8))]
 struct Control([u8; 64]);
 
@@ -67,7 +69,7 @@ pub(super) fn receive<Address: PlainAddress>(
         };
     };
 
-    let mut at = None;
+    let (mut at, mut tos) = (None, None);
     // SAFETY: the kernel has filled `message`; the macros walk only within `msg_controllen` bytes of
     // `control`.
     let mut header = unsafe { libc::CMSG_FIRSTHDR(&raw const message) };
@@ -79,15 +81,24 @@ pub(super) fn receive<Address: PlainAddress>(
             let stamp = unsafe { libc::CMSG_DATA(header).cast::<libc::timespec>().read_unaligned() };
             at = Some(KernelTime(nanoseconds(stamp)));
         }
+        if level == libc::IPPROTO_IP && kind == libc::IP_TOS {
+            // SAFETY: this message carries one octet.
+            tos = Some(unsafe { libc::CMSG_DATA(header).read() });
+        }
         // SAFETY: as for CMSG_FIRSTHDR; `header` came from it.
         header = unsafe { libc::CMSG_NXTHDR(&raw const message, header) };
     }
-    Ok(Some(Message { len, truncated: message.msg_flags & libc::MSG_TRUNC != 0, at }))
+    Ok(Some(Message { len, truncated: message.msg_flags & libc::MSG_TRUNC != 0, at, tos }))
 }
 
 /// Asks the kernel to stamp received messages; `false` when it will not.
 pub(super) fn enable_time_stamps(socket: BorrowedFd<'_>) -> bool {
     set_option(socket, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32).is_ok()
+}
+
+/// Asks the kernel to tell the type of service octet of received datagrams.
+pub(super) fn enable_type_of_service(socket: BorrowedFd<'_>) -> io::Result<()> {
+    set_option(socket, libc::IPPROTO_IP, libc::IP_RECVTOS, &1_i32)
 }
 
 /// `setsockopt` with a plain C value.

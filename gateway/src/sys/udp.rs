@@ -8,12 +8,14 @@
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::os::fd::{AsFd, BorrowedFd};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 use thiserror::Error;
 
 use super::clock::KernelTime;
-use super::receive::{PlainAddress, enable_time_stamps, receive};
+use super::receive::{PlainAddress, enable_time_stamps, enable_type_of_service, receive};
 
 /// UDP port of EtherNet/IP implicit messages.
 pub const PORT_IO: u16 = 2222;
@@ -62,6 +64,8 @@ pub struct Datagram {
     pub from: SocketAddrV4,
     /// When the kernel took it from the network, where it says so.
     pub at: Option<KernelTime>,
+    /// Code point it is marked with, 0..=63.
+    pub dscp: u8,
 }
 
 /// An open socket.
@@ -70,6 +74,32 @@ pub struct IoSocket {
     socket: Socket,
     local: SocketAddrV4,
     time_stamps: bool,
+    dscp: Arc<AtomicU8>,
+}
+
+/// Changes what a socket marks its datagrams with, from another thread and without its knowing: the cycle thread spends no
+/// system call on it.
+#[derive(Debug)]
+pub struct Marker {
+    socket: Socket,
+    dscp: Arc<AtomicU8>,
+}
+
+impl Marker {
+    /// Marks everything sent from now on with this code point, 0 to 63.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn mark(&self, dscp: u8) -> io::Result<()> {
+        set_dscp(&self.socket, dscp)?;
+        self.dscp.store(dscp, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// The code point is the upper six bits of the octet once called type of service.
+fn set_dscp(socket: &Socket, dscp: u8) -> io::Result<()> {
+    socket.set_tos_v4(u32::from(dscp & 0x3F) << 2)
 }
 
 impl IoSocket {
@@ -83,8 +113,8 @@ impl IoSocket {
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP)).map_err(system("socket"))?;
         socket.set_nonblocking(true).map_err(system("O_NONBLOCK"))?;
         socket.set_reuse_address(true).map_err(system("SO_REUSEADDR"))?;
-        // The code point is the upper six bits of the octet once called type of service.
-        socket.set_tos_v4(u32::from(dscp & 0x3F) << 2).map_err(system("IP_TOS"))?;
+        set_dscp(&socket, dscp).map_err(system("IP_TOS"))?;
+        enable_type_of_service(socket.as_fd()).map_err(system("IP_RECVTOS"))?;
         // A smaller buffer than asked for is still a working one.
         let _ = socket.set_recv_buffer_size(RECEIVE_BUFFER_LEN);
         let time_stamps = enable_time_stamps(socket.as_fd());
@@ -98,7 +128,22 @@ impl IoSocket {
             .map_err(system("getsockname"))?
             .as_socket_ipv4()
             .unwrap_or(SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0));
-        Ok(Self { socket, local, time_stamps })
+        Ok(Self { socket, local, time_stamps, dscp: Arc::new(AtomicU8::new(dscp)) })
+    }
+
+    /// What changes the marking of this socket, also from another thread.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn marker(&self) -> io::Result<Marker> {
+        // The options belong to the socket, not to the descriptor.
+        Ok(Marker { socket: self.socket.try_clone()?, dscp: Arc::clone(&self.dscp) })
+    }
+
+    /// The code point that datagrams are marked with.
+    #[must_use]
+    pub fn dscp(&self) -> u8 {
+        self.dscp.load(Ordering::Relaxed)
     }
 
     /// The address it is bound to.
@@ -131,7 +176,8 @@ impl IoSocket {
         let Some(message) = receive(self.socket.as_fd(), buffer, &mut from)? else { return Ok(None) };
         let ip = Ipv4Addr::from(u32::from_be(from.sin_addr.s_addr));
         let from = SocketAddrV4::new(ip, u16::from_be(from.sin_port));
-        Ok(Some(Datagram { len: message.len, truncated: message.truncated, from, at: message.at }))
+        let dscp = message.tos.unwrap_or(0) >> 2;
+        Ok(Some(Datagram { len: message.len, truncated: message.truncated, from, at: message.at, dscp }))
     }
 }
 
@@ -190,9 +236,18 @@ mod tests {
     }
 
     #[test]
-    fn data_are_marked_with_the_code_point() {
-        let socket = any([127, 0, 0, 1]);
-        assert_eq!(socket.socket.tos_v4().unwrap(), 55 << 2);
+    fn datagrams_arrive_with_the_code_point_they_were_marked_with() {
+        let (a, b) = (any([127, 0, 0, 1]), any([127, 0, 0, 1]));
+        let marker = a.marker().unwrap();
+        for dscp in [55, 47, 0, 63] {
+            marker.mark(dscp).unwrap();
+            assert_eq!(a.dscp(), dscp);
+            a.send_to(&[1], b.local_address()).unwrap();
+            assert_eq!(wait(&b, &mut [0; 8]).dscp, dscp);
+        }
+        let plain = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        plain.send_to(&[1], b.local_address()).unwrap();
+        assert_eq!(wait(&b, &mut [0; 8]).dscp, 0, "what is not marked");
     }
 
     #[test]

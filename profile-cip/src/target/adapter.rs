@@ -19,13 +19,14 @@
 use core::net::SocketAddrV4;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::config::{AdapterConfig, ConfigError};
+use super::config::{AdapterConfig, ConfigError, QosConfig};
 use super::counters::Counters;
+use super::ethernet_link::LinkState;
 use super::event::Event;
 use super::identity::Health;
 use super::list;
 use super::motion_link::{MotionReply, MotionRequest, OpenParameters};
-use super::node::Node;
+use super::node::{Node, micros};
 use super::session::{Input, ReplyTo, Session};
 use crate::wire::Reader;
 use crate::wire::cpf::{EncapsulatedPacket, ItemType};
@@ -104,10 +105,14 @@ impl Adapter {
         self.node.health = health;
     }
 
-    /// Speed of the Ethernet port in Mbit/s, 0 without a link.
-    pub fn set_link(&mut self, speed_mbit: u32, full_duplex: bool) {
-        self.node.config.link.speed_mbit = speed_mbit;
-        self.node.config.link.full_duplex = full_duplex;
+    /// How the Ethernet port is, for the Ethernet Link object.
+    pub fn set_link(&mut self, state: LinkState) {
+        self.node.config.link.state = state;
+    }
+
+    /// The code points in use: those of the start. [`Adapter::config`] has those for the next one.
+    pub fn qos_in_use(&self) -> &QosConfig {
+        &self.node.qos_in_use
     }
 
     /// Takes a new stream. `None` if there are too many: the caller closes it.
@@ -128,6 +133,7 @@ impl Adapter {
         if self.session(slot).is_some() {
             self.sessions[slot.index] = None;
             self.node.connections.close_session(slot);
+            self.node.uploads.close_session(slot);
         }
     }
 
@@ -204,7 +210,9 @@ impl Adapter {
     pub fn complete(&mut self, now: MonotonicTime, reply: &MotionReply) -> Option<SessionSlot> {
         self.node.note(reply);
         let token = match reply {
-            MotionReply::Opened { token, .. } | MotionReply::Closed { token } => *token,
+            MotionReply::Opened { token, .. }
+            | MotionReply::Closed { token }
+            | MotionReply::ResetPrepared { token, .. } => *token,
             MotionReply::Explicit(explicit) => explicit.token,
             MotionReply::ConnectionLost { .. } => return None,
         };
@@ -256,9 +264,16 @@ impl Adapter {
                 let bytes = self.node.give_up(&transaction.awaited);
                 self.resume(now, slot, transaction, bytes, false);
                 self.pump(now, slot);
-            } else if session.inactive_at(inactivity).is_some_and(|at| at <= now) {
+            } else if let Some(at) = session.inactive_at(inactivity).filter(|at| *at <= now) {
                 session.closing = true;
+                let event = Event::SessionLost {
+                    peer: session.peer,
+                    registered: session.handle.is_some(),
+                    silent_us: micros(now - session.last_activity),
+                    timeout_us: micros(at - session.last_activity),
+                };
                 self.node.counters.sessions_timed_out += 1;
+                self.node.tell(event);
             }
         }
     }
@@ -440,6 +455,7 @@ impl Adapter {
         if data.data.len() > usize::from(connection.o_to_t_size) {
             return Err(MALFORMED);
         }
+        connection.heard = now;
         connection.deadline = now + connection.timeout;
         let sender_context = packet.sender_context;
         let reply_to = ReplyTo::Connected { sender_context, o_to_t_id, sequence };

@@ -3,6 +3,11 @@
 use arrayvec::{ArrayString, ArrayVec};
 use core::fmt;
 use core::net::Ipv4Addr;
+use std::sync::Arc;
+
+use super::ethernet_link::{InterfaceType, LinkState};
+use super::qos::DSCP_MAX;
+use super::tcp_ip::INACTIVITY_TIMEOUT_MAX_S;
 
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::encapsulation::{EXPLICIT_PORT, IO_PORT};
@@ -22,6 +27,9 @@ pub const MOTION_SIZE_MIN: u16 = 10;
 /// items.
 pub const MOTION_SIZE_MAX: u16 = 1454;
 
+/// Longest electronic data sheet in bytes: a sheet of every attribute of 16 axes has less than a tenth of it.
+pub const EDS_LEN_MAX: usize = 1 << 22;
+
 /// Everything the adapter is told at its start.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AdapterConfig {
@@ -35,6 +43,9 @@ pub struct AdapterConfig {
     pub qos: QosConfig,
     /// The motion connection.
     pub motion: MotionConfig,
+    /// Electronic data sheet of the device, served by the File object; empty for none, and then there is no such
+    /// object. At most [`EDS_LEN_MAX`] bytes.
+    pub eds: Arc<[u8]>,
     /// Where connection IDs and session handles start. A value that differs from run to run keeps a peer from
     /// taking a connection of the last run for one of this run.
     pub incarnation: u16,
@@ -57,6 +68,9 @@ pub struct IdentityConfig {
     pub serial_number: u32,
     /// Product name, ASCII.
     pub product_name: ArrayString<PRODUCT_NAME_MAX>,
+    /// Differs between two configurations of the application, for the Configuration Consistency Value (attribute 9);
+    /// what is set over the network comes on top of it.
+    pub configuration: u16,
 }
 
 impl IdentityConfig {
@@ -142,12 +156,12 @@ impl InterfaceConfig {
 pub struct LinkConfig {
     /// MAC address.
     pub mac: [u8; 6],
-    /// Speed in Mbit/s; 0 while there is no link.
-    pub speed_mbit: u32,
-    /// Full duplex.
-    pub full_duplex: bool,
     /// Name of the port.
     pub label: ArrayString<64>,
+    /// Kind of port.
+    pub interface_type: InterfaceType,
+    /// How the port is at the start; [`super::adapter::Adapter::set_link`] tells of it later.
+    pub state: LinkState,
 }
 
 /// DSCP values of the QoS object, each 0..=63. Set services change them; they are used from the next start
@@ -250,8 +264,11 @@ impl AdapterConfig {
         for value in
             [qos.ptp_event, qos.ptp_general, qos.urgent, qos.scheduled, qos.high, qos.low, qos.explicit]
         {
-            range("DSCP value", u64::from(value), 0, 63)?;
+            range("DSCP value", u64::from(value), 0, u64::from(DSCP_MAX))?;
         }
+        range("length of the electronic data sheet", self.eds.len() as u64, 0, EDS_LEN_MAX as u64)?;
+        let inactivity = u64::from(self.interface.inactivity_timeout_s);
+        range("inactivity time-out", inactivity, 0, u64::from(INACTIVITY_TIMEOUT_MAX_S))?;
         range("I/O port", u64::from(self.interface.io_port), 1, 65535)?;
         range("explicit port", u64::from(self.interface.explicit_port), 1, 65535)
     }
@@ -274,6 +291,7 @@ pub(super) mod tests {
                 minor: 3,
                 serial_number: 0xDEAD_BEEF,
                 product_name: ArrayString::from("Axisbridge").unwrap(),
+                configuration: 0,
             },
             interface: InterfaceConfig {
                 gateway: Ipv4Addr::new(10, 0, 0, 1),
@@ -283,9 +301,15 @@ pub(super) mod tests {
             },
             link: LinkConfig {
                 mac: [2, 0, 0, 0, 0, 9],
-                speed_mbit: 100,
-                full_duplex: true,
                 label: ArrayString::from("north").unwrap(),
+                interface_type: InterfaceType::TwistedPair,
+                state: LinkState {
+                    up: true,
+                    enabled: true,
+                    speed_mbit: 100,
+                    full_duplex: true,
+                    ..LinkState::default()
+                },
             },
             qos: QosConfig::default(),
             motion: MotionConfig {
@@ -297,6 +321,7 @@ pub(super) mod tests {
                 power_structure_class_id: 0x0A0B_0C0D,
                 power_structure_axis_ids: ArrayVec::from_iter([0x11, 0x22]),
             },
+            eds: Arc::new([]),
             incarnation: 0x7A00,
         }
     }

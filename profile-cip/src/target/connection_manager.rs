@@ -16,14 +16,18 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::adapter::SessionSlot;
 use super::motion_link::{ConnectionTriad, OpenParameters, Token};
-use super::object::Object;
 use super::refusal::Refusal;
 use crate::wire::forward_open::{ForwardOpen, Trigger};
 use crate::wire::network_parameters::ConnectionType;
-use crate::wire::status::{ConnectionStatus, GeneralStatus};
+use crate::wire::status::ConnectionStatus;
 
 /// Most explicit connections at once: five controllers with six each, as ODVA recommends to expect.
 pub const EXPLICIT_CONNECTIONS_MAX: usize = 32;
+
+/// Most connections at once: the motion connection and the explicit ones. Connection numbers are below it.
+pub const CONNECTIONS_MAX: u16 = 33;
+
+const _: () = assert!(CONNECTIONS_MAX as usize == EXPLICIT_CONNECTIONS_MAX + 1);
 
 /// Most explicit connections of one session, so that one peer cannot take them all.
 pub const EXPLICIT_PER_SESSION_MAX: usize = 8;
@@ -52,6 +56,8 @@ pub(super) enum Motion {
 pub(super) struct Owner {
     pub open: OpenParameters,
     pub peer: SocketAddrV4,
+    /// Time-out multiplier code of the Forward_Open.
+    pub multiplier: u8,
 }
 
 /// What the motion device has been asked, and until when it may answer.
@@ -82,8 +88,10 @@ impl Motion {
 /// An explicit (class 3) connection.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Explicit {
+    /// From 1, the same as long as the connection lives; 0 is the motion connection.
+    pub number: u16,
     pub session: SessionSlot,
-    pub peer: Ipv4Addr,
+    pub peer: SocketAddrV4,
     pub triad: ConnectionTriad,
     pub o_to_t_id: u32,
     pub t_to_o_id: u32,
@@ -91,7 +99,14 @@ pub(super) struct Explicit {
     pub o_to_t_size: u16,
     /// Largest message to be sent, sequence count included.
     pub t_to_o_size: u16,
+    /// Packet intervals in microseconds, O->T and T->O.
+    pub intervals_us: (u32, u32),
+    /// Time-out multiplier code of the Forward_Open.
+    pub multiplier: u8,
     pub timeout: DurationNs,
+    /// When the last message came, or the connection was opened.
+    pub heard: MonotonicTime,
+    /// When the connection is over without another message.
     pub deadline: MonotonicTime,
     pub last_sequence: Option<u16>,
     pub last_reply: Vec<u8>,
@@ -101,6 +116,8 @@ pub(super) struct Explicit {
 #[derive(Debug)]
 pub(super) struct ConnectionManager {
     pub motion: Motion,
+    /// Whether the last motion connection has timed out, until the next one.
+    pub motion_lost: bool,
     pub explicit: Vec<Explicit>,
     next_id: u32,
 }
@@ -108,7 +125,8 @@ pub(super) struct ConnectionManager {
 impl ConnectionManager {
     pub fn new(incarnation: u16) -> Self {
         let next_id = u32::from(incarnation) << 16 | 1;
-        Self { motion: Motion::Closed, explicit: Vec::with_capacity(EXPLICIT_CONNECTIONS_MAX), next_id }
+        let explicit = Vec::with_capacity(EXPLICIT_CONNECTIONS_MAX);
+        Self { motion: Motion::Closed, motion_lost: false, explicit, next_id }
     }
 
     /// A connection ID nobody uses.
@@ -142,7 +160,7 @@ impl ConnectionManager {
         &mut self,
         now: MonotonicTime,
         session: SessionSlot,
-        peer: Ipv4Addr,
+        peer: SocketAddrV4,
         open: &ForwardOpen<'_>,
     ) -> Result<u32, Refusal> {
         check_explicit(open)?;
@@ -152,7 +170,11 @@ impl ConnectionManager {
         }
         let timeout = timeout_ns(open);
         let o_to_t_id = self.new_id();
+        let free = |number: &u16| self.explicit.iter().all(|one| one.number != *number);
+        // There are as many numbers as places, and a place is free.
+        let number = (1..=CONNECTIONS_MAX).find(free).unwrap_or(CONNECTIONS_MAX);
         self.explicit.push(Explicit {
+            number,
             session,
             peer,
             triad: open.triad,
@@ -160,7 +182,10 @@ impl ConnectionManager {
             t_to_o_id: open.t_to_o_id,
             o_to_t_size: open.o_to_t.size,
             t_to_o_size: open.t_to_o.size,
+            intervals_us: (open.o_to_t_rpi_us, open.t_to_o_rpi_us),
+            multiplier: open.timeout_multiplier,
             timeout,
+            heard: now,
             deadline: now + timeout.max(FIRST_MESSAGE),
             last_sequence: None,
             last_reply: Vec::new(),
@@ -175,7 +200,7 @@ impl ConnectionManager {
 
     /// Closes the explicit connection of this triad, if it was opened from that address.
     pub fn close_explicit(&mut self, triad: ConnectionTriad, peer: Ipv4Addr) -> bool {
-        let found = self.explicit.iter().position(|one| one.triad == triad && one.peer == peer);
+        let found = self.explicit.iter().position(|one| one.triad == triad && *one.peer.ip() == peer);
         found.map(|at| self.explicit.swap_remove(at)).is_some()
     }
 
@@ -236,32 +261,4 @@ fn check_explicit(open: &ForwardOpen<'_>) -> Result<(), Refusal> {
         return Err(Refusal::intervals(0, 10_000, open.t_to_o_rpi_us.max(10_000)));
     }
     Ok(())
-}
-
-/// Attributes of the Connection Manager: what it has counted.
-pub(super) struct Statistics<'a>(pub &'a super::counters::Counters);
-
-impl Object for Statistics<'_> {
-    const REVISION: u16 = 1;
-    const ALL: &'static [u16] = &[1, 2, 3, 4, 5, 6, 7, 8];
-    const ATTRIBUTE_MAX: u16 = 8;
-
-    fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
-        let c = self.0;
-        let count = match attribute {
-            1 => c.open_requests,
-            2 => c.open_format_rejects,
-            3 => c.open_resource_rejects,
-            4 => c.open_other_rejects,
-            5 => c.close_requests,
-            6 => c.close_format_rejects,
-            7 => c.close_other_rejects,
-            8 => c.connection_timeouts,
-            _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
-        };
-        // The attributes are 16 bits wide and start over.
-        let [low, high, ..] = count.to_le_bytes();
-        out.extend([low, high]);
-        Ok(())
-    }
 }

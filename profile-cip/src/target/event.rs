@@ -2,6 +2,7 @@
 
 use super::config::QosConfig;
 use super::motion_link::ConnectionTriad;
+use crate::wire::status::Service;
 use core::fmt;
 use core::net::SocketAddrV4;
 
@@ -61,6 +62,30 @@ pub enum Event {
     ExplicitLost {
         /// Which one.
         triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// Silence in microseconds.
+        silent_us: u64,
+        /// Permitted silence in microseconds.
+        timeout_us: u64,
+    },
+    /// A stream was closed for silence: no whole packet for too long.
+    SessionLost {
+        /// Whose.
+        peer: SocketAddrV4,
+        /// Whether a session was registered on it.
+        registered: bool,
+        /// Silence in microseconds.
+        silent_us: u64,
+        /// Permitted silence in microseconds.
+        timeout_us: u64,
+    },
+    /// The motion device has not answered a request; the requester was told that it is not available.
+    DeviceSilent {
+        /// Service of the request.
+        service: Service,
+        /// How long its answer was waited for, in microseconds.
+        waited_us: u64,
     },
     /// The Identity object was reset; the reply is on its way. The application restarts the device.
     Reset {
@@ -85,11 +110,10 @@ impl fmt::Display for Event {
                 write!(f, "motion {triad} opened by {originator}, interval {rpi_us} us")
             }
             Self::MotionClosed { triad } => write!(f, "motion {triad} closed by its originator"),
-            Self::MotionLost { triad, originator, silent_us, timeout_us } => write!(
-                f,
-                "motion {triad} of {originator} timed out: nothing O->T for {silent_us} us, expected within \
-                 {timeout_us} us"
-            ),
+            Self::MotionLost { triad, originator, silent_us, timeout_us } => {
+                write!(f, "motion {triad} of {originator} timed out: ")?;
+                silence(f, silent_us, timeout_us)
+            }
             Self::OpenRefused { triad, originator, general, extended, found, expected } => {
                 write!(f, "{triad} of {originator} refused with {general:#04x}/{extended:#06x}")?;
                 match (expected, found) {
@@ -98,7 +122,18 @@ impl fmt::Display for Event {
                     _ => Ok(()),
                 }
             }
-            Self::ExplicitLost { triad } => write!(f, "explicit {triad} timed out"),
+            Self::ExplicitLost { triad, originator, silent_us, timeout_us } => {
+                write!(f, "explicit {triad} of {originator} timed out: ")?;
+                silence(f, silent_us, timeout_us)
+            }
+            Self::SessionLost { peer, registered, silent_us, timeout_us } => {
+                let what = if registered { "session" } else { "stream without a session" };
+                write!(f, "{what} of {peer} timed out: ")?;
+                silence(f, silent_us, timeout_us)
+            }
+            Self::DeviceSilent { service, waited_us } => {
+                write!(f, "{service}: no answer of the motion device within {waited_us} us")
+            }
             Self::Reset { kind, originator } => write!(f, "reset ({kind:?}) asked for by {originator}"),
             Self::QosChanged(qos) => write!(f, "DSCP values for the next start: {qos:?}"),
             Self::InactivityTimeoutChanged { seconds } => {
@@ -106,4 +141,10 @@ impl fmt::Display for Event {
             }
         }
     }
+}
+
+/// In which direction, for how long, and how late.
+fn silence(f: &mut fmt::Formatter<'_>, silent_us: u64, timeout_us: u64) -> fmt::Result {
+    let late_us = silent_us.saturating_sub(timeout_us);
+    write!(f, "nothing O->T for {silent_us} us, expected within {timeout_us} us, late by {late_us} us")
 }

@@ -68,7 +68,7 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
     }
     match application {
         Application::MessageRouter => {
-            let (session, peer) = (origin.session, *origin.peer.ip());
+            let (session, peer) = (origin.session, origin.peer);
             let o_to_t_id = node.connections.open_explicit(origin.now, session, peer, open)?;
             Ok(Opened::Now { o_to_t_id, t_to_o_id: open.t_to_o_id })
         }
@@ -76,6 +76,7 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             motion_open::check_path(&path, &node.config.motion)?;
             motion_open::check_parameters(open, &node.config.motion)?;
             node.connections.check_owner()?;
+            node.check_reset()?;
             open_motion(node, origin, open)
         }
     }
@@ -122,10 +123,11 @@ fn open_motion(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Resu
         t_to_o_size: open.t_to_o.size,
         o_to_t_variable: open.o_to_t.variable,
         t_to_o_variable: open.t_to_o.variable,
+        t_to_o_dscp: node.qos_in_use.of_priority(open.t_to_o.priority),
         format_revision: motion_open::FORMAT_REVISION,
     };
     node.ask(MotionRequest::Open(parameters)).map_err(|status| Refusal::new(status, 0))?;
-    let owner = Owner { open: parameters, peer: origin.peer };
+    let owner = Owner { open: parameters, peer: origin.peer, multiplier: open.timeout_multiplier };
     let asked = Asked { token: parameters.token, deadline: origin.now + DEVICE_TIMEOUT };
     node.connections.motion = Motion::Opening(owner, asked);
     Ok(Opened::Asked(parameters))

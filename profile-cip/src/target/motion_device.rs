@@ -455,6 +455,9 @@ impl MotionDevice {
                 self.reply(MotionReply::Closed { token: parameters.token });
             }
             MotionRequest::Explicit(request) => self.queue_explicit(request),
+            MotionRequest::PrepareReset(token) => {
+                self.reply(MotionReply::ResetPrepared { token, granted: !self.is_in_use() });
+            }
         }
         self.run_explicit();
     }

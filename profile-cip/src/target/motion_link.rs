@@ -37,6 +37,9 @@ pub enum MotionRequest {
     Close(CloseParameters),
     /// Run an explicit service of the Motion Device Axis Object; answered with [`MotionReply::Explicit`].
     Explicit(ExplicitRequest),
+    /// Say whether the device may be started anew, which takes power and command away from every axis; answered with
+    /// [`MotionReply::ResetPrepared`]. Nothing is opened behind it until the answer.
+    PrepareReset(Token),
 }
 
 impl MotionRequest {
@@ -46,6 +49,7 @@ impl MotionRequest {
             Self::Open(open) => open.token,
             Self::Close(close) => close.token,
             Self::Explicit(explicit) => explicit.token,
+            Self::PrepareReset(token) => *token,
         }
     }
 }
@@ -81,6 +85,9 @@ pub struct OpenParameters {
     pub o_to_t_variable: bool,
     /// Whether device-to-controller data may be shorter than `t_to_o_size`.
     pub t_to_o_variable: bool,
+    /// Code point that marks device-to-controller datagrams, 0..=63: the QoS object's for the priority of this
+    /// direction.
+    pub t_to_o_dscp: u8,
     /// Format revision of the connection data (the I/O connection point of the path).
     pub format_revision: u8,
 }
@@ -142,6 +149,13 @@ pub enum MotionReply {
     },
     /// Answer to [`MotionRequest::Explicit`].
     Explicit(ExplicitReply),
+    /// Answer to [`MotionRequest::PrepareReset`].
+    ResetPrepared {
+        /// Token of the request.
+        token: Token,
+        /// No connection is open and no axis is energized.
+        granted: bool,
+    },
     /// The connection ended without a Forward_Close: the controller was silent for too long. The connection
     /// is free for the next owner from here on.
     ConnectionLost {

@@ -5,24 +5,29 @@ use std::collections::VecDeque;
 
 use arrayvec::ArrayVec;
 use core::net::SocketAddrV4;
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::adapter::SessionSlot;
-use super::config::AdapterConfig;
-use super::connection_manager::{ConnectionManager, EXPLICIT_CONNECTIONS_MAX, Motion, Owner, Statistics};
+use super::adapter::{DEVICE_TIMEOUT, SessionSlot};
+use super::config::{AdapterConfig, QosConfig};
+use super::connection_data::{self, Statistics};
+use super::connection_manager::{CONNECTIONS_MAX, ConnectionManager, Motion, Owner};
 use super::counters::Counters;
+use super::ethernet_link::{CLASS_ETHERNET_LINK, Cleared, EthernetLink, GET_AND_CLEAR};
 use super::event::Event;
-use super::identity::{self, Health, Identity};
+use super::file_object::{Asker, CLASS_FILE, File, INSTANCE_EDS, Uploads};
+use super::identity::{Health, Identity, Ownership};
 use super::motion_link::{
     CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
     OpenParameters, Token,
 };
-use super::network_objects::{CLASS_ETHERNET_LINK, CLASS_QOS, CLASS_TCP_IP, EthernetLink, Qos, TcpIp};
 use super::object::{Answer, serve};
+use super::qos::{CLASS_QOS, Qos};
 use super::refusal::Refusal;
+use super::reset::{self, Reset};
 use super::router::{
     self, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS, MessageRouter,
 };
+use super::tcp_ip::{CLASS_TCP_IP, TcpIp};
 use super::{forward_close, forward_open, identity::CLASS_IDENTITY};
 use crate::wire::message_router::Request;
 use crate::wire::status::{ConnectionStatus, GeneralStatus, Service};
@@ -66,15 +71,21 @@ pub(super) enum AwaitKind {
     Open(OpenParameters, SocketAddrV4),
     Close(CloseParameters),
     Explicit,
+    Reset,
 }
 
 /// Everything the device keeps besides its sessions.
 #[derive(Debug)]
 pub(super) struct Node {
     pub config: AdapterConfig,
+    /// The code points of the start; those of the configuration are for the next one.
+    pub qos_in_use: QosConfig,
     pub health: Health,
     pub connections: ConnectionManager,
     pub counters: Counters,
+    pub reset: Reset,
+    pub uploads: Uploads,
+    cleared: Cleared,
     requests: VecDeque<MotionRequest>,
     events: VecDeque<Event>,
     next_token: u64,
@@ -86,6 +97,10 @@ impl Node {
             health: Health::default(),
             connections: ConnectionManager::new(config.incarnation),
             counters: Counters::default(),
+            reset: Reset::default(),
+            uploads: Uploads::default(),
+            cleared: Cleared::default(),
+            qos_in_use: config.qos,
             requests: VecDeque::with_capacity(REQUESTS_MAX),
             events: VecDeque::with_capacity(EVENTS_MAX),
             next_token: 1,
@@ -125,8 +140,26 @@ impl Node {
     }
 
     pub fn identity(&self) -> Identity<'_> {
-        let owned = matches!(self.connections.motion, Motion::Open(_));
-        Identity { config: &self.config.identity, health: self.health, owned }
+        let ownership = match self.connections.motion {
+            Motion::Open(_) => Ownership::Owned,
+            _ if self.connections.motion_lost => Ownership::Lost,
+            _ => Ownership::Free,
+        };
+        let config = &self.config.identity;
+        Identity { config, health: self.health, ownership, consistency: self.consistency() }
+    }
+
+    /// Configuration Consistency Value: differs when the application's configuration or a stored setting does.
+    fn consistency(&self) -> u16 {
+        let QosConfig { ptp_event, ptp_general, urgent, scheduled, high, low, explicit } = self.config.qos;
+        let [a, b] = self.config.interface.inactivity_timeout_s.to_le_bytes();
+        let settings = [ptp_event, ptp_general, urgent, scheduled, high, low, explicit, a, b];
+        // A CRC (CCITT polynomial), in which any one change of a setting shows.
+        settings.into_iter().fold(self.config.identity.configuration, |crc, byte| {
+            (0..8).fold(crc ^ u16::from(byte) << 8, |crc, _| {
+                if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ 0x1021 }
+            })
+        })
     }
 
     /// Runs one explicit request.
@@ -155,7 +188,16 @@ impl Node {
             (CLASS_CONNECTION_MANAGER, 1, Service::FORWARD_CLOSE) => {
                 return forward_close::close(self, origin, &request);
             }
-            (CLASS_IDENTITY, 1, Service::RESET) => self.reset(origin, request.data),
+            (CLASS_CONNECTION_MANAGER, 1, Service::GET_CONNECTION_DATA) => {
+                connection_data::get(&self.connections, &self.config.interface, request.data)
+            }
+            (CLASS_CONNECTION_MANAGER, 1, Service::SEARCH_CONNECTION_DATA) => {
+                connection_data::search(&self.connections, &self.config.interface, request.data)
+            }
+            (CLASS_IDENTITY, 1, Service::RESET) => return self.reset(origin, request.data),
+            (CLASS_ETHERNET_LINK, 1, GET_AND_CLEAR) => {
+                self.ethernet_link().get_and_clear(path.attribute, request.data)
+            }
             _ => self.attribute_service(origin, &request, &path),
         };
         if answer.status != GeneralStatus::SUCCESS {
@@ -164,7 +206,7 @@ impl Node {
         Step::Done(answer.into_reply(request.service, origin.reply_max))
     }
 
-    fn refuse(&mut self, service: Service, status: GeneralStatus) -> Step {
+    pub fn refuse(&mut self, service: Service, status: GeneralStatus) -> Step {
         self.counters.requests_refused += 1;
         Step::Done(Answer::status(status).into_reply(service, usize::MAX))
     }
@@ -176,10 +218,26 @@ impl Node {
             CLASS_MESSAGE_ROUTER => {
                 let explicit = u16::try_from(self.connections.explicit.len()).unwrap_or(u16::MAX);
                 let motion = u16::from(self.connections.motion.parameters().is_some());
-                let available = u16::try_from(EXPLICIT_CONNECTIONS_MAX + 1).unwrap_or(u16::MAX);
-                serve(&mut MessageRouter { available, active: explicit + motion }, service, path, data, limit)
+                let has_file = !self.config.eds.is_empty();
+                let mut router =
+                    MessageRouter { available: CONNECTIONS_MAX, active: explicit + motion, has_file };
+                serve(&mut router, service, path, data, limit)
             }
-            CLASS_CONNECTION_MANAGER => serve(&mut Statistics(&self.counters), service, path, data, limit),
+            CLASS_CONNECTION_MANAGER => {
+                let (counters, connections) = (&self.counters, &self.connections);
+                serve(&mut Statistics { counters, connections }, service, path, data, limit)
+            }
+            CLASS_FILE if !self.config.eds.is_empty() => {
+                let Self { config, uploads, .. } = self;
+                let mut file = File { eds: &config.eds, identity: &config.identity, uploads };
+                let asker = Asker { session: origin.session, now: origin.now, reply_max: limit };
+                let own = if path.instance == u32::from(INSTANCE_EDS) {
+                    file.serve(service, &asker, data)
+                } else {
+                    None
+                };
+                own.unwrap_or_else(|| serve(&mut file, service, path, data, limit))
+            }
             CLASS_QOS => {
                 let before = self.config.qos;
                 let answer = serve(&mut Qos(&mut self.config.qos), service, path, data, limit);
@@ -197,23 +255,13 @@ impl Node {
                 }
                 answer
             }
-            CLASS_ETHERNET_LINK => serve(&mut EthernetLink(&self.config.link), service, path, data, limit),
+            CLASS_ETHERNET_LINK => serve(&mut self.ethernet_link(), service, path, data, limit),
             _ => Answer::status(GeneralStatus::PATH_DESTINATION_UNKNOWN),
         }
     }
 
-    /// Reset of the Identity object. It would stop axes that move, so it is refused while a controller owns
-    /// them.
-    fn reset(&mut self, origin: &Origin, data: &[u8]) -> Answer {
-        let kind = match identity::reset_kind(data) {
-            Ok(kind) => kind,
-            Err(status) => return Answer::status(status),
-        };
-        if self.connections.motion.parameters().is_some() {
-            return Answer::status(GeneralStatus::DEVICE_STATE_CONFLICT);
-        }
-        self.tell(Event::Reset { kind, originator: origin.peer });
-        Answer::done(Vec::new())
+    fn ethernet_link(&mut self) -> EthernetLink<'_> {
+        EthernetLink { config: &self.config.link, cleared: &mut self.cleared }
     }
 
     fn hand_on(&mut self, request: &Request<'_>, path: ObjectPath) -> Step {
@@ -230,6 +278,7 @@ impl Node {
 
     /// Takes note of what the motion device did, whether or not somebody still waits for it.
     pub fn note(&mut self, reply: &MotionReply) {
+        self.note_reset(reply);
         match (reply, self.connections.motion) {
             (MotionReply::Opened { token, outcome }, Motion::Opening(owner, asked))
                 if *token == asked.token =>
@@ -238,6 +287,7 @@ impl Node {
                     self.connections.motion = Motion::Closed;
                 } else {
                     self.connections.motion = Motion::Open(owner);
+                    self.connections.motion_lost = false;
                     let OpenParameters { triad, rpi_us, .. } = owner.open;
                     self.tell(Event::MotionOpened { triad, originator: owner.peer, rpi_us });
                 }
@@ -250,6 +300,7 @@ impl Node {
                 Motion::Open(owner) | Motion::Closing(owner, _),
             ) if *o_to_t_id == owner.open.o_to_t_id => {
                 self.connections.motion = Motion::Closed;
+                self.connections.motion_lost = true;
                 self.counters.connection_timeouts += 1;
                 let OpenParameters { triad, timeout_us, .. } = owner.open;
                 let (originator, silent_us) = (owner.peer, *silent_us);
@@ -288,6 +339,7 @@ impl Node {
                 forward_open::opened(self, &open, peer, *outcome)
             }
             (AwaitKind::Close(close), MotionReply::Closed { .. }) => forward_close::closed(close.triad),
+            (AwaitKind::Reset, MotionReply::ResetPrepared { granted, .. }) => reset::prepared(*granted),
             (AwaitKind::Explicit, MotionReply::Explicit(reply)) => Answer {
                 status: GeneralStatus(reply.general_status),
                 extended: reply.extended_status.iter().copied().collect(),
@@ -305,6 +357,7 @@ impl Node {
     pub fn give_up(&mut self, awaited: &Await) -> Vec<u8> {
         self.counters.device_timeouts += 1;
         self.counters.requests_refused += 1;
+        self.tell(Event::DeviceSilent { service: awaited.service, waited_us: micros(DEVICE_TIMEOUT) });
         let answer = match awaited.kind {
             AwaitKind::Open(open, peer) => {
                 let refusal = Refusal::new(GeneralStatus::RESOURCE_UNAVAILABLE, 0);
@@ -314,7 +367,7 @@ impl Node {
                 data: forward_open::failure(close.triad, 0),
                 ..Answer::status(GeneralStatus::RESOURCE_UNAVAILABLE)
             },
-            AwaitKind::Explicit => Answer::status(GeneralStatus::RESOURCE_UNAVAILABLE),
+            AwaitKind::Explicit | AwaitKind::Reset => Answer::status(GeneralStatus::RESOURCE_UNAVAILABLE),
         };
         answer.into_reply(awaited.service, usize::MAX)
     }
@@ -342,7 +395,12 @@ impl Node {
 
     /// When the next connection times out.
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        self.connections.wake_at()
+        self.connections
+            .wake_at()
+            .into_iter()
+            .chain(self.reset_deadline())
+            .chain(self.uploads.wake_at())
+            .min()
     }
 
     /// Ends the connections whose time is up.
@@ -350,9 +408,21 @@ impl Node {
         if self.connections.motion.deadline().is_some_and(|deadline| deadline <= now) {
             self.motion_device_silent();
         }
+        self.expire_reset(now);
+        self.uploads.expire(now);
         while let Some(expired) = self.connections.take_expired(now) {
             self.counters.connection_timeouts += 1;
-            self.tell(Event::ExplicitLost { triad: expired.triad });
+            self.tell(Event::ExplicitLost {
+                triad: expired.triad,
+                originator: expired.peer,
+                silent_us: micros(now - expired.heard),
+                timeout_us: micros(expired.deadline - expired.heard),
+            });
         }
     }
+}
+
+/// Whole microseconds of a time that has passed.
+pub(super) fn micros(time: DurationNs) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(0) / 1000
 }

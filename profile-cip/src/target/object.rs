@@ -1,4 +1,4 @@
-//! The services every single-instance object has in common: reading and writing attributes.
+//! The services that every object with one instance has in common: reading and writing attributes.
 
 use arrayvec::ArrayVec;
 
@@ -57,19 +57,34 @@ pub(super) fn data_status(error: Error) -> GeneralStatus {
     }
 }
 
-/// An object with one instance, number 1.
+/// An object with one instance.
 pub(super) trait Object {
     /// Revision of the class (class attribute 1).
     const REVISION: u16;
+    /// Number of the instance (class attribute 2).
+    const INSTANCE: u16 = 1;
     /// Attributes of the instance in the order of Get_Attributes_All; empty without that service.
     const ALL: &'static [u16];
     /// Class attributes in the order of Get_Attributes_All; empty without that service.
     const CLASS_ALL: &'static [u16] = &[];
+    /// Highest attribute number of the class (class attribute 6).
+    const CLASS_ATTRIBUTE_MAX: u16 = 7;
     /// Highest attribute number of the instance (class attribute 7).
     const ATTRIBUTE_MAX: u16;
 
     /// Appends the value of an attribute.
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus>;
+
+    /// Appends the value of a class attribute beyond the common ones.
+    fn class_get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
+        let _ = (attribute, out);
+        Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)
+    }
+
+    /// Appends what Get_Attributes_All has in the place of an attribute that is not there.
+    fn absent(&self, attribute: u16, out: &mut Vec<u8>) {
+        let _ = (attribute, out);
+    }
 
     /// Length in bytes of an attribute that may be written.
     fn settable_len(&self, attribute: u16) -> Result<usize, GeneralStatus> {
@@ -93,7 +108,7 @@ pub(super) fn serve<T: Object>(
     data: &[u8],
     limit: usize,
 ) -> Answer {
-    if path.instance > 1 {
+    if path.instance != 0 && path.instance != u32::from(T::INSTANCE) {
         return Answer::status(GeneralStatus::PATH_DESTINATION_UNKNOWN);
     }
     if path.member.is_some() || path.connection_point.is_some() {
@@ -121,12 +136,12 @@ fn get<T: Object>(
     }
     let value: u16 = match attribute {
         1 => T::REVISION,
-        // Highest and number of instances.
-        2 | 3 => 1,
-        // Highest class attribute.
-        6 => 7,
+        2 => T::INSTANCE,
+        // Number of instances.
+        3 => 1,
+        6 => T::CLASS_ATTRIBUTE_MAX,
         7 => T::ATTRIBUTE_MAX,
-        _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        _ => return object.class_get(attribute, out),
     };
     out.extend(value.to_le_bytes());
     Ok(())
@@ -142,7 +157,11 @@ fn all<T: Object>(object: &T, of_class: bool, data: &[u8]) -> Result<Vec<u8>, Ge
     }
     let mut out = Vec::new();
     for attribute in attributes {
-        get(object, of_class, *attribute, &mut out)?;
+        let before = out.len();
+        if get(object, of_class, *attribute, &mut out).is_err() {
+            out.truncate(before);
+            object.absent(*attribute, &mut out);
+        }
     }
     Ok(out)
 }

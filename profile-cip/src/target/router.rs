@@ -1,10 +1,13 @@
 //! The Message Router object (class 0x02) and the way from a path to an object.
 
 use super::config::IdentityConfig;
+use super::ethernet_link::CLASS_ETHERNET_LINK;
+use super::file_object::CLASS_FILE;
 use super::identity::CLASS_IDENTITY;
 use super::motion_link::ObjectPath;
-use super::network_objects::{CLASS_ETHERNET_LINK, CLASS_QOS, CLASS_TCP_IP};
 use super::object::Object;
+use super::qos::CLASS_QOS;
+use super::tcp_ip::CLASS_TCP_IP;
 use crate::wire::epath::{self, Encoding, LogicalType, Segment};
 use crate::wire::status::GeneralStatus;
 
@@ -15,11 +18,12 @@ pub const CLASS_CONNECTION_MANAGER: u16 = 0x06;
 /// Class code of the Motion Device Axis Object.
 pub const CLASS_MOTION_DEVICE_AXIS: u16 = 0x42;
 
-/// Every class this device has.
-pub const CLASSES: [u16; 7] = [
+/// Every class a device has; the File object only with something to serve.
+const CLASSES: [u16; 8] = [
     CLASS_IDENTITY,
     CLASS_MESSAGE_ROUTER,
     CLASS_CONNECTION_MANAGER,
+    CLASS_FILE,
     CLASS_MOTION_DEVICE_AXIS,
     CLASS_QOS,
     CLASS_TCP_IP,
@@ -71,6 +75,8 @@ pub(super) struct MessageRouter {
     pub available: u16,
     /// Connections there are.
     pub active: u16,
+    /// Whether there is a file to serve.
+    pub has_file: bool,
 }
 
 impl Object for MessageRouter {
@@ -81,8 +87,9 @@ impl Object for MessageRouter {
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
         match attribute {
             1 => {
-                out.extend(u16::try_from(CLASSES.len()).unwrap_or(0).to_le_bytes());
-                out.extend(CLASSES.iter().flat_map(|class| class.to_le_bytes()));
+                let classes = CLASSES.into_iter().filter(|class| *class != CLASS_FILE || self.has_file);
+                out.extend(u16::try_from(classes.clone().count()).unwrap_or(0).to_le_bytes());
+                out.extend(classes.flat_map(u16::to_le_bytes));
             }
             2 => out.extend(self.available.to_le_bytes()),
             3 => out.extend(self.active.to_le_bytes()),

@@ -179,6 +179,10 @@ open_code! {
         UNCONNECTED_SEND = 0x52 => "Unconnected_Send",
         /// Opens a connection (Connection Manager).
         FORWARD_OPEN = 0x54 => "Forward_Open",
+        /// Data of a connection by its number (Connection Manager).
+        GET_CONNECTION_DATA = 0x56 => "Get_Connection_Data",
+        /// Data of a connection by its triad (Connection Manager).
+        SEARCH_CONNECTION_DATA = 0x57 => "Search_Connection_Data",
         /// Opens a connection of more than 511 bytes (Connection Manager).
         LARGE_FORWARD_OPEN = 0x5B => "Large_Forward_Open",
     }

@@ -49,10 +49,15 @@ pub fn triad(connection_serial: u16) -> ConnectionTriad {
 
 /// A Forward_Open of the motion connection that the device of these tests takes.
 pub fn motion_open(serial: u16) -> Vec<u8> {
+    motion_open_at(serial, Priority::URGENT)
+}
+
+/// The same at another priority.
+pub fn motion_open_at(serial: u16, priority: Priority) -> Vec<u8> {
     let size = |size| NetworkParameters {
         redundant_owner: false,
         connection_type: ConnectionType::POINT_TO_POINT,
-        priority: Priority::URGENT,
+        priority,
         variable: true,
         size,
     };

@@ -21,6 +21,7 @@ use crate::target::config::{
 use crate::target::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
 };
+use crate::target::ethernet_link::{InterfaceType, LinkState};
 use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use crate::target::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
@@ -145,6 +146,7 @@ fn adapter(io_port: u16) -> Adapter {
             minor: 3,
             serial_number: 0xDEAD_BEEF,
             product_name: ArrayString::from("Axisbridge").unwrap(),
+            configuration: 0,
         },
         interface: InterfaceConfig {
             io_port,
@@ -152,9 +154,15 @@ fn adapter(io_port: u16) -> Adapter {
         },
         link: LinkConfig {
             mac: [2, 0, 0, 0, 0, 9],
-            speed_mbit: 100,
-            full_duplex: true,
             label: ArrayString::from("north").unwrap(),
+            interface_type: InterfaceType::TwistedPair,
+            state: LinkState {
+                up: true,
+                enabled: true,
+                speed_mbit: 100,
+                full_duplex: true,
+                ..LinkState::default()
+            },
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
@@ -166,6 +174,7 @@ fn adapter(io_port: u16) -> Adapter {
             power_structure_class_id: 0x0A0B_0C0D,
             power_structure_axis_ids: ArrayVec::new(),
         },
+        eds: std::sync::Arc::new([]),
         incarnation: 0x7A00,
     })
     .unwrap()

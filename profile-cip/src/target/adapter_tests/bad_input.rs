@@ -4,7 +4,6 @@
 use proptest::prelude::*;
 
 use super::rig::*;
-use crate::target::motion_link::{ExplicitReply, MotionReply, MotionRequest};
 use crate::wire::cpf::ItemType;
 use crate::wire::encapsulation::{Command, EncapsulationStatus, HEADER_LEN};
 use crate::wire::forward_open::ForwardOpen;
@@ -288,19 +287,7 @@ proptest! {
             bytes[2..4].copy_from_slice(&u16::try_from(length).unwrap().to_le_bytes());
         }
         rig.feed(client.slot, &bytes);
-        let asked = rig.adapter.poll_motion();
-        if let Some(request) = asked {
-            let reply = match request {
-                MotionRequest::Open(open) =>
-                    MotionReply::Opened { token: open.token, outcome: Ok(()) },
-                MotionRequest::Close(close) =>
-                    MotionReply::Closed { token: close.token },
-                MotionRequest::Explicit(explicit) =>
-                    MotionReply::Explicit(
-                        ExplicitReply::status(explicit.token, 0)),
-            };
-            rig.complete(&reply);
-        }
+        rig.device_obliges();
         prop_assert_eq!(rig.received(client.slot).len(), 1);
         prop_assert_eq!(rig.get(client, PATH_IDENTITY, 1).data, [0x34, 0x12]);
     }

@@ -36,18 +36,19 @@ fn a_repeated_sequence_count_repeats_the_reply_and_not_the_service() {
     let mut rig = Rig::new();
     let client = rig.client(1);
     let id = rig.open_explicit(client, 1);
-    let reset = message(Service::RESET, PATH_IDENTITY, &[0]);
+    let set = message(Service::SET_ATTRIBUTE_SINGLE, &[0x20, 0x48, 0x24, 1, 0x30, 4], &[46]);
     for _ in 0..3 {
-        rig.send_connected(client, id, 7, &reset);
+        rig.send_connected(client, id, 7, &set);
         let (_, sequence, answer) = rig.connected_reply(client);
-        assert_eq!((sequence, answer.service, answer.status), (7, 5, 0));
+        assert_eq!((sequence, answer.service, answer.status), (7, 0x10, 0));
+        // Were it run again, it would be set again.
+        rig.adapter.node.config.qos.urgent = 1;
     }
-    let resets = rig.events().into_iter().filter(|event| matches!(event, Event::Reset { .. })).count();
-    assert_eq!(resets, 1);
+    assert_eq!(rig.adapter.config().qos.urgent, 1);
     assert_eq!(rig.adapter.counters().connected_repeated, 2);
     // Another request under the same count is taken for the repetition it claims to be.
     rig.send_connected(client, id, 7, GET_VENDOR);
-    assert_eq!(rig.connected_reply(client).2.service, 5);
+    assert_eq!(rig.connected_reply(client).2.service, 0x10);
     rig.send_connected(client, id, 8, GET_VENDOR);
     assert_eq!(rig.connected_reply(client).2.data, [0x34, 0x12]);
 }
@@ -139,7 +140,10 @@ fn a_silent_connection_times_out_and_its_session_goes_on() {
     assert_eq!(rig.adapter.explicit_connections(), 1);
     rig.pass(DurationNs::from_millis(1));
     assert_eq!(rig.adapter.explicit_connections(), 0);
-    assert_eq!(rig.events(), [Event::ExplicitLost { triad: triad(1) }]);
+    let originator = peer(1);
+    let lost =
+        Event::ExplicitLost { triad: triad(1), originator, silent_us: 16_000_000, timeout_us: 16_000_000 };
+    assert_eq!(rig.events(), [lost]);
     assert_eq!(rig.adapter.counters().connection_timeouts, 1);
     rig.open_explicit(client, 1);
     // Before its first message a connection has 10 s, however short its interval.

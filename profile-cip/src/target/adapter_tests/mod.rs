@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod explicit_connections;
+mod file_object;
 mod motion_connection;
 mod objects;
 mod rig;

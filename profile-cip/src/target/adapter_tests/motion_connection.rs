@@ -54,6 +54,7 @@ fn the_device_gets_what_was_asked_and_the_originator_what_was_given() {
             t_to_o_size: 230,
             o_to_t_variable: true,
             t_to_o_variable: true,
+            t_to_o_dscp: 55,
             format_revision: 2,
         }
     );
@@ -473,7 +474,7 @@ fn a_vanished_owner_frees_the_connection_at_once() {
     assert_eq!(
         rig.events().iter().map(Event::to_string).collect::<Vec<_>>(),
         ["motion connection 0x0001 of vendor 0x0001 serial 0x0000cafe of 10.0.0.1:50000 timed out: \
-             nothing O->T for 32050 us, expected within 32000 us"]
+             nothing O->T for 32050 us, expected within 32000 us, late by 50 us"]
     );
     assert_eq!(rig.adapter.counters().connection_timeouts, 1);
     rig.open_motion(b, 2);

@@ -329,6 +329,26 @@ impl Rig {
         request
     }
 
+    /// The motion device lets the box be started anew, or not.
+    pub fn device_prepares_reset(&mut self, granted: bool) {
+        let MotionRequest::PrepareReset(token) = self.motion_request() else { panic!("a reset request") };
+        self.complete(&MotionReply::ResetPrepared { token, granted });
+    }
+
+    /// Answers whatever the motion device is asked, as a willing device does.
+    pub fn device_obliges(&mut self) {
+        while let Some(request) = self.adapter.poll_motion() {
+            self.complete(&match request {
+                MotionRequest::Open(open) => MotionReply::Opened { token: open.token, outcome: Ok(()) },
+                MotionRequest::Close(close) => MotionReply::Closed { token: close.token },
+                MotionRequest::Explicit(explicit) => {
+                    MotionReply::Explicit(ExplicitReply::status(explicit.token, 0))
+                }
+                MotionRequest::PrepareReset(token) => MotionReply::ResetPrepared { token, granted: true },
+            });
+        }
+    }
+
     pub fn complete(&mut self, reply: &MotionReply) -> Option<SessionSlot> {
         self.adapter.complete(self.now, reply)
     }

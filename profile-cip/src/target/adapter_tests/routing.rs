@@ -183,9 +183,9 @@ fn unconnected_send_ends_here_or_nowhere() {
     let answer = rig.ask(client, &send(GET_VENDOR, &[1, 0]));
     assert_eq!((answer.service, answer.outcome(), answer.data), (0x52, (1, 0x311), vec![1]));
     // Odd length, motion device, packet inside.
-    let reset = message(Service::RESET, PATH_IDENTITY, &[0]);
-    assert_eq!(reset.len() % 2, 1);
-    assert_eq!(rig.ask(client, &send(&reset, &[])).outcome(), (0, 0));
+    let set = message(Service::SET_ATTRIBUTE_SINGLE, &[0x20, 0x48, 0x24, 1, 0x30, 4], &[46]);
+    assert_eq!(set.len() % 2, 1);
+    assert_eq!(rig.ask(client, &send(&set, &[])).outcome(), (0, 0));
     rig.send_unconnected(client, &send(GET_AXIS, &[]));
     rig.device_answers(&[5]);
     assert_eq!(rig.unconnected_reply(client).0.data, [5]);

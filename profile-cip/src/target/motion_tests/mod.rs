@@ -182,6 +182,7 @@ impl Rig {
             t_to_o_size: self.t_to_o_size,
             o_to_t_variable: true,
             t_to_o_variable: true,
+            t_to_o_dscp: 55,
             format_revision: 2,
         }
     }
