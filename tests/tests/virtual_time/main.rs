@@ -4,5 +4,6 @@ mod faults;
 mod loss;
 mod network;
 mod programs;
+mod stalled;
 mod stopping;
 mod torque;

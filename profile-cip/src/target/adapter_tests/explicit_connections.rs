@@ -260,3 +260,29 @@ fn connected_items_are_two() {
     let types: Vec<_> = body.packet.items.iter().map(|item| item.item_type).collect();
     assert_eq!(types, [ItemType::CONNECTED_ADDRESS, ItemType::CONNECTED_DATA]);
 }
+
+/// What originators expect of a device: three sessions and six connections of class 3 at least, several of them in a
+/// session, unconnected and connected messages at once. Here is what there is.
+#[test]
+fn capacity_that_originators_expect() {
+    let mut rig = Rig::new();
+    let clients: Vec<_> = (1..=4).map(|last| rig.client(last)).collect();
+    rig.open_motion(clients[0], 1000);
+    let mut ids = Vec::new();
+    for (serial, client) in (1..).zip(clients.iter().cycle().take(EXPLICIT_CONNECTIONS_MAX)) {
+        ids.push((*client, rig.open_explicit(*client, serial)));
+    }
+    for (client, id) in &ids {
+        rig.send_connected(*client, *id, 1, GET_VENDOR);
+        rig.send_unconnected(*client, GET_VENDOR);
+        let replies = rig.received(client.slot);
+        assert_eq!(
+            replies.iter().map(|reply| reply.header.command).collect::<Vec<_>>(),
+            [Command::SEND_UNIT_DATA, Command::SEND_RR_DATA]
+        );
+        assert!(replies.iter().all(|reply| reply.data.ends_with(&[0x8E, 0, 0, 0, 0x34, 0x12])));
+    }
+    assert_eq!(rig.adapter.explicit_connections(), 32);
+    assert_eq!(rig.get(clients[1], PATH_ROUTER, 3).data, [33, 0]);
+    assert_eq!(rig.refused(clients[2], &explicit_open(99)).outcome(), (1, 0x113));
+}

@@ -3,8 +3,11 @@
 mod bad_input;
 mod explicit_connections;
 mod file_object;
+mod malformed;
 mod motion_connection;
+mod network_objects;
 mod objects;
+mod other_targets;
 mod rig;
 mod routing;
 mod sessions;

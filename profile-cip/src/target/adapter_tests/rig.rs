@@ -239,6 +239,18 @@ impl Rig {
         self.the_one(slot)
     }
 
+    /// Status of an encapsulation packet that is refused.
+    pub fn encapsulation_status(
+        &mut self,
+        client: Client,
+        command: Command,
+        data: &[u8],
+    ) -> EncapsulationStatus {
+        let reply = self.exchange(client.slot, &packet(command, client.handle, data));
+        assert_eq!(reply.data, []);
+        reply.header.status
+    }
+
     pub fn the_one(&mut self, slot: SessionSlot) -> Received {
         let mut packets = self.received(slot);
         assert_eq!(packets.len(), 1, "one packet: {packets:02x?}");

@@ -60,33 +60,6 @@ fn unregister_session_ends_the_stream_without_an_answer() {
 }
 
 #[test]
-fn unregister_session_of_another_stream_is_refused() {
-    let mut rig = Rig::new();
-    let (a, b) = (rig.client(1), rig.client(2));
-    let reply = rig.exchange(b.slot, &packet(Command::UNREGISTER_SESSION, a.handle, &[]));
-    assert_eq!(reply.header.status, EncapsulationStatus::INVALID_SESSION_HANDLE);
-    assert_eq!(rig.adapter.counters().handles_invalid, 1);
-    assert_eq!(rig.get(a, PATH_IDENTITY, 1).status, 0);
-    assert_eq!(rig.get(b, PATH_IDENTITY, 1).status, 0);
-}
-
-#[test]
-fn a_session_handle_counts_on_its_own_stream_only() {
-    let mut rig = Rig::new();
-    let (a, b) = (rig.client(1), rig.client(2));
-    let stranger = rig.stream(3);
-    let get = unconnected(&message(Service::GET_ATTRIBUTES_ALL, PATH_IDENTITY, &[]));
-    for (slot, handle) in [(b.slot, a.handle), (stranger, a.handle), (stranger, 0), (a.slot, 0)] {
-        for command in [Command::SEND_RR_DATA, Command::SEND_UNIT_DATA] {
-            let reply = rig.exchange(slot, &packet(command, handle, &get));
-            assert_eq!(reply.header.status, EncapsulationStatus::INVALID_SESSION_HANDLE);
-            assert_eq!(reply.data, []);
-        }
-    }
-    assert_eq!(rig.adapter.counters().handles_invalid, 8);
-}
-
-#[test]
 fn nop_is_never_answered() {
     let mut rig = Rig::new();
     let client = rig.client(1);
@@ -186,24 +159,6 @@ fn a_packet_may_come_in_any_pieces() {
         assert_eq!(replies.len(), 3, "pieces of {size}");
         assert!(replies.iter().all(|reply| reply.data.ends_with(&[0x8E, 0, 0, 0, 0x34, 0x12])));
     }
-}
-
-#[test]
-fn a_stream_that_stalls_after_four_bytes_costs_nothing_and_is_closed_in_time() {
-    let mut rig = Rig::new();
-    let stalled = rig.stream(1);
-    let client = rig.client(2);
-    rig.feed(stalled, &[0x65, 0, 4, 0]);
-    assert_eq!(rig.get(client, PATH_IDENTITY, 1).status, 0, "others go on");
-    assert_eq!(rig.received(stalled), []);
-    rig.pass(DurationNs::from_millis(29_999));
-    assert!(!rig.adapter.is_done(stalled));
-    assert_eq!(rig.adapter.wake_at(), Some(rig.now + DurationNs::from_millis(1)));
-    rig.pass(DurationNs::from_millis(1));
-    assert!(rig.adapter.is_done(stalled));
-    assert!(!rig.adapter.is_done(client.slot));
-    assert_eq!(rig.adapter.ready().collect::<Vec<_>>(), [stalled]);
-    assert_eq!(rig.adapter.counters().sessions_timed_out, 1);
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod faults;
 mod handshake;
 mod refusals;
 mod requests;
+mod reset;
 mod robustness;
 mod services;
 mod startup;
