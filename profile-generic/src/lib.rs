@@ -22,6 +22,7 @@
 //! | [`sequence`] | CIP Volume 9, 5-2.3.9.1 |
 //! | [`mode`] | IEC 61800-7-202, 4.2 |
 //! | [`capture`] | CIP Volume 9, the events of the Motion Device Axis Object |
+//! | [`hookup`] | CIP Volume 9, the motor and feedback test of 5-2.5.1.9; how it moves is our own |
 //! | [`quantity`], [`ratio`], [`scaling`], [`program`], [`parameter`], [`servo`] | our own design |
 //!
 //! # Functional elements and their modules
@@ -32,7 +33,7 @@
 //! | communication | [`time`], [`interpolation`], [`program`] |
 //! | device control | [`mode`], requests and reports in [`state`] |
 //! | basic drive | [`state`], [`sequence`], [`image`], [`fault`], [`inhibit`], [`scaling`], [`quantity`], [`ratio`] |
-//! | application functions | [`capture`] |
+//! | application functions | [`capture`], [`hookup`] |
 //!
 //! And the terms of the interface: commands are [`state::Request`]s, status is [`image::StatusBits`] and
 //! [`state::DriveState`], set-points stand in [`image::AxisCommand`], actual values in
@@ -52,6 +53,7 @@ pub mod code;
 pub mod fault;
 pub mod fault_set;
 pub mod functional_element;
+pub mod hookup;
 pub mod image;
 pub mod inhibit;
 pub mod interpolation;

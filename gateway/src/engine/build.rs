@@ -20,7 +20,7 @@ use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
 use profile_sercos::master::config::{Connections, MasterConfig, SlaveConfig};
 
-use super::axis::{AxisChannel, Limits};
+use super::axis::{AxisChannel, HookupSettings, Limits};
 use super::bus::SercosBus;
 use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
@@ -211,6 +211,7 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
         position_max: axis.limits.position_max,
         velocity: axis.limits.velocity,
         following_error: axis.limits.following_error,
+        hookup: Some(HookupSettings::new(kind(axis), axis.limits.velocity, axis.limits.torque)),
     };
     let moves = axis.function == AxisFunction::Drive;
     Ok(AxisChannel::new(program, limits, reaction(axis.on_command_loss), moves))
@@ -262,6 +263,8 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
         control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
         lint_position: false,
         events: EventChecking::empty(),
+        // Motor and feedback, feedback; a drive shows the box neither its marker nor its phasing.
+        hookup_tests: 0b11,
     };
     DeviceConfig {
         axes: members.iter().map(axis).collect(),

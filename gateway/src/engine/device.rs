@@ -3,9 +3,6 @@
 use std::net::SocketAddrV4;
 
 use arrayvec::ArrayVec;
-use profile_cip::target::attribute::{
-    self, Access, AttributeDefinition, Backing, DataType, DefaultValue, Scope,
-};
 use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::drive_link::DriveAction;
@@ -148,7 +145,7 @@ impl DeviceChannel {
         mapping: &Mapping,
     ) -> Result<Self, ChannelError> {
         config.attributes =
-            definitions(mapping, &axes[0].1).ok_or(ChannelError::Scaling { axis: axes[0].0 })?;
+            mapping.attribute_definitions(&axes[0].1).ok_or(ChannelError::Scaling { axis: axes[0].0 })?;
         let device = MotionDevice::new(config)?;
         let members = axes
             .iter()
@@ -285,6 +282,9 @@ impl DeviceChannel {
                 // The update may bring another target; the period stays for the life of the connection.
                 axis.keep_update_period(DurationNs::from_micros(period), TargetUpdate::Interpolate);
             }
+            let (attributes, signals) = (&member.attributes, &*axis);
+            self.device
+                .publish_signals(place, &mut |id, octets| signal_octets(attributes, signals, id, octets));
             if let Some(image) = self.device.command(place, now) {
                 let enabled = image.action == DriveAction::Enable && member.action != DriveAction::Enable;
                 member.action = image.action;
@@ -377,20 +377,25 @@ impl DeviceChannel {
         let entry = *member.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let axis = &axes[member.axis];
         match entry.backing {
-            mapping::Backing::Signal { signal, .. } => {
-                let generic = signal_value(axis, signal).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+            mapping::Backing::Signal { .. } => {
                 let mut bytes = [0; 8];
-                let (len, _) = entry
-                    .from_generic(generic, &mut bytes)
-                    .map_err(|_| GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+                let len = signal_octets(&member.attributes, axis, access.id, &mut bytes)
+                    .ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
                 self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
                 Ok(())
             }
             mapping::Backing::Parameter { parameter, reject, .. } => {
                 let program = axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
                 let Some(held) = program.parameter(parameter) else {
-                    return self.shadow(access, place, reject);
+                    if reject || program.rejects(parameter) {
+                        return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+                    }
+                    return self.shadow(access, place);
                 };
+                if held.to_drive.is_none() && entry.access != mapping::Access::Get {
+                    // The drive lets the parameter only be read: what the controller sets is kept beside it.
+                    return self.shadow(access, place);
+                }
                 let (request, write) = match &access.operation {
                     AccessOperation::Read(_) => (SvcRequest::read(held.idn), false),
                     AccessOperation::Write(bytes) => {
@@ -422,11 +427,8 @@ impl DeviceChannel {
         }
     }
 
-    /// A parameter that the drive lacks: kept and given back where the tables allow it.
-    fn shadow(&mut self, access: &AttributeAccess, place: usize, reject: bool) -> Result<(), GeneralStatus> {
-        if reject {
-            return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
-        }
+    /// A parameter that the drive lacks: kept and given back.
+    fn shadow(&mut self, access: &AttributeAccess, place: usize) -> Result<(), GeneralStatus> {
         match &access.operation {
             AccessOperation::Read(_) => {
                 let mut bytes = [0; 8];
@@ -641,62 +643,6 @@ fn scaling_attributes(
     fixed.into_iter().chain(resolution.map(|(id, value)| (*id, value))).take(SCALING_MAX).collect()
 }
 
-/// The attributes of the device as its object needs them; backing and conversions stay with the tables.
-fn definitions(mapping: &Mapping, scaling: &CipScaling) -> Option<Vec<AttributeDefinition>> {
-    let dictionary = &mapping.dictionaries.cip;
-    let class = dictionary.class_attributes().iter().filter_map(|row| {
-        Some(AttributeDefinition {
-            scope: Scope::Class,
-            id: row.id,
-            data_type: DataType::from_name(row.data_type.name())?,
-            elements: row.length,
-            access: access(row.access),
-            settable_in_running: row.running,
-            backing: Backing::Stored,
-            default: DefaultValue::Integer(row.default.unwrap_or(0)),
-            range: None,
-            element_rules: Vec::new(),
-            name: row.name.clone(),
-        })
-    });
-    let table = mapping.attribute_table(scaling)?;
-    let instance = table.entries().iter().filter_map(|entry| {
-        let name = dictionary.attribute_by_id(entry.id).map(|row| row.name.clone()).unwrap_or_default();
-        Some(AttributeDefinition {
-            scope: Scope::Instance,
-            id: entry.id,
-            data_type: DataType::from_name(entry.data_type.name())?,
-            elements: entry.length,
-            access: access(entry.access),
-            settable_in_running: entry.running,
-            backing: match entry.backing {
-                mapping::Backing::Signal { .. } | mapping::Backing::Parameter { .. } => Backing::Drive,
-                _ => Backing::Stored,
-            },
-            default: DefaultValue::Integer(match entry.backing {
-                mapping::Backing::Constant(value) => value,
-                _ => entry.default,
-            }),
-            range: entry.range.map(|(low, high)| (f64::from(low), f64::from(high))),
-            element_rules: match entry.id {
-                attribute::id::AXIS_EXCEPTION_ACTION => mapping.exception_rules(false),
-                attribute::id::AXIS_EXCEPTION_ACTION_MFG => mapping.exception_rules(true),
-                _ => Vec::new(),
-            },
-            name,
-        })
-    });
-    Some(class.chain(instance).collect())
-}
-
-fn access(access: mapping::Access) -> Access {
-    match access {
-        mapping::Access::Get => Access::Get,
-        mapping::Access::Set => Access::Set,
-        mapping::Access::SetCyclic => Access::Cyclic,
-    }
-}
-
 /// Octets of an integer type.
 fn width(cip: CipType) -> usize {
     match cip {
@@ -721,6 +667,19 @@ fn number_of(bytes: Result<&[u8], GeneralStatus>, signed: bool) -> i64 {
         *to = *from;
     }
     i64::from_le_bytes(wide)
+}
+
+/// Writes the value of a signal as the attribute with this number; `None` while it has none.
+fn signal_octets(
+    attributes: &AttributeTable,
+    axis: &AxisChannel,
+    id: u16,
+    octets: &mut [u8; 8],
+) -> Option<usize> {
+    let entry = attributes.get(id)?;
+    let mapping::Backing::Signal { signal, .. } = entry.backing else { return None };
+    let generic = signal_value(axis, signal)?;
+    entry.from_generic(generic, octets).ok().map(|(len, _)| len)
 }
 
 fn signal_value(axis: &AxisChannel, signal: Signal) -> Option<i64> {

@@ -202,6 +202,8 @@ pub struct CipTables {
     pub feedback_units: Vec<DisplacementUnit>,
     /// What the device serves, by attribute number.
     pub attributes: Vec<ServedAttribute>,
+    /// What it does not serve, by attribute number, and why.
+    pub rejected: Vec<(u16, String)>,
     units: Vec<(String, Quantity, CipUnit)>,
     pub(super) cyclic: Vec<CyclicElement>,
     pub(super) modes: [Option<OperatingMode>; 16],

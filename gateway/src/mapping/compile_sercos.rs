@@ -403,6 +403,11 @@ impl SercosProgram {
         self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.mode)
     }
 
+    /// Whether the drive was set up for this mode.
+    pub fn has_mode(&self, mode: OperatingMode) -> bool {
+        self.modes.iter().any(|entry| entry.mode == mode)
+    }
+
     /// The status bits in a status word.
     pub fn status_bits(&self, status: u16) -> StatusBits {
         let rows = self.status.iter().filter(|(pattern, _)| pattern.matches(u32::from(status)));

@@ -1,6 +1,5 @@
-//! Between the compiled tables and the CIP Motion device: its images and its attribute definitions.
+//! Between the compiled tables and the CIP Motion device: its images.
 
-use profile_cip::target::attribute::{self, AttributeDefinition, DataType, DefaultValue, Scope};
 use profile_cip::target::drive_link::{
     DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
 };
@@ -11,16 +10,14 @@ use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
 use profile_generic::image::{AxisFeedback, StatusBits};
 use profile_generic::state::Request;
 
-use super::attributes::{AttributeEntry, AttributeTable, Backing};
 use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue, CyclicValues};
-use super::compile_sercos::SercosProgram;
-use super::dictionary::{Access, CipDictionary};
 
 /// What the device asks of a drive, with its name in the tables.
-pub(super) const DRIVE_ACTIONS: [(&str, DriveAction); 6] = [
+pub(super) const DRIVE_ACTIONS: [(&str, DriveAction); 7] = [
     ("none", DriveAction::None),
     ("power_up", DriveAction::PowerUp),
     ("enable", DriveAction::Enable),
+    ("test", DriveAction::Test),
     ("disable", DriveAction::Disable),
     ("shutdown", DriveAction::Shutdown),
     ("abort", DriveAction::Abort),
@@ -110,54 +107,4 @@ impl CipProgram {
             at: fault.at.0,
         })
     }
-}
-
-impl AttributeTable {
-    /// The definitions for the device. What the drive of `south` holds is drive-backed; a parameter that it
-    /// lacks is stored in the device, or left out where the tables reject it. Without `south` nothing is
-    /// drive-backed.
-    ///
-    /// Strings are left out: the device keeps numbers only.
-    pub fn definitions(
-        &self,
-        dictionary: &CipDictionary,
-        south: Option<&SercosProgram>,
-    ) -> Vec<AttributeDefinition> {
-        self.entries().iter().filter_map(|entry| definition(entry, dictionary, south)).collect()
-    }
-}
-
-fn definition(
-    entry: &AttributeEntry,
-    dictionary: &CipDictionary,
-    south: Option<&SercosProgram>,
-) -> Option<AttributeDefinition> {
-    let data_type = DataType::from_name(entry.data_type.name())?;
-    let access = match entry.access {
-        Access::Get => attribute::Access::Get,
-        Access::Set => attribute::Access::Set,
-        Access::SetCyclic => attribute::Access::Cyclic,
-    };
-    let name = dictionary.attribute_by_id(entry.id).map(|attribute| attribute.name.as_str())?;
-    let mut definition = AttributeDefinition::new(Scope::Instance, entry.id, data_type, access, name);
-    definition.elements = entry.length;
-    definition.settable_in_running = entry.running;
-    definition.default = DefaultValue::Integer(entry.default);
-    match entry.backing {
-        Backing::Device | Backing::Connection | Backing::Shadow | Backing::Signal { .. } => {}
-        Backing::Constant(value) => definition.default = DefaultValue::Integer(value),
-        Backing::Parameter { parameter, reject, .. } => {
-            let Some(south) = south else { return (!reject).then_some(definition) };
-            match south.parameter(parameter) {
-                Some(held) if held.to_drive.is_some() || entry.access == Access::Get => {
-                    definition.backing = attribute::Backing::Drive;
-                }
-                // The drive lets the parameter only be read: what the controller sets is kept beside it.
-                Some(_) => {}
-                None if reject || south.rejects(parameter) => return None,
-                None => {}
-            }
-        }
-    }
-    Some(definition)
 }

@@ -17,6 +17,7 @@ mod cip_tables;
 mod commissioning;
 mod compile_cip;
 mod compile_sercos;
+mod definitions;
 mod device_link;
 mod dictionary;
 mod examples;
@@ -30,6 +31,8 @@ mod sercos_tables;
 mod tests;
 
 use std::path::Path;
+
+use profile_cip::target::attribute::AttributeDefinition;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use cip_scaling::{CipScaling, CipScalingError};
@@ -133,6 +136,12 @@ impl Mapping {
     /// The attributes of an axis. `None` when a ratio of the scaling does not fit 64 bits.
     pub fn attribute_table(&self, scaling: &CipScaling) -> Option<AttributeTable> {
         AttributeTable::compile(&self.cip, scaling)
+    }
+
+    /// What the device has to know of its attributes, those of the class included. `None` when a ratio of the scaling
+    /// does not fit 64 bits.
+    pub fn attribute_definitions(&self, scaling: &CipScaling) -> Option<Vec<AttributeDefinition>> {
+        Some(definitions::definitions(self, &self.attribute_table(scaling)?))
     }
 
     /// What the telegrams of an axis carry, as far as `facts` are known.

@@ -164,10 +164,15 @@ pub enum DataType {
     Real,
     /// Floating point, 64 bits.
     Lreal,
+    /// One length octet and at most [`SHORT_STRING_MAX`] characters.
+    ShortString,
 }
 
+/// Most characters of a SHORT_STRING that a device keeps.
+pub const SHORT_STRING_MAX: u8 = 32;
+
 impl DataType {
-    const NAMES: [(&'static str, Self); 15] = [
+    const NAMES: [(&'static str, Self); 16] = [
         ("BOOL", Self::Bool),
         ("SINT", Self::Sint),
         ("INT", Self::Int),
@@ -183,6 +188,7 @@ impl DataType {
         ("LWORD", Self::Lword),
         ("REAL", Self::Real),
         ("LREAL", Self::Lreal),
+        ("SHORT_STRING", Self::ShortString),
     ];
 
     /// The type with this name of the standard, for example `UDINT`.
@@ -191,7 +197,7 @@ impl DataType {
         Self::NAMES.iter().find(|(known, _)| *known == name).map(|(_, data_type)| *data_type)
     }
 
-    /// Octets of one element.
+    /// Octets of one element; of a string the most there can be.
     #[must_use]
     pub const fn size(self) -> u8 {
         match self {
@@ -199,17 +205,23 @@ impl DataType {
             Self::Int | Self::Uint | Self::Word => 2,
             Self::Dint | Self::Udint | Self::Dword | Self::Real => 4,
             Self::Lint | Self::Ulint | Self::Lword | Self::Lreal => 8,
+            Self::ShortString => 1 + SHORT_STRING_MAX,
         }
     }
 
-    /// One element as a number, for range checks. Integers beyond 53 bits are rounded.
-    #[must_use]
-    pub fn to_f64(self, element: &[u8]) -> Option<f64> {
+    /// The octets of one element as 64 bits without sign; `None` for a string or too few octets.
+    fn raw(self, element: &[u8]) -> Option<u64> {
         let mut octets = [0; 8];
         let size = usize::from(self.size());
         octets.get_mut(..size)?.copy_from_slice(element.get(..size)?);
+        Some(u64::from_le_bytes(octets))
+    }
+
+    /// One element as a number, for range checks. Integers beyond 53 bits are rounded; a string is none.
+    #[must_use]
+    pub fn to_f64(self, element: &[u8]) -> Option<f64> {
+        let raw = self.raw(element)?;
         let shift = 64 - 8 * u32::from(self.size());
-        let raw = u64::from_le_bytes(octets);
         Some(match self {
             Self::Real => f64::from(f32::from_bits(u32::try_from(raw).ok()?)),
             Self::Lreal => f64::from_bits(raw),
@@ -260,6 +272,17 @@ pub enum Backing {
     WriteThrough,
     /// In the drive: every Get and Set is carried to it.
     Drive,
+    /// In the process image of the drive: a Get is carried to the owner of the device like one of [`Backing::Drive`], and
+    /// what a cyclic read list holds of them is published in every cycle.
+    Signal,
+}
+
+impl Backing {
+    /// Whether a Get has to ask the owner of the device.
+    #[must_use]
+    pub const fn is_elsewhere(self) -> bool {
+        matches!(self, Self::Drive | Self::Signal)
+    }
 }
 
 /// Value an attribute has before it is set.
@@ -295,6 +318,10 @@ pub struct AttributeDefinition {
     /// What holds for single elements of an array in place of `default` and `range`: one rule for each element from the
     /// first; empty where all are alike.
     pub element_rules: Vec<ElementRule>,
+    /// Permitted codes of an enumeration in ascending order; empty for any value of the type.
+    pub codes: Vec<u32>,
+    /// Bits of a bit field that mean something; the others have to be 0.
+    pub bits: Option<u64>,
     /// Name of the standard.
     pub name: String,
 }
@@ -323,6 +350,8 @@ impl AttributeDefinition {
             default: DefaultValue::Integer(0),
             range: None,
             element_rules: Vec::new(),
+            codes: Vec::new(),
+            bits: None,
             name: name.to_owned(),
         }
     }
@@ -452,6 +481,8 @@ fn encode_default(
 ) -> Option<[u8; 8]> {
     let size = usize::from(definition.data_type.size());
     let octets = match (definition.data_type, default) {
+        (DataType::ShortString, DefaultValue::Integer(0)) => return Some([0; 8]),
+        (DataType::ShortString, _) => return None,
         (DataType::Real, DefaultValue::Real(value)) => {
             let narrow = narrow(value);
             let mut octets = [0; 8];
@@ -472,7 +503,8 @@ fn encode_default(
             octets
         }
     };
-    check_value(definition.data_type, range, &octets[..size]).ok()?;
+    // Everything is 0 at power-up unless the standard says otherwise, also where 0 is none of the codes.
+    check_range(definition.data_type, range, &octets[..size]).ok()?;
     Some(octets)
 }
 
@@ -481,8 +513,36 @@ fn narrow(value: f64) -> f32 {
     value as f32
 }
 
+/// Checks one element: a number that is finite and within the range, and then one of the codes and bits that there are.
+fn check_value(
+    definition: &AttributeDefinition,
+    range: Option<(f64, f64)>,
+    element: &[u8],
+) -> Result<(), GeneralStatus> {
+    check_range(definition.data_type, range, element)?;
+    let raw = definition.data_type.raw(element).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?;
+    let truth = definition.data_type != DataType::Bool || raw <= 1;
+    let code = definition.codes.is_empty()
+        || u32::try_from(raw).is_ok_and(|raw| definition.codes.binary_search(&raw).is_ok());
+    let bits = definition.bits.is_none_or(|bits| raw & !bits == 0);
+    if truth && code && bits { Ok(()) } else { Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE) }
+}
+
+/// Checks that the octets are a string with its length in front.
+fn check_string(value: &[u8]) -> Result<(), GeneralStatus> {
+    match value.split_first() {
+        Some((length, characters)) if characters.len() > usize::from(*length) => {
+            Err(GeneralStatus::TOO_MUCH_DATA)
+        }
+        Some((length, characters)) if characters.len() == usize::from(*length) => {
+            if *length <= SHORT_STRING_MAX { Ok(()) } else { Err(GeneralStatus::TOO_MUCH_DATA) }
+        }
+        _ => Err(GeneralStatus::NOT_ENOUGH_DATA),
+    }
+}
+
 /// Checks one element: finite and within the range.
-fn check_value(data_type: DataType, range: Option<(f64, f64)>, element: &[u8]) -> Result<(), GeneralStatus> {
+fn check_range(data_type: DataType, range: Option<(f64, f64)>, element: &[u8]) -> Result<(), GeneralStatus> {
     let value = data_type.to_f64(element).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?;
     let (low, high) = range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     if value.is_finite() && value >= low && value <= high {
@@ -589,7 +649,10 @@ impl Entry {
             return Err((GeneralStatus::ATTRIBUTE_NOT_SETTABLE, 0));
         }
         let range = self.range(part).map_err(|status| (status, part.start))?;
-        if value.len() != range.len() {
+        let is_string = definition.data_type == DataType::ShortString;
+        if is_string {
+            check_string(value).map_err(|status| (status, 0))?;
+        } else if value.len() != range.len() {
             let short = value.len() < range.len();
             let status = if short { GeneralStatus::NOT_ENOUGH_DATA } else { GeneralStatus::TOO_MUCH_DATA };
             return Err((status, 0));
@@ -597,11 +660,14 @@ impl Entry {
         if running && !definition.settable_in_running {
             return Err((GeneralStatus::OBJECT_STATE_CONFLICT, 0));
         }
+        if is_string {
+            return Ok(());
+        }
         let size = usize::from(definition.data_type.size());
         for (index, element) in (part.start..).zip(value.chunks_exact(size)) {
             let rule = definition.element_rules.get(usize::from(index));
             let range = rule.map_or(definition.range, |rule| Some(rule.range));
-            check_value(definition.data_type, range, element).map_err(|status| (status, index))?;
+            check_value(definition, range, element).map_err(|status| (status, index))?;
         }
         Ok(())
     }
@@ -629,7 +695,9 @@ impl AttributeStore {
             let place = entry.offset..entry.offset + entry.definition.size();
             for (index, element) in self.octets[place].chunks_exact_mut(size).enumerate() {
                 let default = entry.element_defaults.get(index).unwrap_or(&entry.default);
-                element.copy_from_slice(&default[..size]);
+                // A string begins empty; only its length octet counts then.
+                let known = size.min(default.len());
+                element[..known].copy_from_slice(&default[..known]);
             }
         }
     }
@@ -640,7 +708,13 @@ impl AttributeStore {
     /// The part does not lie within the attribute.
     pub fn get(&self, entry: &Entry, part: Part) -> Result<&[u8], GeneralStatus> {
         let range = entry.range(part)?;
-        Ok(&self.octets[entry.offset + range.start..entry.offset + range.end])
+        let octets = &self.octets[entry.offset + range.start..entry.offset + range.end];
+        Ok(match octets.first() {
+            Some(length) if entry.definition.data_type == DataType::ShortString => {
+                octets.get(..1 + usize::from(*length)).unwrap_or(octets)
+            }
+            _ => octets,
+        })
     }
 
     /// Writes the octets of a part, without looking at access or range.
@@ -649,7 +723,11 @@ impl AttributeStore {
     /// The part does not lie within the attribute, or the octets are not as many.
     pub fn put(&mut self, entry: &Entry, part: Part, value: &[u8]) -> Result<(), GeneralStatus> {
         let range = entry.range(part)?;
-        let place = &mut self.octets[entry.offset + range.start..entry.offset + range.end];
+        let mut place = &mut self.octets[entry.offset + range.start..entry.offset + range.end];
+        if entry.definition.data_type == DataType::ShortString {
+            check_string(value)?;
+            place = &mut place[..value.len()];
+        }
         if place.len() != value.len() {
             return Err(GeneralStatus::NOT_ENOUGH_DATA);
         }
@@ -663,15 +741,15 @@ impl AttributeStore {
         let entry = table.find(id)?;
         let value = self.get(entry, Part { start: 0, count: 1 }).ok()?;
         let mut octets = [0; 8];
-        octets[..value.len()].copy_from_slice(value);
+        octets.get_mut(..value.len())?.copy_from_slice(value);
         Some(u64::from_le_bytes(octets))
     }
 
     /// Publishes a single value given as 64 bits; the excess octets are cut off. Unknown IDs are ignored.
     pub fn publish(&mut self, table: &AttributeTable, id: u16, value: u64) {
         if let Some(entry) = table.find(id) {
-            let size = usize::from(entry.definition.data_type.size());
-            // A single element of its own size always fits.
+            let size = usize::from(entry.definition.data_type.size()).min(8);
+            // A single number of its own size always fits.
             let _ = self.put(entry, Part { start: 0, count: 1 }, &value.to_le_bytes()[..size]);
         }
     }
@@ -771,6 +849,7 @@ mod tests {
         assert_eq!(f(DataType::Lreal, &(-0.25_f64).to_le_bytes()), Some(-0.25));
         assert_eq!(f(DataType::Dint, &[1, 2]), None);
         assert_eq!(DataType::from_name("LWORD"), Some(DataType::Lword));
+        assert_eq!(DataType::from_name("SHORT_STRING"), Some(DataType::ShortString));
         assert_eq!(DataType::from_name("STRING"), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::attribute::{Access, AttributeStore, AttributeTable, Backing, Entry, Part};
+use super::attribute::{Access, AttributeStore, AttributeTable, Backing, DataType, Entry, Part};
 use super::list_job::{Item, ListFormat, ListJob, Outcome};
 use crate::wire::status::GeneralStatus;
 
@@ -69,9 +69,17 @@ pub(super) struct AttributeWorker {
     limit: usize,
 }
 
+fn is_string(entry: Option<&Entry>) -> bool {
+    entry.is_some_and(|entry| entry.definition.data_type == DataType::ShortString)
+}
+
 /// The part of the attribute that an item names, if its dimension and element size are right.
 fn part_of(entry: &Entry, item: &Item) -> Result<Part, GeneralStatus> {
     let Some(selector) = item.selector else { return Ok(entry.whole()) };
+    if entry.definition.data_type == DataType::ShortString && selector.ranges().is_empty() {
+        // Only who has the string knows how long it is: the size in a Get means nothing, that in a Set is the value's own.
+        return Ok(entry.whole());
+    }
     if selector.element_size != entry.definition.data_type.size() {
         let short = selector.element_size < entry.definition.data_type.size();
         return Err(if short { GeneralStatus::NOT_ENOUGH_DATA } else { GeneralStatus::TOO_MUCH_DATA });
@@ -98,7 +106,7 @@ impl AttributeSpace<'_> {
     fn get(&mut self, entry: &Entry, part: Part) -> Executed {
         match self.store.get(entry, part) {
             Err(status) => Executed::Refused(status, part.start),
-            Ok(value) if entry.definition.backing == Backing::Drive => {
+            Ok(value) if entry.definition.backing.is_elsewhere() => {
                 let len = value.len();
                 if len > ACCESS_MAX {
                     return Executed::Refused(GeneralStatus::REPLY_DATA_TOO_LARGE, 0);
@@ -149,7 +157,7 @@ impl AttributeWorker {
     /// The request is malformed.
     pub fn start(&mut self, format: ListFormat, body: &[u8], limit: usize) -> Result<(), GeneralStatus> {
         *self = Self { limit, ..Self::default() };
-        self.job = Some(ListJob::new(format, body)?);
+        self.job = Some(ListJob::new(format, body, limit)?);
         Ok(())
     }
 
@@ -206,7 +214,9 @@ impl AttributeWorker {
         let part = Part { start: access.start, count: access.count };
         let outcome = match (&access.operation, answer) {
             (_, Err(status)) => Outcome::Refused(status, access.start),
-            (AccessOperation::Read(len), Ok(value)) if value.len() == *len => Outcome::Value(value),
+            (AccessOperation::Read(len), Ok(value)) if value.len() == *len || is_string(entry) => {
+                Outcome::Value(value)
+            }
             (AccessOperation::Read(_), Ok(_)) => Outcome::Refused(GeneralStatus::DEVICE_STATE_CONFLICT, 0),
             (AccessOperation::Write(octets), Ok(_)) => {
                 match entry.map(|entry| space.store.put(entry, part, octets)) {
@@ -222,7 +232,7 @@ impl AttributeWorker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::attribute::{AttributeDefinition, DataType, Scope};
+    use super::super::attribute::{AttributeDefinition, Scope};
     use super::*;
 
     fn table() -> AttributeTable {

@@ -50,6 +50,7 @@ impl Axis {
                 code: fault.code,
             }),
             command,
+            test: self.test_order().filter(|_| context.connected && context.remote && !context.node_fault),
         }
     }
 
@@ -64,7 +65,7 @@ impl Axis {
         status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
         status.set(AxisStatus::TRACKING_COMMAND, self.answers() && self.drive.tracking);
         status.set(AxisStatus::SHUTDOWN, self.shutdown);
-        status.set(AxisStatus::IN_PROCESS, false);
+        status.set(AxisStatus::IN_PROCESS, self.in_process());
         status.set(AxisStatus::POSITION_CONTROL_MODE, powered && mode == ControlMode::POSITION.0);
         status.set(AxisStatus::VELOCITY_CONTROL_MODE, powered && mode == ControlMode::VELOCITY.0);
         status.set(AxisStatus::TORQUE_CONTROL_MODE, powered && mode == ControlMode::TORQUE.0);

@@ -1,12 +1,17 @@
 //! Cyclic write and read data: attribute lists agreed by service and carried in every update, clauses 6-2.7.1.2.3,
 //! 6-2.7.2.1.6, 5-2.5.1.3 and 5-2.5.1.4.
 //!
-//! A list in use stays valid until the controller uses its successor, so two are kept. Only values that are stored in
-//! the device can be carried: the drive cannot be asked within a cycle.
+//! A list in use stays valid until the controller uses its successor, so two are kept.
+//!
+//! The standard promises that what a list carries is read in every update and applied in the next one. Values stored in
+//! the device keep that promise, and so do signals, which the owner of the device publishes in every cycle
+//! ([`CyclicLists::publish`]). A parameter of the drive, which only the service channel reaches, cannot; it is refused
+//! with its own status ("attribute not gettable", "attribute not settable") instead of being served from a copy of
+//! unknown age. Neither can a string, whose length would move what stands behind it.
 
 use arrayvec::ArrayVec;
 
-use super::attribute::{Access, AttributeStore, AttributeTable, Backing, Entry};
+use super::attribute::{Access, AttributeStore, AttributeTable, Backing, DataType, Entry};
 use crate::wire::motion::id_list::{IdList, IdStatus, IdStatusList};
 use crate::wire::status::GeneralStatus;
 
@@ -26,6 +31,8 @@ pub(super) enum Direction {
 struct Layout {
     id: u8,
     attributes: ArrayVec<u16, CYCLIC_ATTRIBUTES_MAX>,
+    /// A signal of it has no value now.
+    incomplete: bool,
 }
 
 /// The lists of one direction.
@@ -49,12 +56,17 @@ impl CyclicLists {
         match (table.find(id), direction) {
             (None, _) => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
             (Some(e), Direction::Write)
-                if e.definition.access != Access::Set || e.definition.backing != Backing::Stored =>
+                if e.definition.access != Access::Set
+                    || e.definition.backing != Backing::Stored
+                    || e.definition.data_type == DataType::ShortString =>
             {
                 GeneralStatus::ATTRIBUTE_NOT_SETTABLE
             }
-            (Some(e), Direction::Read) if e.definition.backing == Backing::Drive => {
-                GeneralStatus::OBJECT_STATE_CONFLICT
+            (Some(e), Direction::Read)
+                if e.definition.backing == Backing::Drive
+                    || e.definition.data_type == DataType::ShortString =>
+            {
+                GeneralStatus::ATTRIBUTE_NOT_GETTABLE
             }
             (Some(_), _) => GeneralStatus::SUCCESS,
         }
@@ -80,7 +92,10 @@ impl CyclicLists {
         if good {
             // ID 0 is the empty list for good, so the count skips it.
             let id = self.current.id.checked_add(1).unwrap_or(1);
-            let next = Layout { id, attributes: list.iter().collect() };
+            let signal = |e: &Entry| e.definition.backing == Backing::Signal;
+            // Until they are published for the first time there is nothing to be read.
+            let incomplete = list.iter().filter_map(|id| table.find(id)).any(signal);
+            let next = Layout { id, attributes: list.iter().collect(), incomplete };
             self.previous = core::mem::replace(&mut self.current, next);
         }
         let status = match (good, fits) {
@@ -129,10 +144,31 @@ impl CyclicLists {
         GeneralStatus::SUCCESS
     }
 
+    /// Puts the signals of the lists into the store. `value` writes the octets of a signal and returns how many they are;
+    /// a list that holds one without a value cannot be read until it has one again.
+    pub fn publish(
+        &mut self,
+        table: &AttributeTable,
+        store: &mut AttributeStore,
+        value: &mut dyn FnMut(u16, &mut [u8; 8]) -> Option<usize>,
+    ) {
+        for layout in [&mut self.current, &mut self.previous] {
+            layout.incomplete = false;
+            let entries = layout.attributes.iter().filter_map(|id| table.find(*id));
+            for entry in entries.filter(|entry| entry.definition.backing == Backing::Signal) {
+                let mut octets = [0; 8];
+                let put = value(entry.definition.id, &mut octets)
+                    .and_then(|len| octets.get(..len))
+                    .map(|octets| store.put(entry, entry.whole(), octets));
+                layout.incomplete |= put != Some(Ok(()));
+            }
+        }
+    }
+
     /// Collects cyclic read data.
     ///
     /// # Errors
-    /// There is no list with this ID.
+    /// There is no list with this ID, or a signal of it has no value now.
     pub fn read(
         &self,
         table: &AttributeTable,
@@ -144,6 +180,9 @@ impl CyclicLists {
             return Ok(data);
         }
         let layout = self.layout(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
+        if layout.incomplete {
+            return Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+        }
         for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
             let padding = align(data.len(), entry) - data.len();
             data.extend([0; 4].into_iter().take(padding));
@@ -156,7 +195,7 @@ impl CyclicLists {
 
 #[cfg(test)]
 mod tests {
-    use super::super::attribute::{AttributeDefinition, DataType, Scope};
+    use super::super::attribute::{AttributeDefinition, Scope};
     use super::*;
 
     fn table() -> AttributeTable {
@@ -170,6 +209,8 @@ mod tests {
             new(3, DataType::Lint, Access::Set, Backing::Stored),
             new(4, DataType::Udint, Access::Get, Backing::Stored),
             new(5, DataType::Udint, Access::Set, Backing::Drive),
+            new(6, DataType::Real, Access::Get, Backing::Signal),
+            new(7, DataType::ShortString, Access::Set, Backing::Stored),
         ];
         AttributeTable::new(Scope::Instance, &definitions).expect("a table")
     }
@@ -212,13 +253,49 @@ mod tests {
     }
 
     #[test]
+    fn signals_are_read_while_they_have_a_value() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let mut lists = CyclicLists::default();
+        assert_eq!(configure(&mut lists, Direction::Read, &[2, 6]).0, GeneralStatus::SUCCESS);
+        let conflict = Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+        assert_eq!(lists.read(&table, &store, 1), conflict, "not published yet");
+        let mut asked = Vec::new();
+        lists.publish(&table, &mut store, &mut |id, octets| {
+            asked.push(id);
+            octets[..4].copy_from_slice(&2.5_f32.to_le_bytes());
+            Some(4)
+        });
+        assert_eq!(asked, [6]);
+        let read = lists.read(&table, &store, 1);
+        assert_eq!(read.as_deref(), Ok(&[0, 0, 0, 0, 0, 0, 0x20, 0x40][..]));
+        lists.publish(&table, &mut store, &mut |_, _| None);
+        assert_eq!(lists.read(&table, &store, 1), conflict);
+        lists.publish(&table, &mut store, &mut |_, _| Some(3));
+        assert_eq!(lists.read(&table, &store, 1), conflict, "another length");
+    }
+
+    #[test]
+    fn strings_and_parameters_of_the_drive_are_refused_by_name() {
+        let mut lists = CyclicLists::default();
+        let (status, body) = configure(&mut lists, Direction::Read, &[7, 5]);
+        assert_eq!(
+            (status, &body[4..]),
+            (GeneralStatus::ATTRIBUTE_LIST_ERROR, &[7, 0, 0x2C, 0, 5, 0, 0x2C, 0][..])
+        );
+        let (status, body) = configure(&mut lists, Direction::Write, &[7, 5, 6]);
+        let refused = [7, 0, 0x0E, 0, 5, 0, 0x0E, 0, 6, 0, 0x0E, 0];
+        assert_eq!((status, &body[4..]), (GeneralStatus::ATTRIBUTE_LIST_ERROR, &refused[..]));
+    }
+
+    #[test]
     fn the_list_before_stays_until_the_one_after_and_a_bad_list_changes_nothing() {
         let mut lists = CyclicLists::default();
         assert_eq!(configure(&mut lists, Direction::Read, &[1]).0, GeneralStatus::SUCCESS);
         assert_eq!(configure(&mut lists, Direction::Read, &[2]).0, GeneralStatus::SUCCESS);
         let (status, body) = configure(&mut lists, Direction::Read, &[1, 9, 5]);
         assert_eq!(status, GeneralStatus::ATTRIBUTE_LIST_ERROR);
-        assert_eq!(body, [3, 0, 2, 0, 1, 0, 0, 0, 9, 0, 0x14, 0, 5, 0, 0x0C, 0], "the ID stays 2");
+        assert_eq!(body, [3, 0, 2, 0, 1, 0, 0, 0, 9, 0, 0x14, 0, 5, 0, 0x2C, 0], "the ID stays 2");
         let table = table();
         let store = AttributeStore::new(&table);
         assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));

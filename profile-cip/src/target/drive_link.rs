@@ -16,6 +16,7 @@ use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
     AxisIoStatus, AxisStatus, CommandTarget, ControlMode, FaultType, FeedbackMode,
 };
+use crate::wire::motion::test_service::HookupTestData;
 
 use super::axis_state::AxisState;
 pub use super::exception::{DriveCondition, DriveConditions, ExceptionAction};
@@ -30,6 +31,8 @@ pub enum DriveAction {
     PowerUp,
     /// Energize and follow the command.
     Enable,
+    /// Energize and run the test of [`AxisCommandImage::test`]; there is no command.
+    Test,
     /// Stop by the configured Stopping Action, then stay stopped.
     Disable,
     /// Stop by the configured Shutdown Action and stay torque-free.
@@ -88,6 +91,56 @@ pub enum Command {
     Withheld(Withheld),
 }
 
+/// A hookup test, clause 5-2.5.1.9. The marker and the commutation test are not among them: nothing that runs a drive
+/// here shows a marker or the phasing of its motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HookupTest {
+    /// Moves the motor in its forward direction and watches Feedback 1.
+    MotorFeedback,
+    /// Watches Feedback 1 while somebody else moves the axis.
+    Feedback,
+}
+
+impl HookupTest {
+    /// The test with this code of Table 5-2.94.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::MotorFeedback),
+            1 => Some(Self::Feedback),
+            _ => None,
+        }
+    }
+
+    /// Whether the test energizes the axis.
+    #[must_use]
+    pub const fn is_active(self) -> bool {
+        matches!(self, Self::MotorFeedback)
+    }
+}
+
+/// A test that the drive has to run. It ends with a [`TestReport`], or when the order is taken back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestOrder {
+    /// Names the test; to be returned in [`TestReport::id`].
+    pub id: u32,
+    /// Which test.
+    pub test: HookupTest,
+    /// Distance that has to be gone in either direction: revolutions, or metres of a linear axis. 0 when `time` counts.
+    pub distance: f32,
+    /// How long the motor has to be moved, s. 0 when `distance` counts.
+    pub time: f32,
+}
+
+/// The end of a test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestReport {
+    /// [`TestOrder::id`].
+    pub id: u32,
+    /// The result, never "test in progress".
+    pub data: HookupTestData,
+}
+
 /// Everything the drive of an axis needs from the motion device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisCommandImage {
@@ -104,6 +157,8 @@ pub struct AxisCommandImage {
     pub abort: Option<AbortOrder>,
     /// Set-points.
     pub command: Command,
+    /// The test to run or, without torque, to watch for.
+    pub test: Option<TestOrder>,
 }
 
 /// How an axis has to stop for a major fault.
@@ -137,6 +192,8 @@ pub struct DriveImage {
     pub power_enabled: bool,
     /// The drive tracks the command.
     pub tracking: bool,
+    /// The test that has ended last.
+    pub test: Option<TestReport>,
     /// Conditions that are there; what follows from them is for the controller to say.
     pub conditions: DriveConditions,
     /// Start Inhibits, attribute 676.

@@ -1,6 +1,7 @@
 //! Explicit requests that wait for their turn, and the one that is worked on.
 
 use arrayvec::ArrayVec;
+use profile_generic::time::SystemTime;
 
 use super::attribute_worker::AttributeWorker;
 use super::motion_link::{ExplicitRequest, Token};
@@ -16,6 +17,8 @@ pub(super) struct ExplicitQueue {
     pub current: Option<(Token, usize)>,
     /// The attribute service of the request in progress.
     pub worker: AttributeWorker,
+    /// System time at which the requests were looked at last.
+    pub system_time: Option<SystemTime>,
 }
 
 impl ExplicitQueue {

@@ -5,15 +5,18 @@
 
 use arrayvec::ArrayVec;
 
-use super::attribute::Entry;
-use crate::wire::Reader;
+use super::attribute::{DataType, Entry};
 use crate::wire::motion::attribute_list::{
     AttributeSelector, GetRequest, HEAD_LEN, ListWriter, SetRequest, SetStatus, take_value,
 };
 use crate::wire::status::GeneralStatus;
+use crate::wire::{Error, Reader};
 
 /// Most octets of a request or response body: 255 words of a service block less its header.
 pub const BODY_MAX: usize = 4 * 254;
+
+/// Octets of one status in the answer to a list of Sets.
+const SET_STATUS_LEN: usize = 4;
 
 /// Which service a job carries out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,28 +69,25 @@ pub(super) struct ListJob {
 }
 
 impl ListJob {
-    /// Checks the form of a request and starts its job.
+    /// Checks the form of a request and starts its job. `limit` is the most octets of the response body: a list of Sets
+    /// whose statuses will not fit is refused before the first value is written.
     ///
     /// # Errors
     /// The request is malformed.
-    pub fn new(format: ListFormat, body: &[u8]) -> Result<Self, GeneralStatus> {
+    pub fn new(format: ListFormat, body: &[u8], limit: usize) -> Result<Self, GeneralStatus> {
         let mut request = ArrayVec::new();
         request.try_extend_from_slice(body).map_err(|_| GeneralStatus::TOO_MUCH_DATA)?;
         let (at, left) = match format {
             ListFormat::AxisGet => {
                 let list = GetRequest::new(body).map_err(|_| GeneralStatus::NOT_ENOUGH_DATA)?;
                 let left = list.left();
-                if { list }.any(|item| item.is_err()) {
-                    return Err(GeneralStatus::NOT_ENOUGH_DATA);
-                }
+                whole(list, GetRequest::rest)?;
                 (HEAD_LEN, left)
             }
             ListFormat::AxisSet => {
                 let list = SetRequest::new(body).map_err(|_| GeneralStatus::NOT_ENOUGH_DATA)?;
                 let left = list.left();
-                if { list }.any(|item| item.is_err()) {
-                    return Err(GeneralStatus::NOT_ENOUGH_DATA);
-                }
+                whole(list, SetRequest::rest)?;
                 (HEAD_LEN, left)
             }
             ListFormat::CommonGet | ListFormat::CommonSet => {
@@ -102,8 +102,13 @@ impl ListJob {
                 }
                 (2, left)
             }
+            ListFormat::SingleGet(_) if !body.is_empty() => return Err(GeneralStatus::TOO_MUCH_DATA),
             ListFormat::SingleGet(_) | ListFormat::SingleSet(_) => (0, 1),
         };
+        let sets = matches!(format, ListFormat::AxisSet | ListFormat::CommonSet);
+        if sets && at + SET_STATUS_LEN * usize::from(left) > limit.min(BODY_MAX) {
+            return Err(GeneralStatus::REPLY_DATA_TOO_LARGE);
+        }
         let mut response = ArrayVec::new();
         let head = match format {
             ListFormat::AxisGet | ListFormat::AxisSet => HEAD_LEN,
@@ -153,7 +158,11 @@ impl ListJob {
                     return Some(Item { id, selector: None, value: Some(0..0) });
                 };
                 let start = self.at + 2;
-                let end = (start + entry.definition.size()).min(self.request.len());
+                let size = match entry.definition.data_type {
+                    DataType::ShortString => 1 + self.request.get(start).map_or(0, |len| usize::from(*len)),
+                    _ => entry.definition.size(),
+                };
+                let end = (start + size).min(self.request.len());
                 self.at = end;
                 Some(Item { id, selector: None, value: Some(start..end) })
             }
@@ -225,11 +234,31 @@ impl ListJob {
     }
 }
 
+/// Checks that a list has all the items that it announces, and nothing behind them.
+fn whole<T, L>(mut list: L, rest: impl Fn(&L) -> usize) -> Result<(), GeneralStatus>
+where
+    L: Iterator<Item = Result<T, Error>>,
+{
+    if list.any(|item| item.is_err()) {
+        return Err(GeneralStatus::NOT_ENOUGH_DATA);
+    }
+    if rest(&list) > 0 { Err(GeneralStatus::TOO_MUCH_DATA) } else { Ok(()) }
+}
+
 /// Writes one item of an axis list behind a head in `scratch`; returns the octets with the head.
 fn list_item(format: ListFormat, item: &Item, outcome: Outcome<'_>, scratch: &mut [u8]) -> Option<usize> {
     let mut writer = ListWriter::new(scratch).ok()?;
     match (format, outcome) {
-        (ListFormat::AxisGet, Outcome::Value(value)) => writer.value(&item.selector?, value),
+        (ListFormat::AxisGet, Outcome::Value(value)) => {
+            let asked = item.selector?;
+            if asked.value_len() == Some(value.len()) {
+                writer.value(&asked, value)
+            } else {
+                // Of a string only the answer says how long it is.
+                let size = u8::try_from(value.len()).ok()?;
+                writer.value(&AttributeSelector::scalar(item.id, size), value)
+            }
+        }
         (ListFormat::AxisGet, Outcome::Refused(status, _)) => writer.error(item.id, status.0),
         (_, Outcome::Refused(status, index)) => {
             let index = u8::try_from(index).unwrap_or(u8::MAX);
@@ -249,7 +278,9 @@ fn append(response: &mut ArrayVec<u8, BODY_MAX>, octets: &[u8], limit: usize) ->
 
 #[cfg(test)]
 mod tests {
-    use super::super::attribute::{Access, AttributeDefinition, AttributeTable, DataType, Scope};
+    use proptest::prelude::*;
+
+    use super::super::attribute::{Access, AttributeDefinition, AttributeTable, Scope};
     use super::*;
 
     const OK: GeneralStatus = GeneralStatus::SUCCESS;
@@ -268,7 +299,7 @@ mod tests {
             &[definition(461, DataType::Real), definition(462, DataType::Uint)],
         )
         .expect("a table");
-        let mut job = match ListJob::new(format, body) {
+        let mut job = match ListJob::new(format, body, limit) {
             Ok(job) => job,
             Err(status) => return (status, Vec::new()),
         };
@@ -318,6 +349,61 @@ mod tests {
         assert_eq!(run(ListFormat::CommonGet, &short, 100, touched).0, GeneralStatus::NOT_ENOUGH_DATA);
         let long = [1, 0, 1, 0, 2];
         assert_eq!(run(ListFormat::CommonGet, &long, 100, touched).0, GeneralStatus::TOO_MUCH_DATA);
+    }
+
+    #[test]
+    fn what_stands_behind_a_list_and_what_will_not_fit_the_answer_touch_nothing() {
+        let touched = |_: &Item, _: &[u8]| -> Outcome<'_> { panic!("an item was handed out") };
+        let long = GeneralStatus::TOO_MUCH_DATA;
+        assert_eq!(run(ListFormat::AxisGet, &[1, 0, 0, 0, 25, 0, 0, 4, 9, 9, 9, 9], 100, touched).0, long);
+        assert_eq!(run(ListFormat::AxisSet, &[1, 0, 0, 0, 25, 0, 0, 1, 7, 0, 0, 0, 1], 100, touched).0, long);
+        assert_eq!(run(ListFormat::SingleGet(461), &[0], 100, touched).0, long);
+        // Three statuses and the count need 14 octets.
+        let body = [3, 0, 0xCE, 1, 7, 8, 0xCE, 1, 7, 8, 0xCE, 1, 7, 8];
+        assert_eq!(run(ListFormat::CommonSet, &body, 13, touched).0, GeneralStatus::REPLY_DATA_TOO_LARGE);
+        assert_eq!(run(ListFormat::CommonSet, &body, 14, |_, _| Outcome::Done).0, OK);
+    }
+
+    proptest! {
+        /// Any octets under any service: no panic, an answer within its limit, and as many items in it as it says.
+        #[test]
+        fn any_list_is_answered_within_bounds(
+            format in 0..6_u8,
+            body in proptest::collection::vec(prop_oneof![3 => 0..6_u8, 1 => any::<u8>()], 0..120),
+            limit in 8..300_usize,
+            refuses in any::<bool>(),
+        ) {
+            let formats = [
+                ListFormat::AxisGet,
+                ListFormat::AxisSet,
+                ListFormat::CommonGet,
+                ListFormat::CommonSet,
+                ListFormat::SingleGet(461),
+                ListFormat::SingleSet(461),
+            ];
+            let format = formats[usize::from(format)];
+            let mut items = 0_u16;
+            let (status, answer) = run(format, &body, limit, |item, value| {
+                items += 1;
+                assert!(value.len() <= body.len());
+                match item.selector {
+                    _ if refuses => Outcome::Refused(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED, 0),
+                    Some(selector) if item.value.is_none() => match selector.value_len() {
+                        Some(len @ 0..=64) => Outcome::Value(&[0xEE; 64][..len]),
+                        _ => Outcome::Refused(GeneralStatus::INVALID_PARAMETER, 0),
+                    },
+                    None if item.value.is_none() => Outcome::Value(&[1, 2, 3, 4]),
+                    _ => Outcome::Done,
+                }
+            });
+            prop_assert!(answer.len() <= limit);
+            let single = matches!(format, ListFormat::SingleGet(_) | ListFormat::SingleSet(_));
+            if !single && matches!(status, OK | GeneralStatus::ATTRIBUTE_LIST_ERROR) {
+                prop_assert_eq!(u16::from_le_bytes([answer[0], answer[1]]), items);
+            } else if !single {
+                prop_assert_eq!(answer.len(), 0);
+            }
+        }
     }
 
     #[test]

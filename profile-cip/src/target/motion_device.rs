@@ -403,6 +403,19 @@ impl MotionDevice {
         slot.store.put(entry, entry.whole(), value)
     }
 
+    /// Publishes the signals of an axis that its cyclic read lists hold, before [`MotionDevice::poll_transmit`] of the same
+    /// cycle. `value` writes the octets of an attribute and returns how many they are, or `None` while it has no value: a
+    /// list with such an attribute is answered with "device state conflict" instead of old data.
+    pub fn publish_signals(
+        &mut self,
+        axis: usize,
+        value: &mut dyn FnMut(u16, &mut [u8; 8]) -> Option<usize>,
+    ) {
+        if let Some(slot) = self.slots.get_mut(axis) {
+            slot.read_lists.publish(&self.axis_table, &mut slot.store, value);
+        }
+    }
+
     /// The value of an attribute of an axis as it is stored in the device.
     ///
     /// # Errors
@@ -459,7 +472,7 @@ impl MotionDevice {
                 self.reply(MotionReply::ResetPrepared { token, granted: !self.is_in_use() });
             }
         }
-        self.run_explicit();
+        self.run_explicit(system_time);
     }
 
     /// The next reply to the explicit side.
@@ -569,7 +582,7 @@ impl MotionDevice {
             }
         }
         self.step(system_time);
-        self.run_explicit();
+        self.run_explicit(system_time);
     }
 
     pub(super) fn step(&mut self, system_time: Option<SystemTime>) {

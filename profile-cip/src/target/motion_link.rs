@@ -123,6 +123,8 @@ pub struct ObjectPath {
 pub struct ExplicitRequest {
     /// Names this request.
     pub token: Token,
+    /// Who asks.
+    pub originator: Ipv4Addr,
     /// Service code, 0..=0x7F.
     pub service: u8,
     /// What it is aimed at.

@@ -1,9 +1,13 @@
 //! The services of the Motion Device Axis Object, clauses 5-2.4 and 5-2.5, for both ways they come: the service
 //! channel of the I/O connection and explicit messages.
 //!
-//! Supported: Group_Sync (class), Get and Set_Axis_Attributes_List, Set_Cyclic_Write_List and Set_Cyclic_Read_List
-//! (axes), and explicitly also Get and Set_Attribute_List and Get and Set_Attribute_Single. The test services answer
-//! "service not supported".
+//! Supported: Group_Sync (class), Get and Set_Axis_Attributes_List, Set_Cyclic_Write_List, Set_Cyclic_Read_List,
+//! Run_Hookup_Test and Get_Hookup_Test_Data (axes), and explicitly also Get and Set_Attribute_List and Get and
+//! Set_Attribute_Single. Motor and inertia tests answer "service not supported": they measure what only the drive can,
+//! and nothing that runs a drive here has a procedure for them.
+//!
+//! What may set an axis in motion or shift its time, Run_Hookup_Test and Group_Sync, is taken by explicit message only
+//! from the owner of the I/O connection; anybody else is told "privilege violation".
 
 use profile_generic::time::SystemTime;
 
@@ -14,9 +18,11 @@ use super::list_job::{BODY_MAX, ListFormat};
 use super::motion_device::MotionDevice;
 use super::motion_link::{EXPLICIT_DATA_MAX, ExplicitReply, ExplicitRequest, MotionReply};
 use super::time_offset::Offsets;
+use crate::wire::Writer;
 use crate::wire::motion::ServiceRequest;
 use crate::wire::motion::codes::{AlarmType, FaultType, MotionService, SyncStatus};
 use crate::wire::motion::id_list::parse_group_sync;
+use crate::wire::motion::test_service::{RUN_HOOKUP_TEST_LEN, RunHookupTest};
 use crate::wire::status::GeneralStatus;
 
 /// Class code of the Motion Device Axis Object.
@@ -28,6 +34,18 @@ mod common {
     pub const SET_ATTRIBUTE_LIST: u8 = 0x04;
     pub const GET_ATTRIBUTE_SINGLE: u8 = 0x0E;
     pub const SET_ATTRIBUTE_SINGLE: u8 = 0x10;
+}
+
+/// Reads a request body that has one length and no other.
+fn exact<T>(
+    body: &[u8],
+    len: usize,
+    parse: impl FnOnce(&[u8]) -> Result<T, crate::wire::Error>,
+) -> Result<T, GeneralStatus> {
+    if body.len() > len {
+        return Err(GeneralStatus::TOO_MUCH_DATA);
+    }
+    parse(body).map_err(|_| GeneralStatus::NOT_ENOUGH_DATA)
 }
 
 /// What a service turned out to be.
@@ -68,6 +86,34 @@ impl MotionDevice {
                 let Some(slot) = self.slots.get_mut(axis) else { return unsupported };
                 let (status, len) = slot.configure_list(&self.axis_table, direction, body, response);
                 Started::Answered(status, len)
+            }
+            (MotionService::RUN_HOOKUP_TEST, Some(axis)) => {
+                let context = self.context(system_time);
+                let Some(slot) = self.slots.get_mut(axis) else { return unsupported };
+                let request = exact(body, RUN_HOOKUP_TEST_LEN, RunHookupTest::parse);
+                let status = match request {
+                    Ok(request) => slot.axis.begin_hookup_test(&request, &context),
+                    Err(status) => status,
+                };
+                Started::Answered(status, 0)
+            }
+            (MotionService::GET_HOOKUP_TEST_DATA, Some(axis)) => {
+                let Some(slot) = self.slots.get(axis) else { return unsupported };
+                if slot.axis.config.hookup_tests == 0 {
+                    return unsupported;
+                }
+                if !body.is_empty() {
+                    return Started::Answered(GeneralStatus::TOO_MUCH_DATA, 0);
+                }
+                // Zeros would say that a test has succeeded.
+                let Some(data) = slot.axis.hookup_test_data() else {
+                    return Started::Answered(GeneralStatus::OBJECT_STATE_CONFLICT, 0);
+                };
+                let mut writer = Writer::new(response);
+                match data.emit(&mut writer) {
+                    Ok(()) => Started::Answered(GeneralStatus::SUCCESS, writer.written()),
+                    Err(_) => Started::Answered(GeneralStatus::REPLY_DATA_TOO_LARGE, 0),
+                }
             }
             _ => unsupported,
         }
@@ -277,18 +323,21 @@ impl MotionDevice {
     }
 
     /// Works on the explicit requests, one at a time.
-    pub(super) fn run_explicit(&mut self) {
+    ///
+    /// `system_time` is that of the moment, for services that compare it.
+    pub(super) fn run_explicit(&mut self, system_time: Option<SystemTime>) {
+        self.explicit.system_time = system_time;
         loop {
             if self.explicit.current.is_none() {
                 let Some(request) = self.explicit.pop() else { return };
-                self.start_explicit(&request);
+                self.start_explicit(&request, system_time);
             } else if !self.continue_explicit() {
                 return;
             }
         }
     }
 
-    fn start_explicit(&mut self, request: &ExplicitRequest) {
+    fn start_explicit(&mut self, request: &ExplicitRequest, system_time: Option<SystemTime>) {
         let token = request.token;
         let answer = |device: &mut Self, status: GeneralStatus, body: &[u8]| {
             let mut reply = ExplicitReply::status(token, status.0);
@@ -316,8 +365,14 @@ impl MotionDevice {
                 Started::Answered(GeneralStatus::PATH_SEGMENT_ERROR, 0)
             }
             (service, _) => {
-                // The explicit side brings no system time with it; Group_Sync belongs to the connection.
-                self.start_service(instance, MotionService(service), &request.data, None, &mut response)
+                let service = MotionService(service);
+                let guarded = matches!(service, MotionService::GROUP_SYNC | MotionService::RUN_HOOKUP_TEST);
+                let owner = self.connection.as_ref().map(|c| c.parameters.originator);
+                if guarded && owner.is_some_and(|owner| owner != request.originator) {
+                    Started::Answered(GeneralStatus::PRIVILEGE_VIOLATION, 0)
+                } else {
+                    self.start_service(instance, service, &request.data, system_time, &mut response)
+                }
             }
         };
         match started {
@@ -389,7 +444,7 @@ impl MotionDevice {
         let taken = self.space(instance).is_some_and(|mut space| worker.complete(ticket, answer, &mut space));
         self.explicit.worker = worker;
         if taken {
-            self.run_explicit();
+            self.run_explicit(self.explicit.system_time);
         }
     }
 }

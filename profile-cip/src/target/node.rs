@@ -181,7 +181,7 @@ impl Node {
             Err(status) => return self.refuse(request.service, status),
         };
         let answer = match (path.class, path.instance, request.service) {
-            (CLASS_MOTION_DEVICE_AXIS, ..) => return self.hand_on(&request, path),
+            (CLASS_MOTION_DEVICE_AXIS, ..) => return self.hand_on(origin, &request, path),
             (CLASS_CONNECTION_MANAGER, 1, Service::FORWARD_OPEN | Service::LARGE_FORWARD_OPEN) => {
                 return forward_open::open(self, origin, &request);
             }
@@ -264,12 +264,13 @@ impl Node {
         EthernetLink { config: &self.config.link, cleared: &mut self.cleared }
     }
 
-    fn hand_on(&mut self, request: &Request<'_>, path: ObjectPath) -> Step {
+    fn hand_on(&mut self, origin: &Origin, request: &Request<'_>, path: ObjectPath) -> Step {
         let Ok(data) = ArrayVec::try_from(request.data) else {
             return self.refuse(request.service, GeneralStatus::TOO_MUCH_DATA);
         };
         let token = self.new_token();
-        let explicit = ExplicitRequest { token, service: request.service.0, path, data };
+        let originator = *origin.peer.ip();
+        let explicit = ExplicitRequest { token, originator, service: request.service.0, path, data };
         match self.ask(MotionRequest::Explicit(explicit)) {
             Ok(()) => Step::Await(Await { token, service: request.service, kind: AwaitKind::Explicit }),
             Err(status) => self.refuse(request.service, status),

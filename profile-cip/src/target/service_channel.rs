@@ -1,7 +1,10 @@
 //! The service channel of an instance, clauses 6-2.7.1.2.5 and 6-2.7.2.1.8.
 //!
 //! A request stays in the C-to-D updates until it is answered; the answer stays in the D-to-C updates until the request
-//! is taken away or replaced. A transaction ID that was seen last is not executed again, however often it comes.
+//! is taken away or replaced. A transaction ID that was seen last is not executed again, however often it comes, also
+//! with another body: what a request asks for is what it asked for when its ID was new. Another service code under the
+//! same ID is another request; its answer names it. A request that is taken away while it is worked on goes on, and
+//! its answer waits for its return until another request comes.
 
 use arrayvec::ArrayVec;
 
@@ -91,7 +94,21 @@ mod tests {
         assert_eq!(channel.response().map(|r| r.general_status), Some(0));
         assert!(channel.handle(Some(&request(2))), "the next one replaces it");
         assert_eq!((channel.response(), channel.is_busy()), (None, true));
+        let other = ServiceRequest { service: MotionService::SET_CYCLIC_READ_LIST, ..request(2) };
+        assert!(channel.handle(Some(&other)), "another service under the same ID");
+        let changed = ServiceRequest { data: &[9, 9, 9, 9], ..other };
+        assert!(!channel.handle(Some(&changed)), "another body under the same ID");
+        assert!(!channel.handle(None));
+        channel.answer(GeneralStatus::INVALID_PARAMETER, &[]);
+        assert_eq!(channel.response(), None, "withdrawn while it was worked on");
+        assert!(!channel.handle(Some(&other)));
+        assert_eq!(channel.response().map(|r| (r.service, r.general_status)), Some((other.service, 0x20)));
+        assert!(channel.handle(Some(&request(2))), "the service before, which was answered long ago");
+        assert!(
+            channel.handle(Some(&request(255))) && channel.handle(Some(&request(0))),
+            "the count starts anew"
+        );
         channel.reset();
-        assert!(channel.handle(Some(&request(2))), "another connection starts anew");
+        assert!(channel.handle(Some(&request(0))), "another connection starts anew");
     }
 }

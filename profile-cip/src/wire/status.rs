@@ -59,6 +59,8 @@ open_code! {
         PATH_SIZE_INVALID = 0x26 => "path size invalid",
         /// The electronic key of the path does not fit this device.
         KEY_FAILURE_IN_PATH = 0x25 => "key failure in path",
+        /// The attribute cannot be read.
+        ATTRIBUTE_NOT_GETTABLE = 0x2C => "attribute not gettable",
         /// The member of an attribute is not there.
         INVALID_MEMBER_ID = 0x28 => "invalid member",
     }

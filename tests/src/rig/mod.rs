@@ -9,6 +9,7 @@
 //! test that fails
 //! prints the seed.
 
+pub mod explicit;
 pub mod motion;
 pub mod network;
 pub mod ports;

@@ -1,6 +1,8 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
+mod attributes;
 mod faults;
+mod hookup;
 mod loss;
 mod network;
 mod programs;

@@ -17,6 +17,7 @@ impl AxisChannel {
         {
             self.lose_command(now, system, Loss::Withheld(why));
         }
+        self.take_test(now, image.test);
         // Before the action: a stop that is ordered in a particular way is under way when the action asks for any.
         self.take_abort(now, system, image.abort);
         if image.action_id != self.action_id {
@@ -28,7 +29,7 @@ impl AxisChannel {
         if self.enable_pending && self.state() == DriveState::Ready {
             // The enable came in the very cycle in which the drive was not ready; the controller still asks for it.
             self.enable_pending = false;
-            self.take_action(now, system, DriveAction::Enable);
+            self.take_action(now, system, self.north_action);
         }
         if image.reset_id != self.reset_id && self.reset.is_none_or(|reset| reset.id != image.reset_id) {
             self.begin_reset(now, system, image.reset_id);
@@ -59,6 +60,12 @@ impl AxisChannel {
         }
         let request = match action {
             DriveAction::Enable if !self.moves => None,
+            // What a test is led by is torque: it ends by the drive's own deceleration, not by a ramp of the box.
+            DriveAction::None | DriveAction::PowerUp | DriveAction::Disable
+                if self.started_for_test && self.may_have_torque() =>
+            {
+                self.north.drive_request(DriveAction::Disable)
+            }
             DriveAction::Disable if self.may_have_torque() => {
                 self.begin_stop(now, system, self.stop_settings.plan);
                 None
@@ -70,6 +77,8 @@ impl AxisChannel {
             }
             // Without torque there is nothing to abort; the motion device keeps the fault.
             DriveAction::Abort if !self.may_have_torque() => None,
+            // A test that has ended before it began needs no torque.
+            DriveAction::Test if !self.tests_with_torque() => None,
             action => self.north.drive_request(action),
         };
         if let Some(request) = request {

@@ -98,6 +98,7 @@ impl AxisChannel {
     /// condition, and the controller has said what is to be done about it. It is over when the axis is not led any more.
     pub(super) fn watch(&mut self, system: SystemTime) {
         let operating = self.state() == DriveState::Operating;
+        let led = operating || self.state() == DriveState::Testing;
         let (position, velocity) = (self.feedback.position, self.feedback.velocity);
         let speed = velocity.get().unsigned_abs();
         let too_fast = |limit: Velocity| {
@@ -124,7 +125,7 @@ impl AxisChannel {
             (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below),
             (FaultCause::EXCESSIVE_POSITION_ERROR, astray),
         ] {
-            if operating && there {
+            if led && there {
                 self.faults.raise(Fault::new(cause, system), Origin::Watch);
             } else {
                 self.faults.clear(cause, Origin::Watch);

@@ -16,6 +16,7 @@ impl AxisChannel {
             online: self.south.is_some() && self.feedback.report != Report::Silent,
             action_id: self.action_id,
             reset_id: self.reset_id,
+            test: self.test_report(),
             ..DriveImage::default()
         };
         let mut feedback = self.feedback;

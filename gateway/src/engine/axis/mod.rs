@@ -11,10 +11,14 @@
 mod action;
 mod diagnosis;
 mod feedback;
+mod hookup;
 mod image;
 mod sequence;
 mod set_point;
 
+pub use self::hookup::HookupSettings;
+
+use self::hookup::TestRun;
 use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
 use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -52,6 +56,8 @@ pub struct Limits {
     pub velocity: Option<Velocity>,
     /// Largest distance of actual from commanded position. What follows from it is for the controller to say.
     pub following_error: Option<Position>,
+    /// What the hookup tests may do; without it none of them moves the axis.
+    pub hookup: Option<HookupSettings>,
 }
 
 /// What an axis has counted.
@@ -145,6 +151,10 @@ pub struct AxisChannel {
     enable_pending: bool,
     /// A connection was opened, and the axis has not been powered up on it yet.
     new_connection: bool,
+    /// The hookup test that the controller has asked for.
+    test: Option<TestRun>,
+    /// The torque was switched on for a test.
+    started_for_test: bool,
     counters: AxisCounters,
 }
 
@@ -194,6 +204,8 @@ impl AxisChannel {
             drive_reset_wanted: false,
             enable_pending: false,
             new_connection: false,
+            test: None,
+            started_for_test: false,
             counters: AxisCounters::default(),
         }
     }

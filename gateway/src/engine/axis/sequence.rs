@@ -54,7 +54,8 @@ impl AxisChannel {
         let heard = report != Report::Silent && self.feedback.present.contains(FeedbackSet::VELOCITY);
         Sensed {
             torque: self.may_have_torque() || report.has_torque(),
-            follows: self.state() == DriveState::Operating && report == Report::Operating,
+            follows: matches!(self.state(), DriveState::Operating | DriveState::Testing)
+                && report == Report::Operating,
             halted: report == Report::Halted && self.action == Action::Halt,
             velocity: heard.then_some(self.feedback.velocity),
         }
@@ -64,15 +65,21 @@ impl AxisChannel {
     /// set-points.
     pub(super) fn prepare_start(&mut self, now: MonotonicTime) {
         self.sequencer.start(now);
+        self.started_for_test = self.state() != DriveState::Operating && self.tests_with_torque();
         self.ramp = None;
         self.sequence = None;
         self.start_interpolator();
         let velocity = self.feedback.velocity;
         let stands =
             velocity.get().unsigned_abs() <= self.stop_settings.times.zero_speed.get().unsigned_abs();
-        let catches = self.stop_settings.flying_start && !stands;
+        let catches = self.stop_settings.flying_start && !stands && !self.started_for_test;
         self.caught = catches.then_some(velocity);
-        self.command.mode = if catches { OperatingMode::Velocity } else { OperatingMode::Position };
+        self.command.mode = match catches {
+            // What a test is to find out is whether a position loop would hold at all.
+            _ if self.started_for_test => OperatingMode::Torque,
+            true => OperatingMode::Velocity,
+            false => OperatingMode::Position,
+        };
     }
 
     pub(super) fn begin_stop(&mut self, now: MonotonicTime, system: SystemTime, plan: StopPlan) {

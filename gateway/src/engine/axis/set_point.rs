@@ -149,6 +149,7 @@ impl AxisChannel {
     pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
         self.acts_at = acts_at;
         self.made_at = now;
+        let test_torque = self.run_test(now, system);
         let operating = self.state() == DriveState::Operating;
         let fine = match self.interpolator.as_mut() {
             Some(interpolator) if operating && self.sequence.is_some() => Some(interpolator.at(acts_at)),
@@ -161,7 +162,10 @@ impl AxisChannel {
                 }
                 fine.set_points
             }
-            None => self.led_by_box(now),
+            None => {
+                let torque = self.started_for_test.then_some(test_torque);
+                FinePoints { torque, ..self.led_by_box(now) }
+            }
         };
         // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it.
         let led = operating && self.command.mode == OperatingMode::Position && !self.drive_leads();
@@ -183,7 +187,9 @@ impl AxisChannel {
         }
         match transition.action {
             Action::None => {}
-            Action::Reject => self.enable_pending = self.north_action == DriveAction::Enable,
+            Action::Reject => {
+                self.enable_pending = matches!(self.north_action, DriveAction::Enable | DriveAction::Test);
+            }
             Action::ResetFault => {
                 // The reset is a pulse, here a procedure command; the control word stays without torque.
                 self.action = Action::TorqueOff;

@@ -20,7 +20,7 @@ use crate::mapping::compile_cip::{
 use crate::mapping::device_link::DRIVE_ACTIONS;
 use crate::mapping::dictionary::{CipAttribute, Dictionaries, quantity};
 use crate::mapping::format::{
-    CipAttributeRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
+    CipAttributeRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name, RejectRow,
 };
 use crate::mapping::load::{Parsed, TableErrors};
 use crate::mapping::resolver::Resolver;
@@ -57,6 +57,9 @@ impl CipTables {
         builder.sequence(rows);
         for row in &rows.attribute {
             builder.attribute(row);
+        }
+        for row in &rows.reject {
+            builder.reject(row);
         }
         builder.finish(file)
     }
@@ -526,6 +529,23 @@ impl Builder<'_> {
         self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
     }
 
+    fn reject(&mut self, row: &RejectRow) {
+        if row.reason.get_ref().trim().is_empty() {
+            self.resolver.error(row.reason.span(), "reason", "expected a reason, got none");
+        }
+        for name in &row.attributes {
+            let dictionaries = self.dictionaries;
+            let found = dictionaries.cip.attribute_or_error("attributes", name, &mut self.resolver);
+            let Some(attribute) = found else { continue };
+            let served = self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id);
+            let twice = self.tables.rejected.iter().any(|(known, _)| *known == attribute.id);
+            if served || twice {
+                self.resolver.error(name.span(), "attributes", "the attribute is there twice");
+            }
+            self.tables.rejected.push((attribute.id, row.reason.get_ref().clone()));
+        }
+    }
+
     fn parameter(&mut self, row: &CipAttributeRow, attribute: &CipAttribute, name: &Name) -> Option<Served> {
         let generic = &self.dictionaries.generic;
         let what = "a parameter of the generic model";
@@ -560,6 +580,7 @@ impl Builder<'_> {
     fn finish(mut self, file: &Parsed<CipGenericFile>) -> CipTables {
         let tables = &mut self.tables;
         tables.attributes.sort_by_key(|row| row.attribute.id);
+        tables.rejected.sort();
         tables.faults.sort_by_key(|(cause, _)| *cause);
         let limits = [
             ("request", tables.requests.len(), MAX_REQUESTS),

@@ -43,6 +43,8 @@ pub struct CipGenericFile {
     pub sequence: SequenceRow,
     /// Attributes.
     pub attribute: Vec<CipAttributeRow>,
+    /// Attributes that are not served.
+    pub reject: Vec<RejectRow>,
 }
 
 /// Which attributes define what a count is.
@@ -177,7 +179,7 @@ pub struct RequestRow {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriveActionRow {
-    /// `none`, `power_up`, `enable`, `disable`, `shutdown` or `abort`.
+    /// `none`, `power_up`, `enable`, `test`, `disable`, `shutdown` or `abort`.
     pub drive_action: Name,
     /// Generic request; absent when it asks for nothing.
     pub request: Option<Name>,
@@ -307,6 +309,16 @@ pub struct SequenceRow {
     pub flying_start: Name,
     /// Where it comes from.
     pub source: Source,
+}
+
+/// Attributes that the device does not have, and why.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RejectRow {
+    /// Why.
+    pub reason: Name,
+    /// The attributes; "Feedback n" by the channel.
+    pub attributes: Vec<Name>,
 }
 
 /// An attribute and what stands behind it.

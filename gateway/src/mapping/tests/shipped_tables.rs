@@ -39,28 +39,64 @@ fn leave_no_cause_inhibit_state_mode_or_reaction_without_a_row() {
     for request in Request::ALL {
         let by_request =
             (0..=255).any(|code| program.request(code).and_then(|row| row.request) == Some(*request));
-        let by_action =
-            [DriveAction::PowerUp, DriveAction::Enable].map(|action| program.drive_request(action));
+        let by_action = [DriveAction::PowerUp, DriveAction::Enable, DriveAction::Test]
+            .map(|action| program.drive_request(action));
         // Stop and Coast are what the stopping actions come to.
-        let own = matches!(request, Request::Stop | Request::Coast | Request::Test);
+        let own = matches!(request, Request::Stop | Request::Coast);
         assert!(by_request || by_action.contains(&Some(*request)) || own, "{request}");
     }
 }
 
 #[test]
 fn give_the_device_a_table_it_accepts() {
-    let mapping = shipped();
-    let axis = rotary_axis(true);
-    let south = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
-    let table = mapping.attribute_table(&rotary_counts()).unwrap();
-    let definitions = table.definitions(&mapping.dictionaries.cip, Some(&south));
-    DeviceTable::new(Scope::Instance, &definitions).unwrap();
-    let backing = |id| definitions.iter().find(|row| row.id == id).map(|row| row.backing);
+    let definitions = shipped().attribute_definitions(&rotary_counts()).unwrap();
+    for scope in [Scope::Class, Scope::Instance] {
+        DeviceTable::new(scope, &definitions).unwrap();
+    }
+    let row = |id| definitions.iter().find(|row| row.id == id && row.scope == Scope::Instance);
+    let backing = |id| row(id).map(|row| row.backing);
     assert_eq!(backing(504), Some(DeviceBacking::Drive), "Torque Limit - Positive");
-    assert_eq!(backing(461), Some(DeviceBacking::Stored), "Kvp: no row on SERCOS");
-    assert_eq!(backing(1319), Some(DeviceBacking::Stored), "rated current: the drive lets it be read only");
-    assert_eq!(backing(641), None, "Inverter Temperature: rejected where the drive lacks it");
-    assert_eq!(backing(1310), None, "strings are left out");
+    assert_eq!(backing(461), Some(DeviceBacking::Drive), "Kvp");
+    assert_eq!(backing(454), Some(DeviceBacking::Signal), "Velocity Feedback");
+    assert_eq!(backing(41), Some(DeviceBacking::Stored), "Control Method");
+    assert_eq!(row(610).map(|row| row.codes.clone()), Some(vec![0, 1, 2, 3, 4]), "Stopping Action");
+    assert_eq!(row(676).and_then(|row| row.bits), Some(0b11_1110), "Start Inhibits");
+}
+
+/// Device functions that the box offers: position, velocity and torque loop with an encoder.
+fn is_required(need: &str) -> bool {
+    need.chars().zip("BEFPVT".chars()).any(|(need, function)| need == 'R' && "PVT".contains(function))
+}
+
+#[test]
+fn say_of_every_attribute_who_serves_it_or_why_nobody_does() {
+    let mapping = shipped();
+    let served = |id| mapping.cip.attributes.iter().any(|row| row.attribute.id == id);
+    let rejected = |id| mapping.cip.rejected.iter().find(|(known, _)| *known == id);
+    let unsaid: Vec<_> = mapping
+        .dictionaries
+        .cip
+        .attributes()
+        .iter()
+        .filter(|row| !served(row.id) && rejected(row.id).is_none())
+        .map(|row| format!("{} {}", row.id, row.name))
+        .collect();
+    assert_eq!(unsaid, Vec::<String>::new());
+    assert_eq!(mapping.cip.attributes.len() + mapping.cip.rejected.len(), 452);
+}
+
+/// What the standard requires of such a device and the box does not have: a list that may only become shorter.
+#[test]
+fn own_up_to_the_required_attributes_that_nobody_serves() {
+    let mapping = shipped();
+    let mut list = String::new();
+    for (id, reason) in &mapping.cip.rejected {
+        let row = mapping.dictionaries.cip.attribute_by_id(*id).unwrap();
+        if is_required(&row.need) {
+            list.push_str(&format!("{id} {} ({}): {reason}\n", row.name, row.need));
+        }
+    }
+    insta::assert_snapshot!(list);
 }
 
 /// What can be set for each exception, from the rows of both tables.

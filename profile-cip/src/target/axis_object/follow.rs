@@ -51,6 +51,8 @@ impl Axis {
         if context.node_fault {
             self.fire(AxisEvent::MajorFault);
         }
+        // First, because the drive leaves its test in the same cycle in which it reports the end.
+        self.follow_test(context);
         self.follow_drive(context);
     }
 
@@ -87,14 +89,16 @@ impl Axis {
             AxisState::Stopped if !self.drive.bus_up || !self.drive.online => self.fire(AxisEvent::BusDown),
             AxisState::Stopped if self.inhibited() => self.fire(AxisEvent::StartInhibit),
             AxisState::StartInhibited if !self.inhibited() => self.fire(AxisEvent::InhibitsCleared),
-            AxisState::Starting | AxisState::Running if self.inhibited() || !context.remote => {
+            AxisState::Starting | AxisState::Running | AxisState::Testing
+                if self.inhibited() || !context.remote =>
+            {
                 self.fire(AxisEvent::Disable)
             }
             AxisState::Starting if self.answers() && self.drive.start_complete => {
                 self.fire(AxisEvent::StartComplete)
             }
             // A drive that no longer follows is no longer Running, and does not start again by itself.
-            AxisState::Running
+            AxisState::Running | AxisState::Testing
                 if self.config.kind == ControlKind::Active
                     && self.answers()
                     && !self.drive.start_complete =>
@@ -127,6 +131,7 @@ impl Axis {
             AxisControl::ABORT if matches!(state, AxisState::Aborting | AxisState::MajorFaulted) => {
                 Some(GeneralStatus::SUCCESS)
             }
+            AxisControl::STOP_PROCESS if !self.in_process() => Some(GeneralStatus::SUCCESS),
             _ => None,
         };
         if let Some(status) = done {
@@ -143,7 +148,9 @@ impl Axis {
             AxisState::PreCharge | AxisState::Stopped | AxisState::StartInhibited => DriveAction::PowerUp,
             // Only an axis that controls motion is energized by Running.
             AxisState::Running if self.config.kind != ControlKind::Active => DriveAction::PowerUp,
-            AxisState::Starting | AxisState::Running | AxisState::Testing => DriveAction::Enable,
+            AxisState::Testing => DriveAction::Test,
+            AxisState::Starting if self.is_testing() => DriveAction::Test,
+            AxisState::Starting | AxisState::Running => DriveAction::Enable,
             AxisState::Stopping if self.shutdown => DriveAction::Shutdown,
             AxisState::Stopping => DriveAction::Disable,
             AxisState::Aborting | AxisState::MajorFaulted => DriveAction::Abort,

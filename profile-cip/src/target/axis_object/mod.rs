@@ -7,6 +7,7 @@
 mod fault;
 mod follow;
 mod request;
+mod test;
 
 pub use fault::FaultWords;
 pub(super) use fault::Faults;
@@ -21,8 +22,9 @@ use super::motion_device::SequenceSettings;
 use super::status_report::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventChecking,
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventChecking, TestStatus,
 };
+use crate::wire::motion::test_service::HookupTestData;
 use crate::wire::motion::{CommandBlock, CommandValues};
 use profile_generic::time::MonotonicTime;
 
@@ -61,6 +63,8 @@ pub struct AxisConfig {
     pub lint_position: bool,
     /// Events the drive can check for.
     pub events: EventChecking,
+    /// Hookup tests that can be run, as bits numbered by the code of the test (Table 5-2.94).
+    pub hookup_tests: u8,
 }
 
 impl AxisConfig {
@@ -124,6 +128,9 @@ pub(super) struct Axis {
     pub(super) io_status: Reported<(AxisIoStatus, u32)>,
     pub(super) safety: Reported<SafetyStatus>,
     pub(super) events: EventChannel,
+    test: Option<test::ActiveTest>,
+    test_id: u32,
+    hookup: Option<HookupTestData>,
 }
 
 /// Whether the command values hold the one that the mode needs.
@@ -164,6 +171,9 @@ impl Axis {
             io_status: Reported::new(),
             safety: Reported::new(),
             events: EventChannel::new(config.events),
+            test: None,
+            test_id: 0,
+            hookup: None,
         }
     }
 
@@ -221,7 +231,7 @@ impl Axis {
         AxisConditions {
             bus_up: self.drive.bus_up,
             shutdown: self.shutdown,
-            in_process: false,
+            in_process: self.is_testing(),
             start_inhibited: self.inhibited(),
             flying_start: self.sequence_settings.flying_start,
         }
@@ -275,6 +285,8 @@ impl Axis {
     /// The connection was lost.
     pub fn lose(&mut self) {
         self.fire(AxisEvent::ConnectionLoss);
+        self.break_off_test(TestStatus::ABORTED);
+        self.test = None;
         self.handshake.reset();
         self.held = None;
         self.reset = None;
@@ -283,6 +295,8 @@ impl Axis {
     }
 
     fn forget(&mut self, system_time: u64) {
+        self.test = None;
+        self.hookup = None;
         self.shutdown = false;
         self.faults.forget(system_time);
         self.reset = None;

@@ -106,7 +106,7 @@ impl Axis {
                 self.raise(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
                 None
             }
-            AxisControl::STOP_PROCESS => Some(GeneralStatus::SUCCESS),
+            AxisControl::STOP_PROCESS => self.stop_process(),
             AxisControl::CHANGE_ACTUAL_POSITION | AxisControl::CHANGE_COMMAND_POSITION => {
                 Some(self.displace(request, block.values.position_displacement))
             }
@@ -119,6 +119,9 @@ impl Axis {
 
     pub(super) fn begin_enable(&mut self, context: &Context) -> Option<GeneralStatus> {
         if self.config.kind != ControlKind::Active {
+            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+        }
+        if self.is_testing() {
             return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
         }
         if matches!(self.state, AxisState::Starting | AxisState::Running) {

@@ -2,6 +2,7 @@
 
 mod faults;
 mod handshake;
+mod hookup;
 mod refusals;
 mod requests;
 mod reset;
@@ -73,9 +74,9 @@ impl FakeDrive {
             return;
         }
         if !self.stuck {
-            let enabled = command.action == DriveAction::Enable;
+            let enabled = matches!(command.action, DriveAction::Enable | DriveAction::Test);
             self.image.start_complete = enabled;
-            self.image.tracking = enabled;
+            self.image.tracking = command.action == DriveAction::Enable;
             self.image.power_enabled = enabled;
             self.image.stop_complete = !enabled;
         }
@@ -125,6 +126,7 @@ impl Rig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
             events: EventChecking::HOME_POSITIVE,
+            hookup_tests: 0b11,
             ..AxisConfig::default()
         };
         let config = DeviceConfig {

@@ -131,7 +131,7 @@ fn group_sync_tells_what_is_wrong() {
 #[test]
 fn services_that_are_not_there_are_refused() {
     let mut rig = Rig::stopped();
-    for (transaction, code) in (1..).zip(0x4F..=0x54) {
+    for (transaction, code) in (1..).zip(0x4F..=0x52) {
         rig.services[1] = Some((transaction, MotionService(code), vec![0; 4]));
         rig.cycle();
         assert_eq!(rig.response(1), Some((transaction, 0x08, vec![])));
@@ -175,16 +175,23 @@ fn an_answer_too_long_for_the_connection_is_an_error_and_others_wait_their_turn(
     assert_eq!(rig.device.counters().left_out, 0);
 }
 
-fn explicit(token: u64, service: u8, instance: u32, attribute: Option<u16>, data: &[u8]) -> MotionRequest {
+pub(super) fn explicit(
+    token: u64,
+    service: u8,
+    instance: u32,
+    attribute: Option<u16>,
+    data: &[u8],
+) -> MotionRequest {
     MotionRequest::Explicit(ExplicitRequest {
         token: Token(token),
+        originator: Ipv4Addr::LOCALHOST,
         service,
         path: ObjectPath { class: 0x42, instance, attribute, ..ObjectPath::default() },
         data: ArrayVec::try_from(data).expect("fits"),
     })
 }
 
-fn reply_of(reply: Option<MotionReply>) -> (u64, u8, Vec<u8>) {
+pub(super) fn reply_of(reply: Option<MotionReply>) -> (u64, u8, Vec<u8>) {
     match reply {
         Some(MotionReply::Explicit(reply)) => (reply.token.0, reply.general_status, reply.data.to_vec()),
         other => panic!("{other:?}"),

@@ -173,6 +173,12 @@ macro_rules! list {
             pub fn left(&self) -> u16 {
                 self.left
             }
+
+            /// Octets that have not been read yet.
+            #[must_use]
+            pub fn rest(&self) -> usize {
+                self.reader.remaining()
+            }
         }
 
         impl<'a> Iterator for $name<'a> {

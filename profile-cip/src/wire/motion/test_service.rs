@@ -17,7 +17,20 @@ use super::codes::TestStatus;
 use super::value::{ReadValue, WriteValue};
 use crate::wire::{Error, Reader, Writer};
 
+/// Octets of a Run_Hookup_Test request.
+pub const RUN_HOOKUP_TEST_LEN: usize = 12;
+
 const BODY: &str = "test service body";
+
+/// Test Status of a hookup test beyond those that all tests have, Table 5-2.96.
+pub mod hookup_status {
+    use super::TestStatus;
+
+    /// Feedback 1 did not show the motion.
+    pub const NO_FEEDBACK_1: TestStatus = TestStatus(5);
+    /// Feedback 2 did not show the motion.
+    pub const NO_FEEDBACK_2: TestStatus = TestStatus(6);
+}
 
 /// Run_Motor_Test request, Table 5-2.86.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +88,7 @@ pub struct RunHookupTest {
 }
 
 /// Get_Hookup_Test_Data response, Table 5-2.96.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct HookupTestData {
     /// Result of the last hookup test.
     pub status: TestStatus,

@@ -1,0 +1,227 @@
+//! Every attribute of an axis by explicit message: read, written well, written badly, and written while the axis runs.
+//!
+//! What is expected follows from the rows of the dictionary, not from the definitions that the device is built with.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use axisbridge::mapping::{Access, CipAttribute, CipType, Mapping, Served, SetKind};
+use axisbridge_tests::rig::explicit::Client;
+use axisbridge_tests::rig::motion::{NANO, millis};
+use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
+use profile_cip::controller::{AxisSet, Step};
+use profile_cip::target::axis_state::AxisState;
+use profile_cip::wire::motion::id_list::IdList;
+
+const GET: u8 = 0x0E;
+const SET: u8 = 0x10;
+const OK: u8 = 0;
+const INVALID_VALUE: u8 = 0x09;
+const STATE_CONFLICT: u8 = 0x0C;
+const NOT_SETTABLE: u8 = 0x0E;
+const DEVICE_CONFLICT: u8 = 0x10;
+const SHORT: u8 = 0x13;
+const NOT_SUPPORTED: u8 = 0x14;
+const LONG: u8 = 0x15;
+
+fn octets(data_type: CipType) -> usize {
+    data_type.width().map_or(1, |width| width.bytes())
+}
+
+/// A value that the attribute cannot have, in its first element; `None` where the dictionary forbids none.
+fn bad_value(mapping: &Mapping, row: &CipAttribute, good: &[u8]) -> Option<Vec<u8>> {
+    let mut value = good.to_vec();
+    let first = value.get_mut(..octets(row.data_type))?;
+    let cip = &mapping.dictionaries.cip;
+    let sets = cip.enumerations().iter().chain(cip.bit_sets());
+    let whole = sets.into_iter().find(|set| set.attributes.contains(&row.id) && set.element.is_empty());
+    match (row.data_type, whole) {
+        (CipType::Real, _) => first.copy_from_slice(&f32::NAN.to_le_bytes()),
+        (CipType::Lreal, _) => first.copy_from_slice(&f64::INFINITY.to_le_bytes()),
+        (CipType::Bool, _) => first[0] = 2,
+        (_, Some(set)) if set.kind == SetKind::Codes => {
+            let free =
+                (0..=255_u8).find(|code| set.codes.iter().all(|known| known.code != u32::from(*code)))?;
+            first.fill(0);
+            first[0] = free;
+        }
+        (_, Some(set)) => {
+            let bits = u32::try_from(8 * first.len()).expect("a few bits");
+            let free = (0..bits).find(|bit| set.codes.iter().all(|known| known.code != *bit))?;
+            first.fill(0);
+            first[usize::try_from(free / 8).expect("small")] = 1 << (free % 8);
+        }
+        _ => return None,
+    }
+    Some(value)
+}
+
+fn rig_in(state: AxisState) -> (Rig, Client) {
+    let mut rig = Rig::ready(Settings::default());
+    let dwell = Step::Dwell { seconds: 1_000.0 };
+    let program = match state {
+        AxisState::Running => vec![Step::Enable(AxisSet::one(1)), dwell],
+        _ => vec![dwell],
+    };
+    rig.connect(program);
+    rig.run_until(millis(10_000), "the state", |rig| {
+        rig.engine.devices()[0].axis_states().next().is_some_and(|(_, reached)| reached == state)
+    });
+    rig.run_for(millis(100));
+    let client = Client::connect(&mut rig, CONTROLLER);
+    (rig, client)
+}
+
+#[test]
+fn every_attribute_answers_as_its_row_in_the_dictionary_says() {
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    let served: BTreeMap<u16, Served> =
+        mapping.cip.attributes.iter().map(|row| (row.attribute.id, row.served)).collect();
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let (mut running, runner) = rig_in(AxisState::Running);
+    let mut wrong = String::new();
+    let mut counts = BTreeMap::<&str, usize>::new();
+    for row in mapping.dictionaries.cip.attributes() {
+        let id = row.id;
+        let mut check = |what: &'static str, got: u8, expected: &[u8]| {
+            *counts.entry(what).or_default() += 1;
+            if !expected.contains(&got) {
+                writeln!(wrong, "{id} {} {what}: 0x{got:02X}, expected {expected:02X?}", row.name)
+                    .expect("a string takes everything");
+            }
+        };
+        let (status, value) = client.ask(&mut rig, GET, 1, Some(id), &[]);
+        let Some(served) = served.get(&id) else {
+            check("get of one that is not served", status, &[NOT_SUPPORTED]);
+            let (status, _) = client.ask(&mut rig, SET, 1, Some(id), &[0; 4]);
+            check("set of one that is not served", status, &[NOT_SUPPORTED]);
+            continue;
+        };
+        match served {
+            // The drive may lack the parameter, and a signal may have no value now.
+            Served::Parameter { .. } => check("get", status, &[OK, NOT_SUPPORTED]),
+            Served::Signal { .. } => check("get", status, &[OK, DEVICE_CONFLICT]),
+            _ => check("get", status, &[OK]),
+        }
+        let size = octets(row.data_type) * usize::from(row.length.unwrap_or(1));
+        let value = if status == OK { value } else { vec![0; size] };
+        if row.data_type != CipType::ShortString {
+            check(
+                "octets",
+                u8::try_from(value.len()).expect("at most 64"),
+                &[u8::try_from(size).expect("64")],
+            );
+        }
+        let mut set = |value: &[u8]| client.ask(&mut rig, SET, 1, Some(id), value).0;
+        if row.access == Access::Get {
+            check("set of one that can only be read", set(&value), &[NOT_SETTABLE]);
+            check("set of one that can only be read", set(&value[..value.len() - 1]), &[NOT_SETTABLE]);
+            continue;
+        }
+        if status == NOT_SUPPORTED {
+            check("set of one that the drive lacks", set(&value), &[NOT_SUPPORTED]);
+            continue;
+        }
+        if row.access == Access::SetCyclic {
+            check("set of what the connection sets, to what it is", set(&value), &[OK]);
+            let mut other = value.clone();
+            other[0] ^= 1;
+            check("set of what the connection sets", set(&other), &[NOT_SETTABLE]);
+            continue;
+        }
+        check("set", set(&value), &[OK]);
+        check("set with an octet less", set(&value[..value.len() - 1]), &[SHORT]);
+        check("set with an octet more", set(&[&value[..], &[0]].concat()), &[LONG]);
+        if let Some(bad) = bad_value(&mapping, row, &value) {
+            check("set to what it cannot be", set(&bad), &[INVALID_VALUE]);
+        }
+        let (_, again) = client.ask(&mut rig, GET, 1, Some(id), &[]);
+        check("the value stays", u8::from(again != value), &[0]);
+        let expected = if row.running { OK } else { STATE_CONFLICT };
+        let (status, _) = runner.ask(&mut running, SET, 1, Some(id), &value);
+        check("set in Running", status, &[expected]);
+    }
+    assert_eq!(wrong, "");
+    let counts: String = counts.iter().map(|(what, count)| format!("{count} {what}\n")).collect();
+    insta::assert_snapshot!(counts);
+    assert_eq!(
+        running.engine.devices()[0].axis_states().next().map(|(_, state)| state),
+        Some(AxisState::Running),
+        "nothing of it has disturbed the axis"
+    );
+}
+
+/// A list of all the attributes that exist, read in pieces that fit, with the same answers as one by one.
+#[test]
+fn lists_answer_attribute_by_attribute() {
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    for rows in mapping.dictionaries.cip.attributes().chunks(16) {
+        let mut list = u16::try_from(rows.len()).expect("few").to_le_bytes().to_vec();
+        list.extend([0, 0]);
+        for row in rows {
+            let size = u8::try_from(octets(row.data_type)).expect("small");
+            list.extend(row.id.to_le_bytes());
+            match row.length {
+                None => list.extend([0, size]),
+                Some(count) => {
+                    list.extend([1, size, 0, 0]);
+                    list.extend(count.to_le_bytes());
+                }
+            }
+        }
+        let (status, body) = client.ask(&mut rig, 0x4B, 1, None, &list);
+        assert!(status == OK || status == 0x0A, "0x{status:02X}");
+        let items = profile_cip::wire::motion::attribute_list::GetResponse::new(&body).expect("a list");
+        let mut answered = 0;
+        for (item, row) in items.zip(rows) {
+            use profile_cip::wire::motion::attribute_list::GetItem;
+            answered += 1;
+            let (single, value) = client.ask(&mut rig, GET, 1, Some(row.id), &[]);
+            match item.expect("an item") {
+                GetItem::Value(selector, octets) => {
+                    assert_eq!((selector.id, single), (row.id, OK));
+                    assert_eq!(octets.len(), value.len(), "{}", row.name);
+                }
+                GetItem::Error(id, status) => assert_eq!((id, status), (row.id, single)),
+            }
+        }
+        assert_eq!(answered, rows.len());
+    }
+}
+
+#[test]
+fn signals_of_a_cyclic_read_list_are_fresh_in_every_cycle_and_parameters_are_refused_by_name() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        Step::Enable(AxisSet::one(1)),
+        Step::Jog { axis: 1, velocity: 4.0, acceleration: 40.0, jerk: 800.0, seconds: 5.0 },
+        Step::Disable(AxisSet::one(1)),
+    ]);
+    rig.run_until(millis(5_000), "motion", |rig| rig.velocity(0) > NANO);
+    let client = Client::connect(&mut rig, CONTROLLER);
+    let list = |ids: &[u16]| {
+        let mut body = [0; 32];
+        let len = IdList::emit(&mut body, ids).expect("room");
+        body[..len].to_vec()
+    };
+    // Velocity Feedback and Axis State; then Torque Limit - Positive, which lives in the drive.
+    let answer = client.ask(&mut rig, 0x4E, 1, None, &list(&[454, 650]));
+    assert_eq!(answer, (OK, vec![2, 0, 1, 0, 0xC6, 1, 0, 0, 0x8A, 2, 0, 0]));
+    let answer = client.ask(&mut rig, 0x4E, 1, None, &list(&[504]));
+    assert_eq!(answer, (0x0A, vec![1, 0, 1, 0, 0xF8, 1, 0x2C, 0]), "the ID stays that of the list before");
+    let answer = client.ask(&mut rig, 0x4D, 1, None, &list(&[504]));
+    assert_eq!(answer, (0x0A, vec![1, 0, 0, 0, 0xF8, 1, 0x0E, 0]));
+    let velocity = |rig: &Rig| {
+        let octets = rig.engine.devices()[0].device().attribute(0, 454).expect("it is there");
+        f32::from_le_bytes(octets.try_into().expect("a REAL"))
+    };
+    rig.run_until(millis(2_000), "full speed", |rig| rig.velocity(0) > 39 * NANO / 10);
+    rig.run_for(millis(100));
+    assert!((velocity(&rig) - 4.0).abs() < 0.05, "{}", velocity(&rig));
+    rig.run_until(millis(10_000), "rest", |rig| rig.velocity(0).abs() < NANO / 1_000);
+    rig.run_for(millis(100));
+    assert!(velocity(&rig).abs() < 0.01, "{}", velocity(&rig));
+    // The two axes have lists of their own.
+    assert_eq!(rig.engine.devices()[0].device().attribute(1, 454), Ok(&[0; 4][..]));
+}
