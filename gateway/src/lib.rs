@@ -4,6 +4,7 @@ pub mod capture;
 pub mod cli;
 pub mod config;
 pub mod decode;
+pub mod eds;
 pub mod engine;
 pub mod host;
 pub mod latest;

@@ -1,5 +1,8 @@
 //! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
 
+use profile_cip::target::identity::ModuleState;
+use profile_cip::target::visualization::Indication;
+use profile_cip::target::visualization::display::{LINE_MAX, Line, LineText};
 use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::inhibit::Inhibits;
@@ -13,7 +16,7 @@ use crate::config::AXES_MAX;
 use crate::latest::Words;
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 10;
+const AXIS_WORDS: usize = 11;
 
 /// Words of the box itself.
 const BOX_WORDS: usize = 9;
@@ -99,9 +102,71 @@ pub struct AxisStatus {
     pub saturated: u32,
     /// Faults that have occurred.
     pub faults: u32,
+    /// What the indicators show for the axis and its device.
+    pub indicators: Indicators,
+}
+
+/// What the indicators of CIP Motion devices show (Volume 9 clause 9-1.1) for one axis and its device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Indicators {
+    /// State of the device, which its Module Status LED shows and its Identity object has.
+    pub module: ModuleState,
+    /// Network Status LED of the device.
+    pub network: Indication,
+    /// Axis Status LED.
+    pub axis: Indication,
+    /// Line of the alphanumeric display.
+    pub line: Line,
+    /// The device has other axes, and lines of the axis begin with its instance number.
+    pub several: bool,
+    /// A minor fault of the axis is latched.
+    pub minor_fault: bool,
+}
+
+impl Indicators {
+    /// Of no axis.
+    pub const NONE: Self = Self {
+        module: ModuleState::Standby,
+        network: Indication::OFF,
+        axis: Indication::OFF,
+        line: Line { text: LineText::NONE, code: 0 },
+        several: false,
+        minor_fault: false,
+    };
+
+    fn to_word(self) -> u64 {
+        u64::from_be_bytes([
+            self.module.code(),
+            self.network.0,
+            self.axis.0,
+            self.line.text.0,
+            self.line.code,
+            u8::from(self.several),
+            u8::from(self.minor_fault),
+            0,
+        ])
+    }
+
+    fn from_word(word: u64) -> Self {
+        let [module, network, axis, text, code, several, minor_fault, _] = word.to_be_bytes();
+        Self {
+            module: ModuleState::from_code(module).unwrap_or(ModuleState::Standby),
+            network: Indication(network),
+            axis: Indication(axis),
+            line: Line { text: LineText(text), code },
+            several: several != 0,
+            minor_fault: minor_fault != 0,
+        }
+    }
 }
 
 impl AxisStatus {
+    /// The line of the display as a person reads it.
+    #[must_use]
+    pub fn display(&self) -> arrayvec::ArrayString<LINE_MAX> {
+        self.indicators.line.characters(self.indicators.several.then_some(self.instance))
+    }
+
     /// No axis.
     pub const NONE: Self = Self {
         instance: 0,
@@ -123,6 +188,7 @@ impl AxisStatus {
         lost_telegrams: 0,
         saturated: 0,
         faults: 0,
+        indicators: Indicators::NONE,
     };
 }
 
@@ -242,11 +308,13 @@ impl AxisStatus {
             self.commands,
             pair(self.lost_updates, self.lost_telegrams),
             pair(self.saturated, self.faults),
+            self.indicators.to_word(),
         ]
     }
 
     fn from_words(words: &[u64; AXIS_WORDS]) -> Self {
-        let [head, bits, codes, position, velocity, torque, error, commands, lost, other] = *words;
+        let [head, bits, codes, position, velocity, torque, error, commands, lost, other, indicators] =
+            *words;
         let [instance, device, state, cip_axis_state, mode, faulted, cause_high, cause_low] =
             head.to_be_bytes();
         let (status, inhibits) = split(bits);
@@ -275,6 +343,7 @@ impl AxisStatus {
             lost_telegrams,
             saturated,
             faults,
+            indicators: Indicators::from_word(indicators),
         }
     }
 }
@@ -378,6 +447,14 @@ pub(crate) mod tests {
             lost_telegrams: 0x7777_8888,
             saturated: 0x0999_0AAA,
             faults: 0x0BBB_0CCC,
+            indicators: Indicators {
+                module: ModuleState::MajorRecoverableFault,
+                network: Indication::SOLID_GREEN,
+                axis: Indication::RED_GREEN,
+                line: Line { text: LineText::RUNNING, code: 0 },
+                several: true,
+                minor_fault: true,
+            },
         };
         status.axes[1] = AxisStatus {
             instance: 200,
@@ -389,6 +466,12 @@ pub(crate) mod tests {
             fault: Some(FaultCause(0x0905)),
             fault_vendor_code: 0xC30A_0040,
             position_counts: i32::MAX,
+            indicators: Indicators {
+                module: ModuleState::MajorUnrecoverableFault,
+                axis: Indication::SOLID_RED,
+                line: Line { text: LineText::INIT_FAULT, code: 12 },
+                ..Indicators::NONE
+            },
             ..AxisStatus::NONE
         };
         status

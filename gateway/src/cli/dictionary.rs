@@ -53,13 +53,14 @@ fn sheet(
     profile: DictionaryProfile,
     part: Option<DictionaryPart>,
 ) -> Result<Sheet, String> {
-    use DictionaryPart::{Class, Enums, Faults, Instance, Services};
+    use DictionaryPart::{Class, Enums, Faults, Instance, Networks, Services};
     let part = part.unwrap_or(Instance);
     Ok(match (profile, part) {
         (DictionaryProfile::Cip, Instance) => cip::instance(&dictionaries.cip),
         (DictionaryProfile::Cip, Class) => cip::class(&dictionaries.cip),
         (DictionaryProfile::Cip, Enums) => cip::enums(&dictionaries.cip),
         (DictionaryProfile::Cip, Services) => cip::services(&dictionaries.cip),
+        (DictionaryProfile::Cip, Networks) => cip::networks(&dictionaries.cip),
         (DictionaryProfile::Cip, Faults) => cip::faults(&dictionaries.cip),
         (DictionaryProfile::Sercos, Instance) => south::idns(&dictionaries.sercos),
         (DictionaryProfile::Sercos, Enums) => south::codes(&dictionaries.sercos),

@@ -5,6 +5,7 @@
 mod decode;
 mod demo;
 mod dictionary;
+mod eds;
 mod progress;
 mod report;
 mod run;
@@ -30,6 +31,8 @@ enum Command {
     Demo(DemoArguments),
     /// Run the gateway box.
     Run(RunArguments),
+    /// Write the electronic data sheets of the devices for the controller's tool.
+    Eds(EdsArguments),
     /// Print the frames of a capture file as an indented tree.
     Decode(DecodeArguments),
     /// Print what a profile has: attributes, parameters, codes, services.
@@ -65,6 +68,20 @@ struct RunArguments {
     /// Record both sides into this file (pcapng).
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
+}
+
+/// Arguments of `eds`.
+#[derive(Debug, Args)]
+struct EdsArguments {
+    /// The configuration of the box (TOML).
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Only the device with this name.
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
+    /// Write each sheet into this folder as NAME.eds; without it the one sheet goes to standard output.
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
 }
 
 /// Arguments of `decode`.
@@ -140,6 +157,8 @@ enum DictionaryPart {
     Enums,
     /// Services.
     Services,
+    /// Object classes and I/O connection on each CIP network.
+    Networks,
     /// Conditions of faults, alarms and inhibits, and what they do.
     Faults,
 }
@@ -152,6 +171,7 @@ impl DictionaryPart {
             Self::Class => "class",
             Self::Enums => "enums",
             Self::Services => "services",
+            Self::Networks => "networks",
             Self::Faults => "faults",
         }
     }
@@ -230,6 +250,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Eds(arguments) => eds::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),

@@ -20,7 +20,7 @@ use super::{
     AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link,
     LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
 };
-use crate::mapping::CaptureMode;
+use crate::mapping::{ETHERNET_IP, networks};
 use crate::sys::realtime::{self, PRIORITY_MAX};
 
 const NAME_LEN_MAX: usize = 32;
@@ -207,6 +207,7 @@ impl Checker {
                     "expected the name of at least one axis",
                 );
             }
+            self.node_axes(device.get_ref());
             for name in listed.get_ref() {
                 let position = axes.iter().position(|axis| axis.get_ref().name.get_ref() == name.get_ref());
                 let Some(position) = position else {
@@ -231,6 +232,26 @@ impl Checker {
             }
         }
         owners.into_iter().map(|owner| owner.map(|(index, _)| index)).collect()
+    }
+
+    /// A device has as many axes as its network lets a node have.
+    fn node_axes(&mut self, device: &DeviceTable) {
+        let networks = networks().iter().filter(|network| network.name == ETHERNET_IP);
+        for network in networks {
+            let (least, most) = (usize::from(*network.axes.start()), usize::from(*network.axes.end()));
+            let count = device.axes.get_ref().len();
+            // Without any there is a report already.
+            if count > 0 && !(least..=most).contains(&count) {
+                self.report::<()>(
+                    device.axes.span(),
+                    format_args!("the device `{}` has {count} axes", device.name.get_ref()),
+                    format_args!(
+                        "expected {least} to {most} axes of a node on {} (IEC 61800-7-302 clause {})",
+                        network.name, network.clause
+                    ),
+                );
+            }
+        }
     }
 
     /// Instance numbers are unique in each device.
@@ -307,9 +328,19 @@ impl Checker {
             None => Some(DEFAULT_PRODUCT_NAME.to_owned()),
             Some(name) => self.label("the product", name),
         };
+        let vendor_name = match &table.vendor_name {
+            None => vendor_id.map(|id: u16| format!("Vendor {id}")),
+            Some(name) => self.label("the vendor", name),
+        };
+        let catalog = match &table.catalog {
+            None => product_name.clone(),
+            Some(name) => self.label("the catalogue entry", name),
+        };
         let (revision_major, revision_minor) = revision?;
         Some(Identity {
             vendor_id: vendor_id?,
+            vendor_name: vendor_name?,
+            catalog: catalog?,
             product_code: product_code?,
             revision_major,
             revision_minor,
@@ -414,7 +445,6 @@ impl Checker {
             Some(limits) => self.limits(limits, table.unwind_counts.as_ref()),
             None => Some(Limits::default()),
         };
-        let events = self.capture_mode(table.events.as_ref());
         let on_command_loss = self.stopping_action(table.on_command_loss.as_ref());
         Some(Axis {
             name: name?,
@@ -428,7 +458,6 @@ impl Checker {
             power_structure_axis_id: power_structure_axis_id?,
             limits: limits?,
             on_command_loss: on_command_loss?,
-            events: events?,
         })
     }
 
@@ -474,20 +503,6 @@ impl Checker {
             });
         }
         (self.problems.len() == before).then_some(function)
-    }
-
-    fn capture_mode(&mut self, name: Option<&Spanned<String>>) -> Option<CaptureMode> {
-        let Some(name) = name else { return Some(CaptureMode::Cyclic) };
-        match name.get_ref().as_str() {
-            "cyclic" => Some(CaptureMode::Cyclic),
-            "service-channel" => Some(CaptureMode::ServiceChannel),
-            "off" => Some(CaptureMode::Off),
-            other => self.report(
-                name.span(),
-                "unknown way to capture events",
-                format!("expected cyclic, service-channel or off, found {other}"),
-            ),
-        }
     }
 
     fn stopping_action(&mut self, name: Option<&Spanned<String>>) -> Option<StoppingAction> {

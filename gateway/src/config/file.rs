@@ -102,10 +102,15 @@ pub struct DeviceTable {
 pub struct IdentityTable {
     /// Vendor number given by ODVA, 1 to 65535.
     pub vendor_id: Spanned<i64>,
+    /// Name of that vendor in the electronic data sheet; printable ASCII, 1 to 32 characters. Default: `"Vendor"` and the
+    /// number.
+    pub vendor_name: Option<Spanned<String>>,
     /// The vendor's number of the product, 1 to 65535.
     pub product_code: Spanned<i64>,
     /// Major and minor revision, such as `"1.1"` (1 to 127, 1 to 255). Default: `"1.1"`.
     pub revision: Option<Spanned<String>>,
+    /// Catalogue number in the electronic data sheet; printable ASCII, 1 to 32 characters. Default: the product name.
+    pub catalog: Option<Spanned<String>>,
     /// Number of the piece, 1 to 4294967295, unique among the vendor's pieces.
     pub serial_number: Spanned<i64>,
     /// Printable ASCII, 1 to 32 characters. Default: `"Axisbridge"`.
@@ -150,8 +155,6 @@ pub struct AxisTable {
     /// `"ramped-decel-and-disable"`, `"current-decel-and-hold"` or `"ramped-decel-and-hold"`. Default:
     /// `"ramped-decel-and-disable"`.
     pub on_command_loss: Option<Spanned<String>>,
-    /// `cyclic`, `service-channel` or `off`.
-    pub events: Option<Spanned<String>>,
 }
 
 /// `limits` of an `[[axis]]`; each is left to the drive where it is not given.

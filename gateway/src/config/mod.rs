@@ -17,7 +17,6 @@ use profile_generic::time::DurationNs;
 
 pub use diagnostic::{ConfigError, Diagnostic};
 
-use crate::mapping::CaptureMode;
 use crate::sys::realtime;
 
 /// Axes of one box: what its status block, its recorder and its cycle have room for.
@@ -158,6 +157,10 @@ pub struct Device {
 pub struct Identity {
     /// Vendor number given by ODVA.
     pub vendor_id: u16,
+    /// Name of that vendor, for the electronic data sheet.
+    pub vendor_name: String,
+    /// Catalogue number of the product, for the electronic data sheet.
+    pub catalog: String,
     /// The vendor's number of the product.
     pub product_code: u16,
     /// Major revision, 1 to 127.
@@ -230,8 +233,6 @@ pub struct Axis {
     pub limits: Limits,
     /// What happens when commands stay away.
     pub on_command_loss: StoppingAction,
-    /// How the drive's captures of events are used.
-    pub events: CaptureMode,
 }
 
 /// Limits of an axis that the box holds; `None` leaves them to the drive.

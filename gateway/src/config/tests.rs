@@ -70,6 +70,8 @@ fn defaults_are_those_of_the_documentation() {
         device.identity,
         Identity {
             vendor_id: 1,
+            vendor_name: "Vendor 1".to_owned(),
+            catalog: "Axisbridge".to_owned(),
             product_code: 2,
             revision_major: 1,
             revision_minor: 1,
@@ -91,7 +93,6 @@ fn defaults_are_those_of_the_documentation() {
             power_structure_axis_id: 0,
             limits: Limits::default(),
             on_command_loss: StoppingAction::RampedDecelAndDisable,
-            events: CaptureMode::Cyclic,
         }
     );
     assert_eq!(config.axes[1].kind, AxisKind::Linear);
@@ -296,7 +297,9 @@ fn too_many_axes_and_devices_are_refused() {
     let text = text.replace("axes = [\"x\", \"y\"]", &format!("axes = [{list}]"));
     let error = Config::parse(&text, "box.toml").unwrap_err();
     let titles: Vec<_> = error.diagnostics().iter().map(|found| found.title.as_str()).collect();
-    assert_eq!(titles, ["too many axes: 17"]);
+    assert_eq!(titles, ["the device `front` has 17 axes", "too many axes: 17"]);
+    let expected = &error.diagnostics()[0].expected;
+    assert_eq!(expected, "expected 1 to 16 axes of a node on EtherNet/IP (IEC 61800-7-302 clause 7.2)");
 }
 
 #[test]

@@ -8,10 +8,12 @@ use arrayvec::{ArrayString, ArrayVec};
 use profile_cip::target::axis_object::AxisConfig;
 use profile_cip::target::axis_state::ControlKind;
 use profile_cip::target::config::{
-    AdapterConfig, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
+    AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
+    DEVICE_TYPE_CIP_MOTION_ENCODER, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
 };
 use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
+use profile_cip::wire::motion::codes::EventChecking;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
@@ -25,17 +27,11 @@ use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, StoppingAction};
+use crate::eds;
 use crate::latest::{self, Reader};
 use crate::mapping::{AxisUnits, CipScaling, Mapping, Reference, SercosAxis};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
-
-/// Device types of clause 6-2: CIP Motion Drive, Encoder and Converter.
-mod device_type {
-    pub const DRIVE: u16 = 0x25;
-    pub const ENCODER: u16 = 0x2F;
-    pub const CONVERTER: u16 = 0x30;
-}
 
 /// Notices kept until the supervisor takes them.
 const NOTICES: usize = 1024;
@@ -108,8 +104,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     let mut devices = Vec::with_capacity(config.devices.len());
     let mut adapters = Vec::with_capacity(config.devices.len());
     for (number, device) in config.devices.iter().enumerate() {
-        let mut members: Vec<_> = config.axes_of(number).collect();
-        members.sort_by_key(|(_, axis)| axis.instance);
+        let members = members(config, number);
         let (adapter_end, device_end) = motion_link();
         let scalings: Vec<_> =
             members.iter().map(|(number, axis)| (*number, scaling(axis), stop_defaults(axis))).collect();
@@ -118,7 +113,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
             DeviceChannel::new(number, device_config(device, &members), device_end, &scalings, &mapping)
                 .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
         devices.push(channel);
-        adapters.push((adapter_config(device, &members, host), adapter_end));
+        adapters.push((with_sheet(device, &members, host), adapter_end));
     }
     let (producer, notices) = rtrb::RingBuffer::new(NOTICES);
     let (publisher, status) = latest::latest(BoxStatus::STARTING);
@@ -187,7 +182,6 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
         modulo: false,
         set_scaling,
         parameters,
-        captures: axis.events,
     }
 }
 
@@ -244,11 +238,11 @@ fn reaction(action: StoppingAction) -> Reaction {
 fn device_type(members: &[(usize, &Axis)]) -> u16 {
     let all = |function| members.iter().all(|(_, axis)| axis.function == function);
     if all(AxisFunction::Encoder) {
-        device_type::ENCODER
+        DEVICE_TYPE_CIP_MOTION_ENCODER
     } else if all(AxisFunction::Converter) {
-        device_type::CONVERTER
+        DEVICE_TYPE_CIP_MOTION_CONVERTER
     } else {
-        device_type::DRIVE
+        DEVICE_TYPE_CIP_MOTION_DRIVE
     }
 }
 
@@ -262,6 +256,7 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
         // Position, velocity and torque; nothing can be enabled that is no drive.
         control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
         lint_position: false,
+        events: EventChecking::empty(),
         // Motor and feedback, feedback; a drive shows the box neither its marker nor its phasing.
         hookup_tests: 0b11,
     };
@@ -282,7 +277,26 @@ fn configuration(device: &Device, members: &[(usize, &Axis)]) -> u16 {
     u16::from_le_bytes([low, high])
 }
 
-fn adapter_config(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
+/// The explicit side of a device, with its electronic data sheet; `None` if there is no such device.
+#[must_use]
+pub fn adapter_config(config: &Config, number: usize, host: Host) -> Option<AdapterConfig> {
+    Some(with_sheet(config.devices.get(number)?, &members(config, number), host))
+}
+
+/// The axes of a device in the order of their instances, with their numbers.
+fn members(config: &Config, device: usize) -> Vec<(usize, &Axis)> {
+    let mut members: Vec<_> = config.axes_of(device).collect();
+    members.sort_by_key(|(_, axis)| axis.instance);
+    members
+}
+
+fn with_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
+    let mut adapter = without_sheet(device, members, host);
+    adapter.eds = eds::sheet(device, &adapter).into_bytes().into();
+    adapter
+}
+
+fn without_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> AdapterConfig {
     let identity = &device.identity;
     let us =
         |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos() / 1000).unwrap_or(u32::MAX);

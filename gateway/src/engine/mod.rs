@@ -29,7 +29,7 @@ use self::notice::Notice;
 use self::port::{FRAME_MAX, NorthPort, SouthPort};
 use crate::latest::Publisher;
 use crate::mapping::Mapping;
-use crate::status::{AxisStatus, BoxState, BoxStatus, PHASE_NONE};
+use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
 
 /// Frames taken from the bus in one cycle: eight telegrams on two ports, and as many strays.
 const FRAMES_PER_CYCLE: usize = 32;
@@ -52,8 +52,6 @@ pub struct Engine {
     cycle_time: DurationNs,
     started: Option<MonotonicTime>,
     due: Option<MonotonicTime>,
-    /// When telegrams were sent last.
-    sent_at: Option<SystemTime>,
     stopping: bool,
 }
 
@@ -84,8 +82,10 @@ impl Engine {
         status.cycle_time_ns = cycle_ns;
         status.axis_count = u8::try_from(axes.len()).unwrap_or(u8::MAX);
         for channel in &devices {
+            let several = channel.axis_states().count() > 1;
             for (place, (axis, _)) in channel.axis_states().enumerate() {
                 if let Some(entry) = status.axes.get_mut(axis) {
+                    entry.indicators.several = several;
                     entry.instance = u8::try_from(place + 1).unwrap_or(u8::MAX);
                     entry.device = channel.number();
                 }
@@ -104,7 +104,6 @@ impl Engine {
             cycle_time: DurationNs(i64::from(cycle_ns)),
             started: None,
             due: None,
-            sent_at: None,
             stopping: false,
         }
     }
@@ -167,10 +166,8 @@ impl Engine {
         self.collect(now, south);
         let stepped = self.bus.take_cycle();
         if stepped {
-            // The drives capture their values when the telegrams pass them.
-            let sampled = self.sent_at.unwrap_or(system);
             for (number, axis) in self.axes.iter_mut().enumerate() {
-                axis.from_drive(now, system, sampled, self.bus.feedback(number));
+                axis.from_drive(now, system, self.bus.feedback(number));
             }
         }
         self.run_bus(now, system);
@@ -188,9 +185,7 @@ impl Engine {
         for (number, axis) in self.axes.iter_mut().enumerate() {
             self.bus.command(number, |telegram| axis.to_drive(now, system, acts_at, telegram));
         }
-        if self.send(now, south) {
-            self.sent_at = Some(system);
-        }
+        self.send(now, south);
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
             channel.transmit(now, system, &mut **port);
         }
@@ -249,11 +244,6 @@ impl Engine {
                     let word = word.and_then(|word| u32::try_from(word).ok());
                     axes[answer.axis].diagnostic_word(now, system, answer.idn, word);
                 }
-                Purpose::Capture(access, generation) => {
-                    let result =
-                        answer.result.as_ref().map(|data| data.as_slice()).map_err(|failure| *failure);
-                    axes[answer.axis].capture_answer(access, generation, result);
-                }
                 // Whether it helped shows in the drive's status word.
                 Purpose::FaultReset => {}
             },
@@ -261,16 +251,12 @@ impl Engine {
         );
     }
 
-    /// Sends the telegrams that are due; `false` when none was.
-    fn send(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) -> bool {
-        let mut any = false;
+    fn send(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) {
         while let Some(Output::Transmit { port, frame }) = self.bus.master_mut().poll(now) {
             if !south.send(now, port, frame) {
                 self.status.counters.send_failures += 1;
             }
-            any = true;
         }
-        any
     }
 
     fn tell_changes(&mut self) {
@@ -305,8 +291,17 @@ impl Engine {
             let lost = device.counters().lost_updates;
             status.counters.lost_updates += lost;
             status.counters.refused_frames += channel.counters().refused;
-            for (axis, state) in channel.axis_states() {
+            let (module, network) = (device.module_state(), channel.network_status());
+            for (place, (axis, state)) in channel.axis_states().enumerate() {
                 if let (Some(entry), Some(axis)) = (status.axes.get_mut(axis), self.axes.get(axis)) {
+                    entry.indicators = Indicators {
+                        module,
+                        network,
+                        axis: device.axis_indication(place),
+                        line: device.display_line(place),
+                        several: entry.indicators.several,
+                        minor_fault: device.axis_condition(place).is_some_and(|axis| axis.minor_fault),
+                    };
                     fill(entry, axis);
                     entry.cip_axis_state = state.code().0;
                     entry.lost_updates = u32::try_from(lost).unwrap_or(u32::MAX);

@@ -14,7 +14,6 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
 
-use super::captures::{self, CaptureMode, CaptureProgram};
 use super::dictionary::{IdnUnit, SercosDictionary};
 use super::scaling::{AxisUnits, DriveFacts, Lsb, ScalingError, power_of_ten};
 use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, SercosTables};
@@ -47,8 +46,6 @@ pub struct SercosAxis {
     pub set_scaling: bool,
     /// Parameters to write at start, in generic units.
     pub parameters: Vec<(Parameter, i64)>,
-    /// How the drive's captures are used.
-    pub captures: CaptureMode,
 }
 
 /// The IDNs in the two telegrams of an axis, in order. The control and the status word come first.
@@ -174,7 +171,6 @@ pub struct SercosProgram {
     known_status: StatusBits,
     faults: ArrayVec<FaultRule, MAX_FAULT_ROWS>,
     commands: ArrayVec<(Action, Idn), { Action::ALL.len() }>,
-    captures: CaptureProgram,
     parameters: Vec<ParameterEntry>,
     rejected: Vec<Parameter>,
 }
@@ -205,7 +201,6 @@ impl Telegram {
                 *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
             }
         }
-        captures::extend(&mut telegram, tables, dictionary, axis, facts);
         Ok(telegram)
     }
 }
@@ -306,7 +301,6 @@ impl SercosProgram {
             known_status: StatusBits::empty(),
             faults: ArrayVec::new(),
             commands: ArrayVec::new(),
-            captures: CaptureProgram::default(),
             parameters: Vec::new(),
             rejected: Vec::new(),
         };
@@ -350,7 +344,6 @@ impl SercosProgram {
             }
         }
         program.parameters.sort_by_key(|entry| entry.parameter);
-        program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
 
@@ -458,11 +451,6 @@ impl SercosProgram {
         self.rejected.contains(&parameter)
     }
 
-    /// The drive's captures.
-    pub fn captures(&self) -> &CaptureProgram {
-        &self.captures
-    }
-
     /// Everything the drive keeps, by parameter.
     pub fn parameters(&self) -> &[ParameterEntry] {
         &self.parameters
@@ -477,7 +465,7 @@ pub(super) struct Compiler<'t> {
 }
 
 impl Compiler<'_> {
-    pub fn unit(&self, idn: Idn, quantity: Quantity) -> Result<Lsb, SercosError> {
+    fn unit(&self, idn: Idn, quantity: Quantity) -> Result<Lsb, SercosError> {
         unit_of(self.tables, self.dictionary, self.axis.units, self.facts, idn, quantity)
     }
 

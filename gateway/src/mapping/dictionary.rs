@@ -4,12 +4,14 @@ mod cip;
 mod cip_attributes;
 mod cip_codes;
 mod cip_faults;
+mod cip_networks;
 mod cip_services;
 mod sercos;
 
 pub use cip::{CipDictionary, DataElement};
 pub use cip_attributes::{Access, CipAttribute, CipType, DEVICE_FUNCTIONS, PolarityEffect};
 pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
+pub use cip_networks::{CipNetwork, ConnectionDataFormat, ETHERNET_IP, NetworkObject, networks};
 pub use cip_services::CipService;
 pub use sercos::{IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word};
 

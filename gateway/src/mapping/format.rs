@@ -7,12 +7,14 @@
 mod cip_dictionary;
 mod cip_faults;
 mod cip_generic;
+mod cip_networks;
 mod dictionary;
 mod generic_sercos;
 
 pub use cip_dictionary::*;
 pub use cip_faults::*;
 pub use cip_generic::*;
+pub use cip_networks::*;
 pub use dictionary::*;
 pub use generic_sercos::*;
 

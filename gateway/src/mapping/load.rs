@@ -9,8 +9,8 @@ use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use serde::de::DeserializeOwned;
 
 use super::format::{
-    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipServiceFile, GenericFile,
-    GenericSercosFile, SercosFile,
+    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipNetworkFile, CipServiceFile,
+    GenericFile, GenericSercosFile, SercosFile,
 };
 
 /// The file format this build understands.
@@ -20,12 +20,13 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 8] = [
+const FILES: [(&str, &str); 9] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
     ("dictionary/cip-faults.toml", include_str!("../../../mappings/dictionary/cip-faults.toml")),
     ("dictionary/cip-services.toml", include_str!("../../../mappings/dictionary/cip-services.toml")),
+    ("dictionary/cip-networks.toml", include_str!("../../../mappings/dictionary/cip-networks.toml")),
     ("dictionary/sercos.toml", include_str!("../../../mappings/dictionary/sercos.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
@@ -53,6 +54,8 @@ pub struct TableTexts {
     pub cip_faults: TableText,
     /// CIP Motion dictionary: services.
     pub cip_services: TableText,
+    /// CIP Motion dictionary: networks.
+    pub cip_networks: TableText,
     /// SERCOS dictionary.
     pub sercos: TableText,
     /// CIP Motion to generic.
@@ -83,6 +86,8 @@ pub struct Tables {
     pub cip_faults: Parsed<CipFaultFile>,
     /// CIP Motion dictionary: services.
     pub cip_services: Parsed<CipServiceFile>,
+    /// CIP Motion dictionary: networks.
+    pub cip_networks: Parsed<CipNetworkFile>,
     /// SERCOS dictionary.
     pub sercos: Parsed<SercosFile>,
     /// CIP Motion to generic.
@@ -181,7 +186,7 @@ impl TableText {
         (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
     }
 
-    fn parse<T: DeserializeOwned>(self, errors: &mut TableErrors) -> Option<Parsed<T>> {
+    pub(super) fn parse<T: DeserializeOwned>(self, errors: &mut TableErrors) -> Option<Parsed<T>> {
         match toml::from_str::<T>(&self.text) {
             Ok(rows) => Some(Parsed { text: self, rows }),
             Err(error) => {
@@ -228,6 +233,7 @@ impl TableTexts {
             cip_enumerations,
             cip_faults,
             cip_services,
+            cip_networks,
             sercos,
             cip_generic,
             generic_sercos,
@@ -238,6 +244,7 @@ impl TableTexts {
             cip_enumerations,
             cip_faults,
             cip_services,
+            cip_networks,
             sercos,
             cip_generic,
             generic_sercos,
@@ -251,6 +258,7 @@ impl TableTexts {
             cip_enumerations,
             cip_faults,
             cip_services,
+            cip_networks,
             sercos,
             cip_generic,
             generic_sercos,
@@ -261,6 +269,7 @@ impl TableTexts {
             cip_enumerations,
             cip_faults,
             cip_services,
+            cip_networks,
             sercos,
             cip_generic,
             generic_sercos,
@@ -278,6 +287,7 @@ impl TableTexts {
         let cip_enumerations = self.cip_enumerations.parse(&mut errors);
         let cip_faults = self.cip_faults.parse(&mut errors);
         let cip_services = self.cip_services.parse(&mut errors);
+        let cip_networks = self.cip_networks.parse(&mut errors);
         let sercos = self.sercos.parse(&mut errors);
         let cip_generic = self.cip_generic.parse(&mut errors);
         let generic_sercos = self.generic_sercos.parse(&mut errors);
@@ -288,6 +298,7 @@ impl TableTexts {
                 cip_enumerations: cip_enumerations?,
                 cip_faults: cip_faults?,
                 cip_services: cip_services?,
+                cip_networks: cip_networks?,
                 sercos: sercos?,
                 cip_generic: cip_generic?,
                 generic_sercos: generic_sercos?,

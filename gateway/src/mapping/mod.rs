@@ -12,8 +12,6 @@
 //! fault is code.
 
 mod attributes;
-mod captures;
-mod cip_events;
 mod cip_scaling;
 mod cip_tables;
 mod commissioning;
@@ -37,11 +35,6 @@ use std::path::Path;
 use profile_cip::target::attribute::AttributeDefinition;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
-pub use captures::{
-    CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
-    WORDS_MAX as CAPTURE_WORDS_MAX,
-};
-pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
     CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes, Served,
@@ -54,9 +47,10 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipService, CipType, Clearing, Code, CodeRange, DEVICE_FUNCTIONS,
-    DataElement, Dictionaries, Enumeration, ExceptionAction, FaultRecord, GenericDictionary, IdnFormat,
-    IdnUnit, PolarityEffect, RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word,
+    Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeRange,
+    ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries, ETHERNET_IP, Enumeration,
+    ExceptionAction, FaultRecord, GenericDictionary, IdnFormat, IdnUnit, NetworkObject, PolarityEffect,
+    RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word, networks,
 };
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};

@@ -58,7 +58,6 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
         modulo,
         set_scaling: true,
         parameters: Vec::new(),
-        captures: CaptureMode::Off,
     }
 }
 

@@ -3,6 +3,8 @@
 //! `docs/modbus.md` holds the same tables; a test compares them. Numbers of more than one register begin with
 //! the most significant one. Registers that are not in the table read 0.
 
+use profile_cip::target::visualization::{self, Indication};
+
 use crate::config::AXES_MAX;
 use crate::status::{AxisStatus, BoxStatus, mode_code, state_code};
 
@@ -199,7 +201,45 @@ pub const AXIS: &[Entry<AxisStatus>] = &[
         u64::from(axis.lost_telegrams)
     }),
     entry(40, Kind::U32, "saturated", "values clamped on their way", |axis| u64::from(axis.saturated)),
+    entry(42, Kind::U16, "module_status", "Module Status LED of the device, an indication", |axis| {
+        lamp(axis, visualization::module_status(axis.indicators.module))
+    }),
+    entry(43, Kind::U16, "network_status", "Network Status LED of the device, an indication", |axis| {
+        lamp(axis, axis.indicators.network)
+    }),
+    entry(44, Kind::U16, "axis_status", "Axis Status LED, an indication", |axis| {
+        lamp(axis, axis.indicators.axis)
+    }),
+    entry(45, Kind::U16, "display_text", "string of the alphanumeric display", |axis| {
+        u64::from(axis.indicators.line.text.0)
+    }),
+    entry(46, Kind::U16, "display_code", "code behind the string; 0 where it has none", |axis| {
+        u64::from(axis.indicators.line.code)
+    }),
+    entry(
+        48,
+        Kind::U64,
+        "display_1",
+        "the display's characters 1 to 8, two in a register, ASCII, then 0",
+        |axis| characters(axis, 0),
+    ),
+    entry(52, Kind::U64, "display_2", "the display's characters 9 to 16", |axis| characters(axis, 8)),
 ];
+
+/// A lamp of an axis that is there.
+fn lamp(axis: &AxisStatus, indication: Indication) -> u64 {
+    if axis.instance == 0 { 0 } else { u64::from(indication.0) }
+}
+
+/// Eight characters of the display from `start` on.
+fn characters(axis: &AxisStatus, start: usize) -> u64 {
+    let display = axis.display();
+    let mut octets = [0; 8];
+    for (place, octet) in octets.iter_mut().zip(display.as_bytes().iter().skip(start)) {
+        *place = *octet;
+    }
+    u64::from_be_bytes(octets)
+}
 
 /// Registers that do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -244,6 +284,7 @@ fn fill<S>(block: &mut [u16], entries: &[Entry<S>], source: &S) {
 mod tests {
     use std::fmt::Write as _;
 
+    use profile_cip::target::visualization::display::LineText;
     use profile_generic::fault::FaultCause;
     use profile_generic::image::StatusBits;
     use profile_generic::inhibit::Inhibits;
@@ -270,7 +311,7 @@ mod tests {
         text
     }
 
-    fn tables() -> [String; 5] {
+    fn tables() -> [String; 7] {
         [
             block(BOX),
             block(AXIS),
@@ -280,6 +321,11 @@ mod tests {
             ),
             names("status bit", bits(StatusBits::NAMED.iter().map(|(bit, name)| (bit.bits(), *name)))),
             names("inhibits bit", bits(Inhibits::NAMED.iter().map(|(bit, name)| (bit.bits(), *name)))),
+            names(
+                "indication",
+                Indication::NAMED.iter().map(|(indication, name)| (indication.0.to_string(), *name)),
+            ),
+            names("display_text", LineText::NAMED.iter().map(|(text, name)| (text.0.to_string(), *name))),
         ]
     }
 
@@ -344,9 +390,17 @@ mod tests {
         for (at, values) in expected {
             assert_eq!(&first[*at..at + values.len()], *values, "register {at}");
         }
+        // Flashing red, solid green, red-green, RUNNING without a code, "X1:RUNNING".
+        assert_eq!(first[42..48], [4, 2, 7, 11, 0, 0]);
+        assert_eq!(first[48..53], [0x5831, 0x3A52, 0x554E, 0x4E49, 0x4E47]);
+        assert_eq!(first[53..], [0; 11]);
         let second = registers(&status, 128, 18).unwrap();
         assert_eq!(second[..12], [200, 1, 9, 8, 5, 0x0905, 0xC30A, 0x0040, 0, 0, 0, 1]);
         assert_eq!(second[16..], [0x7FFF, 0xFFFF]);
+        let shown = registers(&status, 128 + 42, 14).unwrap();
+        // Solid red, off, solid red, INIT FLT with code 12, "INIT FLT S12".
+        assert_eq!(shown[..6], [5, 0, 5, 15, 12, 0]);
+        assert_eq!(shown[6..], [0x494E, 0x4954, 0x2046, 0x4C54, 0x2053, 0x3132, 0, 0]);
         assert_eq!(registers(&status, 192, 64).unwrap(), [0; 64]);
     }
 

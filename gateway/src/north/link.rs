@@ -1,4 +1,7 @@
-//! The way between the adapter (supervisor) and the motion device (cycle thread): two bounded queues.
+//! The way between the adapter (supervisor) and the motion device (cycle thread): two bounded queues, and a number.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use profile_cip::target::motion_link::{MotionReply, MotionRequest};
 use rtrb::{Consumer, Producer, PushError, RingBuffer};
@@ -11,8 +14,10 @@ pub const QUEUE_LEN: usize = 32;
 pub fn motion_link() -> (AdapterEnd, DeviceEnd) {
     let (request_in, request_out) = RingBuffer::new(QUEUE_LEN);
     let (reply_in, reply_out) = RingBuffer::new(QUEUE_LEN);
-    let adapter = AdapterEnd { requests: request_in, replies: reply_out };
-    (adapter, DeviceEnd { requests: request_out, replies: reply_in })
+    let connections = Arc::new(AtomicUsize::new(0));
+    let adapter =
+        AdapterEnd { requests: request_in, replies: reply_out, connections: Arc::clone(&connections) };
+    (adapter, DeviceEnd { requests: request_out, replies: reply_in, connections })
 }
 
 /// The end beside the adapter.
@@ -20,6 +25,7 @@ pub fn motion_link() -> (AdapterEnd, DeviceEnd) {
 pub struct AdapterEnd {
     requests: Producer<MotionRequest>,
     replies: Consumer<MotionReply>,
+    connections: Arc<AtomicUsize>,
 }
 
 impl AdapterEnd {
@@ -30,6 +36,11 @@ impl AdapterEnd {
     #[expect(clippy::result_large_err, reason = "the request is handed back, and boxing would allocate")]
     pub fn request(&mut self, request: MotionRequest) -> Result<(), MotionRequest> {
         self.requests.push(request).map_err(|PushError::Full(request)| request)
+    }
+
+    /// Tells how many explicit connections are open.
+    pub fn tell_connections(&self, count: usize) {
+        self.connections.store(count, Ordering::Relaxed);
     }
 
     /// The next reply of the motion device.
@@ -43,9 +54,16 @@ impl AdapterEnd {
 pub struct DeviceEnd {
     requests: Consumer<MotionRequest>,
     replies: Producer<MotionReply>,
+    connections: Arc<AtomicUsize>,
 }
 
 impl DeviceEnd {
+    /// Explicit connections that were open when the adapter told it last.
+    #[must_use]
+    pub fn explicit_connections(&self) -> usize {
+        self.connections.load(Ordering::Relaxed)
+    }
+
     /// The next request of the adapter.
     pub fn request(&mut self) -> Option<MotionRequest> {
         self.requests.pop().ok()
@@ -79,6 +97,8 @@ mod tests {
             assert_eq!(adapter.request(close(token)), Ok(()));
             assert_eq!(device.reply(MotionReply::Closed { token: Token(token) }), Ok(()));
         }
+        adapter.tell_connections(3);
+        assert_eq!(device.explicit_connections(), 3);
         assert_eq!(adapter.request(close(32)), Err(close(32)));
         let reply = MotionReply::Closed { token: Token(32) };
         assert_eq!(device.reply(reply.clone()), Err(reply));

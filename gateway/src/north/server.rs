@@ -349,6 +349,7 @@ impl Core {
         }
         self.move_bytes(now);
         self.send_requests(now);
+        self.link.tell_connections(self.adapter.explicit_connections());
         while let Some(event) = self.adapter.poll_event() {
             self.note(&event);
         }

@@ -2,7 +2,6 @@
 
 mod client;
 mod marking;
-mod other_targets;
 mod streams;
 
 use std::net::{Ipv4Addr, SocketAddrV4};

@@ -6,6 +6,7 @@
 //! ```
 
 mod cycle;
+mod indicators;
 pub mod port;
 
 use std::io;
@@ -19,11 +20,12 @@ use profile_cip::target::adapter::Adapter;
 use profile_cip::target::event::Event;
 use profile_cip::target::identity::{Health, ModuleState};
 use profile_cip::target::motion_device::SyncState;
+use profile_cip::target::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
-use profile_generic::fault::FaultClass;
 use tracing::{info, warn};
 
 use self::cycle::{CycleThread, Setup};
+use self::indicators::{Change, Shown};
 use self::port::{PacketPort, UdpPort};
 use crate::capture::recorder::{Recorder, Settings, Tap};
 use crate::config::{Config, Link};
@@ -38,7 +40,8 @@ use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
 use crate::simulate::line::InProcessLine;
 use crate::simulate::setup::HOST_CLOCK;
-use crate::status::{AxisStatus, BoxStatus};
+use crate::status::BoxStatus;
+use crate::sys::clock::{SystemClock, TimeScale, monotonic_now};
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 
@@ -136,7 +139,8 @@ pub fn start(
     let Built { mut engine, mut adapters, notices, status } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
-    engine.set_sync(SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 });
+    let sync = SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 };
+    engine.set_sync(sync);
 
     let (recorder, mut taps) = record(config, capture)?;
     let mut tap = || taps.pop();
@@ -178,10 +182,10 @@ pub fn start(
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
             .attend(move |adapter| {
-                adapter.set_health(Health {
-                    minor_recoverable: kept.is_unsaved(),
-                    ..health(&source.read(), number)
-                });
+                let of_axes = health(&source.read(), number);
+                let minor_recoverable = of_axes.minor_recoverable || kept.is_unsaved();
+                adapter.set_health(Health { minor_recoverable, ..of_axes });
+                adapter.set_time_sync(time_sync(sync));
                 if let Some(port) = &port {
                     adapter.set_link(port.state());
                 }
@@ -218,6 +222,9 @@ pub fn start(
     let stop_notices = Arc::new(AtomicBool::new(false));
     let names = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_notices(notices, names, Arc::clone(&stop_notices)));
+    let devices = config.devices.iter().map(|device| device.name.clone()).collect();
+    let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
+    runtime.spawn(log_indicators(status.clone(), devices, axes, Arc::clone(&stop_notices)));
 
     let setup = Setup { engine, north, south, realtime: config.sercos.realtime };
     let cycle = CycleThread::start(setup)
@@ -226,17 +233,32 @@ pub fn start(
     Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
 }
 
-/// How a device is, by the states of its axes.
+/// The clock of the devices: that of the host, which runs no PTP of its own. Clocks that the host's daemons discipline tick
+/// at one rate, so their distance stands between two looks unless somebody sets the clock.
+fn time_sync(sync: SyncState) -> TimeSyncState {
+    let clock = SystemClock::detect();
+    let (system, monotonic) = (clock.now(), monotonic_now());
+    let utc_offset = match clock.scale() {
+        TimeScale::Tai { offset_s } => u16::try_from(offset_s).ok(),
+        TimeScale::Utc => None,
+    };
+    TimeSyncState {
+        sync,
+        system_less_monotonic: Some(system.0.cast_signed().wrapping_sub(monotonic.0.cast_signed())),
+        ptp: false,
+        measurement: None,
+        local: Some(ClockInfo { identity: HOST_CLOCK, utc_offset }),
+    }
+}
+
+/// How a device is, by its axes: what its Module Status LED shows is what its Identity object says.
 fn health(status: &BoxStatus, device: usize) -> Health {
     let axes = || status.configured_axes().iter().filter(|axis| usize::from(axis.device) == device);
-    let state = |axis: &AxisStatus| {
-        let initialization = axis.fault.is_some_and(|cause| cause.class() == FaultClass::Initialization);
-        ModuleState::of_axis(AxisStateCode(axis.cip_axis_state), initialization)
-    };
     Health {
-        state: ModuleState::of_axes(axes().map(state)),
+        state: axes().next().map_or(ModuleState::Standby, |axis| axis.indicators.module),
         // A controller has given every axis its attributes.
         configured: axes().all(|axis| axis.cip_axis_state != AxisStateCode::INITIALIZING.0),
+        minor_recoverable: axes().any(|axis| axis.indicators.minor_fault),
         ..Health::default()
     }
 }
@@ -281,6 +303,33 @@ async fn log_notices(mut notices: rtrb::Consumer<Notice>, axes: Vec<String>, sto
         }
         if last {
             return;
+        }
+    }
+}
+
+/// Logs what the indicators show whenever it changes, until the box has ended.
+async fn log_indicators(
+    status: Reader<BoxStatus>,
+    devices: Vec<String>,
+    axes: Vec<String>,
+    stop: Arc<AtomicBool>,
+) {
+    let mut interval = tokio::time::interval(NOTICE_INTERVAL);
+    let mut shown = Shown::default();
+    while !stop.load(Ordering::Relaxed) {
+        interval.tick().await;
+        let status = status.read();
+        for change in shown.changes(&status) {
+            match change {
+                Change::Device { device, module_status, network_status } => {
+                    let device = devices.get(device).map_or("", String::as_str);
+                    info!(device, %module_status, %network_status, "indicators");
+                }
+                Change::Axis { axis, axis_status, display: line } => {
+                    let axis = axes.get(axis).map_or("", String::as_str);
+                    info!(axis, %axis_status, display = line, "indicators");
+                }
+            }
         }
     }
 }

@@ -10,7 +10,6 @@
 
 use super::config::AxisSetup;
 use super::event::Event;
-use super::events::EventChecks;
 use super::failure::Failure;
 use super::following::Following;
 use super::handshake::Handshake;
@@ -58,7 +57,6 @@ pub(super) struct UpdateTime {
 #[derive(Debug)]
 pub(super) struct Axis {
     pub handshake: Handshake,
-    pub events: EventChecks,
     pub report: AxisReport,
     setup: AxisSetup,
     state: Option<AxisStateCode>,
@@ -78,7 +76,6 @@ impl Axis {
     pub fn new(instance: u8, setup: AxisSetup) -> Self {
         Self {
             handshake: Handshake::default(),
-            events: EventChecks::default(),
             report: AxisReport { axis: instance, ..AxisReport::default() },
             state: None,
             status: None,

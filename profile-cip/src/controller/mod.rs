@@ -19,7 +19,6 @@ mod axis;
 pub mod config;
 mod engine;
 pub mod event;
-mod events;
 mod executor;
 pub mod failure;
 mod following;

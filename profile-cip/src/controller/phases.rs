@@ -58,11 +58,7 @@ impl Controller {
         }
         match self.phase {
             Phase::FirstUpdate { .. } if self.link.received_at().is_some() => {
-                let ticket = self.services.set(
-                    0,
-                    &self.config.class_attributes,
-                    self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
-                )?;
+                let ticket = self.services.set(0, &self.config.class_attributes, self.link.room())?;
                 self.phase = Phase::ClassConfiguration { ticket };
             }
             Phase::ClassConfiguration { ticket } => self.configure_class(now, ticket)?,
@@ -118,11 +114,7 @@ impl Controller {
 
     fn configure_axis(&mut self, instance: u8) -> Result<Phase, Failure> {
         let sets = &self.config.axes[usize::from(instance) - 1].attributes;
-        let ticket = self.services.set(
-            instance,
-            sets,
-            self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
-        )?;
+        let ticket = self.services.set(instance, sets, self.link.room())?;
         Ok(Phase::AxisConfiguration { instance, ticket })
     }
 
@@ -192,7 +184,7 @@ impl Controller {
     }
 
     fn run_program(&mut self, now: MonotonicTime) -> Result<(), Failure> {
-        let room = self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count());
+        let room = self.link.room();
         let events = &mut self.events;
         let mut event = |event| push(events, event);
         let mut context = Context {

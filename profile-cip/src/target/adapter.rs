@@ -28,6 +28,7 @@ use super::list;
 use super::motion_link::{MotionReply, MotionRequest, OpenParameters};
 use super::node::{Node, micros};
 use super::session::{Input, ReplyTo, Session};
+use super::time_sync::TimeSyncState;
 use crate::wire::Reader;
 use crate::wire::cpf::{EncapsulatedPacket, ItemType};
 use crate::wire::encapsulation::{Command, EncapsulationStatus, Header, PROTOCOL_VERSION, Packet};
@@ -103,6 +104,11 @@ impl Adapter {
     /// How the device is, for the Identity object.
     pub fn set_health(&mut self, health: Health) {
         self.node.health = health;
+    }
+
+    /// How the clock of the device is, for the Time Sync object.
+    pub fn set_time_sync(&mut self, state: TimeSyncState) {
+        self.node.time_sync = state;
     }
 
     /// How the Ethernet port is, for the Ethernet Link object.

@@ -49,22 +49,6 @@ pub mod id {
     pub const EVENT_CHECKING_CONTROL: u16 = 60;
     /// Event Checking Status.
     pub const EVENT_CHECKING_STATUS: u16 = 61;
-    /// Registration 1 Positive Edge Position; the other three edges follow.
-    pub const REGISTRATION_POSITION: u16 = 62;
-    /// Registration 1 Positive Edge Time; the other three edges follow.
-    pub const REGISTRATION_TIME: u16 = 66;
-    /// Home Event Position.
-    pub const HOME_EVENT_POSITION: u16 = 70;
-    /// Home Event Time.
-    pub const HOME_EVENT_TIME: u16 = 71;
-    /// Watch 1 Event Time; Watch 2 follows.
-    pub const WATCH_EVENT_TIME: u16 = 72;
-    /// Registration Data Set.
-    pub const REGISTRATION_DATA_SET: u16 = 95;
-    /// Home Data Set.
-    pub const HOME_DATA_SET: u16 = 96;
-    /// Watch Data Set.
-    pub const WATCH_DATA_SET: u16 = 97;
     /// Control Status.
     pub const CONTROL_STATUS: u16 = 89;
     /// Actual Data Set.
@@ -379,13 +363,16 @@ impl AttributeDefinition {
     }
 }
 
+/// Revision of the Motion Device Axis Object that the device speaks (clause 5-2.2).
+pub const OBJECT_REVISION: u16 = 4;
+
 /// Attributes of the engine: scope, ID, type, access, default, name.
 const ENGINE: &[(Scope, u16, DataType, Access, i64, &str)] = {
     use Access::{Cyclic, Get, Set};
     use DataType::{Byte, Dword, Lint, Lword, Udint, Uint, Usint, Word};
     use Scope::{Class, Instance};
     &[
-        (Class, id::REVISION, Uint, Get, 4, "Revision"),
+        (Class, id::REVISION, Uint, Get, OBJECT_REVISION as i64, "Revision"),
         (Class, id::NODE_CONTROL, Byte, Cyclic, 0, "Node Control"),
         (Class, id::NODE_STATUS, Byte, Get, 0, "Node Status"),
         (Class, id::NODE_FAULT_CODE, Usint, Get, 0, "Node Fault Code"),

@@ -14,8 +14,12 @@ use crate::wire::encapsulation::{EXPLICIT_PORT, IO_PORT};
 use crate::wire::epath::ElectronicKey;
 use crate::wire::list_identity::PRODUCT_NAME_MAX;
 
-/// Device type (profile) of CIP Motion drives.
+/// Device type (profile) of CIP Motion drives (Volume 9 clause 6-2).
 pub const DEVICE_TYPE_CIP_MOTION_DRIVE: u16 = 0x25;
+/// Device type of CIP Motion encoders.
+pub const DEVICE_TYPE_CIP_MOTION_ENCODER: u16 = 0x2F;
+/// Device type of CIP Motion converters.
+pub const DEVICE_TYPE_CIP_MOTION_CONVERTER: u16 = 0x30;
 
 /// Most axis instances of a device on EtherNet/IP (IEC 61800-7-302).
 pub const AXES_MAX: usize = 16;
@@ -56,7 +60,7 @@ pub struct AdapterConfig {
 pub struct IdentityConfig {
     /// Vendor ID given by ODVA.
     pub vendor: u16,
-    /// Device type; [`DEVICE_TYPE_CIP_MOTION_DRIVE`] for a drive.
+    /// Device type, such as [`DEVICE_TYPE_CIP_MOTION_DRIVE`].
     pub device_type: u16,
     /// Product code within the vendor.
     pub product_code: u16,

@@ -44,6 +44,15 @@ pub enum ModuleState {
 }
 
 impl ModuleState {
+    /// Every state, in the order of their weight.
+    pub const ALL: [Self; 5] = [
+        Self::Operational,
+        Self::Standby,
+        Self::SelfTesting,
+        Self::MajorRecoverableFault,
+        Self::MajorUnrecoverableFault,
+    ];
+
     /// What the state of one axis makes of the device (Volume 9 table 9-1.2).
     ///
     /// | axis state | device |
@@ -71,6 +80,11 @@ impl ModuleState {
     /// State of a device whose axes make of it what `axes` says: the weightiest of them, standby without any.
     pub fn of_axes(axes: impl IntoIterator<Item = Self>) -> Self {
         axes.into_iter().max().unwrap_or(Self::Standby)
+    }
+
+    /// The state with this value of attribute 8.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.code() == code)
     }
 
     /// Value of attribute 8.

@@ -24,7 +24,6 @@ use super::axis_object::{Axis, AxisConfig, Context, FaultWords};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
 use super::drive_link::{AxisCommandImage, DriveImage};
-use super::event_channel::EventCounters;
 use super::exception::ExceptionActions;
 use super::explicit_queue::ExplicitQueue;
 use super::fault_log::{FaultLog, LogEntry};
@@ -32,6 +31,7 @@ use super::io_connection::{IoConnection, Mode};
 use super::io_counters::MotionCounters;
 use super::motion_class::NodeHealth;
 use super::motion_link::{CloseParameters, MotionReply, MotionRequest, OpenParameters, OpenRefusal};
+use super::motion_visualization::StartupProgress;
 use super::service_channel::ServiceChannel;
 use super::status_report::Reported;
 use super::time_offset::OffsetCompensation;
@@ -155,6 +155,7 @@ pub struct MotionDevice {
     pub(super) node: NodeHealth,
     pub(super) compensation: OffsetCompensation,
     pub(super) sync: SyncState,
+    pub(super) progress: StartupProgress,
     pub(super) counters: MotionCounters,
     pub(super) last_error: Option<Error>,
     /// Lost and late updates of this connection, modulo 256.
@@ -201,6 +202,7 @@ impl MotionDevice {
             node: NodeHealth::default(),
             compensation: OffsetCompensation::default(),
             sync: SyncState::default(),
+            progress: StartupProgress::default(),
             counters: MotionCounters::default(),
             last_error: None,
             diagnostics: (0, 0),
@@ -315,9 +317,7 @@ impl MotionDevice {
         self.connection.as_ref().map(IoConnection::wake_at)
     }
 
-    /// Events that are to be looked for on an axis now, with the parameters of extended checking. Watch positions and
-    /// torque are evaluated here; the rest is the drive's part, which says in [`DriveImage::events_checking`] what it is
-    /// looking for.
+    /// Events that the drive of an axis has to look for now, with the parameters of extended checking.
     #[must_use]
     pub fn armed_events(&self, axis: usize) -> Option<(EventChecking, &ExtendedEventData)> {
         self.slots.get(axis).map(|slot| (slot.axis.events.armed(), slot.axis.events.parameters()))
@@ -382,26 +382,18 @@ impl MotionDevice {
         self.sync = sync;
     }
 
-    /// An event that the drive was armed for has occurred, or cannot be found for the reason `status`, which is then not
-    /// 0. `position` is in the reference system of power-up, position control units, `time_stamp` is system time in ns.
-    /// Returns whether it is on its way to the controller.
+    /// An event that the drive was armed for has occurred. Returns whether it is on its way to the controller.
     pub fn notify_event(
         &mut self,
         axis: usize,
         event: EventType,
         status: u8,
-        position: i64,
+        position: i32,
         time_stamp: u64,
     ) -> bool {
         self.slots
             .get_mut(axis)
-            .is_some_and(|slot| slot.axis.notify_event(event, status, position, time_stamp))
-    }
-
-    /// What the event channel of an axis has counted since construction.
-    #[must_use]
-    pub fn event_counters(&self, axis: usize) -> Option<EventCounters> {
-        self.slots.get(axis).map(|slot| slot.axis.events.counters())
+            .is_some_and(|slot| slot.axis.events.notify(event, status, position, time_stamp))
     }
 
     /// Publishes the value of a stored attribute of an axis, for example a signal. Access and range do not count.
@@ -540,6 +532,7 @@ impl MotionDevice {
     /// Factory defaults and idle channels: a connection begins or ends.
     fn start_over(&mut self) {
         self.node.clear();
+        self.progress = StartupProgress::default();
         self.compensation.reset();
         self.diagnostics = (0, 0);
         self.reported_diagnostics = Reported::known((0, 0));

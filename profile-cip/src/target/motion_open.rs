@@ -14,7 +14,9 @@
 use super::config::{MOTION_SIZE_MIN, MotionConfig};
 use super::connection_path::MotionPath;
 use super::refusal::Refusal;
+use super::router::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::Reader;
+use crate::wire::epath::{Encoding, Segment, emit_path, path_len};
 use crate::wire::forward_open::{ForwardOpen, Transport, Trigger};
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters};
 use crate::wire::status::{ConnectionStatus, GeneralStatus};
@@ -28,7 +30,35 @@ pub(super) const FORMAT_REVISION: u8 = 2;
 /// I/O connection point, which is the format revision.
 const IO_POINT: u16 = FORMAT_REVISION as u16;
 
+/// Transport of the connection: class 1, cyclic, and the device is no server of it (clauses 6-2.5 and 7-1.1).
+pub const TRANSPORT: Transport = Transport { server: false, trigger: Trigger::CYCLIC, class: 1 };
+/// Connection type of both directions.
+pub const CONNECTION_TYPE: ConnectionType = ConnectionType::POINT_TO_POINT;
+/// Whether the size of the data varies, in both directions.
+pub const VARIABLE: bool = true;
+
 const VERIFY_POWER_RATINGS: u8 = 1;
+
+/// The application path of a Forward_Open to the device with configuration block revision 1. The block has the device
+/// verify its own Drive Power Structure Class ID unless that is 0, which leaves it to the axes.
+#[must_use]
+pub fn application_path(config: &MotionConfig) -> Vec<u8> {
+    let class_id = config.power_structure_class_id;
+    let bits = if class_id == 0 { 0 } else { VERIFY_POWER_RATINGS };
+    let [a, b, c, d] = class_id.to_le_bytes();
+    let block = [1, bits, 0, 0, a, b, c, d];
+    let path = [
+        Segment::class(CLASS_MOTION_DEVICE_AXIS),
+        Segment::connection_point(CONFIGURATION_POINT_1),
+        Segment::connection_point(IO_POINT),
+        Segment::Data(&block),
+    ];
+    let mut out = vec![0; path_len(&path, Encoding::Padded)];
+    // The length is that of the path.
+    let written = emit_path(&path, Encoding::Padded, &mut out).unwrap_or(0);
+    out.truncate(written);
+    out
+}
 /// Extended status of a Class ID that does not match; the IDs of axes count on from the next one.
 const CLASS_ID_MISMATCH: u16 = 0x04;
 const AXIS_ID_MISMATCH: u16 = 0x05;
@@ -118,14 +148,15 @@ pub(super) fn check_parameters(open: &ForwardOpen<'_>, config: &MotionConfig) ->
 }
 
 fn check_transport(transport: Transport) -> Result<(), Refusal> {
-    if transport.class != 1 {
-        return Err(Refusal::value(ConnectionStatus::CLASS_NOT_SUPPORTED, u32::from(transport.class), 1));
+    if transport.class != TRANSPORT.class {
+        let (found, expected) = (u32::from(transport.class), u32::from(TRANSPORT.class));
+        return Err(Refusal::value(ConnectionStatus::CLASS_NOT_SUPPORTED, found, expected));
     }
-    if transport.trigger != Trigger::CYCLIC {
-        let found = u32::from(transport.trigger.0);
-        return Err(Refusal::value(ConnectionStatus::TRIGGER_NOT_SUPPORTED, found, 0));
+    if transport.trigger != TRANSPORT.trigger {
+        let (found, expected) = (u32::from(transport.trigger.0), u32::from(TRANSPORT.trigger.0));
+        return Err(Refusal::value(ConnectionStatus::TRIGGER_NOT_SUPPORTED, found, expected));
     }
-    if transport.server {
+    if transport.server != TRANSPORT.server {
         return Err(Refusal::value(ConnectionStatus::DIRECTION_NOT_SUPPORTED, 1, 0));
     }
     Ok(())
@@ -154,15 +185,16 @@ fn check_direction(
     size_max: u16,
     direction: &Direction,
 ) -> Result<(), Refusal> {
-    if parameters.connection_type != ConnectionType::POINT_TO_POINT {
-        let found = u32::from(parameters.connection_type.0);
-        return Err(Refusal::value(direction.connection_type, found, 2));
+    if parameters.connection_type != CONNECTION_TYPE {
+        let (found, expected) = (u32::from(parameters.connection_type.0), u32::from(CONNECTION_TYPE.0));
+        return Err(Refusal::value(direction.connection_type, found, expected));
     }
     if parameters.redundant_owner {
         return Err(Refusal::value(ConnectionStatus::INVALID_REDUNDANT_OWNER, 1, 0));
     }
-    if !parameters.variable {
-        return Err(Refusal::value(direction.fixed_variable, 0, 1));
+    if parameters.variable != VARIABLE {
+        let (found, expected) = (u32::from(parameters.variable), u32::from(VARIABLE));
+        return Err(Refusal::value(direction.fixed_variable, found, expected));
     }
     if parameters.size > size_max {
         return Err(Refusal::size(direction.size, parameters.size, size_max));

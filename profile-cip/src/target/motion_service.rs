@@ -69,7 +69,10 @@ impl MotionDevice {
         let unsupported = Started::Answered(GeneralStatus::SERVICE_NOT_SUPPORTED, 0);
         match (service, instance.checked_sub(1)) {
             (MotionService::GET_AXIS_ATTRIBUTES_LIST, _) => Started::List(ListFormat::AxisGet),
-            (MotionService::SET_AXIS_ATTRIBUTES_LIST, _) => Started::List(ListFormat::AxisSet),
+            (MotionService::SET_AXIS_ATTRIBUTES_LIST, _) => {
+                self.progress.attribute_set = true;
+                Started::List(ListFormat::AxisSet)
+            }
             (MotionService::GROUP_SYNC, None) if self.config.supports_sync => {
                 let (status, sync) = self.group_sync(body, system_time);
                 match (status, response.first_mut()) {
@@ -143,6 +146,7 @@ impl MotionDevice {
                 self.class.store.unsigned(&self.class_table, id::CONTROLLER_TIME_OFFSET).unwrap_or(0);
             let offsets = Offsets { device: self.sync.offset, controller: controller.cast_signed() };
             self.compensation.synchronize(offsets);
+            self.progress.group_synced = true;
         }
         (GeneralStatus::SUCCESS, status)
     }
@@ -263,6 +267,8 @@ impl MotionDevice {
                 let values = [
                     (id::CONTROL_MODE, u64::from(block.control_mode.0)),
                     (id::FEEDBACK_MODE, u64::from(block.feedback_mode.0)),
+                    (id::EVENT_CHECKING_CONTROL, u64::from(slot.axis.events.control().bits())),
+                    (id::EVENT_CHECKING_STATUS, u64::from(slot.axis.events.status().bits())),
                     (id::CONTROL_STATUS, u64::from(block.control_status.bits())),
                     (id::ACTUAL_DATA_SET, u64::from(block.actual_data_set.bits())),
                     (id::COMMAND_DATA_SET, u64::from(block.values.data_set().bits())),
@@ -303,9 +309,6 @@ impl MotionDevice {
                     (id::START_INHIBITS_MFG, u64::from(drive.start_inhibits_mfg)),
                 ];
                 for (id, value) in values {
-                    slot.store.publish(&self.axis_table, id, value);
-                }
-                for (id, value) in slot.axis.events.attributes() {
                     slot.store.publish(&self.axis_table, id, value);
                 }
             }
@@ -379,6 +382,8 @@ impl MotionDevice {
         match started {
             Started::Answered(status, len) => answer(self, status, &response[..len]),
             Started::List(format) => {
+                let sets = matches!(format, ListFormat::CommonSet | ListFormat::SingleSet(_));
+                self.progress.attribute_set |= sets;
                 match self.explicit.worker.start(format, &request.data, EXPLICIT_DATA_MAX) {
                     Ok(()) => self.explicit.current = Some((token, instance)),
                     Err(status) => answer(self, status, &[]),

@@ -28,6 +28,7 @@ use super::router::{
     self, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS, MessageRouter,
 };
 use super::tcp_ip::{CLASS_TCP_IP, TcpIp};
+use super::time_sync::{CLASS_TIME_SYNC, TimeSync, TimeSyncState};
 use super::{forward_close, forward_open, identity::CLASS_IDENTITY};
 use crate::wire::message_router::Request;
 use crate::wire::status::{ConnectionStatus, GeneralStatus, Service};
@@ -81,6 +82,7 @@ pub(super) struct Node {
     /// The code points of the start; those of the configuration are for the next one.
     pub qos_in_use: QosConfig,
     pub health: Health,
+    pub time_sync: TimeSyncState,
     pub connections: ConnectionManager,
     pub counters: Counters,
     pub reset: Reset,
@@ -95,6 +97,7 @@ impl Node {
     pub fn new(config: AdapterConfig) -> Self {
         Self {
             health: Health::default(),
+            time_sync: TimeSyncState::default(),
             connections: ConnectionManager::new(config.incarnation),
             counters: Counters::default(),
             reset: Reset::default(),
@@ -237,6 +240,10 @@ impl Node {
                     None
                 };
                 own.unwrap_or_else(|| serve(&mut file, service, path, data, limit))
+            }
+            CLASS_TIME_SYNC => {
+                let (state, config) = (&self.time_sync, &self.config);
+                serve(&mut TimeSync { state, config, now: origin.now }, service, path, data, limit)
             }
             CLASS_QOS => {
                 let before = self.config.qos;

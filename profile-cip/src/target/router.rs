@@ -1,13 +1,10 @@
 //! The Message Router object (class 0x02) and the way from a path to an object.
 
 use super::config::IdentityConfig;
-use super::ethernet_link::CLASS_ETHERNET_LINK;
 use super::file_object::CLASS_FILE;
-use super::identity::CLASS_IDENTITY;
 use super::motion_link::ObjectPath;
 use super::object::Object;
-use super::qos::CLASS_QOS;
-use super::tcp_ip::CLASS_TCP_IP;
+use super::object_list::OBJECT_CLASSES;
 use crate::wire::epath::{self, Encoding, LogicalType, Segment};
 use crate::wire::status::GeneralStatus;
 
@@ -17,18 +14,6 @@ pub const CLASS_MESSAGE_ROUTER: u16 = 0x02;
 pub const CLASS_CONNECTION_MANAGER: u16 = 0x06;
 /// Class code of the Motion Device Axis Object.
 pub const CLASS_MOTION_DEVICE_AXIS: u16 = 0x42;
-
-/// Every class a device has; the File object only with something to serve.
-const CLASSES: [u16; 8] = [
-    CLASS_IDENTITY,
-    CLASS_MESSAGE_ROUTER,
-    CLASS_CONNECTION_MANAGER,
-    CLASS_FILE,
-    CLASS_MOTION_DEVICE_AXIS,
-    CLASS_QOS,
-    CLASS_TCP_IP,
-    CLASS_ETHERNET_LINK,
-];
 
 /// Resolves the path of an explicit request: class, instance, attribute, member, connection point, each at
 /// most once; an electronic key is checked; a missing instance is the class.
@@ -87,7 +72,8 @@ impl Object for MessageRouter {
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
         match attribute {
             1 => {
-                let classes = CLASSES.into_iter().filter(|class| *class != CLASS_FILE || self.has_file);
+                let classes = OBJECT_CLASSES.into_iter().map(|one| one.class);
+                let classes = classes.filter(|class| *class != CLASS_FILE || self.has_file);
                 out.extend(u16::try_from(classes.clone().count()).unwrap_or(0).to_le_bytes());
                 out.extend(classes.flat_map(u16::to_le_bytes));
             }

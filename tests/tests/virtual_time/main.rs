@@ -1,7 +1,6 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
 mod attributes;
-mod events;
 mod faults;
 mod hookup;
 mod loss;

@@ -301,3 +301,60 @@ pub fn services(dictionary: &CipDictionary) -> Sheet {
     };
     Sheet::new(COLUMNS, dictionary.services().iter().map(row).collect())
 }
+
+/// Object classes and I/O connection on each network: a row for each class, with the connection repeated.
+pub fn networks(dictionary: &CipDictionary) -> Sheet {
+    const COLUMNS: &[&str] = &[
+        "network",
+        "class",
+        "name",
+        "need",
+        "instances",
+        "per",
+        "interface",
+        "formats",
+        "transport_class",
+        "trigger",
+        "priority",
+        "axes_min",
+        "axes_max",
+        "udp_port",
+        "paths",
+        "source",
+        "clause",
+        "note",
+    ];
+    let mut rows = Vec::new();
+    for network in dictionary.networks() {
+        let formats = network
+            .formats
+            .iter()
+            .map(|(format, axes)| format!("{} for {} to {} axes", format.name(), axes.start(), axes.end()));
+        let formats = formats.collect::<Vec<_>>().join("; ");
+        for object in &network.objects {
+            let notes = [object.note.as_str(), network.note.as_str()];
+            let note = notes.into_iter().filter(|note| !note.is_empty()).collect::<Vec<_>>().join("; ");
+            rows.push(vec![
+                (&network.name).into(),
+                format!("{:#04X}", object.class).replace("0X", "0x").into(),
+                (&object.name).into(),
+                if object.required { "R" } else { "O" }.into(),
+                object.instances.into(),
+                if object.per_axis { "axis" } else { "node" }.into(),
+                object.interface.join("; ").into(),
+                formats.clone().into(),
+                network.transport_class.into(),
+                (&network.trigger).into(),
+                (&network.priority).into(),
+                (*network.axes.start()).into(),
+                (*network.axes.end()).into(),
+                network.udp_port.into(),
+                (&network.paths).into(),
+                format!("IEC 61800-7-302 {}", network.table).into(),
+                format!("{}, {}", network.table_clause, network.clause).into(),
+                note.into(),
+            ]);
+        }
+    }
+    Sheet::new(COLUMNS, rows)
+}

@@ -3,6 +3,7 @@
 use super::cip_attributes::{CipAttribute, resolve_class_attributes, resolve_instance_attributes};
 use super::cip_codes::{resolve_data_set_bits, resolve_sets};
 use super::cip_faults::resolve_faults;
+use super::cip_networks::{CipNetwork, resolve_networks};
 use super::cip_services::{CipService, resolve_services};
 use super::{Enumeration, ExceptionAction, FaultRecord, StatusCode, named_code};
 use crate::mapping::format::{CipAttributeFile, CipEnumerationFile, Name};
@@ -31,6 +32,7 @@ pub struct CipDictionary {
     pub(super) exception_actions: Vec<ExceptionAction>,
     pub(super) status_codes: Vec<StatusCode>,
     services: Vec<CipService>,
+    networks: Vec<CipNetwork>,
     data_sets: Vec<(String, Vec<DataElement>)>,
 }
 
@@ -40,6 +42,7 @@ impl CipDictionary {
         dictionary.resolve_enumeration_file(&tables.cip_enumerations, errors);
         resolve_faults(&tables.cip_faults, &mut dictionary, errors);
         dictionary.services = resolve_services(&tables.cip_services, errors);
+        dictionary.networks = resolve_networks(&tables.cip_networks, errors);
         dictionary
     }
 
@@ -142,6 +145,11 @@ impl CipDictionary {
     /// The services, by code.
     pub fn services(&self) -> &[CipService] {
         &self.services
+    }
+
+    /// CIP Motion on each of the networks.
+    pub fn networks(&self) -> &[CipNetwork] {
+        &self.networks
     }
 
     /// The elements of the data set with this name.

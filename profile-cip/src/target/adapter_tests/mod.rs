@@ -11,3 +11,4 @@ mod other_targets;
 mod rig;
 mod routing;
 mod sessions;
+mod time_sync;

@@ -237,7 +237,7 @@ fn message_router_object() {
     let mut rig = Rig::new();
     let client = rig.client(1);
     let classes = rig.get(client, PATH_ROUTER, 1);
-    assert_eq!(classes.data, [7, 0, 1, 0, 2, 0, 6, 0, 0x42, 0, 0x48, 0, 0xF5, 0, 0xF6, 0]);
+    assert_eq!(classes.data, [8, 0, 1, 0, 2, 0, 6, 0, 0x42, 0, 0x43, 0, 0x48, 0, 0xF5, 0, 0xF6, 0]);
     assert_eq!(rig.get(client, PATH_ROUTER, 2).data, [33, 0]);
     rig.open_motion(client, 1);
     rig.open_explicit(client, 2);
@@ -245,7 +245,7 @@ fn message_router_object() {
     let mut rig = Rig::with(|config| config.eds = Arc::from(&b"[File]"[..]));
     let client = rig.client(1);
     let classes = rig.get(client, PATH_ROUTER, 1);
-    assert_eq!(classes.data, [8, 0, 1, 0, 2, 0, 6, 0, 0x37, 0, 0x42, 0, 0x48, 0, 0xF5, 0, 0xF6, 0]);
+    assert_eq!(classes.data, [9, 0, 1, 0, 2, 0, 6, 0, 0x37, 0, 0x42, 0, 0x43, 0, 0x48, 0, 0xF5, 0, 0xF6, 0]);
 }
 
 #[test]

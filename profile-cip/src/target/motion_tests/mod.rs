@@ -1,9 +1,9 @@
 //! Tests of the motion device in virtual time, with a controller and drives that are as simple as can be.
 
-mod events;
 mod faults;
 mod handshake;
 mod hookup;
+mod indicators;
 mod refusals;
 mod requests;
 mod reset;
@@ -56,14 +56,7 @@ pub(super) struct FakeDrive {
 
 impl FakeDrive {
     fn new() -> Self {
-        let events = EventChecking::HOME_POSITIVE;
-        let image = DriveImage {
-            online: true,
-            bus_up: true,
-            events,
-            events_checking: events,
-            ..DriveImage::default()
-        };
+        let image = DriveImage { online: true, bus_up: true, ..DriveImage::default() };
         Self { image, stuck: false, sticky: false }
     }
 
@@ -133,6 +126,7 @@ impl Rig {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
+            events: EventChecking::HOME_POSITIVE,
             hookup_tests: 0b11,
             ..AxisConfig::default()
         };
