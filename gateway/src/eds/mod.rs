@@ -14,7 +14,7 @@ mod writer;
 use profile_cip::target::adapter::SESSIONS_MAX;
 use profile_cip::target::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
-    DEVICE_TYPE_CIP_MOTION_ENCODER, MOTION_SIZE_MIN,
+    DEVICE_TYPE_CIP_MOTION_ENCODER,
 };
 use profile_cip::target::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX};
 use profile_cip::target::motion_open;
@@ -132,7 +132,10 @@ fn parameters(w: &mut Writer, adapter: &AdapterConfig) {
     let rpi =
         [motion.rpi_min_us, motion.acceptable_rpi_us(u32::MAX), motion.acceptable_rpi_us(RPI_PROPOSED_US)];
     param(w, PARAM_RPI, UDINT, ("Controller Update Period", "us"), rpi);
-    let size = |most: u16| [data_size(MOTION_SIZE_MIN), data_size(most), data_size(most)];
+    let size = |most: u16| {
+        let (least, most) = motion.sizes(most);
+        [data_size(least), data_size(most), data_size(most)]
+    };
     let (o_to_t, t_to_o) = (size(motion.o_to_t_size_max), size(motion.t_to_o_size_max));
     param(w, PARAM_O_TO_T_SIZE, UINT, ("Controller-to-Device size", "bytes"), o_to_t);
     param(w, PARAM_T_TO_O_SIZE, UINT, ("Device-to-Controller size", "bytes"), t_to_o);
@@ -194,7 +197,7 @@ fn connection(w: &mut Writer, adapter: &AdapterConfig) {
         | of_type(motion_open::CONNECTION_TYPE, parameters::T_TO_O_TYPES)
         | parameters::O_TO_T_SCHEDULED
         | parameters::T_TO_O_SCHEDULED;
-    parameters |= if motion_open::VARIABLE {
+    parameters |= if adapter.motion.is_variable() {
         parameters::O_TO_T_VARIABLE | parameters::T_TO_O_VARIABLE
     } else {
         parameters::O_TO_T_FIXED | parameters::T_TO_O_FIXED

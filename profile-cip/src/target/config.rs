@@ -13,6 +13,7 @@ use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::encapsulation::{EXPLICIT_PORT, IO_PORT};
 use crate::wire::epath::ElectronicKey;
 use crate::wire::list_identity::PRODUCT_NAME_MAX;
+use crate::wire::motion::{Format, fixed};
 
 /// Device type (profile) of CIP Motion drives (Volume 9 clause 6-2).
 pub const DEVICE_TYPE_CIP_MOTION_DRIVE: u16 = 0x25;
@@ -26,6 +27,9 @@ pub const AXES_MAX: usize = 16;
 
 /// Smallest motion connection in bytes: sequence count and connection header.
 pub const MOTION_SIZE_MIN: u16 = 10;
+
+/// Size of either direction of a motion connection in the fixed format, in bytes: sequence count and update.
+pub const MOTION_SIZE_FIXED: u16 = 18;
 
 /// Largest motion connection in bytes that fits one Ethernet frame: 1500 less IP, UDP and the datagram's
 /// items.
@@ -197,13 +201,18 @@ impl Default for QosConfig {
 /// What a motion connection may look like (Volume 9 clause 7-1.1).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MotionConfig {
+    /// Format of the connection data that the device accepts. The connection point is the same for both (it is the
+    /// Format Revision), so in the Forward_Open the size type tells them apart: fixed size for the fixed format,
+    /// variable size for the variable one.
+    pub format: Format,
     /// Shortest packet interval in microseconds.
     pub rpi_min_us: u32,
     /// Longest packet interval in microseconds.
     pub rpi_max_us: u32,
     /// Packet intervals must be a multiple of this, in microseconds; at least 1.
     pub rpi_multiple_us: u32,
-    /// Largest controller-to-device connection in bytes, [`MOTION_SIZE_MIN`]..=[`MOTION_SIZE_MAX`].
+    /// Largest controller-to-device connection in bytes, [`MOTION_SIZE_MIN`]..=[`MOTION_SIZE_MAX`]. In the fixed format
+    /// this and the next do not count: the size is [`MOTION_SIZE_FIXED`].
     pub o_to_t_size_max: u16,
     /// Largest device-to-controller connection in bytes, [`MOTION_SIZE_MIN`]..=[`MOTION_SIZE_MAX`].
     pub t_to_o_size_max: u16,
@@ -214,6 +223,19 @@ pub struct MotionConfig {
 }
 
 impl MotionConfig {
+    /// Whether the size of the data varies, in both directions.
+    pub fn is_variable(&self) -> bool {
+        self.format == Format::Variable
+    }
+
+    /// Least and greatest size of a direction in bytes, of which the variable format may have up to `max`.
+    pub fn sizes(&self, max: u16) -> (u16, u16) {
+        match self.format {
+            Format::Variable => (MOTION_SIZE_MIN, max),
+            Format::Fixed => (MOTION_SIZE_FIXED, MOTION_SIZE_FIXED),
+        }
+    }
+
     /// The acceptable packet interval nearest to the wanted one that is not shorter, or the longest there is.
     pub fn acceptable_rpi_us(&self, wanted_us: u32) -> u32 {
         let multiple = self.rpi_multiple_us.max(1);
@@ -279,6 +301,7 @@ impl AdapterConfig {
 }
 
 const _: () = assert!(MOTION_SIZE_MIN as usize == SEQUENCE_COUNT_LEN + 8);
+const _: () = assert!(MOTION_SIZE_FIXED as usize == SEQUENCE_COUNT_LEN + fixed::LEN);
 
 #[cfg(test)]
 pub(super) mod tests {
@@ -317,6 +340,7 @@ pub(super) mod tests {
             },
             qos: QosConfig::default(),
             motion: MotionConfig {
+                format: Format::Variable,
                 rpi_min_us: 1000,
                 rpi_max_us: 32_000,
                 rpi_multiple_us: 500,

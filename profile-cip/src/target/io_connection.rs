@@ -117,9 +117,9 @@ impl IoConnection {
         }
     }
 
-    /// A packet of the owner has come.
-    pub fn heard(&mut self, sequence: u16, now: MonotonicTime) {
-        self.sequence = Some(sequence);
+    /// A packet of the owner has come, with its sequence count where the network has one.
+    pub fn heard(&mut self, sequence: Option<u16>, now: MonotonicTime) {
+        self.sequence = sequence;
         self.last_heard = now;
     }
 

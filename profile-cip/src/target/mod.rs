@@ -50,6 +50,7 @@ mod io_connection;
 pub mod io_counters;
 mod motion_class;
 pub mod motion_device;
+mod motion_fixed;
 mod motion_receive;
 mod motion_reset;
 mod motion_service;

@@ -30,6 +30,7 @@ use super::fault_log::{FaultLog, LogEntry};
 use super::io_connection::{IoConnection, Mode};
 use super::io_counters::MotionCounters;
 use super::motion_class::NodeHealth;
+use super::motion_fixed::with_services_alone;
 use super::motion_link::{CloseParameters, MotionReply, MotionRequest, OpenParameters, OpenRefusal};
 use super::motion_visualization::StartupProgress;
 use super::service_channel::ServiceChannel;
@@ -40,7 +41,7 @@ use crate::wire::motion::codes::{
     ControlMode, EventChecking, EventType, FaultType, NodeAlarm, NodeControl, NodeFault,
 };
 use crate::wire::motion::event::ExtendedEventData;
-use crate::wire::motion::{FORMAT_REVISION, WriteBlock};
+use crate::wire::motion::{FORMAT_REVISION, Format, WriteBlock};
 use crate::wire::status::GeneralStatus;
 
 /// Most axes of a device: what the EtherNet/IP part of the standard allows.
@@ -62,6 +63,8 @@ const INVALID_CONNECTION_POINT: u16 = 0x012F;
 /// What the device is made of.
 #[derive(Debug, Clone)]
 pub struct DeviceConfig {
+    /// Format of the connection data. The fixed one is for a single axis without system time.
+    pub format: Format,
     /// The axes in the order of their instance numbers, at most [`AXES_MAX`].
     pub axes: Vec<AxisConfig>,
     /// Attributes of class and instances beside those of the engine.
@@ -79,6 +82,10 @@ pub struct DeviceConfig {
 pub enum DeviceError {
     /// There are no axes, or more than [`AXES_MAX`].
     AxisCount(usize),
+    /// More than one axis for the fixed format.
+    FixedAxisCount(usize),
+    /// A system time for the fixed format, whose updates have no time stamps.
+    FixedSync,
     /// The attribute definitions are not usable.
     Attributes(TableError),
 }
@@ -87,6 +94,12 @@ impl core::fmt::Display for DeviceError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::AxisCount(count) => write!(f, "expected 1 to {AXES_MAX} axes, found {count}"),
+            Self::FixedAxisCount(count) => {
+                write!(f, "fixed connection format: expected 1 axis, found {count}")
+            }
+            Self::FixedSync => {
+                f.write_str("fixed connection format: expected no CIP Sync, found it supported")
+            }
             Self::Attributes(error) => error.fmt(f),
         }
     }
@@ -178,6 +191,18 @@ impl MotionDevice {
         if config.axes.is_empty() || config.axes.len() > AXES_MAX {
             return Err(DeviceError::AxisCount(config.axes.len()));
         }
+        if config.format == Format::Fixed {
+            if config.axes.len() > 1 {
+                return Err(DeviceError::FixedAxisCount(config.axes.len()));
+            }
+            if config.supports_sync {
+                return Err(DeviceError::FixedSync);
+            }
+        }
+        let config = match config.format {
+            Format::Variable => config,
+            Format::Fixed => DeviceConfig { attributes: with_services_alone(config.attributes), ..config },
+        };
         let class_table = AttributeTable::new(Scope::Class, &config.attributes)?;
         let axis_table = AttributeTable::new(Scope::Instance, &config.attributes)?;
         let class = Class { store: AttributeStore::new(&class_table), service: ServiceChannel::default() };
@@ -507,6 +532,7 @@ impl MotionDevice {
         if parameters.format_revision != FORMAT_REVISION {
             return refuse(INVALID_CONNECTION_POINT);
         }
+        self.check_format(&parameters)?;
         if parameters.rpi_us == 0 || parameters.timeout_us == 0 {
             return refuse(INTERVAL_NOT_ACCEPTABLE);
         }

@@ -1,5 +1,8 @@
 //! What a Forward_Open of the motion connection must be like (Volume 9 clause 7-1.1).
 //!
+//! The connection points are those of both formats of the connection data (clause 6-2.7.3 names no others); a device
+//! accepts one of the formats, by the size type and the size of both directions.
+//!
 //! Path: `20 42 2C 51 2C 02 80 04` and the 8 bytes of configuration block revision 1, or connection point
 //! 0x52 and block revision 2 with any number of axis IDs behind it.
 //!
@@ -11,7 +14,7 @@
 //! | 4 | 4 | Drive Power Structure Class ID |
 //! | 8 | 4n | Drive Power Structure Axis IDs, revision 2 only |
 
-use super::config::{MOTION_SIZE_MIN, MotionConfig};
+use super::config::MotionConfig;
 use super::connection_path::MotionPath;
 use super::refusal::Refusal;
 use super::router::CLASS_MOTION_DEVICE_AXIS;
@@ -34,8 +37,6 @@ const IO_POINT: u16 = FORMAT_REVISION as u16;
 pub const TRANSPORT: Transport = Transport { server: false, trigger: Trigger::CYCLIC, class: 1 };
 /// Connection type of both directions.
 pub const CONNECTION_TYPE: ConnectionType = ConnectionType::POINT_TO_POINT;
-/// Whether the size of the data varies, in both directions.
-pub const VARIABLE: bool = true;
 
 const VERIFY_POWER_RATINGS: u8 = 1;
 
@@ -130,8 +131,9 @@ fn power_mismatch(extended: u16, found: u32, expected: Option<u32>) -> Refusal {
 /// Checks transport, directions, sizes and intervals.
 pub(super) fn check_parameters(open: &ForwardOpen<'_>, config: &MotionConfig) -> Result<(), Refusal> {
     check_transport(open.transport)?;
-    check_direction(&open.o_to_t, config.o_to_t_size_max, &O_TO_T)?;
-    check_direction(&open.t_to_o, config.t_to_o_size_max, &T_TO_O)?;
+    let variable = config.is_variable();
+    check_direction(&open.o_to_t, variable, config.sizes(config.o_to_t_size_max), &O_TO_T)?;
+    check_direction(&open.t_to_o, variable, config.sizes(config.t_to_o_size_max), &T_TO_O)?;
     if open.multiplier().is_none() {
         let found = u32::from(open.timeout_multiplier);
         return Err(Refusal::value(ConnectionStatus::MULTIPLIER_NOT_ACCEPTABLE, found, 7));
@@ -182,7 +184,8 @@ const T_TO_O: Direction = Direction {
 
 fn check_direction(
     parameters: &NetworkParameters,
-    size_max: u16,
+    variable: bool,
+    (size_min, size_max): (u16, u16),
     direction: &Direction,
 ) -> Result<(), Refusal> {
     if parameters.connection_type != CONNECTION_TYPE {
@@ -192,15 +195,15 @@ fn check_direction(
     if parameters.redundant_owner {
         return Err(Refusal::value(ConnectionStatus::INVALID_REDUNDANT_OWNER, 1, 0));
     }
-    if parameters.variable != VARIABLE {
-        let (found, expected) = (u32::from(parameters.variable), u32::from(VARIABLE));
+    if parameters.variable != variable {
+        let (found, expected) = (u32::from(parameters.variable), u32::from(variable));
         return Err(Refusal::value(direction.fixed_variable, found, expected));
     }
     if parameters.size > size_max {
         return Err(Refusal::size(direction.size, parameters.size, size_max));
     }
-    if parameters.size < MOTION_SIZE_MIN {
-        return Err(Refusal::size(direction.size, parameters.size, MOTION_SIZE_MIN));
+    if parameters.size < size_min {
+        return Err(Refusal::size(direction.size, parameters.size, size_min));
     }
     Ok(())
 }

@@ -9,10 +9,42 @@ use super::io_connection::{Age, Mode, Packet, Update};
 use super::motion_device::{Echo, INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
 use super::time_offset::Offsets;
 use crate::wire::motion::codes::{NodeAlarm, NodeControl, NodeFault};
-use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance};
+use crate::wire::motion::fixed::FixedCommand;
+use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, Format};
+
+/// An update whose form is right.
+enum Checked<'p> {
+    Variable(CommandFrame<'p>),
+    Fixed(FixedCommand),
+}
+
+impl Checked<'_> {
+    fn header(&self) -> CommandHeader {
+        match self {
+            Self::Variable(frame) => *frame.header(),
+            Self::Fixed(command) => command.header(),
+        }
+    }
+
+    fn has_instance_above(&self, axes: usize) -> bool {
+        match self {
+            Self::Variable(frame) => frame.instances().any(|i| usize::from(i.number) > axes),
+            Self::Fixed(_) => false,
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        match self {
+            Self::Variable(frame) => {
+                frame.instances().all(|i| i.cyclic.is_none_or(|block| block.values.is_finite()))
+            }
+            Self::Fixed(command) => command.values.is_finite(),
+        }
+    }
+}
 
 /// How an update with data goes on.
-enum Verdict {
+pub(super) enum Verdict {
     /// Applied as the newest command.
     Fresh(UpdateTimes),
     /// Its services and acknowledgements count, its commands do not.
@@ -46,21 +78,43 @@ impl MotionDevice {
             Packet::Old => self.counters.out_of_order += 1,
             Packet::Refresh => {
                 self.counters.refreshes += 1;
-                connection.heard(sequence, now);
+                connection.heard(Some(sequence), now);
             }
             Packet::New => {
-                if let Some(frame) = self.check(update) {
-                    self.handle_update(now, system_time, sequence, &frame);
+                if let Some(checked) = self.check(update) {
+                    self.handle_update(now, system_time, Some(sequence), &checked);
                 }
             }
         }
         self.step(system_time);
     }
 
+    /// Takes a C-to-D update of a network that puts no sequence count in front of it, as DeviceNet does not: the 16
+    /// octets of the fixed format, or an update of the variable one. The Update ID alone tells what is new.
+    pub fn handle_unsequenced(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, update: &[u8]) {
+        let Some(connection) = &self.connection else {
+            self.counters.unconnected += 1;
+            return;
+        };
+        if update.len() + SEQUENCE_LEN > usize::from(connection.parameters.o_to_t_size) {
+            self.counters.oversize += 1;
+            self.node.raise(NodeFault::DATA_FORMAT);
+        } else if let Some(checked) = self.check(update) {
+            self.handle_update(now, system_time, None, &checked);
+        }
+        self.step(system_time);
+    }
+
     /// Checks the form of a whole update. A wrong one is counted and raises node fault 4; nothing else changes.
-    fn check<'p>(&mut self, update: &'p [u8]) -> Option<CommandFrame<'p>> {
-        let frame = match CommandFrame::parse(update) {
-            Ok(frame) => frame,
+    ///
+    /// The other format is a wrong form as well: the format of a connection does not change (clause 6-2.7.1.1).
+    fn check<'p>(&mut self, update: &'p [u8]) -> Option<Checked<'p>> {
+        let parsed = match self.config.format {
+            Format::Variable => CommandFrame::parse(update).map(Checked::Variable),
+            Format::Fixed => FixedCommand::parse(update).map(Checked::Fixed),
+        };
+        let checked = match parsed {
+            Ok(checked) => checked,
             Err(error) => {
                 self.last_error = Some(error);
                 self.counters.malformed += 1;
@@ -68,25 +122,26 @@ impl MotionDevice {
                 return None;
             }
         };
-        if frame.instances().any(|i| usize::from(i.number) > self.slots.len()) {
+        if checked.has_instance_above(self.slots.len()) {
             self.counters.unknown_instance += 1;
-        } else if frame.instances().any(|i| i.cyclic.is_some_and(|c| !c.values.is_finite())) {
+        } else if !checked.is_finite() {
             self.counters.not_finite += 1;
         } else {
-            return Some(frame);
+            return Some(checked);
         }
         self.node.raise(NodeFault::DATA_FORMAT);
         None
     }
 
+    /// Judges a checked update and distributes it. Without a sequence count the Update ID alone tells what is new.
     fn handle_update(
         &mut self,
         now: MonotonicTime,
         system_time: Option<SystemTime>,
-        sequence: u16,
-        frame: &CommandFrame<'_>,
+        sequence: Option<u16>,
+        checked: &Checked<'_>,
     ) {
-        let header = *frame.header();
+        let header = checked.header();
         let Some(connection) = &mut self.connection else { return };
         let before = connection.node_control();
         if !header.node_control.contains(NodeControl::DATA_VALID) {
@@ -120,7 +175,10 @@ impl MotionDevice {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
         }
         let verdict = self.judge(now, system_time, &header);
-        self.apply(now, system_time, frame, &verdict);
+        match checked {
+            Checked::Variable(frame) => self.apply(now, system_time, frame, &verdict),
+            Checked::Fixed(command) => self.apply_fixed(now, system_time, command, &verdict),
+        }
         let fresh = matches!(verdict, Verdict::Fresh(_));
         if fresh {
             self.counters.applied += 1;

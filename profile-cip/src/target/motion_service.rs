@@ -19,10 +19,10 @@ use super::motion_device::MotionDevice;
 use super::motion_link::{EXPLICIT_DATA_MAX, ExplicitReply, ExplicitRequest, MotionReply};
 use super::time_offset::Offsets;
 use crate::wire::Writer;
-use crate::wire::motion::ServiceRequest;
 use crate::wire::motion::codes::{AlarmType, FaultType, MotionService, SyncStatus};
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::motion::test_service::{RUN_HOOKUP_TEST_LEN, RunHookupTest};
+use crate::wire::motion::{Format, ServiceRequest};
 use crate::wire::status::GeneralStatus;
 
 /// Class code of the Motion Device Axis Object.
@@ -228,6 +228,8 @@ impl MotionDevice {
                 u8::try_from(value).unwrap_or(u8::MAX)
             };
             self.diagnostics = (counter(id::LOST_UPDATES), counter(id::LATE_UPDATES));
+        } else if self.config.format == Format::Fixed {
+            self.adopt_fixed();
         }
     }
 
@@ -256,14 +258,18 @@ impl MotionDevice {
                 }
             }
             Some(axis) => {
+                let fixed = self.config.format == Format::Fixed;
                 let Some(slot) = self.slots.get_mut(axis) else { return };
                 let (block, drive) = (slot.axis.block(), slot.axis.drive());
                 let words = slot.axis.fault_words();
                 let fault = slot.axis.faults.newest_fault();
                 let alarm = slot.axis.faults.newest_alarm();
                 let safety = drive.safety.unwrap_or_default();
-                let integer =
-                    matches!(block.values.position, Some(crate::wire::motion::CommandPosition::Integer(_)));
+                let integer = fixed
+                    || matches!(
+                        block.values.position,
+                        Some(crate::wire::motion::CommandPosition::Integer(_))
+                    );
                 let values = [
                     (id::CONTROL_MODE, u64::from(block.control_mode.0)),
                     (id::FEEDBACK_MODE, u64::from(block.feedback_mode.0)),
@@ -404,12 +410,12 @@ impl MotionDevice {
             reply.data.extend(body.iter().copied().take(EXPLICIT_DATA_MAX));
             reply
         });
+        self.adopt(instance);
         let Some(reply) = reply else {
             self.explicit.worker = worker;
             return false;
         };
         self.explicit.current = None;
-        self.adopt(instance);
         self.reply(MotionReply::Explicit(reply));
         true
     }

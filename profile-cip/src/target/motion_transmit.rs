@@ -9,8 +9,8 @@ use super::motion_device::{INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
 use crate::wire::Writer;
 use crate::wire::motion::codes::{NodeControl, NodeStatus, TimeDataSet};
 use crate::wire::motion::{
-    ActualBlock, ActualEvents, ActualHeader, ActualInstance, ActualWriter, ReadBlock, ServiceResponse,
-    TimeDiagnostics, UpdateDiagnostics,
+    ActualBlock, ActualEvents, ActualHeader, ActualInstance, ActualWriter, Format, ReadBlock,
+    ServiceResponse, TimeDiagnostics, UpdateDiagnostics,
 };
 use crate::wire::status::GeneralStatus;
 
@@ -71,21 +71,49 @@ impl MotionDevice {
         out: &mut [u8],
     ) -> Option<usize> {
         self.poll(now, system_time);
-        let connection = self.connection.as_mut()?;
-        let update_id = connection.take_transmit(now)?;
-        let size = usize::from(connection.parameters.t_to_o_size).min(out.len());
+        let size = usize::from(self.connection.as_ref()?.parameters.t_to_o_size).min(out.len());
         let (sequence, update) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
-        let len = self.write_update(update, update_id, system_time)?;
-        let idle = update.first_chunk::<8>().copied().filter(|_| len == 8);
+        let len = self.produce(now, system_time, update)?;
+        *sequence = self.connection.as_ref()?.transmit_sequence.to_le_bytes();
+        Some(SEQUENCE_LEN + len)
+    }
+
+    /// As [`MotionDevice::poll_transmit`], for a network that puts no sequence count in front of an update: `out` gets the
+    /// update alone.
+    pub fn poll_unsequenced(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        out: &mut [u8],
+    ) -> Option<usize> {
+        self.poll(now, system_time);
+        let size = usize::from(self.connection.as_ref()?.parameters.t_to_o_size).checked_sub(SEQUENCE_LEN)?;
+        let size = size.min(out.len());
+        self.produce(now, system_time, &mut out[..size])
+    }
+
+    /// Writes the update that is due.
+    fn produce(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        update: &mut [u8],
+    ) -> Option<usize> {
+        let update_id = self.connection.as_mut()?.take_transmit(now)?;
+        let valid = self.node_status().contains(NodeStatus::DATA_VALID);
+        let len = match self.config.format {
+            Format::Variable => self.write_update(update, update_id, system_time)?,
+            Format::Fixed => self.write_fixed(update.first_chunk_mut()?, update_id)?,
+        };
+        let idle = update.first_chunk::<8>().copied().filter(|_| !valid);
         let connection = self.connection.as_mut()?;
         // While there is nothing to say, the same packet is repeated to keep the connection alive (clause 7-1.1).
         if idle.is_none() || connection.has_data() || idle != self.idle_header {
             connection.transmit_sequence = connection.transmit_sequence.wrapping_add(1);
         }
         self.idle_header = idle;
-        *sequence = connection.transmit_sequence.to_le_bytes();
         self.counters.transmitted += 1;
-        Some(SEQUENCE_LEN + len)
+        Some(len)
     }
 
     fn header(&mut self, update_id: u8, system_time: Option<SystemTime>) -> Option<ActualHeader> {

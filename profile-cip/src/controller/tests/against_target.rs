@@ -26,9 +26,9 @@ use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use crate::target::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
 use crate::wire::encapsulation::IO_PORT;
-use crate::wire::motion::CommandPosition;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{AxisStateCode, ControlMode, FaultType, NodeFault};
+use crate::wire::motion::{CommandPosition, Format};
 
 const GRAND_MASTER: [u8; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 const LIMITS: Limits = Limits { velocity: 50.0, acceleration: 500.0, jerk: 10_000.0 };
@@ -166,6 +166,7 @@ fn adapter(io_port: u16) -> Adapter {
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
+            format: Format::Variable,
             rpi_min_us: 500,
             rpi_max_us: 32_000,
             rpi_multiple_us: 500,
@@ -186,6 +187,7 @@ fn device(axes: usize) -> MotionDevice {
         AttributeDefinition::new(Scope::Instance, number, data_type, Access::Set, "attribute of the tests")
     };
     MotionDevice::new(DeviceConfig {
+        format: Format::Variable,
         axes: vec![axis; axes],
         attributes: vec![
             attribute(441, DataType::Real),

@@ -4,6 +4,7 @@ mod bad_input;
 mod explicit_connections;
 mod file_object;
 mod malformed;
+mod fixed_format;
 mod motion_connection;
 mod network_objects;
 mod objects;

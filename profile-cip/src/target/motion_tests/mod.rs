@@ -1,6 +1,7 @@
 //! Tests of the motion device in virtual time, with a controller and drives that are as simple as can be.
 
 mod faults;
+mod fixed;
 mod handshake;
 mod hookup;
 mod indicators;
@@ -32,8 +33,8 @@ use crate::wire::motion::codes::{
     StatusDataSet, TimeDataSet,
 };
 use crate::wire::motion::{
-    ActualBlock, ActualFrame, ActualHeader, CommandBlock, CommandEvents, CommandHeader, CommandInstance,
-    CommandPosition, CommandValues, CommandWriter, ServiceRequest,
+    ActualBlock, ActualFrame, ActualHeader, ActualPosition, ActualValues, CommandBlock, CommandEvents,
+    CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter, Format, ServiceRequest,
 };
 
 /// Controller Update Period, ns.
@@ -131,6 +132,7 @@ impl Rig {
             ..AxisConfig::default()
         };
         let config = DeviceConfig {
+            format: Format::Variable,
             axes: vec![axis, axis],
             attributes,
             power_structure_class_id: 0x1234,

@@ -148,6 +148,7 @@ proptest! {
 fn a_feedback_axis_runs_without_being_enabled_and_never_energizes() {
     let mut rig = Rig::new();
     let config = DeviceConfig {
+        format: Format::Variable,
         axes: vec![AxisConfig { kind: ControlKind::FeedbackOnly, ..AxisConfig::default() }; 2],
         attributes: Vec::new(),
         power_structure_class_id: 0,

@@ -16,18 +16,19 @@
 //! | 11 | reserved | axis state |
 //! | 12 | one 32-bit command value | one 32-bit actual value |
 //!
-//! One axis, no time stamps, no event or service channel. The data set names at most one value of 32 bits; without one
-//! the last four octets are zero.
+//! One axis, no time stamps, no event or service channel. A data set names at most one value of 32 bits, whichever of
+//! its bits that is; without one the last four octets are zero. The position is a DINT in both directions. Every
+//! element of the Status Data Set is longer than the one value, so the device never sends one, whatever is asked for.
 
 use core::fmt;
 
-use super::actual::{ActualPosition, ActualValues};
+use super::actual::{ActualBlock, ActualPosition, ActualValues};
 use super::codes::{
-    ActualDataSet, AxisControl, AxisStateCode, CommandDataSet, ConnectionFormat, ControlMode, FeedbackMode,
-    NodeControl, NodeStatus, StatusDataSet,
+    ActualDataSet, AxisControl, AxisStateCode, CommandDataSet, CommandTarget, ConnectionFormat, ControlMode,
+    ControlStatus, FeedbackMode, NodeControl, NodeStatus, StatusDataSet, TimeDataSet,
 };
-use super::cyclic::{CommandPosition, CommandValues};
-use super::header::FORMAT_REVISION;
+use super::cyclic::{CommandBlock, CommandPosition, CommandValues};
+use super::header::{CommandHeader, FORMAT_REVISION};
 use super::value::invalid;
 use crate::wire::status::GeneralStatus;
 use crate::wire::{Error, Reader, Writer};
@@ -38,6 +39,17 @@ const FRAME: &str = "fixed format update";
 const COMMAND_SET_AT: usize = 8;
 const ACTUAL_SET_AT: usize = 9;
 const VALUE_LEN: usize = 4;
+
+/// The two formats that the data of a connection may have, clause 6-2.7. Each has a code for either direction
+/// ([`ConnectionFormat`]); it does not change for the life of the connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Format {
+    /// Codes 6 and 7: up to all axes of a device, time stamps, event and service channels.
+    #[default]
+    Variable,
+    /// Codes 2 and 3: 16 octets for one axis.
+    Fixed,
+}
 
 /// C-to-D update of format 2.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -100,6 +112,20 @@ fn skip_unused(reader: &mut Reader<'_>, used: bool) -> Result<(), Error> {
     reader.finish(FRAME)
 }
 
+/// The lowest bit that is set, alone.
+fn lowest(bits: u8) -> u8 {
+    bits & bits.wrapping_neg()
+}
+
+/// The answer has room for one of the actual values. A reserved bit asks for nothing, as in the variable format.
+fn check_asked(asked: ActualDataSet) -> Result<(), Error> {
+    let known = asked.bits() & !asked.reserved();
+    if known.count_ones() > 1 {
+        return Err(invalid("actual data set", ACTUAL_SET_AT, asked.bits(), lowest(known)));
+    }
+    Ok(())
+}
+
 fn too_long(len: usize) -> Error {
     let value = u32::try_from(len).unwrap_or(u32::MAX);
     Error::OutOfRange { what: "octets of values in a fixed format", value, max: 4 }
@@ -109,7 +135,8 @@ impl FixedCommand {
     /// Reads an update.
     ///
     /// # Errors
-    /// Format, revision or length are wrong, or the data set has more than one bit or a reserved one.
+    /// Format, revision or length are wrong, the command data set has more than one bit or a reserved one, or more
+    /// actual values are asked for than the answer has room for.
     pub fn parse(update: &[u8]) -> Result<Self, Error> {
         let reader = &mut Reader::new(update);
         let (update_id, node) = head(reader, ConnectionFormat::FIXED_COMMAND)?;
@@ -117,8 +144,11 @@ impl FixedCommand {
         let [command_set, actual_set, status_set, _] = reader.array(FRAME)?;
         let set = CommandDataSet::from_bits_retain(command_set);
         if set.reserved() != 0 || command_set.count_ones() > 1 {
-            return Err(invalid("command data set", COMMAND_SET_AT, command_set, command_set & 0b1111));
+            let one = lowest(command_set & !set.reserved());
+            return Err(invalid("command data set", COMMAND_SET_AT, command_set, one));
         }
+        let asked = ActualDataSet::from_bits_retain(actual_set);
+        check_asked(asked)?;
         let values = CommandValues::parse(reader, set, true)?;
         skip_unused(reader, !set.is_empty())?;
         Ok(Self {
@@ -127,7 +157,7 @@ impl FixedCommand {
             control_mode: ControlMode(control_mode),
             feedback_mode: FeedbackMode(feedback_mode),
             axis_control: AxisControl(axis_control),
-            actual_data_set: ActualDataSet::from_bits_retain(actual_set),
+            actual_data_set: asked,
             status_data_set: StatusDataSet::from_bits_retain(status_set),
             values,
         })
@@ -136,8 +166,10 @@ impl FixedCommand {
     /// Writes an update of [`LEN`] octets.
     ///
     /// # Errors
-    /// The buffer is too short, or there is more than one value, or an LREAL position.
+    /// The buffer is too short, there is more than one value or an LREAL position, or more than one actual value is
+    /// asked for.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
+        check_asked(self.actual_data_set)?;
         if self.values.len() > VALUE_LEN || matches!(self.values.position, Some(CommandPosition::Float(_))) {
             return Err(too_long(self.values.len()));
         }
@@ -148,6 +180,52 @@ impl FixedCommand {
         writer.slice(FRAME, &[command_set, self.actual_data_set.bits(), self.status_data_set.bits(), 0])?;
         self.values.emit(writer)?;
         writer.zeros(FRAME, VALUE_LEN - self.values.len())
+    }
+
+    /// What the update has of the header of the variable format; the rest is zero or absent.
+    #[must_use]
+    pub fn header(&self) -> CommandHeader {
+        CommandHeader {
+            update_id: self.update_id,
+            node_control: self.node_control,
+            instance_count: 1,
+            last_received_id: 0,
+            time_stamp: None,
+            time_offset: None,
+            diagnostics: TimeDataSet::empty(),
+        }
+    }
+
+    /// What the update has of the cyclic block of the variable format. Control Status and Command Control do not
+    /// travel in this format. Neither does what cannot be answered: status data and a LINT position.
+    #[must_use]
+    pub fn block(&self, control_status: ControlStatus, target: CommandTarget) -> CommandBlock {
+        CommandBlock {
+            control_mode: self.control_mode,
+            feedback_mode: self.feedback_mode.with_lint(false),
+            axis_control: self.axis_control,
+            control_status,
+            actual_data_set: self.actual_data_set,
+            status_data_set: StatusDataSet::empty(),
+            target,
+            values: self.values,
+        }
+    }
+}
+
+impl From<&ActualBlock> for FixedActual {
+    /// The part of a cyclic block of the variable format that this format has.
+    fn from(block: &ActualBlock) -> Self {
+        Self {
+            update_id: 0,
+            node_status: NodeStatus::empty(),
+            control_mode: block.control_mode,
+            feedback_mode: block.feedback_mode,
+            axis_response: block.axis_response,
+            response_status: block.response_status,
+            axis_state: block.axis_state,
+            actual: block.actual,
+        }
     }
 }
 
@@ -163,7 +241,12 @@ impl FixedActual {
         let [_, actual_set, status_set, axis_state] = reader.array(FRAME)?;
         let set = ActualDataSet::from_bits_retain(actual_set);
         if set.reserved() != 0 || actual_set.count_ones() > 1 {
-            return Err(invalid("actual data set", ACTUAL_SET_AT, actual_set, actual_set & 0b111));
+            return Err(invalid(
+                "actual data set",
+                ACTUAL_SET_AT,
+                actual_set,
+                lowest(actual_set & !set.reserved()),
+            ));
         }
         if status_set != 0 {
             return Err(invalid("status data set", ACTUAL_SET_AT + 1, status_set, 0));

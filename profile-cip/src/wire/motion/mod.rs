@@ -26,6 +26,7 @@ mod value;
 pub use actual::{ActualBlock, ActualPosition, ActualValues, AlarmRecord, FaultRecord, StatusValues};
 pub use cyclic::{CommandBlock, CommandPosition, CommandValues};
 pub use event::{ActualEvents, CommandEvents, EventAck, EventNotification};
+pub use fixed::Format;
 pub use frame::{ActualFrame, ActualInstance, ActualWriter, CommandFrame, CommandInstance, CommandWriter};
 pub use header::{ActualHeader, CommandHeader, FORMAT_REVISION, TimeDiagnostics, UpdateDiagnostics};
 pub use read_write::{ReadBlock, WriteBlock};

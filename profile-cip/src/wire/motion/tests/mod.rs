@@ -1,6 +1,7 @@
 //! Tests of the CIP Motion connection: the standard's examples, round trips, broken updates, the printed tree.
 
 mod broken;
+mod fixed;
 mod properties;
 mod tree;
 mod vectors;
