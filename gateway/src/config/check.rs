@@ -59,12 +59,17 @@ pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
 /// Collects problems. A method returns `None` when it has reported one: the rest of the file is still
 /// checked.
 #[derive(Default)]
-struct Checker {
+pub(super) struct Checker {
     problems: Vec<Problem>,
 }
 
 impl Checker {
-    fn report<T>(&mut self, span: Range<usize>, title: impl Display, expected: impl Display) -> Option<T> {
+    pub(super) fn report<T>(
+        &mut self,
+        span: Range<usize>,
+        title: impl Display,
+        expected: impl Display,
+    ) -> Option<T> {
         let (title, expected) = (title.to_string(), expected.to_string());
         self.problems.push(Problem { span, title, expected, related: None });
         None
@@ -292,6 +297,7 @@ impl Checker {
             0..=i64::from(u32::MAX),
             0,
         );
+        let connection_format = self.connection_format(table);
         let update_period = self.update_period(table.update_period.as_ref(), cycle_time);
         let (update_period_min, update_period_max) = update_period?;
         Some(Device {
@@ -299,6 +305,7 @@ impl Checker {
             listen: listen?,
             identity: identity?,
             power_structure_class_id: power_structure_class_id?,
+            connection_format: connection_format?,
             update_period_min,
             update_period_max,
         })

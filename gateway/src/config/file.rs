@@ -91,6 +91,9 @@ pub struct DeviceTable {
     /// Drive Power Structure Class ID (class attribute 34); controllers may ask for it when they connect.
     /// Default: 0, each axis has its own.
     pub power_structure_class_id: Option<Spanned<i64>>,
+    /// Format of the motion connection: `"variable"`, or `"fixed"` (16 bytes) for a device with one axis. Default:
+    /// `"variable"`.
+    pub connection_format: Option<Spanned<String>>,
     /// The controller update periods (RPI) it accepts.
     pub update_period: Option<UpdatePeriodTable>,
 }

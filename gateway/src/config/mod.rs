@@ -5,6 +5,7 @@
 //! that shows each fault at its line.
 
 mod check;
+mod connection_format;
 mod diagnostic;
 mod duration;
 pub mod file;
@@ -12,6 +13,7 @@ pub mod file;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
+use profile_cip::wire::motion::Format;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::time::DurationNs;
 
@@ -146,6 +148,8 @@ pub struct Device {
     pub identity: Identity,
     /// Motion Device Axis Object, class attribute 34; 0 when each axis has its own.
     pub power_structure_class_id: u32,
+    /// Format of the motion connection; the fixed one only with a single axis.
+    pub connection_format: Format,
     /// Shortest controller update period accepted.
     pub update_period_min: DurationNs,
     /// Longest controller update period accepted.

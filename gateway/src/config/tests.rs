@@ -250,6 +250,8 @@ const BROKEN: &[(&str, &str, &str)] = &[
     ),
     ("jitter", "[[south.sercos.drive]]", "jitter = \"1 ms\"\n[[south.sercos.drive]]"),
     ("priority", "[[south.sercos.drive]]", "realtime = { priority = 100 }\n[[south.sercos.drive]]"),
+    ("connection_format", "[device.identity]", "connection_format = \"fixd\"\n[device.identity]"),
+    ("fixed_format_for_two_axes", "[device.identity]", "connection_format = \"fixed\"\n[device.identity]"),
     ("log_level", "[[device]]", "[log]\nlevel = \"loud\"\n[[device]]"),
     ("time_source", "[[device]]", "[time]\nsource = \"gps\"\n[[device]]"),
     ("name_with_blank", "name = \"b\"", "name = \"b b\""),
@@ -262,6 +264,19 @@ fn faults_are_shown_at_their_place() {
         text += &format!("== {case}\n{}\n\n", broken(old, new));
     }
     insta::assert_snapshot!(text);
+}
+
+#[test]
+fn a_device_with_one_axis_may_have_the_fixed_format() {
+    let one = GOOD.replace("[\"x\", \"y\"]", "[\"x\"]\nconnection_format = \"fixed\"");
+    let text = format!(
+        "{one}\n[[device]]\nname = \"back\"\nlisten = \"192.0.2.11\"\naxes = [\"y\"]\n\
+         connection_format = \"variable\"\nidentity = {{ vendor_id = 1, product_code = 2, serial_number = 4 }}\n"
+    );
+    let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
+    let formats: Vec<_> = config.devices.iter().map(|device| device.connection_format).collect();
+    assert_eq!(formats, [Format::Fixed, Format::Variable]);
+    assert_eq!(good().devices[0].connection_format, Format::Variable);
 }
 
 #[test]

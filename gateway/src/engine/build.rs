@@ -14,6 +14,7 @@ use profile_cip::target::config::{
 use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
 use profile_cip::wire::motion::codes::EventChecking;
+use profile_cip::wire::motion::Format;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
@@ -261,10 +262,12 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
         hookup_tests: 0b11,
     };
     DeviceConfig {
+        format: device.connection_format,
         axes: members.iter().map(axis).collect(),
         attributes: Vec::new(),
         power_structure_class_id: device.power_structure_class_id,
-        supports_sync: true,
+        // Updates of the fixed format have no time stamps.
+        supports_sync: device.connection_format == Format::Variable,
         transmission_processing_ns: TRANSMISSION_PROCESSING_NS,
     }
 }
@@ -327,6 +330,7 @@ fn without_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ada
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
+            format: device.connection_format,
             rpi_min_us: us(device.update_period_min),
             rpi_max_us: us(device.update_period_max),
             rpi_multiple_us: 1,

@@ -22,6 +22,7 @@ use profile_cip::target::identity::Health;
 use profile_cip::target::motion_link::{ExplicitReply, MotionReply, MotionRequest, ObjectPath, OpenRefusal};
 use profile_cip::wire::encapsulation::Command;
 use profile_cip::wire::forward_open::ForwardOpenReply;
+use profile_cip::wire::motion::Format;
 use profile_cip::wire::status::Service;
 use tokio::net::UdpSocket;
 
@@ -65,6 +66,7 @@ pub(crate) fn test_adapter_config(address: Ipv4Addr) -> AdapterConfig {
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
+            format: Format::Variable,
             rpi_min_us: 1000,
             rpi_max_us: 32_000,
             rpi_multiple_us: 500,

@@ -3,8 +3,8 @@
 mod bad_input;
 mod explicit_connections;
 mod file_object;
-mod malformed;
 mod fixed_format;
+mod malformed;
 mod motion_connection;
 mod network_objects;
 mod objects;

@@ -13,6 +13,7 @@ use crate::target::motion_device::{DeviceConfig, MotionDevice};
 use crate::wire::cpf::ItemType;
 use crate::wire::encapsulation::{Command, EncapsulationStatus};
 use crate::wire::forward_open::ForwardOpen;
+use crate::wire::motion::Format;
 use crate::wire::status::Service;
 
 /// A rig with the real motion device behind the adapter, both on one virtual clock.
@@ -24,6 +25,7 @@ struct Whole {
 impl Whole {
     fn new() -> Self {
         let config = DeviceConfig {
+            format: Format::Variable,
             axes: vec![AxisConfig::default(); 2],
             attributes: Vec::new(),
             power_structure_class_id: 0x0A0B_0C0D,

@@ -165,7 +165,8 @@ impl FixedRig {
     fn explicit(&mut self, service: u8, instance: u32, attribute: u16, data: &[u8]) -> (u8, Vec<u8>) {
         let path = ObjectPath { class: 0x42, instance, attribute: Some(attribute), ..ObjectPath::default() };
         let data = ArrayVec::try_from(data).expect("short");
-        let request = ExplicitRequest { token: Token(500), service, path, data };
+        let request =
+            ExplicitRequest { token: Token(500), originator: Ipv4Addr::LOCALHOST, service, path, data };
         self.device.request(self.now(), None, MotionRequest::Explicit(request));
         match self.device.poll_reply() {
             Some(MotionReply::Explicit(reply)) => (reply.general_status, reply.data.to_vec()),
@@ -293,7 +294,8 @@ fn only_a_fixed_connection_leaves_control_status_and_command_control_to_a_servic
         let path =
             ObjectPath { class: 0x42, instance: 1, attribute: Some(attribute), ..ObjectPath::default() };
         let data = ArrayVec::from_iter([5]);
-        let request = ExplicitRequest { token: Token(1), service: SET, path, data };
+        let request =
+            ExplicitRequest { token: Token(1), originator: Ipv4Addr::LOCALHOST, service: SET, path, data };
         let reply = rig.request(MotionRequest::Explicit(request));
         assert!(matches!(reply, Some(MotionReply::Explicit(reply)) if reply.general_status == 0x0E));
     }
