@@ -13,6 +13,7 @@ use profile_cip::target::motion_open;
 use profile_cip::target::object_list::OBJECT_CLASSES;
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::forward_open::Trigger;
+use profile_cip::wire::motion::Format;
 use serde_json::{Value, json};
 
 const EXAMPLE: &str = include_str!("../../examples/two-axes-in-process.toml");
@@ -169,7 +170,8 @@ fn the_device_is_what_its_network_asks_for() {
         network.formats.iter().map(|(format, _)| *format).collect::<Vec<_>>(),
         [ConnectionDataFormat::Variable]
     );
-    assert_eq!(motion_open::VARIABLE, network.formats[0].0 == ConnectionDataFormat::Variable);
+    // A device that is not told otherwise has the format in general use.
+    assert_eq!(Format::default(), Format::Variable);
     assert_eq!(motion_open::TRANSPORT.class, network.transport_class);
     assert_eq!((network.trigger.as_str(), motion_open::TRANSPORT.trigger), ("cyclic", Trigger::CYCLIC));
     assert_eq!(network.priority, "urgent");

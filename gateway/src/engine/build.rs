@@ -13,8 +13,8 @@ use profile_cip::target::config::{
 };
 use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
-use profile_cip::wire::motion::codes::EventChecking;
 use profile_cip::wire::motion::Format;
+use profile_cip::wire::motion::codes::EventChecking;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;

@@ -56,7 +56,15 @@ impl Client {
             path.extend([0x31, 0]);
             path.extend(attribute.to_le_bytes());
         }
-        let request = Request { service: Service(service), path: &path, data };
+        self.request(rig, service, &path, data)
+    }
+
+    /// Sends a service to any object; returns general status and data.
+    ///
+    /// # Panics
+    /// When there is no answer in time, or none that can be read.
+    pub fn request(&self, rig: &mut Rig, service: u8, path: &[u8], data: &[u8]) -> (u8, Vec<u8>) {
+        let request = Request { service: Service(service), path, data };
         let mut message = vec![0; request.buffer_len()];
         request.emit(&mut message).expect("it fits");
         let items = [

@@ -10,6 +10,7 @@
 //! prints the seed.
 
 pub mod explicit;
+pub mod fixed;
 pub mod motion;
 pub mod network;
 pub mod ports;

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod faults;
+mod fixed;
 mod hookup;
 mod loss;
 mod network;
