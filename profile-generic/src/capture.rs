@@ -15,8 +15,10 @@ named_enum! {
         Marker = "marker",
         /// The home switch input.
         HomeSwitch = "home_switch",
-        /// The first marker after the home switch.
-        HomeSwitchMarker = "home_switch_marker",
+        /// The first rising edge of the marker after the edge of the home switch.
+        HomeSwitchMarkerPositive = "home_switch_marker_positive",
+        /// The first falling edge of the marker after the edge of the home switch.
+        HomeSwitchMarkerNegative = "home_switch_marker_negative",
         /// The actual position passes the watch position.
         WatchPosition = "watch_position",
     }
@@ -31,6 +33,71 @@ named_enum! {
         Positive = "positive",
         /// The input goes inactive; the watch position is passed backward.
         Negative = "negative",
+    }
+}
+
+/// What is captured: a source with its edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CaptureKind {
+    /// What triggers.
+    pub source: CaptureSource,
+    /// Which edge triggers; of the home switch where a marker follows it.
+    pub edge: CaptureEdge,
+}
+
+impl CaptureKind {
+    /// How many there are.
+    pub const COUNT: usize = 2 * CaptureSource::ALL.len();
+
+    /// A source with its edge.
+    pub const fn new(source: CaptureSource, edge: CaptureEdge) -> Self {
+        Self { source, edge }
+    }
+
+    /// Its number, from 0 to [`CaptureKind::COUNT`] less 1.
+    pub fn index(self) -> usize {
+        let source = CaptureSource::ALL.iter().position(|known| *known == self.source).unwrap_or(0);
+        2 * source + usize::from(self.edge == CaptureEdge::Negative)
+    }
+
+    /// Every kind, by its number.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let edges =
+            |source: &'static CaptureSource| CaptureEdge::ALL.iter().map(|edge| Self::new(*source, *edge));
+        CaptureSource::ALL.iter().flat_map(edges)
+    }
+}
+
+/// Some kinds of captures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct CaptureSet(u32);
+
+impl CaptureSet {
+    /// None.
+    pub const EMPTY: Self = Self(0);
+
+    /// Whether there are none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether the kind is among them.
+    pub fn contains(self, kind: CaptureKind) -> bool {
+        self.0 & 1 << kind.index() != 0
+    }
+
+    /// Adds or removes a kind.
+    pub fn set(&mut self, kind: CaptureKind, present: bool) {
+        let bit = 1 << kind.index();
+        self.0 = if present { self.0 | bit } else { self.0 & !bit };
+    }
+}
+
+impl FromIterator<CaptureKind> for CaptureSet {
+    fn from_iter<I: IntoIterator<Item = CaptureKind>>(kinds: I) -> Self {
+        let mut set = Self::EMPTY;
+        kinds.into_iter().for_each(|kind| set.set(kind, true));
+        set
     }
 }
 
@@ -81,17 +148,22 @@ impl CaptureRequest {
     }
 }
 
-/// How a capture request ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum CaptureStatus {
-    /// The trigger came.
-    Captured,
-    /// The capture was disarmed before a trigger came.
-    Disarmed,
-    /// The drive cannot capture this source or edge.
-    NotSupported,
-    /// The drive uses its capture unit for something else.
-    Busy,
+named_enum! {
+    /// How a capture ended.
+    pub enum CaptureStatus {
+        /// The trigger came.
+        Captured = "captured",
+        /// The capture was disarmed before a trigger came.
+        Disarmed = "disarmed",
+        /// The drive cannot capture this source or edge.
+        NotSupported = "not_supported",
+        /// The drive uses its capture unit for something else.
+        Busy = "busy",
+        /// The drive refused to arm, or its value could not be read.
+        Failed = "failed",
+        /// What happened first cannot be told: home switch and marker came too close to each other.
+        Ambiguous = "ambiguous",
+    }
 }
 
 /// What a capture brought.
@@ -120,6 +192,19 @@ mod tests {
         let window = CaptureWindow { from: Position(-5), to: Position(5) };
         let inside = [-6, -5, 0, 5, 6].map(|position| window.contains(Position(position)));
         assert_eq!(inside, [false, true, true, true, false]);
+    }
+
+    #[test]
+    fn kinds_are_numbered_without_a_gap() {
+        let numbers: Vec<_> = CaptureKind::all().map(CaptureKind::index).collect();
+        assert_eq!(numbers, (0..CaptureKind::COUNT).collect::<Vec<_>>());
+        let mut set: CaptureSet = CaptureKind::all().collect();
+        for kind in CaptureKind::all() {
+            assert!(set.contains(kind));
+            set.set(kind, false);
+            assert!(!set.contains(kind));
+        }
+        assert!(set.is_empty());
     }
 
     #[test]

@@ -20,9 +20,11 @@ use crate::time::{DurationNs, SystemTime};
 mod captures;
 mod control;
 mod drive;
+mod marks;
 mod plant;
 
 pub use drive::Servo;
+pub use marks::Marks;
 
 /// The longest step of the simulation inside [`Servo::step`].
 pub const SUB_STEP: DurationNs = DurationNs(31_250);
@@ -106,6 +108,8 @@ pub struct ServoParameters {
     pub overload_time_constant: DurationNs,
     /// Distance from one marker of the encoder to the next, above zero. A marker stands at position zero.
     pub marker_distance: Position,
+    /// How long a marker is, from its place upward; above zero and below the distance.
+    pub marker_width: Position,
 }
 
 impl Default for ServoParameters {
@@ -141,6 +145,7 @@ impl Default for ServoParameters {
             max_temperature: Temperature(140_000),
             overload_time_constant: DurationNs::from_secs(10),
             marker_distance: Position(1_000_000_000),
+            marker_width: Position(1_000_000),
         }
     }
 }

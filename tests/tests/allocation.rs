@@ -4,8 +4,13 @@
 use allocation_counter::measure;
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
-use axisbridge_tests::rig::{Rig, Settings};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cip::controller::Event;
+use profile_cip::wire::motion::codes::EventChecking;
+use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_generic::fault::FaultCause;
+use profile_generic::quantity::Position;
+use profile_generic::servo::Marks;
 
 /// Weighs so many cycles and returns their allocations; `between` acts on the rig before each.
 fn weigh(rig: &mut Rig, cycles: u32, mut between: impl FnMut(&mut Rig, u32)) -> Vec<(u32, u64)> {
@@ -60,4 +65,24 @@ fn a_fault_its_diagnosis_and_its_reset_allocate_nothing() {
     assert_eq!(found, []);
     assert_eq!(rig.engine.axes()[0].counters().faults, 1);
     rig.run_for(millis(10));
+}
+
+#[test]
+fn events_in_the_telegrams_and_over_the_service_channel_allocate_nothing() {
+    for way in ["cyclic", "service-channel"] {
+        let line = format!("events = \"{way}\"\ninstance = ");
+        let settings = Settings { configuration: BOX.replace("instance = ", &line), ..Settings::default() };
+        let mut rig = in_motion(settings);
+        let marks =
+            Marks { from: Position(0), length: Position(1_000_000), every: Some(Position(500_000_000)) };
+        rig.drive_mut(0).servo_mut().set_marks(1, Some(marks));
+        let bits = EventChecking::REG_1_POSITIVE | EventChecking::REG_1_POSITIVE_REARM;
+        let data =
+            ExtendedEventData { watch_positions: [Some(5_000_000), None], ..ExtendedEventData::default() };
+        let checking = bits | EventChecking::WATCH_1_FORWARD | EventChecking::MARKER_POSITIVE;
+        rig.controller.as_mut().expect("a controller").arm_events(1, checking, Some(&data));
+        assert_eq!(weigh(&mut rig, 1_000, |_, _| ()), []);
+        let told = rig.events.iter().filter(|event| matches!(event, Event::AxisEvent { .. })).count();
+        assert!(told > 5, "{way}: {told} events");
+    }
 }

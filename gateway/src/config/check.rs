@@ -20,7 +20,7 @@ use super::{
     AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link,
     LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
 };
-use crate::mapping::{ETHERNET_IP, networks};
+use crate::mapping::{CaptureMode, ETHERNET_IP, networks};
 use crate::sys::realtime::{self, PRIORITY_MAX};
 
 const NAME_LEN_MAX: usize = 32;
@@ -452,6 +452,7 @@ impl Checker {
             Some(limits) => self.limits(limits, table.unwind_counts.as_ref()),
             None => Some(Limits::default()),
         };
+        let events = self.capture_mode(table.events.as_ref());
         let on_command_loss = self.stopping_action(table.on_command_loss.as_ref());
         Some(Axis {
             name: name?,
@@ -465,6 +466,7 @@ impl Checker {
             power_structure_axis_id: power_structure_axis_id?,
             limits: limits?,
             on_command_loss: on_command_loss?,
+            events: events?,
         })
     }
 
@@ -510,6 +512,20 @@ impl Checker {
             });
         }
         (self.problems.len() == before).then_some(function)
+    }
+
+    fn capture_mode(&mut self, name: Option<&Spanned<String>>) -> Option<CaptureMode> {
+        let Some(name) = name else { return Some(CaptureMode::Cyclic) };
+        match name.get_ref().as_str() {
+            "cyclic" => Some(CaptureMode::Cyclic),
+            "service-channel" => Some(CaptureMode::ServiceChannel),
+            "off" => Some(CaptureMode::Off),
+            other => self.report(
+                name.span(),
+                "unknown way to capture events",
+                format!("expected cyclic, service-channel or off, found {other}"),
+            ),
+        }
     }
 
     fn stopping_action(&mut self, name: Option<&Spanned<String>>) -> Option<StoppingAction> {

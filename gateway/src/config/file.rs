@@ -158,6 +158,8 @@ pub struct AxisTable {
     /// `"ramped-decel-and-disable"`, `"current-decel-and-hold"` or `"ramped-decel-and-hold"`. Default:
     /// `"ramped-decel-and-disable"`.
     pub on_command_loss: Option<Spanned<String>>,
+    /// `cyclic`, `service-channel` or `off`.
+    pub events: Option<Spanned<String>>,
 }
 
 /// `limits` of an `[[axis]]`; each is left to the drive where it is not given.

@@ -19,6 +19,7 @@ use profile_generic::time::DurationNs;
 
 pub use diagnostic::{ConfigError, Diagnostic};
 
+use crate::mapping::CaptureMode;
 use crate::sys::realtime;
 
 /// Axes of one box: what its status block, its recorder and its cycle have room for.
@@ -237,6 +238,8 @@ pub struct Axis {
     pub limits: Limits,
     /// What happens when commands stay away.
     pub on_command_loss: StoppingAction,
+    /// How the drive's captures of events are used.
+    pub events: CaptureMode,
 }
 
 /// Limits of an axis that the box holds; `None` leaves them to the drive.

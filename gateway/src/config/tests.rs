@@ -93,6 +93,7 @@ fn defaults_are_those_of_the_documentation() {
             power_structure_axis_id: 0,
             limits: Limits::default(),
             on_command_loss: StoppingAction::RampedDecelAndDisable,
+            events: CaptureMode::Cyclic,
         }
     );
     assert_eq!(config.axes[1].kind, AxisKind::Linear);

@@ -14,7 +14,6 @@ use profile_cip::target::config::{
 use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
 use profile_cip::wire::motion::Format;
-use profile_cip::wire::motion::codes::EventChecking;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
@@ -183,6 +182,7 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
         modulo: false,
         set_scaling,
         parameters,
+        captures: axis.events,
     }
 }
 
@@ -257,7 +257,6 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
         // Position, velocity and torque; nothing can be enabled that is no drive.
         control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
         lint_position: false,
-        events: EventChecking::empty(),
         // Motor and feedback, feedback; a drive shows the box neither its marker nor its phasing.
         hookup_tests: 0b11,
     };

@@ -15,6 +15,7 @@ use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
 use super::axis::AxisChannel;
+use super::axis::capture::CaptureAccess;
 use super::commissioning::Commissioning;
 use super::notice::Notice;
 use crate::mapping::{DriveFacts, Mapping, SercosAxis};
@@ -70,6 +71,8 @@ pub enum Purpose {
     Diagnosis,
     /// The drive's fault reset.
     FaultReset,
+    /// Capturing events, with the generation of the axis's captures.
+    Capture(CaptureAccess, u8),
 }
 
 /// The drive of one axis.
@@ -241,6 +244,7 @@ impl SercosBus {
         }
         self.commission(mapping, axes, notice);
         self.diagnose(now, axes);
+        self.capture(axes);
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
         let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
@@ -444,6 +448,17 @@ impl SercosBus {
                 && self.access(axis, SvcRequest::read(idn).urgent(), Purpose::Diagnosis)
             {
                 channel.word_asked(now, idn);
+            }
+        }
+    }
+
+    /// Carries on with captures over the service channels: one access of each drive at a time.
+    fn capture(&mut self, axes: &mut [AxisChannel]) {
+        for (axis, channel) in axes.iter_mut().enumerate() {
+            if let Some((request, access, generation)) = channel.capture_access()
+                && self.access(axis, request, Purpose::Capture(access, generation))
+            {
+                channel.capture_sent(access);
             }
         }
     }

@@ -6,6 +6,7 @@
 use profile_sercos::master::Master;
 use profile_sercos::master::event::{SlaveId, Ticket};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
+use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
@@ -88,7 +89,11 @@ impl Commissioning {
         self.ticket = None;
         match &outcome.result {
             Ok(reply) => {
-                if let Some(attribute) = reply.attribute {
+                // On the way to the data the master reads it by itself; asked for alone it is the data.
+                let alone = outcome.operation == SvcOperation::Read(Element::Attribute);
+                let alone = outcome.data.as_slice().first_chunk().filter(|_| alone);
+                let attribute = alone.map(|bytes| Attribute(u32::from_le_bytes(*bytes)));
+                if let Some(attribute) = reply.attribute.or(attribute) {
                     facts.note_attribute(outcome.idn, attribute);
                 }
                 let data = matches!(

@@ -10,8 +10,9 @@ use profile_cip::target::fault_log::FaultLog;
 use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice, SequenceSettings};
 use profile_cip::target::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
-use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
+use profile_cip::wire::motion::codes::{EventChecking, NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
+use profile_generic::capture::{CaptureKind, CaptureResult};
 use profile_generic::fault::Reaction;
 use profile_generic::image::Signal;
 use profile_generic::inhibit::Inhibits;
@@ -72,6 +73,8 @@ struct Member {
     node_fault: Option<SystemTime>,
     /// The controller's scaling is known and in use on this connection.
     scaled: bool,
+    /// The device does the scaling, not the controller.
+    drive_scaling: bool,
     /// The action of the device in the last exchange.
     action: DriveAction,
     /// What a stop falls back to where the controller has set nothing.
@@ -162,6 +165,7 @@ impl DeviceChannel {
                     state: AxisState::Off,
                     node_fault: None,
                     scaled: false,
+                    drive_scaling: true,
                     action: DriveAction::None,
                     stops: *stops,
                     writes: ArrayVec::new(),
@@ -257,13 +261,16 @@ impl DeviceChannel {
     ) {
         self.preset_scaling(mapping, axes);
         for (place, member) in self.members.iter().enumerate() {
-            self.device.set_drive(place, axes[member.axis].drive_image());
+            let mut image = axes[member.axis].drive_image();
+            image.events = member.checkable(image.events);
+            self.device.set_drive(place, image);
             let settings = member.stop_settings(mapping, &self.device, place, &axes[member.axis]);
             let abort = axes[member.axis].north().fault_action(settings.1);
             self.device
                 .set_sequence(place, SequenceSettings { flying_start: settings.0.flying_start, abort });
             axes[member.axis].set_stop_settings(settings.0);
         }
+        self.events(axes);
         for member in &mut self.members {
             let fault = axes[member.axis].node_fault();
             if let Some((code, at)) = fault
@@ -343,6 +350,24 @@ impl DeviceChannel {
         self.device.fault_log(place)
     }
 
+    /// Hands on what the drives have captured, and tells them what to capture.
+    fn events(&mut self, axes: &mut [AxisChannel]) {
+        for (place, member) in self.members.iter().enumerate() {
+            let axis = &mut axes[member.axis];
+            while let Some(CaptureResult { source, edge, status, position, at, .. }) = axis.poll_capture() {
+                let events = axis.north().events();
+                let event = events.event(CaptureKind::new(source, edge));
+                if let (Some(event), Some(status)) = (event, events.status(status)) {
+                    let position = axis.north().counts(position.get()).value;
+                    self.device.notify_event(place, event, status, position, at.0);
+                }
+            }
+            let armed = self.device.armed_events(place).map_or(EventChecking::empty(), |(armed, _)| armed);
+            let captures = axis.north().events().captures(armed);
+            axis.want_captures(captures);
+        }
+    }
+
     /// A new connection finds the scaling attributes as the configuration of the box has them.
     fn preset_scaling(&mut self, mapping: &Mapping, axes: &mut [AxisChannel]) {
         let open = self.device.connection().map(|connection| connection.o_to_t_id);
@@ -365,6 +390,7 @@ impl DeviceChannel {
             // Counts from the end of the configuration on; refused while the axis still stops, and then taken again.
             let _ = member.use_scaling(mapping, axis, member.configured);
             member.scaled = false;
+            member.drive_scaling = true;
         }
     }
 
@@ -535,6 +561,12 @@ impl DeviceChannel {
 }
 
 impl Member {
+    /// What can be checked for on this connection, of what axis and drive can. Windows, watch positions and torque only
+    /// where the device does the scaling (Table 5-2.36).
+    fn checkable(&self, events: EventChecking) -> EventChecking {
+        if self.drive_scaling { events | events.windows() } else { events - EventChecking::EXTENDED }
+    }
+
     /// How the axis is to start and stop by the attributes that the controller has set, and the reaction to an Abort.
     fn stop_settings(
         &self,
@@ -608,6 +640,8 @@ impl Member {
             let signed = self.attributes.get(id).is_some_and(|entry| is_signed(entry.data_type));
             number_of(get(id), signed)
         };
+        let rows = &mapping.cip.scaling;
+        self.drive_scaling = number(rows.configuration) == i64::from(rows.drive_scaling);
         let scaling = CipScaling::from_attributes(&mapping.cip, number)?;
         self.use_scaling(mapping, axis, scaling)?;
         self.scaled = true;

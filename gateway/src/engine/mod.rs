@@ -52,6 +52,8 @@ pub struct Engine {
     cycle_time: DurationNs,
     started: Option<MonotonicTime>,
     due: Option<MonotonicTime>,
+    /// When telegrams were sent last.
+    sent_at: Option<SystemTime>,
     stopping: bool,
 }
 
@@ -104,6 +106,7 @@ impl Engine {
             cycle_time: DurationNs(i64::from(cycle_ns)),
             started: None,
             due: None,
+            sent_at: None,
             stopping: false,
         }
     }
@@ -166,8 +169,10 @@ impl Engine {
         self.collect(now, south);
         let stepped = self.bus.take_cycle();
         if stepped {
+            // The drives capture their values when the telegrams pass them.
+            let sampled = self.sent_at.unwrap_or(system);
             for (number, axis) in self.axes.iter_mut().enumerate() {
-                axis.from_drive(now, system, self.bus.feedback(number));
+                axis.from_drive(now, system, sampled, self.bus.feedback(number));
             }
         }
         self.run_bus(now, system);
@@ -185,7 +190,9 @@ impl Engine {
         for (number, axis) in self.axes.iter_mut().enumerate() {
             self.bus.command(number, |telegram| axis.to_drive(now, system, acts_at, telegram));
         }
-        self.send(now, south);
+        if self.send(now, south) {
+            self.sent_at = Some(system);
+        }
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
             channel.transmit(now, system, &mut **port);
         }
@@ -244,6 +251,11 @@ impl Engine {
                     let word = word.and_then(|word| u32::try_from(word).ok());
                     axes[answer.axis].diagnostic_word(now, system, answer.idn, word);
                 }
+                Purpose::Capture(access, generation) => {
+                    let result =
+                        answer.result.as_ref().map(|data| data.as_slice()).map_err(|failure| *failure);
+                    axes[answer.axis].capture_answer(access, generation, result);
+                }
                 // Whether it helped shows in the drive's status word.
                 Purpose::FaultReset => {}
             },
@@ -251,12 +263,16 @@ impl Engine {
         );
     }
 
-    fn send(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) {
+    /// Sends the telegrams that are due; `false` when none was.
+    fn send(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) -> bool {
+        let mut any = false;
         while let Some(Output::Transmit { port, frame }) = self.bus.master_mut().poll(now) {
             if !south.send(now, port, frame) {
                 self.status.counters.send_failures += 1;
             }
+            any = true;
         }
+        any
     }
 
     fn tell_changes(&mut self) {

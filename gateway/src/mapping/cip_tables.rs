@@ -3,6 +3,7 @@
 mod builder;
 
 use profile_cip::target::drive_link::DriveAction;
+use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;
@@ -12,6 +13,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, DriveState, Request};
 
+use super::cip_events::EventTables;
 use super::compile_cip::{
     CipFault, CipRequest, CipState, CipStopping, InhibitRule, MissingValue, StatusRule,
 };
@@ -217,6 +219,7 @@ pub struct CipTables {
     pub(super) reactions: [u8; Reaction::ALL.len()],
     pub(super) inhibits: Vec<InhibitRule>,
     pub(super) stoppings: Vec<CipStopping>,
+    pub(super) events: EventTables,
 }
 
 impl CipTables {
@@ -257,4 +260,13 @@ pub(super) fn action(resolver: &mut Resolver<'_>, name: &Name) -> Option<Action>
 pub(super) fn unit_kind(resolver: &mut Resolver<'_>, name: &Name) -> Option<UnitKind> {
     let known = UnitKind::ALL.iter().map(|kind| kind.name());
     resolver.name("kind", name, "rotary or linear", UnitKind::parse, known)
+}
+
+/// A capture by the names of its source and its edge.
+pub(super) fn capture_kind(resolver: &mut Resolver<'_>, source: &Name, edge: &Name) -> Option<CaptureKind> {
+    let known = CaptureSource::ALL.iter().map(|source| source.name());
+    let source = resolver.name("capture", source, "a source of captures", CaptureSource::parse, known);
+    let known = CaptureEdge::ALL.iter().map(|edge| edge.name());
+    let edge = resolver.name("edge", edge, "positive or negative", CaptureEdge::parse, known);
+    Some(CaptureKind::new(source?, edge?))
 }

@@ -3,6 +3,7 @@
 use profile_generic::program::Width;
 use profile_sercos::wire::idn::Idn;
 
+use super::captures::{self, CaptureMode};
 use super::compile_sercos::{Compiler, SercosAxis, SercosError, Telegram, mode_rules};
 use super::dictionary::SercosDictionary;
 use super::scaling::DriveFacts;
@@ -81,6 +82,7 @@ fn applies(rule: &StepRule, axis: &SercosAxis) -> bool {
     rule.axis.is_none_or(|kind| kind == axis.units.kind)
         && rule.modulo.is_none_or(|modulo| modulo == axis.modulo)
         && rule.set_scaling.is_none_or(|set| set == axis.set_scaling)
+        && rule.captures.is_none_or(|captures| captures == (axis.captures != CaptureMode::Off))
         && rule.mode.is_none_or(|mode| axis.modes.contains(&mode))
 }
 
@@ -127,6 +129,11 @@ impl Compiler<'_> {
             StepKind::ReadTelegram => {
                 let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
                 for idn in telegram.command.into_iter().chain(telegram.feedback) {
+                    steps.push(Step::Read { idn, attribute: true, data: false, refused });
+                }
+            }
+            StepKind::ReadCaptures => {
+                for idn in captures::idns(self.tables) {
                     steps.push(Step::Read { idn, attribute: true, data: false, refused });
                 }
             }

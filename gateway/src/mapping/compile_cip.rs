@@ -14,6 +14,7 @@ use profile_generic::scaling::{WrapTracker, fold};
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{DriveState, Request};
 
+use super::cip_events::EventProgram;
 use super::cip_scaling::CipScaling;
 use super::cip_tables::CipTables;
 use super::device_link::DRIVE_ACTIONS;
@@ -250,6 +251,7 @@ pub struct CipProgram {
     inhibits: ArrayVec<InhibitRule, MAX_INHIBITS>,
     stoppings: ArrayVec<CipStopping, MAX_STOPPINGS>,
     pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
+    events: EventProgram,
 }
 
 impl CipProgram {
@@ -274,6 +276,7 @@ impl CipProgram {
             inhibits: tables.inhibits.iter().copied().collect(),
             stoppings: tables.stoppings.iter().copied().collect(),
             drive_actions: tables.drive_actions,
+            events: EventProgram::compile(&tables.events, scaling)?,
         };
         for row in &tables.cyclic {
             let to_generic = scaling.convert(row.unit, row.turns)?;
@@ -471,6 +474,11 @@ impl CipProgram {
         active.fold((0, 0), |(standard, manufacturer), rule| {
             (standard | rule.standard, manufacturer | rule.manufacturer)
         })
+    }
+
+    /// Events and what brings them.
+    pub fn events(&self) -> &EventProgram {
+        &self.events
     }
 
     /// What a Stopping Action does.

@@ -14,6 +14,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
 
+use super::captures::{self, CaptureMode, CaptureProgram};
 use super::dictionary::{IdnUnit, SercosDictionary};
 use super::scaling::{AxisUnits, DriveFacts, Lsb, ScalingError, power_of_ten};
 use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, SercosTables};
@@ -46,6 +47,8 @@ pub struct SercosAxis {
     pub set_scaling: bool,
     /// Parameters to write at start, in generic units.
     pub parameters: Vec<(Parameter, i64)>,
+    /// How the drive's captures are used.
+    pub captures: CaptureMode,
 }
 
 /// The IDNs in the two telegrams of an axis, in order. The control and the status word come first.
@@ -171,6 +174,7 @@ pub struct SercosProgram {
     known_status: StatusBits,
     faults: ArrayVec<FaultRule, MAX_FAULT_ROWS>,
     commands: ArrayVec<(Action, Idn), { Action::ALL.len() }>,
+    captures: CaptureProgram,
     parameters: Vec<ParameterEntry>,
     rejected: Vec<Parameter>,
 }
@@ -201,6 +205,7 @@ impl Telegram {
                 *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
             }
         }
+        captures::extend(&mut telegram, tables, dictionary, axis, facts);
         Ok(telegram)
     }
 }
@@ -301,6 +306,7 @@ impl SercosProgram {
             known_status: StatusBits::empty(),
             faults: ArrayVec::new(),
             commands: ArrayVec::new(),
+            captures: CaptureProgram::default(),
             parameters: Vec::new(),
             rejected: Vec::new(),
         };
@@ -344,6 +350,7 @@ impl SercosProgram {
             }
         }
         program.parameters.sort_by_key(|entry| entry.parameter);
+        program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
 
@@ -451,6 +458,11 @@ impl SercosProgram {
         self.rejected.contains(&parameter)
     }
 
+    /// The drive's captures.
+    pub fn captures(&self) -> &CaptureProgram {
+        &self.captures
+    }
+
     /// Everything the drive keeps, by parameter.
     pub fn parameters(&self) -> &[ParameterEntry] {
         &self.parameters
@@ -465,7 +477,7 @@ pub(super) struct Compiler<'t> {
 }
 
 impl Compiler<'_> {
-    fn unit(&self, idn: Idn, quantity: Quantity) -> Result<Lsb, SercosError> {
+    pub fn unit(&self, idn: Idn, quantity: Quantity) -> Result<Lsb, SercosError> {
         unit_of(self.tables, self.dictionary, self.axis.units, self.facts, idn, quantity)
     }
 

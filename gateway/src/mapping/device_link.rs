@@ -78,6 +78,7 @@ impl CipProgram {
         (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
         image.conditions = self.conditions(faults);
         image.captured_at = feedback.at.0;
+        image.torque = self.events().torque(feedback);
         report
     }
 

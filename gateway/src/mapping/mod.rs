@@ -12,6 +12,8 @@
 //! fault is code.
 
 mod attributes;
+mod captures;
+mod cip_events;
 mod cip_scaling;
 mod cip_tables;
 mod commissioning;
@@ -35,6 +37,11 @@ use std::path::Path;
 use profile_cip::target::attribute::AttributeDefinition;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
+pub use captures::{
+    CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
+    WORDS_MAX as CAPTURE_WORDS_MAX,
+};
+pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
     CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes, Served,

@@ -13,6 +13,7 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
 
+use super::captures::CaptureRule;
 use super::dictionary::{Dictionaries, IdnUnit};
 use super::scaling::ScalingRule;
 
@@ -71,6 +72,7 @@ pub(super) enum StepKind {
     Read { idn: Idn, attribute: bool, data: bool },
     ReadScaling,
     ReadTelegram,
+    ReadCaptures,
     Command(Idn),
 }
 
@@ -82,6 +84,7 @@ pub(super) struct StepRule {
     pub modulo: Option<bool>,
     pub set_scaling: Option<bool>,
     pub mode: Option<OperatingMode>,
+    pub captures: Option<bool>,
     /// Whether commissioning fails when the drive refuses.
     pub fail: bool,
 }
@@ -102,6 +105,9 @@ pub struct SercosTables {
     pub(super) status: Vec<(BitPattern, StatusBits)>,
     pub(super) faults: Vec<FaultRule>,
     pub(super) parameters: Vec<ParameterRule>,
+    pub(super) captures: Vec<CaptureRule>,
+    /// The drive's lists of what its telegram, and the master's, may carry.
+    pub(super) configurable: [Idn; 2],
     pub(super) steps: Vec<StepRule>,
 }
 

@@ -58,6 +58,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
         modulo,
         set_scaling: true,
         parameters: Vec::new(),
+        captures: CaptureMode::Off,
     }
 }
 

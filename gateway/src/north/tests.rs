@@ -2,6 +2,7 @@
 
 mod client;
 mod marking;
+mod other_targets;
 mod streams;
 
 use std::net::{Ipv4Addr, SocketAddrV4};

@@ -10,6 +10,7 @@
 
 use super::config::AxisSetup;
 use super::event::Event;
+use super::events::EventChecks;
 use super::failure::Failure;
 use super::following::Following;
 use super::handshake::Handshake;
@@ -57,6 +58,7 @@ pub(super) struct UpdateTime {
 #[derive(Debug)]
 pub(super) struct Axis {
     pub handshake: Handshake,
+    pub events: EventChecks,
     pub report: AxisReport,
     setup: AxisSetup,
     state: Option<AxisStateCode>,
@@ -76,6 +78,7 @@ impl Axis {
     pub fn new(instance: u8, setup: AxisSetup) -> Self {
         Self {
             handshake: Handshake::default(),
+            events: EventChecks::default(),
             report: AxisReport { axis: instance, ..AxisReport::default() },
             state: None,
             status: None,

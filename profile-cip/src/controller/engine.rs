@@ -334,6 +334,7 @@ impl Controller {
                 let events = &mut self.events;
                 axis.handle(block, time, |event| push(events, event));
             }
+            self.handle_events(index, instance.events.as_ref(), header.last_received_id);
         }
     }
 
@@ -435,9 +436,11 @@ impl Controller {
         }
         let request = self.services.request();
         let service_of = |number: u8| request.filter(|(instance, _)| *instance == number).map(|(_, r)| r);
-        let axes = self.axes.iter().map(|axis| CommandInstance {
+        let (update_id, busy) = (self.update_id, request.is_some());
+        let axes = self.axes.iter_mut().map(|axis| CommandInstance {
             number: axis.instance(),
             cyclic: configured.then(|| axis.block(configured, target)),
+            events: configured.then(|| axis.events.block(update_id, busy)).flatten(),
             service: service_of(axis.instance()),
             ..CommandInstance::default()
         });

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::status;
 use crate::wire;
 use crate::wire::motion::codes::{AxisStateCode, ClearingEvent, FaultType, NodeAlarm, NodeFault, SyncStatus};
-use crate::wire::motion::{AlarmRecord, FaultRecord};
+use crate::wire::motion::{AlarmRecord, EventNotification, FaultRecord};
 
 /// Who the device says it is.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -117,6 +117,13 @@ pub enum Event {
         /// The entry.
         alarm: AlarmRecord,
     },
+    /// An event that was armed on an axis occurred, or cannot be found.
+    AxisEvent {
+        /// Instance number.
+        axis: u8,
+        /// What the device tells of it.
+        notification: EventNotification,
+    },
     /// The fault of the communications node changed.
     NodeFault(NodeFault),
     /// The alarm of the communications node changed.
@@ -202,6 +209,15 @@ impl fmt::Display for Event {
             Self::AxisState { axis, from: None, to } => write!(f, "axis {axis}: {to}"),
             Self::AxisState { axis, from: Some(from), to } => write!(f, "axis {axis}: {from} -> {to}"),
             Self::AxisFault { axis, fault } => write!(f, "axis {axis}: {}", FaultText(*fault)),
+            Self::AxisEvent { axis, notification } => write!(
+                f,
+                "axis {axis}: event {}: {}, status {}, position {}, at {} ns",
+                notification.event_id,
+                notification.event_type,
+                notification.status,
+                notification.position,
+                notification.time_stamp
+            ),
             Self::AxisAlarm { axis, alarm } => write!(
                 f,
                 "axis {axis}: {} code {} sub code {} state {} at {} ns",

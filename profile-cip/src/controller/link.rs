@@ -5,6 +5,7 @@ use core::net::SocketAddrV4;
 use super::services::Room;
 use super::session::Opened;
 use crate::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
+use crate::wire::motion::event::{ACTUAL_EVENTS_BARE, COMMAND_EVENTS_MAX};
 use crate::wire::motion::header::CommandHeader;
 use crate::wire::motion::{CommandInstance, CommandWriter};
 use crate::wire::{Error, motion};
@@ -104,17 +105,18 @@ impl Link {
         self.received.map(|received| received.at)
     }
 
-    /// Room for a service beside the cyclic data of all axes.
-    pub fn room(&self) -> Room {
-        let cut = |header: usize, axis: usize| {
-            let fixed = SEQUENCE_COUNT_LEN + header + self.axes * axis + SERVICE_HEADERS;
-            let instance = INSTANCE_MAX - axis - SERVICE_HEADERS;
+    /// Room for a service beside the cyclic data of all axes and the event blocks of `checking` of them.
+    pub fn room(&self, checking: usize) -> Room {
+        let cut = |header: usize, axis: usize, events: usize| {
+            let fixed = SEQUENCE_COUNT_LEN + header + self.axes * axis + checking * events + SERVICE_HEADERS;
+            let instance = INSTANCE_MAX - axis - events - SERVICE_HEADERS;
             // Whole words, as the blocks are.
             self.size.saturating_sub(fixed).min(instance) / 4 * 4
         };
         Room {
-            request: cut(COMMAND_HEADER_MAX, COMMAND_AXIS_MAX),
-            response: cut(ACTUAL_HEADER_MAX, ACTUAL_AXIS_MAX),
+            request: cut(COMMAND_HEADER_MAX, COMMAND_AXIS_MAX, COMMAND_EVENTS_MAX),
+            // The device keeps notifications back for which there is no room.
+            response: cut(ACTUAL_HEADER_MAX, ACTUAL_AXIS_MAX, ACTUAL_EVENTS_BARE),
         }
     }
 
@@ -247,12 +249,15 @@ mod tests {
     #[test]
     fn the_room_of_a_service_leaves_the_cyclic_data_theirs() {
         // 500 - 2 - 24 - 2 x 32 - 12 and 500 - 2 - 44 - 2 x 56 - 12, in whole words.
-        let room = Link::new(500, 2).room();
+        let room = Link::new(500, 2).room(0);
         assert_eq!((room.request, room.response), (396, 328));
-        // Block sizes are counted in one byte: 1020 - 32 - 12 and 1020 - 56 - 12.
-        let room = Link::new(1400, 1).room();
-        assert_eq!((room.request, room.response), (976, 952));
-        assert_eq!(Link::new(20, 1).room().request, 0);
+        // Less 20 and 8 for the events of one axis.
+        let room = Link::new(500, 2).room(1);
+        assert_eq!((room.request, room.response), (376, 320));
+        // Block sizes are counted in one byte: 1020 - 32 - 20 - 12 and 1020 - 56 - 8 - 12.
+        let room = Link::new(1400, 1).room(1);
+        assert_eq!((room.request, room.response), (956, 944));
+        assert_eq!(Link::new(20, 1).room(0).request, 0);
     }
 
     #[test]

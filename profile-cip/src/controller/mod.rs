@@ -19,6 +19,7 @@ mod axis;
 pub mod config;
 mod engine;
 pub mod event;
+mod events;
 mod executor;
 pub mod failure;
 mod following;

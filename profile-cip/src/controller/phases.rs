@@ -58,7 +58,11 @@ impl Controller {
         }
         match self.phase {
             Phase::FirstUpdate { .. } if self.link.received_at().is_some() => {
-                let ticket = self.services.set(0, &self.config.class_attributes, self.link.room())?;
+                let ticket = self.services.set(
+                    0,
+                    &self.config.class_attributes,
+                    self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
+                )?;
                 self.phase = Phase::ClassConfiguration { ticket };
             }
             Phase::ClassConfiguration { ticket } => self.configure_class(now, ticket)?,
@@ -114,7 +118,11 @@ impl Controller {
 
     fn configure_axis(&mut self, instance: u8) -> Result<Phase, Failure> {
         let sets = &self.config.axes[usize::from(instance) - 1].attributes;
-        let ticket = self.services.set(instance, sets, self.link.room())?;
+        let ticket = self.services.set(
+            instance,
+            sets,
+            self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
+        )?;
         Ok(Phase::AxisConfiguration { instance, ticket })
     }
 
@@ -184,7 +192,7 @@ impl Controller {
     }
 
     fn run_program(&mut self, now: MonotonicTime) -> Result<(), Failure> {
-        let room = self.link.room();
+        let room = self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count());
         let events = &mut self.events;
         let mut event = |event| push(events, event);
         let mut context = Context {

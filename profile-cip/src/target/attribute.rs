@@ -49,6 +49,22 @@ pub mod id {
     pub const EVENT_CHECKING_CONTROL: u16 = 60;
     /// Event Checking Status.
     pub const EVENT_CHECKING_STATUS: u16 = 61;
+    /// Registration 1 Positive Edge Position; the other three edges follow.
+    pub const REGISTRATION_POSITION: u16 = 62;
+    /// Registration 1 Positive Edge Time; the other three edges follow.
+    pub const REGISTRATION_TIME: u16 = 66;
+    /// Home Event Position.
+    pub const HOME_EVENT_POSITION: u16 = 70;
+    /// Home Event Time.
+    pub const HOME_EVENT_TIME: u16 = 71;
+    /// Watch 1 Event Time; Watch 2 follows.
+    pub const WATCH_EVENT_TIME: u16 = 72;
+    /// Registration Data Set.
+    pub const REGISTRATION_DATA_SET: u16 = 95;
+    /// Home Data Set.
+    pub const HOME_DATA_SET: u16 = 96;
+    /// Watch Data Set.
+    pub const WATCH_DATA_SET: u16 = 97;
     /// Control Status.
     pub const CONTROL_STATUS: u16 = 89;
     /// Actual Data Set.

@@ -84,10 +84,10 @@ impl Axis {
     pub fn actual_block(&mut self, update_id: u8, context: &Context) -> ActualBlock {
         let asked = self.block.actual_data_set;
         let (axis_response, response_status) = self.handshake.response();
-        let position = self.drive.position.wrapping_add(self.actual_reference);
+        let position = self.seen_by_controller(self.drive.position);
         let lint = self.config.lint_position && self.block.feedback_mode.position_is_lint();
         let position =
-            if lint { ActualPosition::Lint(position) } else { ActualPosition::Dint(low_32(position)) };
+            if lint { ActualPosition::Lint(position) } else { ActualPosition::Dint(rolled(position)) };
         let displaced = axis_response == AxisControl::CHANGE_ACTUAL_POSITION && response_status == 0;
         let displacement = if displaced { self.displacement } else { 0 };
         ActualBlock {
@@ -136,7 +136,7 @@ impl Axis {
 }
 
 /// The low 32 bits of a position: a DINT position rolls over.
-fn low_32(position: i64) -> i32 {
+pub(super) fn rolled(position: i64) -> i32 {
     let [a, b, c, d, ..] = position.to_le_bytes();
     i32::from_le_bytes([a, b, c, d])
 }

@@ -14,7 +14,7 @@
 use crate::wire::motion::CommandValues;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisIoStatus, AxisStatus, CommandTarget, ControlMode, FaultType, FeedbackMode,
+    AxisIoStatus, AxisStatus, CommandTarget, ControlMode, EventChecking, FaultType, FeedbackMode,
 };
 use crate::wire::motion::test_service::HookupTestData;
 
@@ -216,6 +216,14 @@ pub struct DriveImage {
     pub io_status_mfg: u32,
     /// Safety status of a drive with a safety core.
     pub safety: Option<SafetyStatus>,
-    /// System time at which the actual values were captured, ns.
+    /// System time at which the actual values were captured, ns; 0 if it is not known.
     pub captured_at: u64,
+    /// Actual torque, % of the rated one, of a drive that tells it.
+    pub torque: Option<f32>,
+    /// Events that can be checked for on this axis, and for registration edges the window checks: those that the drive
+    /// looks for, and of [`EventChecking::WATCHES`] and [`EventChecking::HOME_TORQUE`], which the device evaluates itself
+    /// from position and torque, those that it may.
+    pub events: EventChecking,
+    /// Events that the drive is looking for at this moment.
+    pub events_checking: EventChecking,
 }

@@ -1,98 +1,217 @@
 //! The event channel of an axis, Tables 6-2.29 to 6-2.31: arming, notifications, acknowledgements.
+//!
+//! ```text
+//! Event Checking bit   C-to-D set and checkable -> WANTED -> the drive looks for it -> CHECKING (status bit set)
+//!                      event, no auto-rearm     -> FIRED (status bit stays, nothing is looked for)
+//!                      C-to-D clear             -> off, and the status bit with it
+//! notification         event -> pending, sent in every update -> acknowledged with status 0 -> gone
+//! ```
+//!
+//! A bit is not checkable, and its status bit stays clear, if the drive cannot look for the event or if a parameter of it
+//! has never come: the window of a registration edge, a watch position, the torque threshold. A registration edge whose
+//! window cannot be checked is not checked at all.
 
 use arrayvec::ArrayVec;
 
+use super::attribute::id;
 use crate::wire::motion::codes::{EventChecking, EventType};
 use crate::wire::motion::event::{ExtendedAck, ExtendedEventData, MAX_EVENTS};
 use crate::wire::motion::{ActualEvents, CommandEvents, EventNotification};
 
-/// The bit that arms an event type.
-fn checking_bit(event: EventType) -> Option<EventChecking> {
-    Some(match event.0 {
-        code @ 0..=3 => EventChecking::from_bits_retain(1 << code),
-        code @ 4..=12 => EventChecking::from_bits_retain(1 << (code + 12)),
-        code @ 13..=16 => EventChecking::from_bits_retain(1 << (code - 1)),
-        _ => return None,
-    })
+/// Notifications that wait to be acknowledged; what occurs beyond that is lost. One of each of the 17 event types, and
+/// nearly as many again from auto-rearm.
+pub const PENDING_MAX: usize = 32;
+
+/// What an event channel has counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct EventCounters {
+    /// Events told to the controller, errors among them.
+    pub notified: u64,
+    /// Registration edges outside of their window: not told.
+    pub outside_window: u64,
+    /// Events lost because the controller acknowledged none of [`PENDING_MAX`] before.
+    pub lost: u64,
 }
 
-/// The auto-rearm bit of an armed bit; only the four registration edges have one.
-fn rearm_bit(bit: EventChecking) -> EventChecking {
-    EventChecking::from_bits_retain((bit.bits() & 0b1111) << 8)
+/// Positions and times of the last events, attributes 62 to 73.
+#[derive(Debug, Clone, Copy, Default)]
+struct Captured {
+    registration: [(i32, u64); 4],
+    home: (i32, u64),
+    watch: [u64; 2],
+}
+
+impl Captured {
+    fn take(&mut self, event: EventType, position: i32, time: u64) {
+        match event.0 {
+            edge @ 0..=3 => self.registration[usize::from(edge)] = (position, time),
+            4..=12 => self.home = (position, time),
+            13 | 14 => self.watch[0] = time,
+            15 | 16 => self.watch[1] = time,
+            _ => {}
+        }
+    }
 }
 
 /// State of the channel.
 #[derive(Debug, Clone, Default)]
-pub(super) struct EventChannel {
+pub(crate) struct EventChannel {
     supported: EventChecking,
     open: bool,
     control: EventChecking,
+    /// First word of the last C-to-D block.
+    control_word: u32,
+    /// What the drive has been looking for since its bit was set.
+    confirmed: EventChecking,
     /// Events that have occurred and are not checked again until their control bit goes off.
     fired: EventChecking,
-    extended: ExtendedEventData,
+    parameters: ExtendedEventData,
+    data_sets: ExtendedAck,
     ack: Option<ExtendedAck>,
-    queue: ArrayVec<EventNotification, MAX_EVENTS>,
+    pending: ArrayVec<EventNotification, PENDING_MAX>,
     last_id: u8,
+    captured: Captured,
+    counters: EventCounters,
 }
 
 impl EventChannel {
-    /// A closed channel for a drive that can check for `supported` events.
-    pub fn new(supported: EventChecking) -> Self {
-        Self { supported, ..Self::default() }
+    /// A connection begins or ends: nothing is armed and no event has occurred. Event IDs and counters go on.
+    pub fn reset(&mut self) {
+        let Self { supported, last_id, counters, .. } = *self;
+        *self = Self { supported, last_id, counters, ..Self::default() };
     }
 
     /// Takes the event block of an update, or its absence, which closes the channel.
     pub fn handle(&mut self, block: Option<&CommandEvents>) {
         let Some(block) = block else {
-            let last_id = self.last_id;
-            *self = Self { last_id, ..Self::new(self.supported) };
+            let captured = self.captured;
+            self.reset();
+            self.captured = captured;
             return;
         };
         self.open = true;
         self.control = block.checking;
+        self.control_word = block.word();
         self.fired &= block.checking;
         for ack in block.acks.iter().filter(|ack| ack.status == 0) {
-            self.queue.retain(|n| n.event_id != ack.event_id);
+            self.pending.retain(|n| n.event_id != ack.event_id);
         }
         self.ack = block.extended.map(|data| {
-            self.extended = data;
-            data.data_sets()
+            self.parameters.update(&data);
+            self.data_sets = data.data_sets();
+            self.data_sets
         });
+        self.confirmed &= self.wanted();
     }
 
-    /// Event Checking Status: what the controller has armed and the drive can check.
+    /// Tells what can be checked for.
+    pub fn support(&mut self, supported: EventChecking) {
+        self.supported = supported;
+        self.confirmed &= self.wanted();
+    }
+
+    /// Tells what is being looked for.
+    pub fn confirm(&mut self, checking: EventChecking) {
+        self.confirmed |= checking & self.wanted();
+    }
+
+    /// Events that the controller has armed and that can be checked for.
+    fn wanted(&self) -> EventChecking {
+        let mut wanted = self.control & self.supported & EventChecking::EVENTS;
+        for (number, window) in self.parameters.windows.iter().enumerate() {
+            let edge = EventChecking::from_bits_retain(1 << number);
+            let known = self.supported.contains(edge.windows()) && window.is_some();
+            if self.control.contains(edge.windows()) && !known {
+                wanted -= edge;
+            }
+        }
+        let watch_1 = EventChecking::WATCH_1_FORWARD | EventChecking::WATCH_1_REVERSE;
+        let watch_2 = EventChecking::WATCH_2_FORWARD | EventChecking::WATCH_2_REVERSE;
+        let [first, second] = self.parameters.watch_positions;
+        let torque = self.parameters.home_torque_threshold;
+        for (bits, known) in [
+            (watch_1, first.is_some()),
+            (watch_2, second.is_some()),
+            (EventChecking::HOME_TORQUE, torque.is_some()),
+        ] {
+            if !known {
+                wanted -= bits;
+            }
+        }
+        wanted
+    }
+
+    /// Event Checking Status: what is being checked for, or has occurred and is still armed.
     pub fn status(&self) -> EventChecking {
-        let supported = self.supported | rearm_bit(self.supported);
-        self.control & supported
+        let events = self.control & (self.confirmed | self.fired) & EventChecking::EVENTS;
+        events | (self.control & (events.windows() | events.rearms()))
     }
 
-    /// Event Checking Control as it came.
-    pub fn control(&self) -> EventChecking {
-        self.control
-    }
-
-    /// What the drive has to look for now.
+    /// What has to be looked for now.
     pub fn armed(&self) -> EventChecking {
-        self.status() - self.fired
+        self.wanted() - self.fired
+    }
+
+    /// Whether an event is being looked for, and has been since before the actual values of this moment.
+    pub fn is_checking(&self, event: EventType) -> bool {
+        event.checking().is_some_and(|bit| (self.armed() & self.confirmed).contains(bit))
     }
 
     /// Parameters of extended checking.
     pub fn parameters(&self) -> &ExtendedEventData {
-        &self.extended
+        &self.parameters
     }
 
-    /// An event occurred. Returns whether it was armed and is now on its way.
+    pub fn counters(&self) -> EventCounters {
+        self.counters
+    }
+
+    /// Values of the attributes 60 to 73 and 95 to 97.
+    pub fn attributes(&self) -> impl Iterator<Item = (u16, u64)> {
+        let status = self.block().map_or(0, |block| block.word());
+        let position = |position: i32| u64::from(position.cast_unsigned());
+        let Captured { registration, home, watch } = self.captured;
+        let sets = self.data_sets;
+        let positions = (id::REGISTRATION_POSITION..).zip(registration.map(|(place, _)| position(place)));
+        let times = (id::REGISTRATION_TIME..).zip(registration.map(|(_, time)| time));
+        [
+            (id::EVENT_CHECKING_CONTROL, u64::from(self.control_word)),
+            (id::EVENT_CHECKING_STATUS, u64::from(status)),
+            (id::HOME_EVENT_POSITION, position(home.0)),
+            (id::HOME_EVENT_TIME, home.1),
+            (id::REGISTRATION_DATA_SET, u64::from(sets.registration)),
+            (id::HOME_DATA_SET, u64::from(sets.home)),
+            (id::WATCH_DATA_SET, u64::from(sets.watch)),
+        ]
+        .into_iter()
+        .chain(positions)
+        .chain(times)
+        .chain((id::WATCH_EVENT_TIME..).zip(watch))
+    }
+
+    /// An event occurred, or cannot be found for the reason `status`, which then is not 0. Returns whether it was armed
+    /// and is now on its way.
     pub fn notify(&mut self, event: EventType, status: u8, position: i32, time_stamp: u64) -> bool {
-        let Some(bit) = checking_bit(event) else { return false };
-        if !self.armed().contains(bit) || self.queue.is_full() {
+        let Some(bit) = event.checking().filter(|bit| self.armed().contains(*bit)) else { return false };
+        let (position, time_stamp) = if status == 0 { (position, time_stamp) } else { (0, 0) };
+        if status == 0 && !self.is_within(bit, position) {
+            self.counters.outside_window += 1;
             return false;
         }
-        if !self.control.contains(rearm_bit(bit)) || rearm_bit(bit).is_empty() {
+        if self.pending.is_full() {
+            self.counters.lost += 1;
+            return false;
+        }
+        let rearms = !bit.rearms().is_empty() && self.control.contains(bit.rearms());
+        if status != 0 || !rearms {
             self.fired |= bit;
         }
+        if status == 0 {
+            self.captured.take(event, position, time_stamp);
+        }
+        self.counters.notified += 1;
         self.last_id = self.last_id.wrapping_add(1);
-        let (position, time_stamp) = if status == 0 { (position, time_stamp) } else { (0, 0) };
-        self.queue.push(EventNotification {
+        self.pending.push(EventNotification {
             event_id: self.last_id,
             status,
             event_type: event,
@@ -102,102 +221,26 @@ impl EventChannel {
         true
     }
 
-    /// The event block for the next D-to-C update.
+    /// Whether a position passes the window check of a registration edge, if there is one.
+    fn is_within(&self, bit: EventChecking, position: i32) -> bool {
+        let windowed = bit.windows();
+        if windowed.is_empty() || !self.control.contains(windowed) {
+            return true;
+        }
+        let number = usize::try_from(bit.bits().trailing_zeros()).unwrap_or(usize::MAX);
+        let window = self.parameters.windows.get(number).copied().flatten();
+        window.is_some_and(|window| window.contains(position))
+    }
+
+    /// The event block for the next D-to-C update: the oldest events that are not acknowledged.
     pub fn block(&self) -> Option<ActualEvents> {
         self.open.then(|| ActualEvents {
             checking: self.status(),
             extended: self.ack,
-            notifications: self.queue.clone(),
+            notifications: self.pending.iter().take(MAX_EVENTS).copied().collect(),
         })
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::wire::motion::EventAck;
-
-    fn block(checking: EventChecking, acks: &[(u8, u8)]) -> CommandEvents {
-        let acks =
-            acks.iter().map(|(event_id, status)| EventAck { event_id: *event_id, status: *status }).collect();
-        CommandEvents { checking, extended: None, acks }
-    }
-
-    fn ids(channel: &EventChannel) -> Vec<u8> {
-        channel.block().expect("open").notifications.iter().map(|n| n.event_id).collect()
-    }
-
-    #[test]
-    fn basic_cycle_of_table_6_2_29() {
-        let home = EventChecking::HOME_POSITIVE;
-        let mut channel = EventChannel::new(home | EventChecking::MARKER_POSITIVE);
-        assert_eq!(channel.block(), None);
-        assert!(!channel.notify(EventType::HOME_POSITIVE, 0, 1, 1), "not armed");
-        channel.handle(Some(&block(home | EventChecking::HOME_TORQUE, &[])));
-        assert_eq!(channel.status(), home, "torque is not supported");
-        assert!(channel.notify(EventType::HOME_POSITIVE, 0, -5, 99));
-        assert!(!channel.notify(EventType::HOME_POSITIVE, 0, -6, 100), "no rearm: one event");
-        assert_eq!((channel.armed(), channel.status()), (EventChecking::empty(), home));
-        let note = channel.block().expect("open").notifications[0];
-        assert_eq!((note.event_id, note.position, note.time_stamp), (1, -5, 99));
-        channel.handle(Some(&block(home, &[(1, 3)])));
-        assert_eq!(ids(&channel), [1], "a bad acknowledge asks for it again");
-        channel.handle(Some(&block(EventChecking::empty(), &[(1, 0)])));
-        assert_eq!((channel.status(), ids(&channel)), (EventChecking::empty(), vec![]));
-        channel.handle(Some(&block(home, &[])));
-        assert!(channel.notify(EventType::HOME_POSITIVE, 7, -5, 99), "armed again");
-        let note = channel.block().expect("open").notifications[0];
-        assert_eq!((note.event_id, note.status, note.position, note.time_stamp), (2, 7, 0, 0));
-        channel.handle(None);
-        assert_eq!(channel.block(), None);
-    }
-
-    #[test]
-    fn auto_rearm_keeps_checking() {
-        // Table 6-2.31.
-        let bits = EventChecking::REG_2_NEGATIVE | EventChecking::REG_2_NEGATIVE_REARM;
-        let mut channel = EventChannel::new(EventChecking::REG_2_NEGATIVE);
-        channel.handle(Some(&block(bits, &[])));
-        assert_eq!(channel.status(), bits);
-        for _ in 0..MAX_EVENTS {
-            assert!(channel.notify(EventType::REGISTRATION_2_NEGATIVE, 0, 0, 0));
-        }
-        assert!(!channel.notify(EventType::REGISTRATION_2_NEGATIVE, 0, 0, 0), "the block is full");
-        channel.handle(Some(&block(bits, &[(1, 0), (3, 0)])));
-        assert_eq!(ids(&channel), [2, 4, 5, 6, 7]);
-        assert!(channel.notify(EventType::REGISTRATION_2_NEGATIVE, 0, 0, 0));
-    }
-
-    #[test]
-    fn every_event_type_has_the_bit_of_its_name() {
-        let named = |bits: EventChecking| bits.iter().next().map(|b| b.to_string());
-        let pairs = [
-            (EventType::REGISTRATION_1_NEGATIVE, "Reg 1 Neg Edge"),
-            (EventType::MARKER_POSITIVE, "Marker Pos Edge"),
-            (EventType::HOME_NEGATIVE, "Home Switch Neg Edge"),
-            (EventType::HOME_MARKER_NN, "Home Switch-Marker --"),
-            (EventType::HOME_TORQUE, "Home Torque Threshold"),
-            (EventType::WATCH_1_FORWARD, "Watch Position 1 Fwd"),
-            (EventType::WATCH_2_REVERSE, "Watch Position 2 Rev"),
-        ];
-        for (event, name) in pairs {
-            assert_eq!(checking_bit(event).and_then(named).as_deref(), Some(name));
-        }
-        assert_eq!(checking_bit(EventType(17)), None);
-    }
-
-    #[test]
-    fn extended_parameters_are_acknowledged_in_the_update_after() {
-        let data = ExtendedEventData { watch_positions: [Some(5), None], ..ExtendedEventData::default() };
-        let mut channel = EventChannel::new(EventChecking::WATCH_1_FORWARD);
-        let mut events = block(EventChecking::WATCH_1_FORWARD, &[]);
-        events.extended = Some(data);
-        channel.handle(Some(&events));
-        assert_eq!(channel.block().and_then(|b| b.extended), Some(data.data_sets()));
-        assert_eq!(channel.parameters(), &data);
-        events.extended = None;
-        channel.handle(Some(&events));
-        assert_eq!(channel.block().and_then(|b| b.extended), None);
-        assert_eq!(channel.parameters(), &data, "the parameters stay");
-    }
-}
+mod tests;

@@ -17,7 +17,7 @@ mod cyclic_list;
 pub mod drive_link;
 pub mod ethernet_link;
 pub mod event;
-mod event_channel;
+pub mod event_channel;
 pub mod exception;
 mod exchange;
 pub mod fault_log;

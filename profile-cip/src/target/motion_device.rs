@@ -24,6 +24,7 @@ use super::axis_object::{Axis, AxisConfig, Context, FaultWords};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
 use super::drive_link::{AxisCommandImage, DriveImage};
+use super::event_channel::EventCounters;
 use super::exception::ExceptionActions;
 use super::explicit_queue::ExplicitQueue;
 use super::fault_log::{FaultLog, LogEntry};
@@ -342,7 +343,9 @@ impl MotionDevice {
         self.connection.as_ref().map(IoConnection::wake_at)
     }
 
-    /// Events that the drive of an axis has to look for now, with the parameters of extended checking.
+    /// Events that are to be looked for on an axis now, with the parameters of extended checking. Watch positions and
+    /// torque are evaluated here; the rest is the drive's part, which says in [`DriveImage::events_checking`] what it is
+    /// looking for.
     #[must_use]
     pub fn armed_events(&self, axis: usize) -> Option<(EventChecking, &ExtendedEventData)> {
         self.slots.get(axis).map(|slot| (slot.axis.events.armed(), slot.axis.events.parameters()))
@@ -407,18 +410,26 @@ impl MotionDevice {
         self.sync = sync;
     }
 
-    /// An event that the drive was armed for has occurred. Returns whether it is on its way to the controller.
+    /// An event that the drive was armed for has occurred, or cannot be found for the reason `status`, which is then not
+    /// 0. `position` is in the reference system of power-up, position control units, `time_stamp` is system time in ns.
+    /// Returns whether it is on its way to the controller.
     pub fn notify_event(
         &mut self,
         axis: usize,
         event: EventType,
         status: u8,
-        position: i32,
+        position: i64,
         time_stamp: u64,
     ) -> bool {
         self.slots
             .get_mut(axis)
-            .is_some_and(|slot| slot.axis.events.notify(event, status, position, time_stamp))
+            .is_some_and(|slot| slot.axis.notify_event(event, status, position, time_stamp))
+    }
+
+    /// What the event channel of an axis has counted since construction.
+    #[must_use]
+    pub fn event_counters(&self, axis: usize) -> Option<EventCounters> {
+        self.slots.get(axis).map(|slot| slot.axis.events.counters())
     }
 
     /// Publishes the value of a stored attribute of an axis, for example a signal. Access and range do not count.

@@ -273,8 +273,6 @@ impl MotionDevice {
                 let values = [
                     (id::CONTROL_MODE, u64::from(block.control_mode.0)),
                     (id::FEEDBACK_MODE, u64::from(block.feedback_mode.0)),
-                    (id::EVENT_CHECKING_CONTROL, u64::from(slot.axis.events.control().bits())),
-                    (id::EVENT_CHECKING_STATUS, u64::from(slot.axis.events.status().bits())),
                     (id::CONTROL_STATUS, u64::from(block.control_status.bits())),
                     (id::ACTUAL_DATA_SET, u64::from(block.actual_data_set.bits())),
                     (id::COMMAND_DATA_SET, u64::from(block.values.data_set().bits())),
@@ -315,6 +313,9 @@ impl MotionDevice {
                     (id::START_INHIBITS_MFG, u64::from(drive.start_inhibits_mfg)),
                 ];
                 for (id, value) in values {
+                    slot.store.publish(&self.axis_table, id, value);
+                }
+                for (id, value) in slot.axis.events.attributes() {
                     slot.store.publish(&self.axis_table, id, value);
                 }
             }

@@ -8,11 +8,15 @@ use super::io_connection::Mode;
 use super::motion_device::{INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
 use crate::wire::Writer;
 use crate::wire::motion::codes::{NodeControl, NodeStatus, TimeDataSet};
+use crate::wire::motion::event::NOTIFICATION_LEN;
 use crate::wire::motion::{
     ActualBlock, ActualEvents, ActualHeader, ActualInstance, ActualWriter, Format, ReadBlock,
     ServiceResponse, TimeDiagnostics, UpdateDiagnostics,
 };
 use crate::wire::status::GeneralStatus;
+
+/// Octets of the largest instance data block: its size is counted in one byte, in words.
+const INSTANCE_MAX: usize = 255 * 4;
 
 /// Cyclic read data of an instance: write ID and status, read ID and status, octets.
 struct ReadData {
@@ -43,6 +47,21 @@ impl Part {
             read,
             events: self.events.clone(),
             service,
+        }
+    }
+}
+
+/// Keeps back notifications that have no room beside everything else of the update; they stay until acknowledged anyway.
+fn fit_notifications(parts: &mut [Part], room: usize) {
+    let of = |part: &Part| part.events.as_ref().map_or(0, |events| events.notifications.len());
+    let bare = |part: &Part| part.instance(None).buffer_len() - NOTIFICATION_LEN * of(part);
+    let mut left = room.saturating_sub(parts.iter().map(bare).sum()) / NOTIFICATION_LEN;
+    for part in parts {
+        let own = INSTANCE_MAX.saturating_sub(bare(part)) / NOTIFICATION_LEN;
+        let fits = of(part).min(left).min(own);
+        left -= fits;
+        if let Some(events) = &mut part.events {
+            events.notifications.truncate(fits);
         }
     }
 }
@@ -194,9 +213,11 @@ impl MotionDevice {
             header.emit(&mut writer).ok()?;
             return Some(writer.written());
         }
-        let parts = self.parts(update_id, system_time);
+        let mut parts = self.parts(update_id, system_time);
+        let room = update.len().saturating_sub(header.buffer_len());
+        fit_notifications(&mut parts, room);
         let base: usize = parts.iter().map(|part| part.instance(None).buffer_len()).sum();
-        let room = update.len().saturating_sub(header.buffer_len()).saturating_sub(base);
+        let room = room.saturating_sub(base);
         let mut left = room;
         let mut writer = ActualWriter::new(update, &header).ok()?;
         for part in &parts {

@@ -1,7 +1,8 @@
 //! The drive: its states, its faults, and the step that puts everything together.
 
-use super::captures::{Captures, Stretch};
+use super::captures::Captures;
 use super::control::{Control, Offsets, Target};
+use super::marks::{self, Marks, Stretch};
 use super::plant::{self, Plant, nano, parts, ppm, seconds, units};
 use super::{
     MAX_ACTIVE_FAULTS, MAX_STEP, SUB_STEP, ServoActual, ServoCommand, ServoControl, ServoError,
@@ -85,7 +86,7 @@ impl Servo {
             from_counts: scaling.from_counts(),
             plant: Plant::new(&parameters)?,
             control: Control::new(&parameters)?,
-            captures: Captures::new(parameters.marker_distance),
+            captures: Captures::new(marks::of_feedback(&parameters)),
             stage: Stage::Off,
             armed: false,
             reset_before: false,
@@ -118,7 +119,7 @@ impl Servo {
         let fresh = Self::new(parameters)?;
         self.control = fresh.control.resuming(&self.control);
         self.plant.retune(&fresh.plant);
-        self.captures.set_marker_distance(parameters.marker_distance);
+        self.captures.set_markers(marks::of_feedback(&parameters));
         self.parameters = parameters;
         Ok(())
     }
@@ -157,6 +158,12 @@ impl Servo {
     /// Sets where the home switch is active.
     pub fn set_home_switch(&mut self, window: Option<CaptureWindow>) {
         self.captures.set_home_switch(window);
+    }
+
+    /// Sets the marks that switch a registration input, 1 or 2, while the axis passes them; any other number changes
+    /// nothing. What [`Servo::set_registration`] has set counts beside them.
+    pub fn set_marks(&mut self, number: usize, marks: Option<Marks>) {
+        self.captures.set_marks(number, marks);
     }
 
     /// Sets a registration input, 1 or 2; any other number changes nothing.
@@ -488,11 +495,12 @@ impl Servo {
     }
 
     fn actual(&self, command: &ServoCommand) -> ServoActual {
-        let home = self.captures.home_switch_at(self.plant.position());
+        let place = self.plant.position();
+        let marked = |number| self.registration[number] || self.captures.is_marked(number + 1, place);
         let bits = [
-            (home, input::HOME_SWITCH),
-            (self.registration[0], input::REGISTRATION_1),
-            (self.registration[1], input::REGISTRATION_2),
+            (self.captures.home_switch_at(place), input::HOME_SWITCH),
+            (marked(0), input::REGISTRATION_1),
+            (marked(1), input::REGISTRATION_2),
         ];
         let report = self.report();
         let current = cast::f64_from_i64(self.parameters.rated_current.0) * self.plant.torque;

@@ -171,11 +171,6 @@ impl Plant {
     }
 }
 
-/// The mark at or below `position`, of a row of marks `distance` apart with one at zero.
-pub(super) const fn mark_below(position: Position, distance: Position) -> i64 {
-    position.0.saturating_sub(position.0.rem_euclid(distance.0))
-}
-
 /// Checks the parameters that a plant and its control are made of.
 pub(super) fn check(parameters: &ServoParameters) -> Result<(), ServoError> {
     let above_zero = [
@@ -193,6 +188,8 @@ pub(super) fn check(parameters: &ServoParameters) -> Result<(), ServoError> {
         ("thermal_time_constant", parameters.thermal_time_constant.0),
         ("overload_time_constant", parameters.overload_time_constant.0),
         ("marker_distance", parameters.marker_distance.0),
+        ("marker_width", parameters.marker_width.0),
+        ("marker_distance", parameters.marker_distance.0.saturating_sub(parameters.marker_width.0)),
     ];
     let not_below_zero = [
         ("coulomb_friction", parameters.coulomb_friction.0),

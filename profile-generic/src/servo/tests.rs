@@ -330,7 +330,7 @@ fn captures_are_exact_in_place_and_time() {
     servo.capture(CaptureRequest { watch_position: watch, ..arm(1, CaptureSource::WatchPosition) });
     servo.capture(CaptureRequest { auto_rearm: true, ..arm(2, CaptureSource::Marker) });
     servo.capture(arm(3, CaptureSource::HomeSwitch));
-    servo.capture(arm(4, CaptureSource::HomeSwitchMarker));
+    servo.capture(arm(4, CaptureSource::HomeSwitchMarkerPositive));
     let home =
         CaptureWindow { from: Position((turn + 3) * UNIT + 7), to: Position((turn + 3) * UNIT + UNIT / 2) };
     servo.set_home_switch(Some(home));
@@ -355,6 +355,63 @@ fn captures_are_exact_in_place_and_time() {
     assert_eq!(of(3)[0].position, home.from);
     assert_eq!(of(4)[0].position, Position((turn + 4) * UNIT), "the first marker after the switch");
     assert!(results.iter().all(|result| result.status == CaptureStatus::Captured));
+}
+
+/// Forward and back over a home switch that begins a quarter turn before a marker, with marks on input 1.
+#[test]
+fn every_order_of_home_switch_and_marker_and_every_edge_of_a_mark() {
+    let mut target = ServoCommand { velocity: Velocity(2 * UNIT), ..command(OperatingMode::Velocity) };
+    let mut servo = enabled(ServoParameters::default(), &target);
+    servo.set_home_switch(Some(CaptureWindow { from: Position(3 * UNIT / 4), to: Position(5 * UNIT / 4) }));
+    servo.set_marks(
+        1,
+        Some(Marks { from: Position(500), length: Position(1_000), every: Some(Position(UNIT / 2)) }),
+    );
+    let source = |source| {
+        [CaptureEdge::Positive, CaptureEdge::Negative].map(|edge| CaptureRequest::arm(0, source, edge))
+    };
+    let arm = |servo: &mut Servo, auto_rearm| {
+        for request in [CaptureSource::HomeSwitchMarkerPositive, CaptureSource::HomeSwitchMarkerNegative]
+            .into_iter()
+            .flat_map(source)
+        {
+            servo.capture(request);
+        }
+        for request in source(CaptureSource::Registration1) {
+            servo.capture(CaptureRequest { auto_rearm, ..request });
+        }
+    };
+    let mut pass = |servo: &mut Servo, velocity, steps| {
+        arm(servo, true);
+        target.velocity = Velocity(velocity);
+        let mut results = Vec::new();
+        for _ in 0..steps {
+            servo.step(MS, &target);
+            results.extend(core::iter::from_fn(|| servo.poll_capture()));
+        }
+        assert!(results.is_sorted_by_key(|result| result.at));
+        results.into_iter().map(|result| (result.source, result.edge, result.position.0)).collect::<Vec<_>>()
+    };
+    use CaptureEdge::{Negative as N, Positive as P};
+    use CaptureSource::{HomeSwitchMarkerNegative as Hn, HomeSwitchMarkerPositive as Hp};
+    let homes = |results: &[(CaptureSource, CaptureEdge, i64)]| {
+        results.iter().filter(|result| result.0 != CaptureSource::Registration1).copied().collect::<Vec<_>>()
+    };
+    let width = 1_000_000;
+    let there = pass(&mut servo, 2 * UNIT, 1_150);
+    let expected =
+        [(Hp, P, UNIT), (Hn, P, UNIT + width - 1), (Hp, N, 2 * UNIT), (Hn, N, 2 * UNIT + width - 1)];
+    assert_eq!(homes(&there), expected);
+    let marks: Vec<_> = there.iter().filter(|result| result.0 == CaptureSource::Registration1).collect();
+    assert_eq!(marks[0].2.rem_euclid(UNIT / 2), 500);
+    for (number, pair) in (0..).zip(marks.chunks(2)) {
+        let place = marks[0].2 + number * UNIT / 2;
+        assert_eq!([(pair[0].1, pair[0].2), (pair[1].1, pair[1].2)], [(P, place), (N, place + 999)]);
+    }
+    assert!(marks.len() >= 8, "{}", marks.len());
+    let back = pass(&mut servo, -2 * UNIT, 1_400);
+    let expected = [(Hp, P, UNIT + width - 1), (Hn, P, UNIT), (Hp, N, width - 1), (Hn, N, 0)];
+    assert_eq!(homes(&back), expected, "a marker that is passed backward rises at its other end");
 }
 
 #[test]

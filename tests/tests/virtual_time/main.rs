@@ -1,6 +1,7 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
 mod attributes;
+mod events;
 mod faults;
 mod fixed;
 mod hookup;

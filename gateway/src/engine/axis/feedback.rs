@@ -4,6 +4,7 @@ use super::diagnosis::CAUSE_TIME_OUT;
 use super::{AxisChannel, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
+use profile_generic::image::FeedbackSet;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
@@ -12,8 +13,14 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 
 impl AxisChannel {
-    /// Takes what the drive's connection brought in this cycle.
-    pub fn from_drive(&mut self, now: MonotonicTime, system: SystemTime, consumer: Option<Consumer<'_>>) {
+    /// Takes what the drive's connection brought in this cycle; its values were captured at `sampled`.
+    pub fn from_drive(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        sampled: SystemTime,
+        consumer: Option<Consumer<'_>>,
+    ) {
         let Some((program, trackers)) = self.south.as_mut() else {
             self.tick(now, system);
             return;
@@ -36,10 +43,14 @@ impl AxisChannel {
         if program.decode(consumer.data, &mut self.feedback, trackers, &mut conversions).is_none() {
             return;
         }
-        self.count_saturated(conversions.saturated);
         self.feedback.fresh = true;
         self.feedback.age_cycles = 0;
-        self.feedback.at = system;
+        self.feedback.at = sampled;
+        if self.feedback.present.contains(FeedbackSet::POSITION) {
+            let position = self.feedback.position;
+            self.captures.sample(program.captures(), consumer.data, position, sampled);
+        }
+        self.count_saturated(conversions.saturated);
         let report = self.feedback.report;
         self.report(now, system, report);
         self.watch(system);

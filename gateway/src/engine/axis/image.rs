@@ -24,6 +24,11 @@ impl AxisChannel {
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
         self.north.drive_image(&feedback, &self.faults, &mut image);
         self.sequence_image(&mut image);
+        if let Some(program) = self.south() {
+            let events = self.north.events();
+            image.events = events.checkable(program.captures().kinds(), &feedback);
+            image.events_checking = events.captured(self.captures.checking(program.captures()));
+        }
         if self.cause_wanted.is_some() {
             // The stop ends with the fault that says why, once the drive has told it.
             image.stop_complete = false;

@@ -9,8 +9,10 @@
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
 
 mod action;
+pub mod capture;
 mod diagnosis;
 mod feedback;
+mod history;
 mod hookup;
 mod image;
 mod sequence;
@@ -21,6 +23,7 @@ pub use self::hookup::HookupSettings;
 use self::hookup::TestRun;
 use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
 use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
+use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
@@ -30,6 +33,9 @@ use profile_generic::quantity::{Position, Velocity};
 use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::master::svc::request::{SvcFailure, SvcRequest};
+
+use self::capture::CaptureAccess;
 
 /// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
 pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
@@ -156,6 +162,7 @@ pub struct AxisChannel {
     /// The torque was switched on for a test.
     started_for_test: bool,
     counters: AxisCounters,
+    captures: capture::CaptureUnit,
 }
 
 /// The generic state machine and since when it is in its state.
@@ -207,6 +214,7 @@ impl AxisChannel {
             test: None,
             started_for_test: false,
             counters: AxisCounters::default(),
+            captures: capture::CaptureUnit::default(),
         }
     }
 
@@ -271,6 +279,7 @@ impl AxisChannel {
     pub fn set_south(&mut self, program: SercosProgram) {
         let trackers = program.feedback.trackers();
         self.south = Some((program, trackers));
+        self.captures.restart();
         self.action = Action::TorqueOff;
         self.control_word = 0;
     }
@@ -291,6 +300,42 @@ impl AxisChannel {
         self.end_diagnosis();
         self.report(now, system, report);
         self.south = None;
+        self.captures.restart();
+    }
+
+    /// Tells what events need captured, in each cycle and after [`AxisChannel::poll_capture`] gives no more.
+    pub fn want_captures(&mut self, wanted: CaptureSet) {
+        if let Some((program, _)) = &self.south {
+            self.captures.want(program.captures(), wanted);
+        }
+    }
+
+    /// The oldest capture that has come, or has failed.
+    pub fn poll_capture(&mut self) -> Option<CaptureResult> {
+        self.captures.poll()
+    }
+
+    /// A service channel access that the captures need, with what [`AxisChannel::capture_answer`] wants back.
+    #[must_use]
+    pub fn capture_access(&self) -> Option<(SvcRequest, CaptureAccess, u8)> {
+        self.captures.access(self.south()?.captures())
+    }
+
+    /// The access is on its way.
+    pub fn capture_sent(&mut self, access: CaptureAccess) {
+        self.captures.sent(access);
+    }
+
+    /// The drive has answered such an access.
+    pub fn capture_answer(
+        &mut self,
+        access: CaptureAccess,
+        generation: u8,
+        result: Result<&[u8], SvcFailure>,
+    ) {
+        if let Some((program, _)) = &self.south {
+            self.captures.answer(program.captures(), access, generation, result);
+        }
     }
 
     /// Fine interpolation for a connection with this update period, in the way the last update asked for.

@@ -136,6 +136,7 @@ impl AxisChannel {
             telegram,
             &mut conversions,
         );
+        self.captures.encode(program.captures(), telegram);
         self.count_saturated(conversions.saturated);
         if conversions.saturated > 0 && self.state() == DriveState::Operating {
             // The drive would be led elsewhere than the controller means.

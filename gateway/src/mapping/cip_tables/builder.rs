@@ -1,6 +1,7 @@
 //! CIP Motion <-> generic: from rows to the resolved mapping.
 
 use profile_cip::target::exception::ExceptionAction;
+use profile_generic::capture::CaptureStatus;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::StatusBits;
 use profile_generic::inhibit::Inhibits;
@@ -11,8 +12,9 @@ use profile_generic::state::{DriveState, Request};
 
 use super::{
     CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes,
-    Served, ServedAttribute, Times, has_direction, operating_mode, signal, unit_kind,
+    Served, ServedAttribute, Times, capture_kind, has_direction, operating_mode, signal, unit_kind,
 };
+use crate::mapping::cip_events::{EventRule, EventTrigger};
 use crate::mapping::compile_cip::{
     CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
     MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
@@ -20,7 +22,8 @@ use crate::mapping::compile_cip::{
 use crate::mapping::device_link::DRIVE_ACTIONS;
 use crate::mapping::dictionary::{CipAttribute, Dictionaries, quantity};
 use crate::mapping::format::{
-    CipAttributeRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name, RejectRow,
+    CipAttributeRow, CipEventRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
+    RejectRow,
 };
 use crate::mapping::load::{Parsed, TableErrors};
 use crate::mapping::resolver::Resolver;
@@ -55,6 +58,7 @@ impl CipTables {
         builder.inhibits(rows);
         builder.stoppings(rows);
         builder.sequence(rows);
+        builder.events(rows);
         for row in &rows.attribute {
             builder.attribute(row);
         }
@@ -496,6 +500,50 @@ impl Builder<'_> {
             ramp_deceleration: self.attribute_id("ramp_deceleration", &row.ramp_deceleration),
             flying_start: self.attribute_id("flying_start", &row.flying_start),
         };
+    }
+
+    fn events(&mut self, rows: &CipGenericFile) {
+        for row in &rows.event {
+            let event = self.byte_code("Event Type", "event", &row.event);
+            let checking = self.bit("Event Checking", "checking", &row.checking);
+            let trigger = match (&row.capture, &row.edge, &row.signal) {
+                (Some(source), Some(edge), None) => {
+                    capture_kind(&mut self.resolver, source, edge).map(EventTrigger::Capture)
+                }
+                (None, None, Some(name)) => self.event_signal(row, name),
+                _ => {
+                    let message = "expected capture and edge, or a signal";
+                    self.resolver.error(row.event.span(), "event", message);
+                    None
+                }
+            };
+            if let (Some(event), Some(checking), Some(trigger)) = (event, checking, trigger) {
+                if self.tables.events.rules.iter().any(|known| known.event == event) {
+                    self.resolver.error(row.event.span(), "event", "the event is there twice");
+                }
+                let checking = 1 << checking;
+                self.tables.events.rules.push(EventRule { event, checking, trigger });
+            }
+        }
+        for row in &rows.capture_status {
+            let known = CaptureStatus::ALL.iter().map(|status| status.name());
+            let what = "how a capture ends";
+            let status = self.resolver.name("status", &row.status, what, CaptureStatus::parse, known);
+            self.tables.events.status.extend(status.map(|status| (status, row.event_status)));
+        }
+    }
+
+    fn event_signal(&mut self, row: &CipEventRow, name: &Name) -> Option<EventTrigger> {
+        let signal = signal(&mut self.resolver, "signal", name)?;
+        if let Some(unit) = &row.unit {
+            let Some(found) = self.tables.unit(unit.get_ref(), signal.quantity()) else {
+                let message = format!("no [[unit]] row turns {} into {}", unit.get_ref(), signal.quantity());
+                self.resolver.error(unit.span(), "unit", message);
+                return None;
+            };
+            self.tables.events.units.push((signal, found));
+        }
+        Some(EventTrigger::Signal(signal))
     }
 
     fn attribute(&mut self, row: &CipAttributeRow) {

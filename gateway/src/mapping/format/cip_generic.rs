@@ -41,10 +41,46 @@ pub struct CipGenericFile {
     pub stopping: Vec<StoppingRow>,
     /// Attributes of the start and stop sequences.
     pub sequence: SequenceRow,
+    /// Events.
+    pub event: Vec<CipEventRow>,
+    /// What an event is told as that cannot be found.
+    pub capture_status: Vec<CaptureStatusRow>,
     /// Attributes.
     pub attribute: Vec<CipAttributeRow>,
     /// Attributes that are not served.
     pub reject: Vec<RejectRow>,
+}
+
+/// An event and what brings it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CipEventRow {
+    /// Code of Event Type.
+    pub event: Name,
+    /// Bit of Event Checking Control.
+    pub checking: Name,
+    /// Source of the capture that the drive does.
+    pub capture: Option<Name>,
+    /// Edge of that source.
+    pub edge: Option<Name>,
+    /// Signal from which the device evaluates the event itself.
+    pub signal: Option<Name>,
+    /// Unit in which the event wants the signal, where it is not the controller's count.
+    pub unit: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// How a capture ended, and the Event Status that says so.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaptureStatusRow {
+    /// How the capture ended.
+    pub status: Name,
+    /// Event Status.
+    pub event_status: u8,
+    /// Where it comes from.
+    pub source: Source,
 }
 
 /// Which attributes define what a count is.

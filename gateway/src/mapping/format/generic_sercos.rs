@@ -35,8 +35,51 @@ pub struct GenericSercosFile {
     pub fault: Vec<SercosFaultRow>,
     /// Parameters.
     pub parameter: Vec<SercosParameterRow>,
+    /// Which values a telegram may carry.
+    pub configurable_data: ConfigurableDataRow,
+    /// Captures.
+    pub capture: Vec<SercosCaptureRow>,
     /// What is written and read at start.
     pub commission: Vec<CommissionRow>,
+}
+
+/// The drive's lists of the values that it takes in telegrams.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConfigurableDataRow {
+    /// List for the drive's telegram.
+    pub producer: Name,
+    /// List for the master's telegram.
+    pub consumer: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// How a drive captures.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SercosCaptureRow {
+    /// Source of the capture.
+    pub capture: Name,
+    /// Its edge.
+    pub edge: Name,
+    /// `latch`, `counter`, `input` or `sequence`.
+    pub by: Name,
+    /// IDN with the position; latch and counter.
+    pub value: Option<Name>,
+    /// Word that says that the edge has come, or what the level is; latch and input.
+    pub word: Option<Name>,
+    /// Its fields.
+    #[serde(default)]
+    pub pattern: Vec<FieldValueRow>,
+    /// IDN that counts the edges; counter.
+    pub counter: Option<Name>,
+    /// IDN that lets the edge through; latch.
+    pub enable: Option<Name>,
+    /// Procedure command that has to be in process; latch.
+    pub command: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
 }
 
 /// The words that every telegram begins with.
@@ -281,7 +324,7 @@ pub struct SercosParameterRow {
 pub struct CommissionRow {
     /// Communication phase, 2 to 4.
     pub phase: Spanned<u8>,
-    /// `write`, `read`, `command`, `read_scaling`, `read_telegram` or `write_modes`.
+    /// `write`, `read`, `command`, `read_scaling`, `read_telegram`, `read_captures` or `write_modes`.
     #[serde(rename = "do")]
     pub step: Name,
     /// IDN; none for the steps that know theirs.
@@ -312,4 +355,6 @@ pub struct WhenRow {
     pub set_scaling: Option<bool>,
     /// An operating mode that must be configured.
     pub mode: Option<Name>,
+    /// Whether the axis is to capture events.
+    pub captures: Option<bool>,
 }

@@ -10,12 +10,13 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
 
 use super::{FaultRule, ModeRule, ParameterRule, SercosTables, SignalRule, SlotRule, StepKind, StepRule};
+use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
-use crate::mapping::cip_tables::{action, operating_mode, signal, unit_kind};
+use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::format::{
-    CommissionRow, FieldValueRow, GenericSercosFile, Name, ScalingMethodRow, SercosFaultRow, SercosModeRow,
-    SercosParameterRow, SercosScalingRow, SercosSignalRow,
+    CommissionRow, FieldValueRow, GenericSercosFile, Name, ScalingMethodRow, SercosCaptureRow,
+    SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
 };
 use crate::mapping::load::{Parsed, TableErrors};
 use crate::mapping::resolver::Resolver;
@@ -53,6 +54,7 @@ impl SercosTables {
         for row in &rows.parameter {
             builder.parameter(row);
         }
+        builder.captures(rows);
         for row in &rows.commission {
             builder.step(row);
         }
@@ -333,6 +335,89 @@ impl<'a> Builder<'a> {
         }
     }
 
+    fn captures(&mut self, rows: &GenericSercosFile) {
+        let lists = [&rows.configurable_data.producer, &rows.configurable_data.consumer];
+        let lists = lists.map(|name| self.idn("configurable_data", name).map(|row| row.idn));
+        if let [Some(producer), Some(consumer)] = lists {
+            self.tables.configurable = [producer, consumer];
+        }
+        for row in &rows.capture {
+            let Some(rule) = self.capture(row) else { continue };
+            if self.tables.captures.iter().any(|known| known.kind == rule.kind) {
+                self.resolver.error(row.capture.span(), "capture", "the capture is there twice");
+            }
+            self.tables.captures.push(rule);
+        }
+    }
+
+    fn capture(&mut self, row: &SercosCaptureRow) -> Option<CaptureRule> {
+        let kind = capture_kind(&mut self.resolver, &row.capture, &row.edge)?;
+        let words = [("latch", 0), ("counter", 1), ("input", 2), ("sequence", 3)];
+        let by = self.resolver.word("by", &row.by, &words)?;
+        let idns = [
+            ("value", &row.value, by <= 1),
+            ("counter", &row.counter, by == 1),
+            ("enable", &row.enable, by == 0),
+            ("command", &row.command, false),
+        ];
+        let mut found = [None; 4];
+        for ((key, name, needed), found) in idns.into_iter().zip(&mut found) {
+            match name {
+                Some(name) => *found = Some(self.idn(key, name)?),
+                None if needed => {
+                    let message = format!("expected an IDN, got none for {}", row.by.get_ref());
+                    self.resolver.error(row.by.span(), key, message);
+                    return None;
+                }
+                None => {}
+            }
+        }
+        let [value, counter, enable, command] = found;
+        if let (Some(value), Some(name)) = (value, &row.value)
+            && !self.measures(value, Quantity::Position)
+        {
+            let message = format!("the unit of {} is no {}", value.idn, Quantity::Position);
+            self.resolver.error(name.span(), "value", message);
+        }
+        if let (Some(command), Some(name)) = (command.filter(|command| !command.command), &row.command) {
+            let message = format!("expected a procedure command, {} is none", command.idn);
+            self.resolver.error(name.span(), "command", message);
+        }
+        let word = match (&row.word, by) {
+            (Some(name), 0 | 2) => {
+                let word = self.word("word", name)?;
+                Some((word.idn, self.pattern(word, &row.pattern)?))
+            }
+            (None, 1 | 3) => None,
+            _ => {
+                let message = "expected a word for a latch or an input, and for nothing else";
+                self.resolver.error(row.by.span(), "word", message);
+                return None;
+            }
+        };
+        let is_sequence = crate::mapping::captures::sequence(kind).is_some();
+        let by = match (by, value, word, counter, enable) {
+            (0, Some(value), Some((word, pattern)), None, Some(enable)) => CaptureBy::Latch {
+                value: value.idn,
+                word,
+                pattern,
+                enable: enable.idn,
+                command: command.map(|command| command.idn),
+            },
+            (1, Some(value), None, Some(counter), None) => {
+                CaptureBy::Counter { value: value.idn, counter: counter.idn }
+            }
+            (2, None, Some((word, pattern)), None, None) => CaptureBy::Input { word, pattern },
+            (3, None, None, None, None) if is_sequence => CaptureBy::Sequence,
+            _ => {
+                let message = format!("{} does not go with these keys", row.by.get_ref());
+                self.resolver.error(row.by.span(), "by", message);
+                return None;
+            }
+        };
+        Some(CaptureRule { kind, by })
+    }
+
     fn parameter_id(&mut self, name: &Name) -> Option<(Parameter, Quantity)> {
         let generic = &self.dictionaries.generic;
         let what = "a parameter of the generic model";
@@ -388,6 +473,7 @@ impl<'a> Builder<'a> {
             ("command", Verb::Command),
             ("read_scaling", Verb::ReadScaling),
             ("read_telegram", Verb::ReadTelegram),
+            ("read_captures", Verb::ReadCaptures),
             ("write_modes", Verb::WriteModes),
         ];
         let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
@@ -400,6 +486,7 @@ impl<'a> Builder<'a> {
             modulo: None,
             set_scaling: None,
             mode: None,
+            captures: None,
             fail: fail.unwrap_or(true),
         };
         if let Some(when) = &row.when {
@@ -407,6 +494,7 @@ impl<'a> Builder<'a> {
             rule.mode = when.mode.as_ref().and_then(|name| operating_mode(&mut self.resolver, name));
             rule.modulo = when.modulo;
             rule.set_scaling = when.set_scaling;
+            rule.captures = when.captures;
         }
         self.tables.steps.push(rule);
     }
@@ -450,6 +538,7 @@ impl<'a> Builder<'a> {
             (Verb::Command, Some(idn), None, None) if idn.command => Some(StepKind::Command(idn.idn)),
             (Verb::ReadScaling, None, None, None) => Some(StepKind::ReadScaling),
             (Verb::ReadTelegram, None, None, None) => Some(StepKind::ReadTelegram),
+            (Verb::ReadCaptures, None, None, None) => Some(StepKind::ReadCaptures),
             (Verb::WriteModes, None, None, None) => Some(StepKind::WriteModes),
             _ => {
                 let message = "expected `write` with idn and value or with parameter, `read` with idn, \
@@ -468,5 +557,6 @@ enum Verb {
     Command,
     ReadScaling,
     ReadTelegram,
+    ReadCaptures,
     WriteModes,
 }

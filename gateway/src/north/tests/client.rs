@@ -43,6 +43,18 @@ pub fn message(service: Service, path: &[u8], data: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Items of an unconnected message.
+pub fn unconnected(message: &[u8]) -> Vec<u8> {
+    let items = [
+        Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
+        Item { item_type: ItemType::UNCONNECTED_DATA, data: message },
+    ];
+    let body = EncapsulatedPacket { packet: CommonPacket::new(&items), ..EncapsulatedPacket::default() };
+    let mut bytes = vec![0; body.buffer_len()];
+    body.emit(&mut bytes).unwrap();
+    bytes
+}
+
 pub fn triad(connection_serial: u16) -> ConnectionTriad {
     ConnectionTriad { connection_serial, originator_vendor: 1, originator_serial: 0xCAFE }
 }
@@ -145,16 +157,14 @@ impl Client {
         self.read_packet().await
     }
 
+    /// A packet of this client's session.
+    pub fn packet(&self, command: Command, data: &[u8]) -> Vec<u8> {
+        packet(command, self.handle, data)
+    }
+
     pub async fn send_message(&mut self, message: &[u8]) {
-        let items = [
-            Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
-            Item { item_type: ItemType::UNCONNECTED_DATA, data: message },
-        ];
-        let packets = CommonPacket::new(&items);
-        let body = EncapsulatedPacket { packet: packets, ..EncapsulatedPacket::default() };
-        let mut bytes = vec![0; body.buffer_len()];
-        body.emit(&mut bytes).unwrap();
-        self.stream.write_all(&packet(Command::SEND_RR_DATA, self.handle, &bytes)).await.unwrap();
+        let bytes = self.packet(Command::SEND_RR_DATA, &unconnected(message));
+        self.stream.write_all(&bytes).await.unwrap();
     }
 
     pub async fn reply(&mut self) -> Answered {

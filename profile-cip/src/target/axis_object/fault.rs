@@ -321,7 +321,8 @@ fn alarms_of(place: usize, word: u64) -> impl Iterator<Item = (AlarmType, u8)> {
 
 impl Axis {
     pub fn set_drive(&mut self, image: DriveImage) {
-        self.drive = image;
+        let before = core::mem::replace(&mut self.drive, image);
+        self.check_events(&before);
     }
 
     /// Raises a fault of the device itself: an event, not a condition that lasts. All of them are fundamental to the axis

@@ -4,6 +4,7 @@
 //! events, follows [`AxisState::next`], and derives the level the drive has to keep. Nothing but an Enable request that
 //! begins in Stopped (or, with flying start, in Stopping) ever leads to Starting.
 
+mod events;
 mod fault;
 mod follow;
 mod request;
@@ -22,7 +23,7 @@ use super::motion_device::SequenceSettings;
 use super::status_report::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventChecking, TestStatus,
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, TestStatus,
 };
 use crate::wire::motion::test_service::HookupTestData;
 use crate::wire::motion::{CommandBlock, CommandValues};
@@ -61,8 +62,6 @@ pub struct AxisConfig {
     pub control_modes: u16,
     /// Whether the position may be reported as LINT when the controller asks for it.
     pub lint_position: bool,
-    /// Events the drive can check for.
-    pub events: EventChecking,
     /// Hookup tests that can be run, as bits numbered by the code of the test (Table 5-2.94).
     pub hookup_tests: u8,
 }
@@ -128,6 +127,8 @@ pub(super) struct Axis {
     pub(super) io_status: Reported<(AxisIoStatus, u32)>,
     pub(super) safety: Reported<SafetyStatus>,
     pub(super) events: EventChannel,
+    /// Since when the torque is beyond the Home Torque Threshold, system time in ns.
+    torque_since: Option<u64>,
     test: Option<test::ActiveTest>,
     test_id: u32,
     hookup: Option<HookupTestData>,
@@ -170,7 +171,8 @@ impl Axis {
             axis_status: Reported::new(),
             io_status: Reported::new(),
             safety: Reported::new(),
-            events: EventChannel::new(config.events),
+            events: EventChannel::default(),
+            torque_since: None,
             test: None,
             test_id: 0,
             hookup: None,
@@ -309,6 +311,7 @@ impl Axis {
         self.axis_status = Reported::new();
         self.io_status = Reported::new();
         self.safety = Reported::new();
-        self.events.handle(None);
+        self.events.reset();
+        self.torque_since = None;
     }
 }

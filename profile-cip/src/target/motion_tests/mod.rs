@@ -1,5 +1,6 @@
 //! Tests of the motion device in virtual time, with a controller and drives that are as simple as can be.
 
+mod events;
 mod faults;
 mod fixed;
 mod handshake;
@@ -57,7 +58,14 @@ pub(super) struct FakeDrive {
 
 impl FakeDrive {
     fn new() -> Self {
-        let image = DriveImage { online: true, bus_up: true, ..DriveImage::default() };
+        let events = EventChecking::HOME_POSITIVE;
+        let image = DriveImage {
+            online: true,
+            bus_up: true,
+            events,
+            events_checking: events,
+            ..DriveImage::default()
+        };
         Self { image, stuck: false, sticky: false }
     }
 
@@ -127,7 +135,6 @@ impl Rig {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
-            events: EventChecking::HOME_POSITIVE,
             hookup_tests: 0b11,
             ..AxisConfig::default()
         };

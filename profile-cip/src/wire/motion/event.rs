@@ -18,6 +18,12 @@ use crate::wire::{Error, Reader, Writer};
 
 /// Most acknowledgements or notifications in one block: the count has three bits.
 pub const MAX_EVENTS: usize = 7;
+/// Octets of one notification.
+pub const NOTIFICATION_LEN: usize = 16;
+/// Octets of the longest C-to-D block of the basic format: [`MAX_EVENTS`] acknowledgements, padded.
+pub const COMMAND_EVENTS_MAX: usize = 4 + 16;
+/// Octets of the longest D-to-C block without notifications.
+pub const ACTUAL_EVENTS_BARE: usize = 4 + 4;
 const BLOCK: &str = "event block";
 const CHECKING_MASK: u32 = 0x0FFF_FFFF;
 const COUNT_SHIFT: u32 = 28;
@@ -44,6 +50,56 @@ pub struct ExtendedEventData {
     pub home_torque_time: Option<f32>,
     /// Watch 1 and Watch 2 Position, position control units.
     pub watch_positions: [Option<i32>; 2],
+}
+
+impl Window {
+    /// Whether a position lies within the limits, which belong to the window. Positions roll over, so a window whose
+    /// lower limit is above the upper one reaches around the end of the range.
+    #[must_use]
+    pub const fn contains(self, position: i32) -> bool {
+        let above = position.wrapping_sub(self.min).cast_unsigned();
+        above <= self.max.wrapping_sub(self.min).cast_unsigned()
+    }
+}
+
+impl EventChecking {
+    /// The four registration edges.
+    pub const REGISTRATION: Self = Self::from_bits_retain(0x0000_000F);
+    /// The window checks of the registration edges.
+    pub const WINDOWS: Self = Self::from_bits_retain(0x0000_00F0);
+    /// Auto-rearm of the registration edges.
+    pub const REARMS: Self = Self::from_bits_retain(0x0000_0F00);
+    /// Both directions of both watch positions.
+    pub const WATCHES: Self = Self::from_bits_retain(0x0000_F000);
+    /// Everything that stands for an event type of its own.
+    pub const EVENTS: Self = Self::from_bits_retain(0x01FF_F00F);
+    /// What only the extended format has, and only an axis whose device does the scaling (Table 5-2.36).
+    pub const EXTENDED: Self = Self::WINDOWS.union(Self::WATCHES).union(Self::HOME_TORQUE);
+
+    /// The window checks that belong to the registration edges among these bits.
+    #[must_use]
+    pub const fn windows(self) -> Self {
+        Self::from_bits_retain((self.bits() & Self::REGISTRATION.bits()) << 4)
+    }
+
+    /// The auto-rearm bits that belong to the registration edges among these bits.
+    #[must_use]
+    pub const fn rearms(self) -> Self {
+        Self::from_bits_retain((self.bits() & Self::REGISTRATION.bits()) << 8)
+    }
+}
+
+impl EventType {
+    /// The bit of Event Checking Control that arms it; `None` for a code that is not of the standard.
+    #[must_use]
+    pub const fn checking(self) -> Option<EventChecking> {
+        Some(EventChecking::from_bits_retain(match self.0 {
+            code @ 0..=3 => 1 << code,
+            code @ 4..=12 => 1 << (code + 12),
+            code @ 13..=16 => 1 << (code - 1),
+            _ => return None,
+        }))
+    }
 }
 
 /// Echo of the three data sets in the D-to-C block.
@@ -129,6 +185,18 @@ impl ExtendedEventData {
         }
     }
 
+    /// Takes over the values that an update brings; the others stay.
+    pub fn update(&mut self, new: &Self) {
+        for (held, new) in self.windows.iter_mut().zip(new.windows) {
+            *held = new.or(*held);
+        }
+        self.home_torque_threshold = new.home_torque_threshold.or(self.home_torque_threshold);
+        self.home_torque_time = new.home_torque_time.or(self.home_torque_time);
+        for (held, new) in self.watch_positions.iter_mut().zip(new.watch_positions) {
+            *held = new.or(*held);
+        }
+    }
+
     fn len(&self) -> usize {
         let sets = self.data_sets();
         let ones = |set: u8| usize::try_from(set.count_ones()).unwrap_or(0);
@@ -200,6 +268,12 @@ impl CommandEvents {
         Ok(Self { checking, extended, acks })
     }
 
+    /// The first word of the block: Event Checking Control with count and format, attribute 60.
+    #[must_use]
+    pub fn word(&self) -> u32 {
+        join(self.checking, self.acks.len(), self.extended.is_some())
+    }
+
     /// Octets that [`CommandEvents::emit`] writes; a multiple of four.
     #[must_use]
     pub fn buffer_len(&self) -> usize {
@@ -211,7 +285,7 @@ impl CommandEvents {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u32(BLOCK, join(self.checking, self.acks.len(), self.extended.is_some()))?;
+        writer.u32(BLOCK, self.word())?;
         self.extended.map_or(Ok(()), |e| e.emit(writer))?;
         for ack in &self.acks {
             writer.slice(BLOCK, &[ack.event_id, ack.status])?;
@@ -249,10 +323,16 @@ impl ActualEvents {
         Ok(Self { checking, extended, notifications })
     }
 
+    /// The first word of the block: Event Checking Status with count and format, attribute 61.
+    #[must_use]
+    pub fn word(&self) -> u32 {
+        join(self.checking, self.notifications.len(), self.extended.is_some())
+    }
+
     /// Octets that [`ActualEvents::emit`] writes; a multiple of four.
     #[must_use]
     pub fn buffer_len(&self) -> usize {
-        4 + 4 * usize::from(self.extended.is_some()) + 16 * self.notifications.len()
+        4 + 4 * usize::from(self.extended.is_some()) + NOTIFICATION_LEN * self.notifications.len()
     }
 
     /// Writes the block.
@@ -260,7 +340,7 @@ impl ActualEvents {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u32(BLOCK, join(self.checking, self.notifications.len(), self.extended.is_some()))?;
+        writer.u32(BLOCK, self.word())?;
         if let Some(ack) = self.extended {
             writer.slice(BLOCK, &[ack.registration, ack.home, ack.watch, 0])?;
         }

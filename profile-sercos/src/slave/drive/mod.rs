@@ -17,6 +17,7 @@
 
 mod fault;
 pub mod parameters;
+pub mod probe;
 pub mod scaling;
 
 use profile_generic::fault::FaultCause;
@@ -28,6 +29,7 @@ use profile_generic::state::Report;
 use profile_generic::time::DurationNs;
 
 use self::parameters::{MODES, idn};
+use self::probe::Probe;
 use self::scaling::Scales;
 use super::application::{Application, Cycle, Diagnosis, Order, Progress};
 use super::communication;
@@ -71,6 +73,9 @@ pub struct Drive {
     /// The connection was lost in operation, or a fault was reset: the enabling bits have to go away once.
     locked: bool,
     referenced: bool,
+    probe: Probe,
+    /// Set-points that count from the next cycle on.
+    next: ServoCommand,
 }
 
 impl Drive {
@@ -80,8 +85,12 @@ impl Drive {
         parameters::define(&mut store, &parameters);
         // The preset scaling fits every servo that can be built.
         let scales = Scales::read(&store, &parameters).map_err(|_| ServoError::OutOfRange("kind"))?;
+        let mut servo = Servo::new(parameters)?;
+        let probe = Probe::new(&mut servo);
         Ok(Drive {
-            servo: Servo::new(parameters)?,
+            servo,
+            probe,
+            next: ServoCommand::default(),
             scales,
             main_power: true,
             warnings: 0,
@@ -278,6 +287,24 @@ impl Drive {
         command
     }
 
+    /// The command for the time up to now: the set-points of a telegram count from the synchronisation after it, so that
+    /// all drives of a line follow at the same instant. Everything else counts at once.
+    fn synchronous(&mut self, command: ServoCommand) -> ServoCommand {
+        let points = core::mem::replace(&mut self.next, command);
+        if points.mode != command.mode {
+            // Those of another operation mode lead nowhere.
+            return command;
+        }
+        ServoCommand {
+            position: points.position,
+            velocity: points.velocity,
+            torque: points.torque,
+            velocity_offset: points.velocity_offset,
+            torque_offset: points.torque_offset,
+            ..command
+        }
+    }
+
     /// Travel limits S-0-0049 and S-0-0050, where S-0-0055 bit 4 enables them.
     fn watch_travel(&mut self, store: &Store) {
         const ENABLED: i64 = 1 << 4;
@@ -330,6 +357,18 @@ impl Drive {
             store.set_number_of(communication::idn::INTERFACE_STATUS, status | UNDEFINED_MODE);
         }
         store.set_number_of(Idn::DRIVE_STATUS, i64::from(self.status(cycle).bits()));
+    }
+
+    /// Takes captured positions over as feedback values.
+    fn collect_probes(&mut self, store: &mut Store) {
+        const POLARITY: i64 = 1 << 2;
+        let inverted = store.number_of(idn::POSITION_POLARITY) & POLARITY != 0;
+        let scales = self.scales;
+        let counts = |position: Position| {
+            let counts = scales.position.counts(position.0);
+            scales.fold(if inverted { -counts } else { counts })
+        };
+        self.probe.collect(&mut self.servo, store, counts);
     }
 
     /// S-0-0013.
@@ -425,12 +464,13 @@ impl Application for Drive {
         self.adopt(store);
     }
 
-    fn order(&mut self, _: Idn, _: Order, _: &mut Store) -> Result<Progress, SvcError> {
-        Err(SvcError::NOT_EXECUTABLE)
+    fn order(&mut self, idn: Idn, order: Order, _: &mut Store) -> Result<Progress, SvcError> {
+        if idn == probe::idn::COMMAND { Ok(self.probe.order(order)) } else { Err(SvcError::NOT_EXECUTABLE) }
     }
 
-    fn progress(&mut self, _: Idn, _: &mut Store) -> Progress {
-        Progress::Failed
+    fn progress(&mut self, idn: Idn, _: &mut Store) -> Progress {
+        // Probing goes on until it is cancelled.
+        if idn == probe::idn::COMMAND { Progress::InProcess } else { Progress::Failed }
     }
 
     fn check_phase(&self, phase: Phase, store: &Store, invalid: &mut Invalid) {
@@ -477,9 +517,15 @@ impl Application for Drive {
             self.servo.clear_fault(FaultCause::ILLEGAL_MODE);
         }
         let command = self.command(&cycle, mode.unwrap_or(OperatingMode::Velocity), store);
-        self.actual = self.servo.step(cycle.elapsed.0, &command);
+        // What happened before this cycle counts as the enables were before it.
+        self.collect_probes(store);
+        self.probe.enable(store);
+        let step = self.synchronous(command);
+        self.actual = self.servo.step(cycle.elapsed.0, &step);
+        self.collect_probes(store);
         self.watch_travel(store);
         self.publish(&cycle, store);
+        self.probe.publish(&self.actual, store);
     }
 
     fn diagnosis(&self) -> Diagnosis {

@@ -211,6 +211,7 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
     for definition in definitions {
         store.define(definition);
     }
+    super::probe::define(store, length);
     let milli = |micro: i64| micro / 1_000;
     let rated = milli(servo.rated_current.0);
     let peak = rated.saturating_mul(servo.torque_limit.0) / 1_000_000;

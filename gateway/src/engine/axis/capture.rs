@@ -1,0 +1,436 @@
+//! Capturing events with the drive of an axis.
+//!
+//! ```text
+//! latch     OFF -> RISING -> ARMED      enable told 1; the drive stores the position at the edge by itself
+//!            ^                 |
+//!            +--- FALLING <----+        enable told 0, until the drive shows no edge any more: nothing is wanted, or an
+//!                                       edge has come and is wanted again
+//! counter   a change from one telegram to the next is a marker, at the position that the drive has stored
+//! input     a change from one telegram to the next is an edge, at the actual position of the later telegram
+//! sequence  the first marker after the edge; both in one telegram: nobody knows which was first
+//! ```
+//!
+//! A drive stores positions, not times: the time follows from the actual positions around the stored one. Between an edge
+//! that was latched and the next that can be lie three bus cycles with everything in the telegrams; over the service channel
+//! two writes and one or two reads, of which each takes some cycles.
+
+use arrayvec::ArrayVec;
+use profile_generic::capture::{CaptureKind, CaptureResult, CaptureSet, CaptureStatus};
+use profile_generic::quantity::Position;
+use profile_generic::time::SystemTime;
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
+
+use super::history::History;
+use crate::mapping::{CaptureProgram, Latch};
+
+/// Results that wait to be taken, one of each kind in a cycle.
+const RESULTS_MAX: usize = CaptureKind::COUNT;
+
+/// Fresh telegrams after which a changed enable has certainly been seen by the drive.
+const SEEN_AFTER: u8 = 2;
+
+/// Set and start a procedure command.
+const START: [u8; 2] = [3, 0];
+
+/// What a service channel access of a capture does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CaptureAccess {
+    /// Starts the procedure command.
+    Start,
+    /// Writes an enable: its place in the program, and its value.
+    Enable(usize, bool),
+    /// Reads a word: its place in the program.
+    Word(usize),
+    /// Reads the position of a latch: its place in the program.
+    Value(usize),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Command {
+    #[default]
+    Idle,
+    Active,
+    Refused,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Phase {
+    #[default]
+    Off,
+    Rising,
+    Armed,
+    Falling,
+}
+
+/// An enable and the edges that it lets through.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gate {
+    phase: Phase,
+    /// Fresh telegrams since the enable was changed; with the service channel the write's answer completes it.
+    fresh: u8,
+    /// What the drive has been told over the service channel.
+    told: Option<bool>,
+}
+
+impl Gate {
+    fn go(&mut self, phase: Phase) {
+        (self.phase, self.fresh) = (phase, 0);
+    }
+
+    const fn is_on(self) -> bool {
+        matches!(self.phase, Phase::Rising | Phase::Armed)
+    }
+}
+
+/// Captures of one axis.
+#[derive(Debug, Default)]
+pub struct CaptureUnit {
+    wanted: CaptureSet,
+    /// Counters, inputs and sequences that were wanted when the last telegram came.
+    watching: CaptureSet,
+    /// Not tried again before it has not been wanted.
+    failed: CaptureSet,
+    command: Command,
+    gates: [Gate; crate::mapping::CAPTURE_WORDS_MAX],
+    words: [u32; crate::mapping::CAPTURE_WORDS_MAX],
+    /// The latch has shown its edge since its enable rose.
+    latched: [bool; crate::mapping::CAPTURES_MAX],
+    /// The position of the latch has to be read, and then counts.
+    unread: [bool; crate::mapping::CAPTURES_MAX],
+    counters: [Option<i64>; crate::mapping::CAPTURES_MAX],
+    inputs: [Option<bool>; crate::mapping::CAPTURES_MAX],
+    /// The edge of the switch has come, the marker has not.
+    awaiting: [bool; crate::mapping::CAPTURE_WORDS_MAX],
+    history: History,
+    results: ArrayVec<CaptureResult, RESULTS_MAX>,
+    outstanding: Option<CaptureAccess>,
+    /// Answers of before the drive was lost do not count.
+    generation: u8,
+}
+
+impl CaptureUnit {
+    /// Another drive, or the same after it was lost: what was armed there is not any more.
+    pub fn restart(&mut self) {
+        let (wanted, generation) = (self.wanted, self.generation.wrapping_add(1));
+        *self = Self { wanted, generation, ..Self::default() };
+    }
+
+    /// The oldest result.
+    pub fn poll(&mut self) -> Option<CaptureResult> {
+        (!self.results.is_empty()).then(|| self.results.remove(0))
+    }
+
+    /// Tells what is to be captured; to be called in each cycle, after the results were taken.
+    pub fn want(&mut self, program: &CaptureProgram, wanted: CaptureSet) {
+        self.wanted = wanted;
+        for kind in CaptureKind::all().filter(|kind| !wanted.contains(*kind)) {
+            self.failed.set(kind, false);
+            self.watching.set(kind, false);
+        }
+        for (place, sequence) in program.sequences.iter().enumerate() {
+            self.awaiting[place] &= wanted.contains(sequence.kind);
+        }
+        if self.command == Command::Refused && self.failed.is_empty() {
+            self.command = Command::Idle;
+        }
+        for (place, latch) in program.latches.iter().enumerate() {
+            self.unread[place] &= wanted.contains(latch.kind);
+        }
+        for place in 0..program.enables.len() {
+            self.move_gate(program, place);
+        }
+    }
+
+    /// What is being looked for at this moment.
+    pub fn checking(&self, program: &CaptureProgram) -> CaptureSet {
+        let armed = program.latches.iter().enumerate().filter(|(place, latch)| {
+            let armed = self.gates[latch.enable].phase == Phase::Armed;
+            armed && !self.latched[*place] && self.is_wanted(latch.kind)
+        });
+        let mut checking = self.watching;
+        armed.for_each(|(_, latch)| checking.set(latch.kind, true));
+        checking
+    }
+
+    /// Puts the enables into the master's telegram.
+    pub fn encode(&self, program: &CaptureProgram, telegram: &mut [u8]) {
+        for (place, gate) in program.enables.iter().zip(self.gates) {
+            place.write_bit(telegram, gate.is_on());
+        }
+    }
+
+    /// Takes a fresh telegram of the drive, with its actual position at the instant it was captured. What follows for the
+    /// enables is decided in [`CaptureUnit::want`]: an edge that has come may not be wanted again.
+    pub fn sample(&mut self, program: &CaptureProgram, telegram: &[u8], position: Position, at: SystemTime) {
+        let before = self.history.newest();
+        self.history.push(position, at);
+        for (word, place) in self.words.iter_mut().zip(&program.words) {
+            *word = place.read_word(telegram).unwrap_or(*word);
+        }
+        for gate in &mut self.gates {
+            gate.fresh = gate.fresh.saturating_add(1);
+        }
+        for place in 0..program.latches.len() {
+            let latch = program.latches[place];
+            if program.words[latch.word].offset.is_some() && self.shows(&latch, place) {
+                match latch.value.place.read(telegram) {
+                    Some(raw) if self.is_wanted(latch.kind) => {
+                        self.stored(&latch, raw, before.map(|(_, at)| at))
+                    }
+                    Some(_) => {}
+                    None => self.unread[place] = self.is_wanted(latch.kind),
+                }
+            }
+        }
+        self.compare(program, telegram, position, at, before.map(|(_, at)| at));
+        for kind in CaptureKind::all() {
+            let latch = program.latches.iter().any(|latch| latch.kind == kind);
+            self.watching.set(kind, !latch && self.is_wanted(kind) && program.kinds().contains(kind));
+        }
+    }
+
+    fn is_wanted(&self, kind: CaptureKind) -> bool {
+        self.wanted.contains(kind) && !self.failed.contains(kind)
+    }
+
+    /// Whether a latch shows its edge for the first time since its enable rose.
+    fn shows(&mut self, latch: &Latch, place: usize) -> bool {
+        let on = self.gates[latch.enable].is_on();
+        let new = on && !self.latched[place] && latch.pattern.matches(self.words[latch.word]);
+        self.latched[place] |= new;
+        new
+    }
+
+    /// A latch has stored a raw position, not before `since`.
+    fn stored(&mut self, latch: &Latch, raw: i64, since: Option<SystemTime>) {
+        let near = self.history.newest().map_or(0, |(position, _)| position.get());
+        let position = Position(latch.value.position(raw, near));
+        let at = self.history.time_at(position, since);
+        self.give(latch.kind, CaptureStatus::Captured, position, at);
+    }
+
+    /// Compares counters and inputs with those of the last telegram.
+    fn compare(
+        &mut self,
+        program: &CaptureProgram,
+        telegram: &[u8],
+        position: Position,
+        at: SystemTime,
+        since: Option<SystemTime>,
+    ) {
+        let mut switched = [false; crate::mapping::CAPTURES_MAX];
+        for (place, input) in program.inputs.iter().enumerate() {
+            let Some(word) = input.word.read_word(telegram) else { continue };
+            let level = input.pattern.matches(word);
+            let before = self.inputs[place].replace(level);
+            switched[place] = level && before == Some(false);
+            if switched[place] && self.watching.contains(input.kind) {
+                self.give(input.kind, CaptureStatus::Captured, position, at);
+            }
+        }
+        let mut markers = [None; crate::mapping::CAPTURES_MAX];
+        for (place, counter) in program.counters.iter().enumerate() {
+            let Some(count) = counter.counter.read(telegram) else { continue };
+            let Some(last) = self.counters[place].replace(count).filter(|last| *last != count) else {
+                continue;
+            };
+            let Some(raw) = counter.value.place.read(telegram) else { continue };
+            let marker = Position(counter.value.position(raw, position.get()));
+            let when = self.history.time_at(marker, since);
+            let bits = counter.counter.width.bits();
+            let several =
+                count.wrapping_sub(last).rem_euclid(1_i64.checked_shl(bits).unwrap_or(i64::MAX)) != 1;
+            markers[place] = Some((marker, when, several));
+            if self.watching.contains(counter.kind) {
+                self.give(counter.kind, CaptureStatus::Captured, marker, when);
+            }
+        }
+        for (place, sequence) in program.sequences.iter().enumerate() {
+            if !self.watching.contains(sequence.kind) {
+                self.awaiting[place] = false;
+                continue;
+            }
+            let status = match (switched[sequence.switch], self.awaiting[place], markers[sequence.marker]) {
+                (true, _, None) => {
+                    self.awaiting[place] = true;
+                    continue;
+                }
+                (false, true, Some((marker, when, false))) => {
+                    self.awaiting[place] = false;
+                    self.give(sequence.kind, CaptureStatus::Captured, marker, when);
+                    continue;
+                }
+                // Which of several markers was the first, or whether it came after the switch, cannot be told.
+                (true, _, Some(_)) | (false, true, Some(_)) => CaptureStatus::Ambiguous,
+                (false, ..) => continue,
+            };
+            self.awaiting[place] = false;
+            self.give(sequence.kind, status, position, at);
+        }
+    }
+
+    fn move_gate(&mut self, program: &CaptureProgram, place: usize) {
+        let own = |latch: &&Latch| latch.enable == place;
+        let wanted = program.latches.iter().filter(own).any(|latch| self.is_wanted(latch.kind));
+        let cyclic = program.enables[place].offset.is_some();
+        let gate = self.gates[place];
+        let arrived = if cyclic { gate.fresh >= SEEN_AFTER } else { gate.told == Some(gate.is_on()) };
+        // What is read over the service channel has no newer word than the one that showed the edge.
+        let clear = program.latches.iter().filter(own).all(|latch| {
+            program.words[latch.word].offset.is_none() || !latch.pattern.matches(self.words[latch.word])
+        });
+        let reading = (0..).zip(&program.latches).any(|(at, latch)| own(&latch) && self.unread[at]);
+        let next = match gate.phase {
+            Phase::Off => {
+                let ready = program.command.is_none() || self.command == Command::Active;
+                (wanted && ready && clear).then_some(Phase::Rising)
+            }
+            Phase::Rising | Phase::Armed => {
+                let again = (0..).zip(&program.latches).any(|(at, latch): (usize, _)| {
+                    own(&latch) && self.is_wanted(latch.kind) && self.latched[at]
+                });
+                if !reading && (!wanted || again) {
+                    Some(Phase::Falling)
+                } else {
+                    (gate.phase == Phase::Rising && arrived).then_some(Phase::Armed)
+                }
+            }
+            Phase::Falling => (arrived && clear).then_some(Phase::Off),
+        };
+        let Some(next) = next else { return };
+        self.gates[place].go(next);
+        match next {
+            Phase::Rising => {
+                for (at, latch) in program.latches.iter().enumerate().filter(|(_, latch)| own(latch)) {
+                    self.latched[at] = false;
+                    if program.words[latch.word].offset.is_none() {
+                        self.words[latch.word] &= !latch.pattern.mask;
+                    }
+                }
+            }
+            // It may rise again at once.
+            Phase::Off => self.move_gate(program, place),
+            _ => {}
+        }
+    }
+
+    fn give(&mut self, kind: CaptureKind, status: CaptureStatus, position: Position, at: SystemTime) {
+        if status != CaptureStatus::Captured {
+            self.failed.set(kind, true);
+        }
+        let CaptureKind { source, edge } = kind;
+        // There is room for one of each kind, and they are taken in each cycle.
+        let _ = self.results.try_push(CaptureResult { id: 0, source, edge, status, position, at });
+    }
+
+    // ---- over the service channel ------------------------------------------------------------------------------
+
+    /// The next access to the drive's service channel, if one is due and none under way.
+    pub fn access(&self, program: &CaptureProgram) -> Option<(SvcRequest, CaptureAccess, u8)> {
+        if self.outstanding.is_some() {
+            return None;
+        }
+        let next = self.next_access(program)?;
+        let request = match next {
+            CaptureAccess::Start => SvcRequest::write(program.command?, SvcData::inline(&START)?),
+            CaptureAccess::Enable(place, on) => {
+                let enable = program.enables.get(place)?;
+                let value = u64::from(on).to_le_bytes();
+                SvcRequest::write(enable.idn, SvcData::inline(&value[..enable.width.bytes()])?)
+            }
+            CaptureAccess::Word(place) => SvcRequest::read(program.words.get(place)?.idn),
+            CaptureAccess::Value(place) => SvcRequest::read(program.latches.get(place)?.value.place.idn),
+        };
+        Some((request, next, self.generation))
+    }
+
+    fn next_access(&self, program: &CaptureProgram) -> Option<CaptureAccess> {
+        let mut latches = program.latches.iter().enumerate();
+        let wanted = program.latches.iter().any(|latch| self.is_wanted(latch.kind));
+        if wanted && program.command.is_some() && self.command == Command::Idle {
+            return Some(CaptureAccess::Start);
+        }
+        if let Some((place, _)) = latches.find(|(place, _)| self.unread[*place]) {
+            return Some(CaptureAccess::Value(place));
+        }
+        for (place, enable) in program.enables.iter().enumerate() {
+            let gate = self.gates[place];
+            let changes = gate.phase != Phase::Off && gate.told != Some(gate.is_on());
+            if enable.offset.is_none() && changes {
+                return Some(CaptureAccess::Enable(place, gate.is_on()));
+            }
+        }
+        let polled = program.latches.iter().enumerate().find(|(place, latch)| {
+            let open = self.gates[latch.enable].is_on() && !self.latched[*place];
+            program.words[latch.word].offset.is_none() && open && self.is_wanted(latch.kind)
+        });
+        polled.map(|(_, latch)| CaptureAccess::Word(latch.word))
+    }
+
+    /// The access was handed to the service channel.
+    pub fn sent(&mut self, access: CaptureAccess) {
+        self.outstanding = Some(access);
+    }
+
+    /// Takes the answer to an access.
+    pub fn answer(
+        &mut self,
+        program: &CaptureProgram,
+        access: CaptureAccess,
+        generation: u8,
+        result: Result<&[u8], SvcFailure>,
+    ) {
+        if generation != self.generation || self.outstanding != Some(access) {
+            return;
+        }
+        self.outstanding = None;
+        match (access, result) {
+            (CaptureAccess::Start, Ok(_)) => self.command = Command::Active,
+            (CaptureAccess::Start, Err(_)) => {
+                self.command = Command::Refused;
+                self.fail(program, |_, _| true);
+            }
+            (CaptureAccess::Enable(place, on), Ok(_)) => self.gates[place].told = Some(on),
+            (CaptureAccess::Enable(place, _), Err(_)) => {
+                self.gates[place].go(Phase::Off);
+                self.gates[place].told = None;
+                self.fail(program, |_, latch| latch.enable == place);
+            }
+            (CaptureAccess::Word(place), Ok(bytes)) => {
+                let Some(raw) = program.words.get(place).and_then(|word| word.decode(bytes)) else { return };
+                let [a, b, c, d, ..] = raw.to_le_bytes();
+                self.words[place] = u32::from_le_bytes([a, b, c, d]);
+                for (at, latch) in program.latches.iter().enumerate() {
+                    if latch.word == place && self.shows(latch, at) {
+                        self.unread[at] = self.is_wanted(latch.kind);
+                    }
+                }
+            }
+            (CaptureAccess::Word(place), Err(_)) => self.fail(program, |_, latch| latch.word == place),
+            (CaptureAccess::Value(place), result) => {
+                self.unread[place] = false;
+                let Some(latch) = program.latches.get(place) else { return };
+                match result.ok().and_then(|bytes| latch.value.place.decode(bytes)) {
+                    // Everything that is remembered may hold the instant.
+                    Some(raw) => self.stored(latch, raw, None),
+                    None => self.fail(program, |at, _| at == place),
+                }
+            }
+        }
+        for place in 0..program.enables.len() {
+            self.move_gate(program, place);
+        }
+    }
+
+    /// Ends the latches that the drive does not let work, with a result that says so.
+    fn fail(&mut self, program: &CaptureProgram, concerns: impl Fn(usize, &Latch) -> bool) {
+        for (place, latch) in program.latches.iter().enumerate() {
+            if concerns(place, latch) && self.is_wanted(latch.kind) {
+                self.give(latch.kind, CaptureStatus::Failed, Position::ZERO, SystemTime::ZERO);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
