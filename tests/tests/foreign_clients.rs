@@ -118,6 +118,54 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
     }
 }
 
+#[test]
+fn pycomm3_reads_the_clock_and_uploads_the_data_sheet() {
+    const ADDRESS: &str = "127.0.0.64";
+    const TEST: &str = "pycomm3_reads_the_clock_and_uploads_the_data_sheet";
+    let Some(python) = peer::python_or_skip(TEST, "pycomm3") else { return };
+    let (mut running, capture) = start_box(ADDRESS, "foreign-device");
+    let got = ask(&python, "pycomm3_device.py", ADDRESS);
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+
+    // Of the clock what is true of a host's clock, and nothing of PTP.
+    let clock = &got["clock"];
+    for (attribute, value) in
+        [("1", "00"), ("2", "01"), ("11", "0100"), ("12", "010001000300"), ("27", "0000")]
+    {
+        assert_eq!(clock[attribute], value, "attribute {attribute}");
+    }
+    for attribute in ["5", "6", "7", "9", "14", "15", "16", "17", "18", "19", "20", "24"] {
+        assert_eq!(clock[attribute], "Attribute not supported", "attribute {attribute}");
+    }
+    assert_eq!(clock["10"].as_str().map(|local| &local[..16]), Some("024142fffe000001"));
+    let refused = got["switched_on"].as_str().expect("PTP cannot be switched on");
+    assert!(refused.ends_with("invalid attribute value"), "{refused}");
+
+    // The sheet is the one that the command writes.
+    let config = capture.with_extension("toml");
+    let written =
+        Command::new(axisbridge()).arg("eds").arg("--config").arg(config).output().expect("it starts");
+    let sheet = &got["sheet"];
+    assert_eq!(sheet["text"].as_str().map(str::as_bytes), Some(&*written.stdout));
+    assert_eq!((&sheet["size"], &sheet["total"]), (&json!(written.stdout.len()), &json!(0)));
+
+    if peer::tshark_or_skip(TEST) {
+        let frames = tshark::dissect(&capture, "cip.class == 0x43 && cip.rr == 1", &[]);
+        let shown = |name: &str| {
+            let field = frames.iter().find_map(|frame| frame.field(name));
+            field.map(|field| field.show.clone()).unwrap_or_else(|| panic!("tshark reads no {name}"))
+        };
+        assert!(frames.iter().all(|frame| !frame.has("_ws.malformed")));
+        assert_eq!(shown("cip.time_sync.gm_clock.clock_id"), "02:41:42:ff:fe:00:00:01");
+        assert_eq!(shown("cip.time_sync.gm_clock.time_source"), "144");
+        assert_eq!(shown("cip.time_sync.gm_clock.priority2"), "128");
+        assert_eq!(shown("cip.time_sync.port_state_info.port_state"), "3");
+        assert_eq!(shown("cip.time_sync.port_proto_addr_info.network_proto"), "1");
+        assert_eq!(shown("cip.time_sync.prod_desc"), ";Axisbridge two axes;0001E240");
+        assert_eq!(shown("cip.time_sync.steps_removed"), "0");
+    }
+}
+
 /// What tshark reads in the answers of the box: services and general statuses in their order.
 fn explicit_traffic(capture: &Path) {
     let frames = tshark::dissect(capture, "enip && tcp", &[]);

@@ -590,6 +590,7 @@ impl MotionDevice {
         let Some(connection) = self.connection.take() else { return };
         self.counters.connection_losses += 1;
         self.node.raise(NodeFault::CONNECTION_LOSS);
+        self.progress = StartupProgress { connection_lost: true, ..StartupProgress::default() };
         self.echo.clear();
         self.class.service.reset();
         for slot in &mut self.slots {

@@ -6,7 +6,7 @@ use super::identity::ModuleState;
 use super::motion_device::{MotionDevice, Slot};
 use super::visualization::display::{self, Line, NodeCondition, Startup};
 use super::visualization::{self, AxisCondition, Indication};
-use crate::wire::motion::codes::{AlarmType, FaultType, NodeFault};
+use crate::wire::motion::codes::{AlarmType, FaultType};
 
 /// How far the controller has come since it opened the connection.
 #[derive(Debug, Clone, Copy, Default)]
@@ -15,6 +15,8 @@ pub(super) struct StartupProgress {
     pub attribute_set: bool,
     /// A Group_Sync has succeeded.
     pub group_synced: bool,
+    /// The connection was lost, and there has been none since.
+    pub connection_lost: bool,
 }
 
 /// The faults in the order in which they are told: what keeps the device from working at all, what endangers people,
@@ -85,7 +87,7 @@ impl MotionDevice {
     /// Whether the motion connection was lost and nobody has opened it since.
     #[must_use]
     pub fn is_connection_lost(&self) -> bool {
-        self.connection.is_none() && self.node_fault() == NodeFault::CONNECTION_LOSS
+        self.progress.connection_lost
     }
 }
 

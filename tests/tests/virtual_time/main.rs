@@ -5,6 +5,7 @@ mod events;
 mod faults;
 mod fixed;
 mod hookup;
+mod indicators;
 mod loss;
 mod network;
 mod programs;

@@ -2,6 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use profile_cip::target::axis_state::{AxisState, ControlKind};
+use profile_cip::target::visualization::AxisCondition;
+use profile_cip::target::visualization::display::{self, NodeCondition, Startup};
+use profile_cip::wire::motion::codes::{AlarmType, FaultType, NodeAlarm, NodeFault};
+
 use super::*;
 use crate::mapping::{CipAttribute, CipType, DEVICE_FUNCTIONS, PolarityEffect};
 
@@ -264,6 +269,47 @@ fn every_set_of_codes_belongs_to_an_attribute_or_says_to_what() {
         let nothing = set.attributes.is_empty() && set.class_attributes.is_empty();
         assert!(!nothing || !set.element.is_empty(), "{}", set.name);
     }
+}
+
+/// Tables 9-1.3 and 9-1.4: the display of the device shows what the dictionary says of each type of fault and alarm.
+#[test]
+fn the_display_shows_what_the_dictionary_says() {
+    const CODE: u8 = 7;
+    let mut told = 0;
+    for record in cip().fault_records() {
+        let mut node = NodeCondition { startup: Startup::Complete, ..NodeCondition::default() };
+        let mut axis = AxisCondition::new(ControlKind::Active, AxisState::Running, true);
+        match (record.fault_type, record.alarm_type) {
+            (Some(fault), _) => axis.fault = Some((FaultType(fault), CODE)),
+            (None, Some(alarm @ 1..=2)) => {
+                axis.state = AxisState::StartInhibited;
+                axis.inhibit = Some((AlarmType(alarm), CODE));
+            }
+            (None, Some(alarm)) => axis.alarm = Some((AlarmType(alarm), CODE)),
+            (None, None) if record.display.contains("FLT") => node.fault = NodeFault(CODE),
+            (None, None) => node.alarm = NodeAlarm(CODE),
+        }
+        let line = display::line(&node, &axis);
+        if record.display.is_empty() {
+            // The standard has none; the text is ours.
+            assert!(line.characters(None).starts_with("APR FLT "), "{}", record.conditions);
+            continue;
+        }
+        told += 1;
+        assert_eq!(
+            line.characters(None).as_str(),
+            record.display.replace("##", "07"),
+            "{}",
+            record.conditions
+        );
+        assert_eq!(
+            line.segments().as_str(),
+            record.seven_segment.replace("##", "07"),
+            "{}",
+            record.conditions
+        );
+    }
+    assert_eq!(told, 12, "the coded rows of the tables");
 }
 
 /// Tables 5-2.82 and 5-2.85.
