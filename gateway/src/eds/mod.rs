@@ -236,8 +236,9 @@ fn capacity(w: &mut Writer, adapter: &AdapterConfig) {
     w.entry("MaxIOConnections", &[Field::Number(u32::from(CONNECTIONS_MAX).saturating_sub(explicit()))]);
     w.entry("MaxMsgConnections", &[count(EXPLICIT_CONNECTIONS_MAX)]);
     let per_second = Field::Number(1_000_000 / motion.rpi_min_us.max(1));
-    w.entry("TSpec1", &[Field::Word("Rx"), Field::from(motion.o_to_t_size_max), per_second.clone()]);
-    w.entry("TSpec2", &[Field::Word("Tx"), Field::from(motion.t_to_o_size_max), per_second]);
+    let size = |most: u16| Field::from(motion.sizes(most).1);
+    w.entry("TSpec1", &[Field::Word("Rx"), size(motion.o_to_t_size_max), per_second.clone()]);
+    w.entry("TSpec2", &[Field::Word("Tx"), size(motion.t_to_o_size_max), per_second]);
 }
 
 fn explicit() -> u32 {

@@ -224,6 +224,19 @@ fn the_sheet_follows_the_configuration_and_nothing_else() {
         unquoted(&sheet.fields("Connection Manager", "Connection1")[14]),
         "20 42 2C 51 2C 02 80 04 01 01 00 00 04 03 02 01"
     );
+    // The fixed format has one size, in the connection and in what the device can carry.
+    let fixed = EXAMPLE.replace(
+        "axes = [\"turntable\", \"slide\"]",
+        "axes = [\"turntable\"]\nconnection_format = \"fixed\"",
+    );
+    let fixed = &fixed[..fixed.rfind("[[axis]]").unwrap()];
+    let bus = &EXAMPLE[EXAMPLE.find("[south.sercos]").unwrap()..];
+    let adapter_fixed = self::adapter(&format!("{fixed}{bus}"));
+    let sheet_fixed = Reader::of(&adapter_fixed);
+    let (size, _) = adapter_fixed.motion.sizes(adapter_fixed.motion.o_to_t_size_max);
+    assert_eq!(number(&sheet_fixed.fields("Connection Manager", "Connection1")[1]), 0x4444_0005);
+    assert_eq!(sheet_fixed.range("Param2"), [data_size(size); 3]);
+    assert_eq!(number(&sheet_fixed.fields("Capacity", "TSpec1")[1]), u32::from(size));
     // Another start, another host, the same sheet.
     let config = Config::parse(&changed, "test.toml").unwrap();
     let again = adapter_config(&config, 0, Host { mac: [4; 6], incarnation: 77 }).unwrap();
