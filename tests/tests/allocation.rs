@@ -2,11 +2,12 @@
 //! engine alone.
 
 use allocation_counter::measure;
+use axisbridge_tests::rig::fixed::{self, FixedController};
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::Event;
-use profile_cip::wire::motion::codes::EventChecking;
+use profile_cip::wire::motion::codes::{AxisControl, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_generic::fault::FaultCause;
 use profile_generic::quantity::Position;
@@ -85,4 +86,27 @@ fn events_in_the_telegrams_and_over_the_service_channel_allocate_nothing() {
         let told = rig.events.iter().filter(|event| matches!(event, Event::AxisEvent { .. })).count();
         assert!(told > 5, "{way}: {told} events");
     }
+}
+
+#[test]
+fn the_fixed_format_allocates_nothing() {
+    let mut rig = Rig::ready(fixed::settings());
+    let mut controller = FixedController::open(&mut rig, 18).expect("a connection");
+    controller.configure(&mut rig, fixed::INTERPOLATE);
+    controller.request(&mut rig, AxisControl::ENABLE);
+    let applied = rig.engine.axes()[0].counters().commands;
+    let found = weigh(&mut rig, 1_000, |rig, number| {
+        // Faster and faster, then a lost update, an update of the other format, and silence.
+        let step = u16::try_from(number.min(500)).unwrap_or(500);
+        controller.command.values.velocity = Some(f32::from(step) / 250.0);
+        match number {
+            0..=598 => controller.send(rig),
+            599 => controller.command.update_id = controller.command.update_id.wrapping_add(1),
+            600..=699 => controller.send(rig),
+            700 => controller.send_octets(rig, &[6, 2, 0, 5, 0, 0, 0, 0]),
+            _ => {}
+        }
+    });
+    assert_eq!(found, []);
+    assert!(rig.engine.axes()[0].counters().commands > applied + 600, "the axis was led");
 }

@@ -16,10 +16,11 @@ use profile_cip::wire::motion::codes::{
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand, LEN};
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use profile_cip::wire::{ConnectionTriad, Writer};
+use profile_generic::scaling::UnitKind;
 use profile_generic::time::DurationNs;
 
-use super::Rig;
 use super::explicit::Client;
+use super::{Rig, Settings};
 
 /// Where it sits.
 const ADDRESS: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 7);
@@ -33,6 +34,21 @@ const COMMAND_CONTROL: u16 = 92;
 const PATH: [u8; 16] = [0x20, 0x42, 0x2C, 0x51, 0x2C, 2, 0x80, 4, 1, 0, 0, 0, 0, 0, 0, 0];
 const CONNECTION_MANAGER: [u8; 4] = [0x20, 6, 0x24, 1];
 const FORWARD_OPEN: u8 = 0x54;
+
+/// Command Control: DINT with Immediate.
+pub const IMMEDIATE: u8 = 0b0100;
+/// Command Control: DINT with Interpolate.
+pub const INTERPOLATE: u8 = 0b0110;
+
+/// A box with one axis and one rotary drive.
+#[must_use]
+pub fn settings() -> Settings {
+    Settings {
+        configuration: include_str!("fixed.toml").to_owned(),
+        drives: vec![(1, UnitKind::Rotary)],
+        ..Settings::default()
+    }
+}
 
 /// The controller.
 pub struct FixedController {
@@ -128,26 +144,39 @@ impl FixedController {
     }
 
     /// One period: an update, and what the box does until the next one is due.
+    pub fn cycle(&mut self, rig: &mut Rig) {
+        self.send(rig);
+        rig.run_for(PERIOD);
+    }
+
+    /// Sends the next update.
     ///
     /// # Panics
     /// When the update cannot be written.
-    pub fn cycle(&mut self, rig: &mut Rig) {
-        self.sequence = self.sequence.wrapping_add(1);
+    pub fn send(&mut self, rig: &mut Rig) {
         if self.command.node_control.contains(NodeControl::DATA_VALID) {
             self.command.update_id = self.command.update_id.wrapping_add(1);
         }
         let mut data = [0; LEN];
         self.command.emit(&mut Writer::new(&mut data)).expect("16 octets");
+        self.send_octets(rig, &data);
+    }
+
+    /// Sends these octets as the next update.
+    ///
+    /// # Panics
+    /// When they do not fit a datagram.
+    pub fn send_octets(&mut self, rig: &mut Rig, data: &[u8]) {
+        self.sequence = self.sequence.wrapping_add(1);
         let datagram = Class1Datagram {
             connection_id: self.connection_id,
             encapsulation_sequence: u32::from(self.sequence),
             sequence_count: self.sequence,
-            data: &data,
+            data,
         };
         let mut bytes = vec![0; datagram.buffer_len()];
         datagram.emit(&mut bytes).expect("it fits");
         rig.inject_datagram(&bytes, SocketAddrV4::new(ADDRESS, IO_PORT));
-        rig.run_for(PERIOD);
     }
 
     /// What the last update of the device said.

@@ -2,64 +2,20 @@
 
 use std::f64::consts::PI;
 
-use axisbridge_tests::rig::fixed::FixedController;
-use axisbridge_tests::rig::{Rig, Settings};
+use axisbridge_tests::rig::Rig;
+use axisbridge_tests::rig::fixed::{FixedController, IMMEDIATE, INTERPOLATE, settings};
 use profile_cip::wire::motion::codes::{ActualDataSet, AxisControl, AxisStateCode, ControlMode, NodeStatus};
 use profile_cip::wire::motion::{ActualPosition, CommandPosition, CommandValues};
 use profile_generic::cast::i64_from_f64;
-use profile_generic::scaling::UnitKind;
 use profile_generic::time::DurationNs;
-
-const BOX: &str = r#"
-[box]
-name = "fixed"
-
-[[device]]
-name = "front"
-listen = "10.0.0.2"
-axes = ["turntable"]
-connection_format = "fixed"
-update_period = { min = "2 ms", max = "16 ms" }
-
-[device.identity]
-vendor_id = 1
-product_code = 1002
-serial_number = 0x0041_4202
-
-[[axis]]
-name = "turntable"
-instance = 1
-drive = "drive-a"
-unit = "revolution"
-motion_resolution = 1_000_000
-
-[axis.limits]
-following_error = 0.5
-
-[south.sercos]
-interface = "in-process"
-cycle_time = "2 ms"
-jitter = "100 us"
-
-[[south.sercos.drive]]
-name = "drive-a"
-address = 1
-"#;
 
 /// Nanounits in a revolution.
 const REVOLUTION: i64 = 1_000_000_000;
-/// Command Control: DINT with Immediate, and with Interpolate.
-const IMMEDIATE: u8 = 0b0100;
-const INTERPOLATE: u8 = 0b0110;
 const GET_ATTRIBUTE_SINGLE: u8 = 0x0E;
 const AXIS_STATE: u16 = 650;
 
 fn rig() -> Rig {
-    Rig::ready(Settings {
-        configuration: BOX.to_owned(),
-        drives: vec![(1, UnitKind::Rotary)],
-        ..Settings::default()
-    })
+    Rig::ready(settings())
 }
 
 fn velocity(value: f32) -> CommandValues {
