@@ -2,11 +2,13 @@
 //! engine alone.
 
 use allocation_counter::measure;
+use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::fixed::{self, FixedController};
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
-use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::Event;
+use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
+use profile_cip::controller::{Event, Step};
+use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::motion::codes::{AxisControl, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_generic::fault::FaultCause;
@@ -109,4 +111,20 @@ fn the_fixed_format_allocates_nothing() {
     });
     assert_eq!(found, []);
     assert!(rig.engine.axes()[0].counters().commands > applied + 600, "the axis was led");
+}
+
+#[test]
+fn a_hookup_test_allocates_nothing() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![Step::Dwell { seconds: 100.0 }]);
+    let stopped =
+        |rig: &Rig| rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped);
+    rig.run_until(millis(10_000), "both axes in Stopped", stopped);
+    let client = Client::connect(&mut rig, CONTROLLER);
+    let quarter_turn = [0, 0, 0, 0, 0, 0, 0x80, 0x3E, 0, 0, 0, 0];
+    assert_eq!(client.ask(&mut rig, 0x53, 1, None, &quarter_turn), (0, vec![]));
+    let from = rig.position(0);
+    assert_eq!(weigh(&mut rig, 6_000, |_, _| ()), []);
+    assert!(rig.position(0) - from > 200_000_000, "it moved while it was weighed");
+    assert!(stopped(&rig), "from beginning to end");
 }

@@ -77,6 +77,16 @@ pub mod id {
     pub const COMMAND_TARGET_TIME: u16 = 93;
     /// Status Data Set.
     pub const STATUS_DATA_SET: u16 = 94;
+    /// Controller Position Command - Integer.
+    pub const POSITION_COMMAND_INTEGER: u16 = 360;
+    /// Controller Position Command - Float.
+    pub const POSITION_COMMAND_FLOAT: u16 = 361;
+    /// Controller Velocity Command.
+    pub const VELOCITY_COMMAND: u16 = 362;
+    /// Controller Acceleration Command.
+    pub const ACCELERATION_COMMAND: u16 = 363;
+    /// Controller Torque Command.
+    pub const TORQUE_COMMAND: u16 = 364;
     /// Axis State.
     pub const AXIS_STATE: u16 = 650;
     /// Axis Status.

@@ -22,7 +22,7 @@ use crate::wire::Writer;
 use crate::wire::motion::codes::{AlarmType, FaultType, MotionService, SyncStatus};
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::motion::test_service::{RUN_HOOKUP_TEST_LEN, RunHookupTest};
-use crate::wire::motion::{Format, ServiceRequest};
+use crate::wire::motion::{CommandPosition, Format, ServiceRequest};
 use crate::wire::status::GeneralStatus;
 
 /// Class code of the Motion Device Axis Object.
@@ -265,20 +265,27 @@ impl MotionDevice {
                 let fault = slot.axis.faults.newest_fault();
                 let alarm = slot.axis.faults.newest_alarm();
                 let safety = drive.safety.unwrap_or_default();
-                let integer = fixed
-                    || matches!(
-                        block.values.position,
-                        Some(crate::wire::motion::CommandPosition::Integer(_))
-                    );
+                let real = |value: Option<f32>| u64::from(value.unwrap_or(0.0).to_bits());
+                // A position in the form in which it came; the other form shows nothing.
+                let (integer, counts, float) = match block.values.position {
+                    Some(CommandPosition::Integer(counts)) => (true, i64::from(counts).cast_unsigned(), 0),
+                    Some(CommandPosition::Float(counts)) => (false, 0, counts.to_bits()),
+                    None => (false, 0, 0),
+                };
                 let values = [
                     (id::CONTROL_MODE, u64::from(block.control_mode.0)),
                     (id::FEEDBACK_MODE, u64::from(block.feedback_mode.0)),
                     (id::CONTROL_STATUS, u64::from(block.control_status.bits())),
                     (id::ACTUAL_DATA_SET, u64::from(block.actual_data_set.bits())),
                     (id::COMMAND_DATA_SET, u64::from(block.values.data_set().bits())),
-                    (id::COMMAND_CONTROL, u64::from(block.target.0) | (u64::from(integer) << 2)),
+                    (id::COMMAND_CONTROL, u64::from(block.target.0) | (u64::from(fixed || integer) << 2)),
                     (id::COMMAND_TARGET_TIME, slot.axis.target_time()),
                     (id::STATUS_DATA_SET, u64::from(block.status_data_set.bits())),
+                    (id::POSITION_COMMAND_INTEGER, counts),
+                    (id::POSITION_COMMAND_FLOAT, float),
+                    (id::VELOCITY_COMMAND, real(block.values.velocity)),
+                    (id::ACCELERATION_COMMAND, real(block.values.acceleration)),
+                    (id::TORQUE_COMMAND, real(block.values.torque)),
                     (id::AXIS_STATE, u64::from(slot.axis.state().code().0)),
                     (id::AXIS_STATUS, u64::from(slot.axis.status(&context).bits())),
                     (id::AXIS_STATUS_MFG, u64::from(drive.axis_status_mfg)),

@@ -122,6 +122,9 @@ pub(super) fn definitions() -> Vec<AttributeDefinition> {
         AttributeDefinition { elements: Some(64), ..new(673, DataType::Usint) },
         AttributeDefinition { backing: Backing::Drive, ..new(1316, DataType::Udint) },
         AttributeDefinition { range: Some((0.0, 4.0)), ..new(610, DataType::Usint) },
+        AttributeDefinition { access: Access::Cyclic, ..new(360, DataType::Dint) },
+        AttributeDefinition { access: Access::Cyclic, ..new(361, DataType::Lreal) },
+        AttributeDefinition { access: Access::Cyclic, ..new(362, DataType::Real) },
     ]
 }
 

@@ -225,6 +225,26 @@ fn explicit_services_work_beside_the_connection() {
 }
 
 #[test]
+fn the_commands_of_the_connection_are_read_in_the_form_in_which_they_came() {
+    let mut rig = Rig::stopped();
+    let values = |rig: &mut Rig, values| {
+        rig.blocks[0].values = values;
+        rig.cycle();
+        [360, 361, 362].map(|id| reply_of(rig.request(explicit(1, 0x0E, 1, Some(id), &[]))).2)
+    };
+    let float = CommandValues {
+        position: Some(CommandPosition::Float(-2.5)),
+        velocity: Some(7.5),
+        ..CommandValues::default()
+    };
+    let zero = |size: usize| vec![0; size];
+    let expected = [zero(4), (-2.5_f64).to_le_bytes().to_vec(), 7.5_f32.to_le_bytes().to_vec()];
+    assert_eq!(values(&mut rig, float), expected);
+    let integer = CommandValues { position: Some(CommandPosition::Integer(-3)), ..CommandValues::default() };
+    assert_eq!(values(&mut rig, integer), [(-3_i32).to_le_bytes().to_vec(), zero(8), zero(4)]);
+}
+
+#[test]
 fn explicit_requests_wait_for_the_drive_and_for_each_other() {
     let mut rig = Rig::stopped();
     assert_eq!(rig.request(explicit(1, 0x0E, 1, Some(1316), &[])), None);
