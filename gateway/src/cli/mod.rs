@@ -9,6 +9,7 @@ mod eds;
 mod progress;
 mod report;
 mod run;
+mod script;
 mod signal;
 mod simulate;
 
@@ -209,11 +210,17 @@ struct SercosDriveArguments {
 #[derive(Debug, Args)]
 struct ControllerArguments {
     /// The device's address.
-    #[arg(long, value_name = "ADDR")]
-    target: std::net::Ipv4Addr,
+    #[arg(long, value_name = "ADDR", required_unless_present = "script")]
+    target: Option<std::net::Ipv4Addr>,
     /// This controller's own address; the class 1 data arrive there on UDP 2222.
-    #[arg(long, value_name = "ADDR", default_value = "0.0.0.0")]
-    bind: std::net::Ipv4Addr,
+    #[arg(long, value_name = "ADDR")]
+    bind: Option<std::net::Ipv4Addr>,
+    /// Run this script instead of the usual motion; it says everything about connection, axes and steps.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["axes", "update_period_us", "counts_per_unit", "speed", "seconds"])]
+    script: Option<PathBuf>,
+    /// Only check the script and print what it would do; nothing is sent.
+    #[arg(long, requires = "script")]
+    check: bool,
     /// How many axes the device has.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
     axes: u8,

@@ -1,5 +1,6 @@
 //! `axisbridge simulate`: the other sides as processes of their own.
 
+use std::net::Ipv4Addr;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +10,7 @@ use profile_generic::scaling::UnitKind;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
-use super::{CliError, ControllerArguments, SercosDriveArguments, signal};
+use super::{CliError, ControllerArguments, SercosDriveArguments, script, signal};
 use crate::mapping::Mapping;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::line;
@@ -73,6 +74,10 @@ fn end_after(stop: Arc<AtomicBool>, seconds: u64) {
 
 /// A CIP Motion controller that moves the axes of a device.
 pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError> {
+    if let Some(path) = &arguments.script {
+        return script::run(arguments, path);
+    }
+    let Some(target) = arguments.target else { return Err("expected --target ADDR".into()) };
     let stop = signal::stop_on_signals()?;
     let seconds = f64::from(arguments.seconds);
     let counts = |axis: usize| {
@@ -89,7 +94,7 @@ pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError>
         .collect();
     let mapping = Mapping::embedded()?;
     let config = setup::controller(&mapping, &axes, arguments.update_period_us);
-    let endpoints = Endpoints { target: arguments.target, bind: arguments.bind };
+    let endpoints = Endpoints { target, bind: arguments.bind.unwrap_or(Ipv4Addr::UNSPECIFIED) };
     let mut progress = Progress::new(arguments.json);
     let steps = program::standard(&plans, seconds);
     let report =

@@ -12,7 +12,7 @@ use super::FILE_LEN_MAX;
 
 /// A fault found while checking, by its place in the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Problem {
+pub(crate) struct Problem {
     pub span: Range<usize>,
     pub title: String,
     pub expected: String,
@@ -91,17 +91,9 @@ impl fmt::Display for Report {
 }
 
 impl ConfigError {
-    pub(super) fn invalid(source: &str, name: &str, mut problems: Vec<Problem>) -> Self {
-        problems.sort_by_key(|problem| problem.span.start);
-        let rendered: Vec<String> = problems.iter().map(|problem| render(source, name, problem)).collect();
-        let diagnostics = problems
-            .into_iter()
-            .map(|problem| {
-                let (line, column) = place(source, problem.span.start);
-                Diagnostic { line, column, title: problem.title, expected: problem.expected }
-            })
-            .collect();
-        Self::Invalid { report: Report(rendered.join("\n\n")), diagnostics }
+    pub(super) fn invalid(source: &str, name: &str, problems: Vec<Problem>) -> Self {
+        let (report, diagnostics) = diagnose(source, name, problems);
+        Self::Invalid { report, diagnostics }
     }
 
     /// The faults of the file; empty when it could not be read at all.
@@ -112,6 +104,20 @@ impl ConfigError {
             _ => &[],
         }
     }
+}
+
+/// Shows the faults of a file in their order, to people and to programs.
+pub(crate) fn diagnose(source: &str, name: &str, mut problems: Vec<Problem>) -> (Report, Vec<Diagnostic>) {
+    problems.sort_by_key(|problem| problem.span.start);
+    let rendered: Vec<String> = problems.iter().map(|problem| render(source, name, problem)).collect();
+    let diagnostics = problems
+        .into_iter()
+        .map(|problem| {
+            let (line, column) = place(source, problem.span.start);
+            Diagnostic { line, column, title: problem.title, expected: problem.expected }
+        })
+        .collect();
+    (Report(rendered.join("\n\n")), diagnostics)
 }
 
 fn render(source: &str, name: &str, problem: &Problem) -> String {

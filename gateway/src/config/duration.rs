@@ -3,10 +3,10 @@
 use profile_generic::time::DurationNs;
 
 /// What [`parse`] expects, for error messages.
-pub(super) const EXPECTED: &str = "a number and a unit, such as \"2 ms\" (units: ns, us, ms, s)";
+pub(crate) const EXPECTED: &str = "a number and a unit, such as \"2 ms\" (units: ns, us, ms, s)";
 
 /// Reads a time exactly; `None` when it is not one, is finer than a nanosecond or too long for 64 bits.
-pub(super) fn parse(text: &str) -> Option<DurationNs> {
+pub(crate) fn parse(text: &str) -> Option<DurationNs> {
     let text = text.trim();
     let digits = text.find(|character: char| !character.is_ascii_digit() && character != '.')?;
     let (number, unit) = text.split_at(digits);

@@ -7,7 +7,7 @@
 mod check;
 mod connection_format;
 mod diagnostic;
-mod duration;
+pub(crate) mod duration;
 pub mod file;
 
 use std::net::{Ipv4Addr, SocketAddr};
@@ -17,7 +17,8 @@ use profile_cip::wire::motion::Format;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::time::DurationNs;
 
-pub use diagnostic::{ConfigError, Diagnostic};
+pub use diagnostic::{ConfigError, Diagnostic, Report};
+pub(crate) use diagnostic::{Problem, diagnose};
 
 use crate::mapping::CaptureMode;
 use crate::sys::realtime;

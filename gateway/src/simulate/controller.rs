@@ -6,7 +6,9 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use profile_cip::controller::{Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step};
+use profile_cip::controller::{
+    Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
+};
 use profile_generic::time::DurationNs;
 
 use crate::sys::clock::{self, SystemClock};
@@ -81,27 +83,32 @@ pub fn run(
     let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), cpu: None, lock_memory: false });
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
-    let mut stream =
-        connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
+    let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
     let clock = SystemClock::detect();
     let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
     let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
-    let mut stream_open = true;
+    // Gone when either side has closed it.
+    let mut stream = Some(stream);
     let mut stopping = false;
     controller.tcp_connected(clock::monotonic_now());
     while !controller.is_closed() {
         if stop.load(Ordering::Relaxed) && !stopping {
             stopping = true;
-            controller.finish(clock::monotonic_now());
+            controller.interrupt(clock::monotonic_now());
         }
-        while stream_open {
-            match stream.read(&mut buffer[..STREAM_CHUNK]) {
+        while let Some(open) = &mut stream {
+            match open.read(&mut buffer[..STREAM_CHUNK]) {
                 Ok(0) => {
-                    stream_open = false;
+                    stream = None;
                     controller.tcp_closed(clock::monotonic_now());
                 }
                 Ok(length) => controller.handle_stream(clock::monotonic_now(), &buffer[..length]),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                // A device that throws the stream away is as good as one that closes it.
+                Err(error) if error.kind() == io::ErrorKind::ConnectionReset => {
+                    stream = None;
+                    controller.tcp_closed(clock::monotonic_now());
+                }
                 Err(source) => return Err(RunError::Socket { what: "TCP stream to the device", source }),
             }
         }
@@ -123,7 +130,19 @@ pub fn run(
         while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
             outgoing.extend_from_slice(&buffer[..length]);
         }
-        flush(&mut stream, &mut outgoing, stream_open)?;
+        flush(stream.as_mut(), &mut outgoing)?;
+        match controller.poll_stream_action() {
+            Some(StreamAction::Close) => stream = None,
+            Some(StreamAction::Reopen) => {
+                drop(stream.take());
+                outgoing.clear();
+                let opened =
+                    connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
+                stream = Some(opened);
+                controller.tcp_connected(clock::monotonic_now());
+            }
+            None => {}
+        }
         while let Some(event) = controller.poll_event() {
             on_event(&event);
         }
@@ -153,8 +172,12 @@ fn connect(target: SocketAddrV4, bind: Ipv4Addr) -> io::Result<TcpStream> {
 }
 
 /// Writes what the stream takes now; the rest waits.
-fn flush(stream: &mut TcpStream, outgoing: &mut Vec<u8>, open: bool) -> Result<(), RunError> {
-    while open && !outgoing.is_empty() {
+fn flush(stream: Option<&mut TcpStream>, outgoing: &mut Vec<u8>) -> Result<(), RunError> {
+    let Some(stream) = stream else {
+        outgoing.clear();
+        return Ok(());
+    };
+    while !outgoing.is_empty() {
         match stream.write(outgoing) {
             Ok(written) => {
                 outgoing.drain(..written);

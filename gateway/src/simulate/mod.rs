@@ -5,4 +5,5 @@
 pub mod controller;
 pub mod line;
 pub mod program;
+pub mod script;
 pub mod setup;

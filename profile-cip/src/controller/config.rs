@@ -2,9 +2,11 @@
 
 use core::fmt;
 
-use super::link::cyclic_len;
+use super::failure::Failure;
+use super::limits::AxisLimits;
+use super::sets::{DataSets, cyclic_len};
 use crate::wire::motion::attribute_list::AttributeSelector;
-use crate::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode, FeedbackSource};
+use crate::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode, FeedbackSource, TimeDataSet};
 use profile_generic::time::DurationNs;
 
 /// Most axis instances of one connection; the EtherNet/IP part of the standard (IEC 61800-7-302) allows 16.
@@ -88,29 +90,35 @@ pub struct KeyExpectation {
     pub compatible: bool,
 }
 
+/// Counts (position control units) in a unit of the program.
+///
+/// The unit of the program is the one that the device counts velocity in, since velocities go out in units/s
+/// and accelerations in units/s² (Table 5-2.8). A device that scales (attribute 45 is 1) has Motion Counts and
+/// Motion Units, and this is its Motion Resolution, attribute 78. One that does not has counts and units of
+/// its feedback or motor, and this is the resolution of that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scaling {
+    /// Nobody knows: the axis is watched, enabled and asked, and never moved.
+    Unknown,
+    /// So many counts; above zero.
+    Counts(f64),
+    /// What the device says in Motion Resolution (78), if it scales (attribute 45 is 1).
+    Device,
+}
+
 /// One axis of the device; its instance number is its place in [`ControllerConfig::axes`], counted from 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisSetup {
-    /// Counts (position control units) per unit of the program; above zero.
-    ///
-    /// The unit of the program is the one that the device counts velocity in, since velocities go out in
-    /// units/s and accelerations in units/s² (Table 5-2.8). A device that scales (attribute 45 is 1) has
-    /// Motion Counts and Motion Units, and this is its Motion Resolution, attribute 78. One that does not has
-    /// counts and units of its feedback or motor, and this is the resolution of that.
-    pub counts_per_unit: f64,
-    /// Control Mode outside of jogs; position or velocity.
+    /// Counts in a unit.
+    pub scaling: Scaling,
+    /// Control Mode at the start; steps change it.
     pub control_mode: ControlMode,
-    /// Feedback Mode sent in every update.
+    /// Feedback Mode sent in every update; steps change it.
     pub feedback_mode: FeedbackMode,
-    /// Send Command Position as DINT instead of LREAL.
-    pub integer_position: bool,
-    /// Send Command Velocity, in units/s, along with Command Position.
-    pub velocity_feed_forward: bool,
-    /// Send Command Acceleration, in units/s², along with the other commands.
-    pub acceleration_feed_forward: bool,
-    /// Ask for Actual Velocity, in units/s. The controller itself makes no use of it, and not every device has
-    /// it.
-    pub actual_velocity: bool,
+    /// What goes to the device and what is asked of it in every update; steps change it.
+    pub sets: DataSets,
+    /// What no step may go beyond.
+    pub limits: AxisLimits,
     /// Attributes written before Configuration Complete, in this order.
     pub attributes: Vec<AttributeSet>,
 }
@@ -119,14 +127,18 @@ impl AxisSetup {
     /// A position-controlled axis on its motor feedback, commanded in LREAL with velocity feed-forward.
     #[must_use]
     pub fn position(counts_per_unit: f64) -> Self {
+        Self { scaling: Scaling::Counts(counts_per_unit), ..Self::unscaled() }
+    }
+
+    /// The same axis, of which nobody knows the scaling: it does not move.
+    #[must_use]
+    pub fn unscaled() -> Self {
         Self {
-            counts_per_unit,
+            scaling: Scaling::Unknown,
             control_mode: ControlMode::POSITION,
             feedback_mode: FeedbackMode(FeedbackSource::MOTOR.0),
-            integer_position: false,
-            velocity_feed_forward: true,
-            acceleration_feed_forward: false,
-            actual_velocity: true,
+            sets: DataSets::default(),
+            limits: AxisLimits::default(),
             attributes: Vec::new(),
         }
     }
@@ -201,6 +213,9 @@ pub struct ControllerConfig {
     /// Consecutive update periods without a D-to-C update after which the controller gives up before the
     /// connection times out; `None` leaves it to the connection.
     pub update_delay_high_limit: Option<u8>,
+    /// Diagnostics in the header that every D-to-C update is asked for; steps change them. Time stamp and time
+    /// offset go by themselves.
+    pub time_data: TimeDataSet,
     /// Attributes of the class (instance 0), written first.
     pub class_attributes: Vec<AttributeSet>,
     /// The axes.
@@ -214,7 +229,7 @@ impl ControllerConfig {
     /// `grand_master` with interpolation, for these axes.
     #[must_use]
     pub fn new(grand_master: Option<[u8; 8]>, axes: Vec<AxisSetup>) -> Self {
-        let wanted = cyclic_len(axes.len()) + SERVICE_ROOM;
+        let wanted = cyclic_len(&axes) + SERVICE_ROOM;
         let connection_size =
             u16::try_from(wanted).unwrap_or(CONNECTION_SIZE_MAX).clamp(500, CONNECTION_SIZE_MAX);
         Self {
@@ -233,6 +248,7 @@ impl ControllerConfig {
             command_target: CommandTarget::INTERPOLATE,
             update_delay_low_limit: 2,
             update_delay_high_limit: None,
+            time_data: TimeDataSet::UPDATE_DIAGNOSTICS,
             class_attributes: Vec::new(),
             axes,
             time_outs: TimeOuts::default(),
@@ -256,7 +272,7 @@ impl ControllerConfig {
     /// # Errors
     /// The first value out of its range.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let bad = |what, value: f64, wanted| Err(ConfigError { what, value, wanted });
+        let bad = |what, value: f64, wanted| Err(ConfigError::Value { what, value, wanted });
         if self.axes.is_empty() || self.axes.len() > MAX_AXES {
             let count = u32::try_from(self.axes.len()).unwrap_or(u32::MAX);
             return bad("number of axes", f64::from(count), "1 to 16");
@@ -267,9 +283,9 @@ impl ControllerConfig {
         if self.timeout_multiplier > 7 {
             return bad("timeout_multiplier", f64::from(self.timeout_multiplier), "0 to 7");
         }
-        let least = cyclic_len(self.axes.len()) + SERVICE_ROOM_MIN;
+        let least = cyclic_len(&self.axes) + SERVICE_ROOM_MIN;
         if usize::from(self.connection_size) < least || self.connection_size > CONNECTION_SIZE_MAX {
-            let wanted = "room for all axes and a service (78 + 56 for each axis) and at most 1400";
+            let wanted = "room for the data sets of all axes and a service, and at most 1400";
             return bad("connection_size", f64::from(self.connection_size), wanted);
         }
         if self.command_target.0 > 2 {
@@ -279,32 +295,54 @@ impl ControllerConfig {
             return bad("major_revision", f64::from(self.key.major_revision), "0 to 127");
         }
         for axis in &self.axes {
-            let scale = axis.counts_per_unit;
-            if !(scale.is_finite() && scale > 0.0) {
+            if let Scaling::Counts(scale) = axis.scaling
+                && !(scale.is_finite() && scale > 0.0)
+            {
                 return bad("counts_per_unit", scale, "a finite number above zero");
             }
-            if ![ControlMode::POSITION, ControlMode::VELOCITY].contains(&axis.control_mode) {
-                return bad("control_mode", f64::from(axis.control_mode.0), "1 (position) or 2 (velocity)");
+            if !(1..=4).contains(&axis.control_mode.0) {
+                let wanted = "1 (position), 2 (velocity), 3 (acceleration) or 4 (torque)";
+                return bad("control_mode", f64::from(axis.control_mode.0), wanted);
+            }
+            if let Some((what, value)) = axis.limits.first_bad() {
+                return bad(
+                    what,
+                    value,
+                    "a finite number above zero, and the lower position below the upper one",
+                );
             }
         }
         Ok(())
     }
 }
 
-/// A value of the configuration that cannot work.
+/// What cannot work in a configuration or a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConfigError {
-    /// The value's name.
-    pub what: &'static str,
-    /// The value.
-    pub value: f64,
-    /// What it may be.
-    pub wanted: &'static str,
+pub enum ConfigError {
+    /// A value of the configuration.
+    Value {
+        /// The value's name.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// What it may be.
+        wanted: &'static str,
+    },
+    /// A step of the program that would fail for certain.
+    Step {
+        /// Place in the program, from 0.
+        step: usize,
+        /// Why.
+        failure: Failure,
+    },
 }
 
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: expected {}, found {}", self.what, self.wanted, self.value)
+        match self {
+            Self::Value { what, value, wanted } => write!(f, "{what}: expected {wanted}, found {value}"),
+            Self::Step { step, failure } => write!(f, "step {step}: {failure}"),
+        }
     }
 }
 
@@ -331,24 +369,29 @@ mod tests {
         assert_eq!(good.check(), Ok(()));
         assert_eq!(good.connection_timeout(), DurationNs::from_millis(16));
         type Spoil = fn(&mut ControllerConfig);
-        let broken: [(Spoil, &str); 8] = [
+        let broken: [(Spoil, &str); 9] = [
             (|c| c.axes.clear(), "number of axes: expected 1 to 16, found 0"),
             (|c| c.rpi_us = 50, "rpi_us: expected 100 to 1000000, found 50"),
             (|c| c.timeout_multiplier = 8, "timeout_multiplier: expected 0 to 7, found 8"),
             (
                 |c| c.connection_size = 133,
-                "connection_size: expected room for all axes and a service (78 + 56 for each axis) and at \
-                 most 1400, found 133",
+                "connection_size: expected room for the data sets of all axes and a service, and at most \
+                 1400, found 133",
             ),
             (|c| c.command_target = CommandTarget(3), "command_target: expected 0 to 2, found 3"),
             (|c| c.key.major_revision = 128, "major_revision: expected 0 to 127, found 128"),
             (
-                |c| c.axes[0].counts_per_unit = -1.0,
+                |c| c.axes[0].scaling = Scaling::Counts(-1.0),
                 "counts_per_unit: expected a finite number above zero, found -1",
             ),
             (
-                |c| c.axes[0].control_mode = ControlMode::TORQUE,
-                "control_mode: expected 1 (position) or 2 (velocity), found 4",
+                |c| c.axes[0].control_mode = ControlMode::NO_CONTROL,
+                "control_mode: expected 1 (position), 2 (velocity), 3 (acceleration) or 4 (torque), found 0",
+            ),
+            (
+                |c| c.axes[0].limits.position = Some((2.0, 1.0)),
+                "position limits: expected a finite number above zero, and the lower position below the \
+                 upper one, found 2",
             ),
         ];
         for (spoil, text) in broken {

@@ -3,9 +3,12 @@
 use core::fmt;
 
 use super::failure::Failure;
+use super::misbehaviour::Misbehaviour;
 use super::status;
 use crate::wire;
-use crate::wire::motion::codes::{AxisStateCode, ClearingEvent, FaultType, NodeAlarm, NodeFault, SyncStatus};
+use crate::wire::motion::codes::{
+    AxisStateCode, ClearingEvent, FaultType, MotionService, NodeAlarm, NodeFault, SyncStatus,
+};
 use crate::wire::motion::{AlarmRecord, EventNotification, FaultRecord};
 
 /// Who the device says it is.
@@ -135,6 +138,48 @@ pub enum Event {
         /// The values in the order of the answer.
         values: Vec<AttributeValue>,
     },
+    /// The answer to [`Step::Service`](super::program::Step::Service) or a test result.
+    ServiceAnswered {
+        /// Instance number; 0 is the class.
+        instance: u8,
+        /// The service.
+        service: MotionService,
+        /// General status.
+        status: u8,
+        /// Body of the answer.
+        data: Vec<u8>,
+    },
+    /// The answer to [`Step::Explicit`](super::program::Step::Explicit).
+    ExplicitAnswered {
+        /// Service code.
+        service: u8,
+        /// General status.
+        status: u8,
+        /// First word of the extended status.
+        extended: Option<u16>,
+        /// Reply data.
+        data: Vec<u8>,
+    },
+    /// A cyclic list is in use.
+    CyclicListInUse {
+        /// Instance number.
+        axis: u8,
+        /// Block ID.
+        block_id: u8,
+    },
+    /// The scaling of an axis was taken from the device.
+    Scaled {
+        /// Instance number.
+        axis: u8,
+        /// Counts in a unit.
+        counts: f64,
+    },
+    /// The controller misbehaves from now on.
+    Misbehaving(Misbehaviour),
+    /// The connection is lost, as is to be expected of a controller that misbehaves.
+    ConnectionLost,
+    /// Session and connection are opened anew.
+    Reconnecting,
     /// A step of the program began.
     StepStarted {
         /// Place in the program, from 0.
@@ -232,6 +277,21 @@ impl fmt::Display for Event {
                     Err(s) => write!(f, " {}: {}", v.id, status::Named(*s)),
                 })
             }
+            Self::ServiceAnswered { instance, service, status, data } => {
+                write!(f, "{}: {service}: {} {data:02X?}", Instance(*instance), status::Named(*status))
+            }
+            Self::ExplicitAnswered { service, status, extended, data } => {
+                write!(f, "explicit service {service:#04x}: {}", status::Named(*status))?;
+                extended.map_or(Ok(()), |word| write!(f, ", extended status {word:#06x}"))?;
+                write!(f, " {data:02X?}")
+            }
+            Self::CyclicListInUse { axis, block_id } => {
+                write!(f, "axis {axis}: cyclic list in use as block {block_id}")
+            }
+            Self::Scaled { axis, counts } => write!(f, "axis {axis}: {counts} counts in a unit"),
+            Self::Misbehaving(kind) => write!(f, "misbehaving: {kind}"),
+            Self::ConnectionLost => f.write_str("connection lost"),
+            Self::Reconnecting => f.write_str("reconnecting"),
             Self::StepStarted { step } => write!(f, "step {step} started"),
             Self::StepFinished { step } => write!(f, "step {step} finished"),
             Self::Malformed { error } => write!(f, "dropped malformed data: {error}"),

@@ -150,7 +150,9 @@ impl Controller {
     pub(super) fn handle_events(&mut self, index: usize, block: Option<&ActualEvents>, received: u8) {
         let Some(axis) = self.axes.get_mut(index) else { return };
         let (number, events) = (axis.instance(), &mut self.events);
-        axis.events.handle(block, received, |notification| {
+        let super::axis::Axis { events: checks, seen, .. } = axis;
+        checks.handle(block, received, |notification| {
+            seen.note_event(notification);
             super::engine::push(events, Event::AxisEvent { axis: number, notification });
         });
     }

@@ -2,13 +2,15 @@
 
 use core::fmt;
 
+use super::condition::{Condition, Found};
 use super::event::{FaultText, Instance};
 use super::status;
 use super::trajectory::ProfileError;
 use crate::wire;
 use crate::wire::motion::FaultRecord;
 use crate::wire::motion::codes::{
-    AxisControl, AxisStateCode, MotionService, NodeAlarm, NodeFault, SyncStatus,
+    AxisControl, AxisStateCode, ControlMode, EventChecking, MotionService, NodeAlarm, NodeFault, SyncStatus,
+    TestStatus,
 };
 use profile_generic::time::DurationNs;
 
@@ -27,10 +29,15 @@ pub enum Exchange {
     LargeForwardOpen,
     /// Forward_Close.
     ForwardClose,
+    /// A request of the program with this service code.
+    Message(u8),
 }
 
 impl fmt::Display for Exchange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Self::Message(service) = self {
+            return write!(f, "explicit service {service:#04x}");
+        }
         f.write_str(match self {
             Self::ListIdentity => "ListIdentity",
             Self::RegisterSession => "RegisterSession",
@@ -38,6 +45,7 @@ impl fmt::Display for Exchange {
             Self::ForwardOpen => "Forward_Open",
             Self::LargeForwardOpen => "Large_Forward_Open",
             Self::ForwardClose => "Forward_Close",
+            Self::Message(_) => "message",
         })
     }
 }
@@ -225,7 +233,118 @@ pub enum Failure {
     WrongMode {
         /// Instance number.
         axis: u8,
+        /// Mode it is in.
+        mode: ControlMode,
     },
+    /// A step names an axis that the configuration does not have.
+    UnknownAxis {
+        /// Instance number.
+        axis: u8,
+        /// How many axes there are.
+        count: u8,
+    },
+    /// Nobody knows how many counts a unit of the axis has, so it may not move.
+    NotScaled {
+        /// Instance number.
+        axis: u8,
+    },
+    /// A step goes beyond a limit of the axis.
+    BeyondLimit {
+        /// Instance number.
+        axis: u8,
+        /// What.
+        what: &'static str,
+        /// The value, in units, units/s, units/s² or %.
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The data sets of all axes do not fit the connection.
+    DataTooLong {
+        /// Bytes that the axes need in the longer direction.
+        needed: usize,
+        /// Bytes of the connection.
+        size: u16,
+    },
+    /// A request does not fit the connection.
+    ServiceTooLong {
+        /// Instance number; 0 is the class.
+        instance: u8,
+        /// The request.
+        service: MotionService,
+        /// Bytes that fit.
+        room: usize,
+    },
+    /// A value is not in the cyclic list, or not as long as that has it.
+    NotInList {
+        /// Instance number.
+        axis: u8,
+        /// Attribute ID.
+        attribute: u16,
+    },
+    /// The device does not take cyclic data of the list agreed.
+    CyclicRefused {
+        /// Instance number.
+        axis: u8,
+        /// General status.
+        status: u8,
+    },
+    /// The scaling cannot be taken from the device.
+    ScalingUnknown {
+        /// Instance number.
+        axis: u8,
+        /// What the device says of Motion Scaling Configuration (45), if anything.
+        configuration: Option<u8>,
+    },
+    /// An expectation was not met.
+    Unmet {
+        /// What was expected.
+        condition: Condition,
+        /// What came.
+        found: Found,
+        /// How long the controller waited.
+        waited: DurationNs,
+    },
+    /// An answer has another status than expected.
+    OtherStatus {
+        /// Service code.
+        service: u8,
+        /// Expected.
+        expected: u8,
+        /// Found.
+        found: u8,
+    },
+    /// A request that had to be refused was not.
+    NotRefused {
+        /// Instance number.
+        axis: u8,
+        /// The request.
+        request: AxisControl,
+        /// Response Status expected, if it mattered.
+        expected: Option<u8>,
+        /// Response Status found.
+        found: u8,
+    },
+    /// A test ended otherwise than expected.
+    TestResult {
+        /// Instance number.
+        axis: u8,
+        /// Expected.
+        expected: TestStatus,
+        /// Found.
+        found: TestStatus,
+    },
+    /// The device does not check for events that are armed.
+    EventsNotChecked {
+        /// Instance number.
+        axis: u8,
+        /// Armed.
+        wanted: EventChecking,
+        /// Event Checking Status.
+        found: EventChecking,
+    },
+    /// The run was ended from outside.
+    Interrupted,
     /// No motion can be planned.
     Profile {
         /// Instance number.
@@ -335,7 +454,53 @@ impl fmt::Display for Failure {
                 fault.map_or(Ok(()), |fault| write!(f, ", {}", FaultText(fault)))
             }
             Self::AxisBusy { axis } => write!(f, "axis {axis}: a motion is under way already"),
-            Self::WrongMode { axis } => write!(f, "axis {axis}: expected position control for this step"),
+            Self::WrongMode { axis, mode } => write!(f, "axis {axis}: this step does not go with {mode}"),
+            Self::UnknownAxis { axis, count } => write!(f, "axis {axis}: expected an axis from 1 to {count}"),
+            Self::NotScaled { axis } => {
+                write!(f, "axis {axis}: does not move, since nobody knows how many counts its unit has")
+            }
+            Self::BeyondLimit { axis, what, value, limit } => {
+                write!(f, "axis {axis}: {what} {value} is beyond the limit {limit}")
+            }
+            Self::DataTooLong { needed, size } => {
+                write!(f, "the data sets of the axes need {needed} bytes, the connection has {size}")
+            }
+            Self::ServiceTooLong { instance, service, room } => write!(
+                f,
+                "{}: {service} does not fit the {room} bytes that the connection leaves",
+                Instance(instance)
+            ),
+            Self::NotInList { axis, attribute } => {
+                write!(f, "axis {axis}: attribute {attribute} is not in the cyclic list with this length")
+            }
+            Self::CyclicRefused { axis, status: s } => {
+                write!(f, "axis {axis}: cyclic data refused with {}", status(s))
+            }
+            Self::ScalingUnknown { axis, configuration } => {
+                write!(f, "axis {axis}: expected the device to scale (attribute 45 is 1), found ")?;
+                match configuration {
+                    Some(configuration) => write!(f, "{configuration}"),
+                    None => f.write_str("no such attribute"),
+                }
+            }
+            Self::Unmet { condition, found, waited } => {
+                write!(f, "expected {condition}, found {found} after {waited}")
+            }
+            Self::OtherStatus { service, expected, found } => {
+                write!(f, "service {service:#04x}: expected {}, found {}", status(expected), status(found))
+            }
+            Self::NotRefused { axis, request, expected, found } => {
+                write!(f, "axis {axis}: expected {request} refused")?;
+                expected.map_or(Ok(()), |expected| write!(f, " with {}", status(expected)))?;
+                write!(f, ", found {}", status(found))
+            }
+            Self::TestResult { axis, expected, found } => {
+                write!(f, "axis {axis}: expected {expected}, found {found}")
+            }
+            Self::EventsNotChecked { axis, wanted, found } => {
+                write!(f, "axis {axis}: expected events checked: {wanted}, found {found}")
+            }
+            Self::Interrupted => f.write_str("interrupted"),
             Self::Profile { axis, error } => write!(f, "axis {axis}: {error}"),
             Self::OutOfRange { axis, counts } => {
                 write!(f, "axis {axis}: {counts} counts are beyond the 32-bit range of Command Position")

@@ -66,6 +66,20 @@ impl Handshake {
         }
     }
 
+    /// Goes on from the acknowledged request to `code` without a zero between, Table 5-2.109.
+    pub fn chain(&mut self, code: AxisControl) {
+        self.acknowledge = None;
+        self.next = None;
+        self.exchange = Exchange::Requested(code);
+    }
+
+    /// Gives up the request under way and waits for the acknowledge of that.
+    pub fn ask_cancel(&mut self) {
+        self.next = None;
+        self.acknowledge = None;
+        self.exchange = Exchange::Requested(AxisControl::CANCEL);
+    }
+
     /// The code to send.
     pub const fn code(&self) -> AxisControl {
         match self.exchange {
@@ -88,6 +102,7 @@ impl Handshake {
     pub fn handle(&mut self, response: AxisControl, status: u8) {
         self.response = response;
         match self.exchange {
+            // What is chained begins while the acknowledge before it still stands; that one has another code.
             Exchange::Requested(request) if response == request => {
                 self.acknowledge = Some(Acknowledge { request, status });
                 self.exchange = Exchange::Clearing;

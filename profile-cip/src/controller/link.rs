@@ -1,11 +1,13 @@
 //! The motion I/O connection: datagrams out, datagrams in, and what is lost or late between them.
 
 use core::net::SocketAddrV4;
+use std::collections::VecDeque;
 
+use super::misbehaviour::Spoil;
 use super::services::Room;
 use super::session::Opened;
+use super::sets::ACTUAL_HEADER_MAX;
 use crate::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
-use crate::wire::motion::event::{ACTUAL_EVENTS_BARE, COMMAND_EVENTS_MAX};
 use crate::wire::motion::header::CommandHeader;
 use crate::wire::motion::{CommandInstance, CommandWriter};
 use crate::wire::{Error, motion};
@@ -13,22 +15,10 @@ use profile_generic::time::MonotonicTime;
 
 /// Largest C-to-D header: 8 bytes, time stamp, time offset.
 const COMMAND_HEADER_MAX: usize = 24;
-/// Largest D-to-C header: 8 bytes, time stamp, time offset, update and time diagnostics.
-const ACTUAL_HEADER_MAX: usize = 44;
-/// Largest cyclic part of an axis from this controller: instance header, block header, LREAL, two REAL.
-pub(super) const COMMAND_AXIS_MAX: usize = 8 + 8 + 8 + 4 + 4;
-/// Largest cyclic part of an axis that this controller asks for: instance header, block header, DINT, REAL,
-/// fault, alarm, axis status.
-pub(super) const ACTUAL_AXIS_MAX: usize = 8 + 8 + 4 + 4 + 12 + 12 + 8;
 /// Header of an instance and of its service block.
 const SERVICE_HEADERS: usize = 8 + 4;
 /// Block sizes count up to 255 words; an instance has its header, the cyclic part and the service block.
 const INSTANCE_MAX: usize = 255 * 4;
-
-/// Bytes of connection data that every axis in every update needs, beside the service channel.
-pub(super) const fn cyclic_len(axes: usize) -> usize {
-    SEQUENCE_COUNT_LEN + ACTUAL_HEADER_MAX + axes * ACTUAL_AXIS_MAX
-}
 
 /// What a received datagram means for the counters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,9 +36,12 @@ pub(super) enum Arrival {
 pub(super) struct Link {
     opened: Option<Opened>,
     size: usize,
-    axes: usize,
     frame: Vec<u8>,
     length: Option<usize>,
+    /// Datagrams beside the usual one: repeated, held back until the next one, or until an instant.
+    extra: VecDeque<Vec<u8>>,
+    held: Option<Vec<u8>>,
+    delayed: VecDeque<(MonotonicTime, Vec<u8>)>,
     sequence_count: u16,
     encapsulation_sequence: u32,
     received: Option<Received>,
@@ -63,14 +56,16 @@ struct Received {
 }
 
 impl Link {
-    pub fn new(size: u16, axes: usize) -> Self {
+    pub fn new(size: u16) -> Self {
         let size = usize::from(size);
         Self {
             opened: None,
             size,
-            axes,
             frame: vec![0; CLASS1_HEADER_LEN + size],
             length: None,
+            extra: VecDeque::new(),
+            held: None,
+            delayed: VecDeque::new(),
             sequence_count: 0,
             encapsulation_sequence: 0,
             received: None,
@@ -85,6 +80,9 @@ impl Link {
     pub fn close(&mut self) {
         self.opened = None;
         self.length = None;
+        self.extra.clear();
+        self.held = None;
+        self.delayed.clear();
     }
 
     pub const fn is_open(&self) -> bool {
@@ -105,27 +103,34 @@ impl Link {
         self.received.map(|received| received.at)
     }
 
-    /// Room for a service beside the cyclic data of all axes and the event blocks of `checking` of them.
-    pub fn room(&self, checking: usize) -> Room {
-        let cut = |header: usize, axis: usize, events: usize| {
-            let fixed = SEQUENCE_COUNT_LEN + header + self.axes * axis + checking * events + SERVICE_HEADERS;
-            let instance = INSTANCE_MAX - axis - events - SERVICE_HEADERS;
+    /// Whether so many bytes of cyclic data of all axes fit, to the device and from it.
+    pub fn fits(&self, (command, actual): (usize, usize)) -> bool {
+        let fixed = |header: usize| SEQUENCE_COUNT_LEN + header;
+        fixed(COMMAND_HEADER_MAX) + command <= self.size && fixed(ACTUAL_HEADER_MAX) + actual <= self.size
+    }
+
+    /// Room for a service beside so many bytes of cyclic data of all axes, of which the largest axis has so many.
+    pub fn room(&self, all: (usize, usize), largest: (usize, usize)) -> Room {
+        let cut = |header: usize, all: usize, axis: usize| {
+            let fixed = SEQUENCE_COUNT_LEN + header + all + SERVICE_HEADERS;
+            let instance = INSTANCE_MAX.saturating_sub(axis + SERVICE_HEADERS);
             // Whole words, as the blocks are.
             self.size.saturating_sub(fixed).min(instance) / 4 * 4
         };
         Room {
-            request: cut(COMMAND_HEADER_MAX, COMMAND_AXIS_MAX, COMMAND_EVENTS_MAX),
-            // The device keeps notifications back for which there is no room.
-            response: cut(ACTUAL_HEADER_MAX, ACTUAL_AXIS_MAX, ACTUAL_EVENTS_BARE),
+            request: cut(COMMAND_HEADER_MAX, all.0, largest.0),
+            response: cut(ACTUAL_HEADER_MAX, all.1, largest.1),
         }
     }
 
     /// Writes an update. With `fresh` it has a new sequence count, without it repeats the data as a refresh.
     pub fn send<'i>(
         &mut self,
+        now: MonotonicTime,
         header: &CommandHeader,
         instances: impl Iterator<Item = CommandInstance<'i>>,
         fresh: bool,
+        spoil: &Spoil,
     ) -> Result<(), Error> {
         let Some(opened) = self.opened else { return Ok(()) };
         let end = CLASS1_HEADER_LEN + self.size - SEQUENCE_COUNT_LEN;
@@ -134,17 +139,64 @@ impl Link {
             writer.instance(&instance)?;
         }
         let length = writer.finish();
+        let length = length.saturating_sub(usize::from(spoil.cut));
         self.sequence_count = self.sequence_count.wrapping_add(u16::from(fresh));
         self.encapsulation_sequence = self.encapsulation_sequence.wrapping_add(1);
-        let (id, sequence) = (opened.o_to_t_id, self.encapsulation_sequence);
-        Class1Datagram::emit_header(id, sequence, self.sequence_count, length, &mut self.frame)?;
+        let sequence = self.encapsulation_sequence.wrapping_sub(spoil.sequence_back);
+        Class1Datagram::emit_header(
+            opened.o_to_t_id,
+            sequence,
+            self.sequence_count,
+            length,
+            &mut self.frame,
+        )?;
         self.length = Some(CLASS1_HEADER_LEN + length);
+        if *spoil != Spoil::default() || self.held.is_some() {
+            self.misdirect(now, spoil);
+        }
         Ok(())
     }
 
-    /// The update, once.
+    /// Keeps, repeats or forgets the update that is ready.
+    fn misdirect(&mut self, now: MonotonicTime, spoil: &Spoil) {
+        let Some(length) = self.length else { return };
+        let copy = || self.frame[..length].to_vec();
+        if spoil.skip {
+            self.length = None;
+        } else if spoil.hold {
+            self.held = Some(copy());
+            self.length = None;
+        } else if spoil.delay.0 > 0 {
+            self.delayed.push_back((now + spoil.delay, copy()));
+            self.length = None;
+        } else if spoil.duplicate {
+            self.extra.push_back(copy());
+        }
+        if !spoil.hold {
+            self.extra.extend(self.held.take());
+        }
+    }
+
+    /// When a delayed update is due.
+    pub fn wake_at(&self) -> Option<MonotonicTime> {
+        self.delayed.iter().map(|(due, _)| *due).min()
+    }
+
+    /// Lets delayed updates go that are due.
+    pub fn handle_time(&mut self, now: MonotonicTime) {
+        while let Some(at) = self.delayed.iter().position(|(due, _)| *due <= now) {
+            self.extra.extend(self.delayed.remove(at).map(|(_, datagram)| datagram));
+        }
+    }
+
+    /// An update to be sent now.
     pub fn poll_transmit(&mut self, buffer: &mut [u8]) -> Option<usize> {
-        let length = self.length?;
+        let Some(length) = self.length else {
+            let length = self.extra.front()?.len();
+            buffer.get_mut(..length)?.copy_from_slice(self.extra.front()?);
+            self.extra.pop_front();
+            return Some(length);
+        };
         let target = buffer.get_mut(..length)?;
         target.copy_from_slice(&self.frame[..length]);
         self.length = None;
@@ -195,8 +247,9 @@ impl Link {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::motion::codes::{NodeAlarm, NodeFault, NodeStatus};
+    use crate::wire::motion::codes::{NodeAlarm, NodeControl, NodeFault, NodeStatus, TimeDataSet};
     use crate::wire::motion::{ActualHeader, ActualWriter};
+    use profile_generic::time::DurationNs;
 
     fn update(id: u32, sequence: u32, count: u16, update_id: u8) -> Vec<u8> {
         let header = ActualHeader {
@@ -226,7 +279,7 @@ mod tests {
 
     #[test]
     fn arrivals_are_told_apart() {
-        let mut link = Link::new(200, 1);
+        let mut link = Link::new(200);
         let mut receive = |id, sequence, count, update_id| {
             if !link.is_open() {
                 link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
@@ -249,20 +302,59 @@ mod tests {
     #[test]
     fn the_room_of_a_service_leaves_the_cyclic_data_theirs() {
         // 500 - 2 - 24 - 2 x 32 - 12 and 500 - 2 - 44 - 2 x 56 - 12, in whole words.
-        let room = Link::new(500, 2).room(0);
+        let room = Link::new(500).room((64, 112), (32, 56));
         assert_eq!((room.request, room.response), (396, 328));
-        // Less 20 and 8 for the events of one axis.
-        let room = Link::new(500, 2).room(1);
-        assert_eq!((room.request, room.response), (376, 320));
-        // Block sizes are counted in one byte: 1020 - 32 - 20 - 12 and 1020 - 56 - 8 - 12.
-        let room = Link::new(1400, 1).room(1);
-        assert_eq!((room.request, room.response), (956, 944));
-        assert_eq!(Link::new(20, 1).room(0).request, 0);
+        // Block sizes are counted in one byte: 1020 - 32 - 12 and 1020 - 56 - 12.
+        let room = Link::new(1400).room((32, 56), (32, 56));
+        assert_eq!((room.request, room.response), (976, 952));
+        assert_eq!(Link::new(20).room((32, 56), (32, 56)).request, 0);
+        assert!(
+            Link::new(102).fits((76, 56)) && !Link::new(101).fits((76, 56)) && !Link::new(101).fits((0, 56))
+        );
+    }
+
+    #[test]
+    fn updates_are_held_delayed_doubled_cut_and_skipped() {
+        let mut link = Link::new(200);
+        link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
+        let mut buffer = [0; 300];
+        // What goes out after each update: encapsulation sequence and length.
+        let mut send = |now: u64, spoil: Spoil| {
+            let now = MonotonicTime(now);
+            link.handle_time(now);
+            let header = CommandHeader {
+                update_id: 1,
+                node_control: NodeControl::empty(),
+                instance_count: 0,
+                last_received_id: 0,
+                time_stamp: None,
+                time_offset: None,
+                diagnostics: TimeDataSet::empty(),
+            };
+            link.send(now, &header, core::iter::empty(), true, &spoil).unwrap();
+            let mut sent = Vec::new();
+            while let Some(length) = link.poll_transmit(&mut buffer) {
+                let sequence = u32::from_le_bytes([buffer[10], buffer[11], buffer[12], buffer[13]]);
+                sent.push((sequence, length));
+            }
+            (sent, link.wake_at().map(|at| at.0))
+        };
+        let good = Spoil::default();
+        let len = CLASS1_HEADER_LEN + 8;
+        assert_eq!(send(0, good), (vec![(1, len)], None));
+        assert_eq!(send(1, Spoil { hold: true, ..good }), (vec![], None));
+        assert_eq!(send(2, good), (vec![(3, len), (2, len)], None));
+        assert_eq!(send(3, Spoil { duplicate: true, ..good }), (vec![(4, len), (4, len)], None));
+        assert_eq!(send(4, Spoil { delay: DurationNs(5), ..good }), (vec![], Some(9)));
+        assert_eq!(send(9, good), (vec![(6, len), (5, len)], None));
+        assert_eq!(send(10, Spoil { skip: true, ..good }), (vec![], None));
+        assert_eq!(send(11, Spoil { cut: 3, ..good }), (vec![(8, len - 3)], None));
+        assert_eq!(send(12, Spoil { sequence_back: 5, ..good }), (vec![(4, len)], None));
     }
 
     #[test]
     fn an_update_longer_than_the_connection_is_refused() {
-        let mut link = Link::new(9, 1);
+        let mut link = Link::new(9);
         link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
         let error = link.receive(MonotonicTime(0), &update(2, 1, 1, 1)).unwrap_err();
         assert_eq!(error.to_string(), "connection data: expected at most 7, found 8");

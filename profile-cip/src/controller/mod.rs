@@ -7,7 +7,8 @@
 //! - in: [`Controller::tcp_connected`], [`Controller::handle_stream`], [`Controller::handle_datagram`],
 //!   [`Controller::handle_time`], [`Controller::tcp_closed`], [`Controller::finish`];
 //! - out, to be drained after every input: [`Controller::poll_stream_transmit`],
-//!   [`Controller::poll_datagram_transmit`], [`Controller::poll_event`];
+//!   [`Controller::poll_datagram_transmit`], [`Controller::poll_event`],
+//!   [`Controller::poll_stream_action`], which only programs that misbehave or reconnect need;
 //! - [`Controller::wake_at`] says when [`Controller::handle_time`] is due. Datagrams that have come are to
 //!   be handed in before it, so that a caller who was held up does not take its own delay for the device's
 //!   silence.
@@ -16,7 +17,10 @@
 //! figures of a run in [`report`].
 
 mod axis;
+mod axis_set;
+pub mod condition;
 pub mod config;
+mod cyclic_lists;
 mod engine;
 pub mod event;
 mod events;
@@ -24,23 +28,32 @@ mod executor;
 pub mod failure;
 mod following;
 mod handshake;
+pub mod limits;
 mod link;
+pub mod misbehaviour;
+mod node;
 mod number;
 mod phases;
+mod plan_check;
 pub mod program;
 pub mod report;
 mod services;
 mod session;
+pub mod sets;
+pub mod statistics;
 mod status;
 #[cfg(test)]
 mod tests;
 mod time_offset;
 pub mod trajectory;
+mod update;
 
-pub use config::{AttributeSet, AxisSetup, ControllerConfig};
-pub use engine::Controller;
+pub use condition::Condition;
+pub use config::{AttributeSet, AxisSetup, ControllerConfig, Scaling};
+pub use engine::{Controller, StreamAction};
 pub use event::Event;
 pub use failure::Failure;
+pub use misbehaviour::Misbehaviour;
 pub use program::{AxisSet, Step};
 pub use report::Report;
 pub use trajectory::Limits;

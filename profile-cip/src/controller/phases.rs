@@ -8,9 +8,11 @@
 //! | ClassConfiguration | Set_Axis_Attributes_List to instance 0 | answered |
 //! | GroupSync | Group_Sync, again and again; time stamps | device synchronized, and no skew seen here |
 //! | AxisConfiguration | Set_Axis_Attributes_List to one axis after the other | answered |
+//! | AxisScaling | Get_Axis_Attributes_List of the scaling, where it is the device's | answered |
 //! | Synchronizing | cyclic blocks, Configuration Complete, Sync Control | Sync Mode |
 //! | Initializing | the same | every axis has left Initializing |
 //! | Program | the same, with the commands of the steps | the steps have finished |
+//! | Reconnecting | Forward_Close, UnRegisterSession, and Idle again | answered |
 //! | Stopping | controlled stop, then Disable | no axis is enabled |
 //! | Closing | Forward_Close, UnRegisterSession | answered, or nobody answers |
 //! | Closed | | |
@@ -19,11 +21,13 @@
 //! Whatever fails leads to Stopping if the connection is still there, and to Closing otherwise.
 
 use super::axis::Axis;
+use super::config::Scaling;
 use super::engine::{Controller, push};
 use super::event::Event;
 use super::executor::{Context, report_refused};
 use super::failure::Failure;
 use super::services::{Outcome, Ticket};
+use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{AxisControl, AxisStateCode, NodeFault, NodeStatus, SyncStatus};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -31,6 +35,11 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 const GROUP_SYNC_INTERVAL: DurationNs = DurationNs::from_millis(100);
 /// Update periods by which the system times of controller and device may differ at Group_Sync.
 const SKEW_PERIODS: i64 = 4;
+/// Attributes of the scaling, Table 5-2.12, and what the first one says where the device scales.
+const MOTION_SCALING_CONFIGURATION: u16 = 45;
+const MOTION_RESOLUTION: u16 = 78;
+const DRIVE_SCALING: u8 = 1;
+
 /// Where a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Phase {
@@ -40,9 +49,11 @@ pub(super) enum Phase {
     ClassConfiguration { ticket: Ticket },
     GroupSync { since: MonotonicTime, ticket: Option<Ticket>, next: MonotonicTime, last: SyncStatus },
     AxisConfiguration { instance: u8, ticket: Ticket },
+    AxisScaling { instance: u8, ticket: Ticket },
     Synchronizing { since: MonotonicTime },
     Initializing { since: MonotonicTime },
     Program,
+    Reconnecting,
     Stopping { since: MonotonicTime },
     Closing,
     Closed,
@@ -51,18 +62,17 @@ pub(super) enum Phase {
 impl Controller {
     /// Goes through the phases as far as possible.
     pub(super) fn advance(&mut self, now: MonotonicTime) -> Result<(), Failure> {
-        if self.node_fault != NodeFault::NONE
+        if self.node.fault != NodeFault::NONE
             && !matches!(self.phase, Phase::Program | Phase::Stopping { .. } | Phase::Closing | Phase::Closed)
         {
-            return Err(Failure::NodeFault(self.node_fault));
+            return Err(Failure::NodeFault(self.node.fault));
         }
         match self.phase {
             Phase::FirstUpdate { .. } if self.link.received_at().is_some() => {
-                let ticket = self.services.set(
-                    0,
-                    &self.config.class_attributes,
-                    self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
-                )?;
+                let ticket = {
+                    let room = self.room();
+                    self.services.set(0, &self.config.class_attributes, room)?
+                };
                 self.phase = Phase::ClassConfiguration { ticket };
             }
             Phase::ClassConfiguration { ticket } => self.configure_class(now, ticket)?,
@@ -70,14 +80,15 @@ impl Controller {
                 self.phase = self.group_sync(now, since, ticket, next, last)?;
             }
             Phase::AxisConfiguration { instance, ticket } => self.configure_next(now, instance, ticket)?,
+            Phase::AxisScaling { instance, ticket } => self.take_scaling(now, instance, ticket)?,
             Phase::Synchronizing { since } => {
                 let waited = now - since;
-                if self.node_status.contains(NodeStatus::SYNC_MODE) {
+                if self.node.status.contains(NodeStatus::SYNC_MODE) {
                     self.report.synchronous = true;
                     self.event(Event::Started { synchronous: true });
                     self.phase = Phase::Initializing { since: now };
                 } else if waited > self.config.time_outs.synchronization {
-                    return Err(Failure::NoSyncMode { waited, alarm: self.node_alarm });
+                    return Err(Failure::NoSyncMode { waited, alarm: self.node.alarm });
                 }
             }
             Phase::Initializing { since } => self.await_axes(now, now - since)?,
@@ -105,6 +116,35 @@ impl Controller {
         if !self.take_configuration(instance, ticket)? {
             return Ok(());
         }
+        if self.config.axes[usize::from(instance) - 1].scaling == Scaling::Device {
+            let selectors = [(MOTION_SCALING_CONFIGURATION, 1), (MOTION_RESOLUTION, 4)]
+                .map(|(id, size)| AttributeSelector::scalar(id, size));
+            let room = self.room();
+            let ticket = self.services.get(instance, &selectors, room)?;
+            self.phase = Phase::AxisScaling { instance, ticket };
+            return Ok(());
+        }
+        self.after_configuration(now, instance)
+    }
+
+    /// Takes the counts in a unit from the device, if it scales.
+    fn take_scaling(&mut self, now: MonotonicTime, instance: u8, ticket: Ticket) -> Result<(), Failure> {
+        let Some(result) = self.services.take(ticket) else { return Ok(()) };
+        let Outcome::Get { values } = result? else { return Ok(()) };
+        let value = |id| values.iter().find(|row| row.id == id).and_then(|row| row.value.as_ref().ok());
+        let configuration = value(MOTION_SCALING_CONFIGURATION).and_then(|bytes| bytes.first()).copied();
+        let resolution =
+            value(MOTION_RESOLUTION).and_then(|bytes| Some(i32::from_le_bytes(bytes[..].try_into().ok()?)));
+        let counts = f64::from(resolution.unwrap_or(0));
+        if configuration != Some(DRIVE_SCALING) || counts <= 0.0 {
+            return Err(Failure::ScalingUnknown { axis: instance, configuration });
+        }
+        self.axes[usize::from(instance) - 1].set_scale(counts);
+        self.event(Event::Scaled { axis: instance, counts });
+        self.after_configuration(now, instance)
+    }
+
+    fn after_configuration(&mut self, now: MonotonicTime, instance: u8) -> Result<(), Failure> {
         self.phase = if usize::from(instance) < self.axes.len() {
             self.configure_axis(instance + 1)?
         } else if self.config.grand_master.is_some() {
@@ -117,12 +157,9 @@ impl Controller {
     }
 
     fn configure_axis(&mut self, instance: u8) -> Result<Phase, Failure> {
+        let room = self.room();
         let sets = &self.config.axes[usize::from(instance) - 1].attributes;
-        let ticket = self.services.set(
-            instance,
-            sets,
-            self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count()),
-        )?;
+        let ticket = self.services.set(instance, sets, room)?;
         Ok(Phase::AxisConfiguration { instance, ticket })
     }
 
@@ -192,23 +229,42 @@ impl Controller {
     }
 
     fn run_program(&mut self, now: MonotonicTime) -> Result<(), Failure> {
-        let room = self.link.room(self.axes.iter().filter(|axis| axis.events.is_open()).count());
+        let room = self.room();
         let events = &mut self.events;
         let mut event = |event| push(events, event);
         let mut context = Context {
             now,
             axes: &mut self.axes,
             services: &mut self.services,
+            session: &mut self.session,
+            answer: &mut self.answer,
+            config: &mut self.config,
+            link: &self.link,
             room,
-            time_outs: self.config.time_outs,
-            node_fault: self.node_fault,
+            node: &mut self.node,
             node_fault_reset: &mut self.node_fault_reset,
+            abuse: &mut self.abuse,
+            lost: self.lost,
+            loss_expected: &mut self.loss_expected,
+            connection: self.connections,
+            reconnect: false,
+            drop_stream: false,
+            steps: &mut self.report.steps,
             event: &mut event,
         };
         let finished = self.executor.poll(&mut context);
+        let (reconnect, drop_stream) = (context.reconnect, context.drop_stream);
         self.report.steps_finished = self.executor.at();
+        if drop_stream {
+            self.drop_stream();
+        }
         if finished? {
-            self.wind_up(now);
+            match self.lost {
+                Some(failure) if !self.loss_expected => return Err(failure),
+                _ => self.wind_up(now),
+            }
+        } else if reconnect {
+            self.reconnect(now);
         }
         Ok(())
     }

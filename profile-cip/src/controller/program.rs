@@ -7,69 +7,63 @@
 
 use core::fmt;
 
-use super::config::{AttributeSet, MAX_AXES};
+pub use super::axis_set::AxisSet;
+use super::condition::Condition;
+use super::config::AttributeSet;
+use super::event::Instance;
+use super::misbehaviour::Misbehaviour;
+use super::sets::DataSets;
 use super::trajectory::Limits;
 use crate::wire::motion::attribute_list::AttributeSelector;
-use crate::wire::motion::codes::AxisControl;
+use crate::wire::motion::codes::{
+    AxisControl, CommandTarget, ControlMode, EventChecking, FeedbackMode, MotionService, TestStatus,
+    TimeDataSet,
+};
+use crate::wire::motion::event::ExtendedEventData;
 use profile_generic::time::DurationNs;
 
-const _: () = assert!(MAX_AXES == 16, "an axis set has one bit for each axis");
-
-/// A set of axes, by instance number.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct AxisSet(u16);
-
-impl AxisSet {
-    /// No axis.
-    pub const NONE: Self = Self(0);
-
-    /// One axis; instances beyond the largest number of axes make an empty set.
-    #[must_use]
-    pub const fn one(instance: u8) -> Self {
-        if instance == 0 || instance > 16 { Self::NONE } else { Self(1 << (instance - 1)) }
-    }
-
-    /// The axes 1 to `count`.
-    #[must_use]
-    pub fn first(count: u8) -> Self {
-        (1..=count).fold(Self::NONE, |set, axis| set.with(axis))
-    }
-
-    /// This set and one axis more.
-    #[must_use]
-    pub const fn with(self, instance: u8) -> Self {
-        Self(self.0 | Self::one(instance).0)
-    }
-
-    /// This set without that axis.
-    #[must_use]
-    pub const fn without(self, instance: u8) -> Self {
-        Self(self.0 & !Self::one(instance).0)
-    }
-
-    /// Whether the axis is in the set.
-    #[must_use]
-    pub const fn contains(self, instance: u8) -> bool {
-        self.0 & Self::one(instance).0 != 0
-    }
-
-    /// Whether no axis is in the set.
-    #[must_use]
-    pub const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// The instance numbers in ascending order.
-    pub fn iter(self) -> impl Iterator<Item = u8> {
-        (1..=16).filter(move |instance| self.contains(*instance))
-    }
+/// Direction of a cyclic attribute list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CyclicDirection {
+    /// Controller to device, Set_Cyclic_Write_List.
+    Write,
+    /// Device to controller, Set_Cyclic_Read_List.
+    Read,
 }
 
-impl fmt::Display for AxisSet {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.iter().count() == 1 { "axis" } else { "axes" })?;
-        self.iter().try_for_each(|axis| write!(f, " {axis}"))
-    }
+/// An attribute of a cyclic list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CyclicAttribute {
+    /// Attribute ID.
+    pub id: u16,
+    /// Bytes of one element, by which the value is aligned.
+    pub element_size: u8,
+    /// The value in wire order; of a read list only its length counts.
+    pub value: Vec<u8>,
+}
+
+/// A request beside the motion connection, as an unconnected message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExplicitMessage {
+    /// Service code.
+    pub service: u8,
+    /// Class.
+    pub class: u16,
+    /// Instance.
+    pub instance: u16,
+    /// Attribute, for services that need one in the path.
+    pub attribute: Option<u16>,
+    /// Request data.
+    pub data: Vec<u8>,
+}
+
+/// By how much a position reference changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Redefine {
+    /// The position becomes this one, in units.
+    To(f64),
+    /// All positions change by this distance, in units.
+    By(f64),
 }
 
 /// One step of a program. It has finished when what it says has happened, and it fails when that cannot
@@ -88,6 +82,26 @@ pub enum Step {
     Abort(AxisSet),
     /// Reset axis faults.
     FaultReset(AxisSet),
+    /// Stop a test process and the motion that it makes.
+    StopProcess(AxisSet),
+    /// Give up the Axis Control request under way.
+    Cancel(AxisSet),
+    /// Make an Axis Control request and go on without waiting for its acknowledge.
+    Ask {
+        /// The axes.
+        axes: AxisSet,
+        /// The request.
+        request: AxisControl,
+    },
+    /// Make an Axis Control request that the device has to refuse.
+    Refused {
+        /// The axes.
+        axes: AxisSet,
+        /// The request.
+        request: AxisControl,
+        /// The Response Status, if it matters.
+        status: Option<u8>,
+    },
     /// Reset the fault of the communications node.
     NodeFaultReset,
     /// Move from rest to a position and wait until the command has arrived.
@@ -120,6 +134,62 @@ pub enum Step {
         jerk: f64,
         /// Seconds from the start of the jog to the start of slowing down.
         seconds: f64,
+    },
+    /// Take an axis in velocity or acceleration control to a velocity and leave it there.
+    RunAt {
+        /// Instance number.
+        axis: u8,
+        /// Velocity in units/s; its sign is the direction.
+        velocity: f64,
+        /// Acceleration limit in units/s².
+        acceleration: f64,
+        /// Jerk limit in units/s³.
+        jerk: f64,
+    },
+    /// Take an axis in torque control to a torque and leave it there.
+    Torque {
+        /// Instance number.
+        axis: u8,
+        /// Torque in % of motor rated torque.
+        torque: f64,
+        /// How fast it changes, %/s.
+        rate: f64,
+        /// Velocity in units/s above which the step fails and the torque goes away.
+        velocity_limit: f64,
+    },
+    /// Change the Control Mode on line. A motion under way is refused, an axis in torque control is brought to
+    /// standstill by velocity control first.
+    Mode {
+        /// Instance number.
+        axis: u8,
+        /// The mode.
+        mode: ControlMode,
+    },
+    /// Change the Feedback Mode.
+    Feedback {
+        /// Instance number.
+        axis: u8,
+        /// The mode.
+        mode: FeedbackMode,
+    },
+    /// Change what travels in the updates of an axis.
+    DataSets {
+        /// Instance number.
+        axis: u8,
+        /// From now on.
+        sets: DataSets,
+    },
+    /// Change the diagnostics asked for in the header.
+    TimeData(TimeDataSet),
+    /// Change the update that commands are meant for.
+    Target(CommandTarget),
+    /// Change the position reference of a standing axis: first of the actual, then of the command position,
+    /// Table 5-2.109.
+    RedefinePosition {
+        /// Instance number.
+        axis: u8,
+        /// By how much.
+        change: Redefine,
     },
     /// End the motion under way on an axis, in a controlled manner; the axis stays Running. The step that
     /// began the motion ends with it.
@@ -159,6 +229,77 @@ pub enum Step {
         /// What to write.
         attributes: Vec<AttributeSet>,
     },
+    /// Agree on a list of attributes that travel in every update, and use it from then on.
+    CyclicList {
+        /// Instance number.
+        axis: u8,
+        /// Which way.
+        direction: CyclicDirection,
+        /// The attributes; of a write list with the values to begin with.
+        attributes: Vec<CyclicAttribute>,
+    },
+    /// Change values of the cyclic write data.
+    CyclicWrite {
+        /// Instance number.
+        axis: u8,
+        /// Attribute IDs and values in wire order.
+        values: Vec<(u16, Vec<u8>)>,
+    },
+    /// Arm events, with the parameters that extended checking needs; ends when the device says that it checks for
+    /// them.
+    ArmEvents {
+        /// Instance number.
+        axis: u8,
+        /// Events, windows and auto-rearm.
+        checking: EventChecking,
+        /// Windows, watch positions in counts, homing torque; boxed, since few steps have them.
+        parameters: Option<Box<ExtendedEventData>>,
+    },
+    /// Disarm events; ends when the device no longer checks for them.
+    DisarmEvents {
+        /// Instance number.
+        axis: u8,
+        /// The events.
+        checking: EventChecking,
+    },
+    /// Make any request in the service channel; the answer comes as an event.
+    Service {
+        /// Instance number; 0 is the class.
+        axis: u8,
+        /// The service.
+        service: MotionService,
+        /// Its body.
+        data: Vec<u8>,
+        /// General status that the answer has to have; `None` takes any.
+        status: Option<u8>,
+    },
+    /// Ask for the result of a test again and again until the test is over.
+    TestResult {
+        /// Instance number.
+        axis: u8,
+        /// The service that gets the result.
+        service: MotionService,
+        /// What it has to be.
+        status: TestStatus,
+    },
+    /// Make a request beside the motion connection; the answer comes as an event.
+    Explicit {
+        /// The request.
+        message: ExplicitMessage,
+        /// General status that the answer has to have; `None` takes any.
+        status: Option<u8>,
+    },
+    /// Wait until something is so, and fail when it does not come to be.
+    Expect {
+        /// What.
+        condition: Condition,
+        /// For how long to wait.
+        within: DurationNs,
+    },
+    /// Misbehave, and go on when the updates meant by it are over.
+    Misbehave(Misbehaviour),
+    /// Close the connection if it is still there, and open session and connection anew.
+    Reconnect,
     /// All of these at once; ends when the last one does.
     Together(Vec<Step>),
     /// One after the other; of use inside of [`Step::Together`].
@@ -183,8 +324,34 @@ impl Step {
             Self::ShutdownReset(axes) => Some((*axes, AxisControl::SHUTDOWN_RESET)),
             Self::Abort(axes) => Some((*axes, AxisControl::ABORT)),
             Self::FaultReset(axes) => Some((*axes, AxisControl::FAULT_RESET)),
+            Self::StopProcess(axes) => Some((*axes, AxisControl::STOP_PROCESS)),
+            Self::Cancel(axes) => Some((*axes, AxisControl::CANCEL)),
+            Self::Ask { axes, request } | Self::Refused { axes, request, .. } => Some((*axes, *request)),
             _ => None,
         }
+    }
+
+    /// Whether the step can do its work when the motion connection is lost.
+    #[must_use]
+    pub const fn works_without_connection(&self) -> bool {
+        matches!(
+            self,
+            Self::Dwell { .. }
+                | Self::Expect {
+                    condition: Condition::ConnectionLost
+                        | Condition::NoFault
+                        | Condition::NodeFault(_)
+                        | Condition::NodeAlarm(_)
+                        | Condition::Fault { .. }
+                        | Condition::Alarm { .. },
+                    ..
+                }
+                | Self::Misbehave(_)
+                | Self::Reconnect
+                | Self::Together(_)
+                | Self::Sequence(_)
+                | Self::Within { .. }
+        )
     }
 
     /// The first axis in the step that the device of `count` axes does not have.
@@ -196,11 +363,30 @@ impl Step {
             | Self::MoveRelative { axis, .. }
             | Self::Jog { axis, .. }
             | Self::Stop { axis, .. }
+            | Self::RunAt { axis, .. }
+            | Self::Torque { axis, .. }
+            | Self::Mode { axis, .. }
+            | Self::Feedback { axis, .. }
+            | Self::DataSets { axis, .. }
+            | Self::RedefinePosition { axis, .. }
+            | Self::CyclicList { axis, .. }
+            | Self::CyclicWrite { axis, .. }
+            | Self::ArmEvents { axis, .. }
+            | Self::DisarmEvents { axis, .. }
+            | Self::TestResult { axis, .. }
             | Self::WaitInWindow { axis, .. } => beyond(*axis, 1),
-            Self::ReadAttributes { axis, .. } | Self::SetAttributes { axis, .. } => beyond(*axis, 0),
+            Self::ReadAttributes { axis, .. }
+            | Self::SetAttributes { axis, .. }
+            | Self::Service { axis, .. } => beyond(*axis, 0),
+            Self::Expect { condition, .. } => {
+                let first = u8::from(!matches!(condition, Condition::Attribute { .. }));
+                condition.axis().and_then(|axis| beyond(axis, first))
+            }
             Self::Together(steps) | Self::Sequence(steps) => steps.iter().find_map(|s| s.unknown_axis(count)),
             Self::Within { step, .. } => step.unknown_axis(count),
-            Self::Dwell { .. } | Self::NodeFaultReset => None,
+            Self::Misbehave(
+                Misbehaviour::OmitSetPoint { axes, .. } | Misbehaviour::WrongMode { axes, .. },
+            ) => axes.iter().find_map(|axis| beyond(axis, 1)),
             _ => self.request().and_then(|(axes, _)| axes.iter().find_map(|axis| beyond(axis, 1))),
         }
     }
@@ -223,6 +409,42 @@ impl fmt::Display for Step {
                 write!(f, "Jog axis {axis} at {velocity}/s for {seconds} s")
             }
             Self::Stop { axis, .. } => write!(f, "Stop axis {axis}"),
+            Self::RunAt { axis, velocity, .. } => write!(f, "Run axis {axis} at {velocity}/s"),
+            Self::Torque { axis, torque, .. } => write!(f, "Torque of axis {axis} to {torque} %"),
+            Self::Mode { axis, mode } => write!(f, "{mode} of axis {axis}"),
+            Self::Feedback { axis, mode } => write!(f, "{mode} of axis {axis}"),
+            Self::DataSets { axis, .. } => write!(f, "Data sets of axis {axis}"),
+            Self::TimeData(set) => write!(f, "Time data: {set}"),
+            Self::Target(target) => write!(f, "Command target: {target}"),
+            Self::RedefinePosition { axis, change: Redefine::To(position) } => {
+                write!(f, "Redefine position of axis {axis} to {position}")
+            }
+            Self::RedefinePosition { axis, change: Redefine::By(distance) } => {
+                write!(f, "Redefine position of axis {axis} by {distance}")
+            }
+            Self::CyclicList { axis, direction, attributes } => {
+                let name = if *direction == CyclicDirection::Write { "write" } else { "read" };
+                write!(f, "Cyclic {name} list of {} attributes for axis {axis}", attributes.len())
+            }
+            Self::CyclicWrite { axis, values } => {
+                write!(f, "Write {} attributes of axis {axis} cyclically", values.len())
+            }
+            Self::ArmEvents { axis, checking, .. } => write!(f, "Arm events of axis {axis}: {checking}"),
+            Self::DisarmEvents { axis, checking } => write!(f, "Disarm events of axis {axis}: {checking}"),
+            Self::Service { axis, service, .. } => write!(f, "{service} to {}", Instance(*axis)),
+            Self::TestResult { axis, service, status } => {
+                write!(f, "{service} of axis {axis}: expect {status}")
+            }
+            Self::Explicit { message, .. } => write!(
+                f,
+                "Explicit service {:#04x} to class {:#x} instance {}",
+                message.service, message.class, message.instance
+            ),
+            Self::Expect { condition, within } => write!(f, "Expect {condition} within {within}"),
+            Self::Misbehave(kind) => write!(f, "Misbehave: {kind}"),
+            Self::Reconnect => f.write_str("Reconnect"),
+            Self::Ask { axes, request } => write!(f, "{request} {axes} without waiting"),
+            Self::Refused { axes, request, .. } => write!(f, "{request} {axes}, to be refused"),
             Self::Dwell { seconds } => write!(f, "Dwell {seconds} s"),
             Self::WaitInWindow { axis, window, .. } => write!(f, "Wait for axis {axis} within {window}"),
             Self::ReadAttributes { axis, attributes } => {
@@ -245,17 +467,6 @@ impl fmt::Display for Step {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sets_hold_axes_by_instance_number() {
-        let set = AxisSet::one(3).with(1).with(16);
-        assert_eq!(set.iter().collect::<Vec<_>>(), [1, 3, 16]);
-        assert_eq!(set.without(3).to_string(), "axes 1 16");
-        assert_eq!(AxisSet::first(2), AxisSet::one(1).with(2));
-        assert_eq!((AxisSet::one(0), AxisSet::one(17)), (AxisSet::NONE, AxisSet::NONE));
-        assert!(!set.contains(0) && !set.contains(2) && set.contains(16));
-        assert_eq!(AxisSet::first(255).iter().count(), MAX_AXES);
-    }
 
     #[test]
     fn axes_that_the_device_lacks_are_found_at_any_depth() {

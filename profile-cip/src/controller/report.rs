@@ -4,8 +4,10 @@ use core::fmt;
 
 use super::event::{DeviceIdentity, FaultText};
 use super::failure::Failure;
+use super::statistics::Spread;
 use crate::wire::motion::codes::{AxisStateCode, NodeAlarm, NodeFault};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
+use profile_generic::time::MonotonicTime;
 
 /// Most entries of a list in the report; what comes later is counted, not kept.
 pub const ENTRIES_MAX: usize = 64;
@@ -65,6 +67,15 @@ pub struct AxisReport {
     pub alarms: Entries<AlarmRecord>,
 }
 
+/// One step of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepReport {
+    /// When it began.
+    pub began: MonotonicTime,
+    /// When it finished or failed; `None` while it is under way.
+    pub ended: Option<MonotonicTime>,
+}
+
 /// The whole run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
@@ -86,6 +97,10 @@ pub struct Report {
     pub device_lost_updates: u8,
     /// C-to-D updates that the device reports as late, modulo 256.
     pub device_late_updates: u8,
+    /// Time between two D-to-C updates.
+    pub interval: Spread,
+    /// Time from sending an update until the device says that it received it.
+    pub round_trip: Spread,
     /// Messages from the device that could not be understood.
     pub malformed: u64,
     /// Last node fault other than none.
@@ -94,6 +109,8 @@ pub struct Report {
     pub node_alarm: Option<NodeAlarm>,
     /// Whether the device ran synchronously.
     pub synchronous: bool,
+    /// The steps that have begun, in their order.
+    pub steps: Vec<StepReport>,
     /// Steps of the program that have finished.
     pub steps_finished: usize,
     /// Why the run failed.

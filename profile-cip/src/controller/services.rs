@@ -9,11 +9,13 @@ use std::collections::VecDeque;
 use super::config::{AttributeSet, MAX_AXES};
 use super::event::AttributeValue;
 use super::failure::Failure;
+use super::program::CyclicDirection;
 use crate::wire::Error;
 use crate::wire::motion::attribute_list::{
     AttributeSelector, GetItem, GetResponse, HEAD_LEN, ListWriter, SetResponse,
 };
 use crate::wire::motion::codes::{MotionService, SyncStatus};
+use crate::wire::motion::id_list::{IdList, IdStatusList};
 use crate::wire::motion::{ServiceRequest, ServiceResponse};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -35,6 +37,10 @@ pub(super) enum Outcome {
     Get { values: Vec<AttributeValue> },
     /// The answer to Group_Sync.
     Sync(SyncStatus),
+    /// Block ID in force after Set_Cyclic_Write_List or Set_Cyclic_Read_List, and the attributes refused.
+    List { block_id: u8, refused: Vec<(u16, u8)> },
+    /// The answer to anything else, as it came.
+    Raw { status: u8, data: Vec<u8> },
 }
 
 /// Room of one request and one response in the connection, in bytes of body.
@@ -130,6 +136,46 @@ impl Services {
         self.submit(0, MotionService::GROUP_SYNC, VecDeque::from([body]), outcome)
     }
 
+    /// Agrees on the attributes of a cyclic list.
+    pub fn cyclic_list(
+        &mut self,
+        instance: u8,
+        direction: CyclicDirection,
+        ids: &[u16],
+        room: Room,
+    ) -> Result<Ticket, Failure> {
+        let service = match direction {
+            CyclicDirection::Write => MotionService::SET_CYCLIC_WRITE_LIST,
+            CyclicDirection::Read => MotionService::SET_CYCLIC_READ_LIST,
+        };
+        let mut bytes = vec![0; room.request.min(HEAD_LEN + ids.len().next_multiple_of(2) * 2)];
+        let length = IdList::emit(&mut bytes, ids).map_err(|error| Failure::ServiceMalformed {
+            instance,
+            service,
+            error,
+        })?;
+        bytes.truncate(length);
+        let attributes = u16::try_from(ids.len()).unwrap_or(u16::MAX);
+        let outcome = Outcome::List { block_id: 0, refused: Vec::new() };
+        Ok(self.submit(instance, service, VecDeque::from([Body { bytes, attributes }]), outcome))
+    }
+
+    /// Makes any request; the answer is not looked into.
+    pub fn raw(
+        &mut self,
+        instance: u8,
+        service: MotionService,
+        data: &[u8],
+        room: Room,
+    ) -> Result<Ticket, Failure> {
+        if data.len() > room.request {
+            return Err(Failure::ServiceTooLong { instance, service, room: room.request });
+        }
+        let body = Body { bytes: data.to_vec(), attributes: 0 };
+        let outcome = Outcome::Raw { status: 0, data: Vec::new() };
+        Ok(self.submit(instance, service, VecDeque::from([body]), outcome))
+    }
+
     fn submit(
         &mut self,
         instance: u8,
@@ -221,6 +267,11 @@ impl Job {
         let (instance, service) = (self.instance, self.service);
         let malformed = |error| Failure::ServiceMalformed { instance, service, error };
         let status = response.general_status;
+        if let Outcome::Raw { status: told, data } = &mut self.outcome {
+            *told = status;
+            *data = response.data.to_vec();
+            return Ok(());
+        }
         if status != 0 && status != ATTRIBUTE_LIST_ERROR {
             return Err(Failure::ServiceRefused { instance, service, status });
         }
@@ -262,6 +313,15 @@ impl Job {
                 };
                 *sync = SyncStatus(*code);
             }
+            Outcome::List { block_id, refused } => {
+                let list = IdStatusList::parse(response.data).map_err(malformed)?;
+                let answered = u16::try_from(list.iter().count()).unwrap_or(u16::MAX);
+                same_count(body.attributes, answered).map_err(malformed)?;
+                *block_id = list.block_id;
+                refused
+                    .extend(list.iter().filter(|item| item.status != 0).map(|item| (item.id, item.status)));
+            }
+            Outcome::Raw { .. } => {}
         }
         Ok(())
     }

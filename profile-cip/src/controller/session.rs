@@ -7,7 +7,8 @@
 //! | Asked(RegisterSession) | RegisterSession | Identity |
 //! | Asked(ReadIdentity) | Get_Attributes_All | Forward_Open |
 //! | Asked(ForwardOpen) | Forward_Open, or the large one above 511 bytes | Open |
-//! | Open | | `close` |
+//! | Open | | `close`, or `message` |
+//! | Asked(Message) | any request of the program | Open |
 //! | Asked(ForwardClose) | Forward_Close | Closed |
 //! | Closed | UnRegisterSession | |
 //!
@@ -19,6 +20,7 @@ use std::collections::VecDeque;
 use super::config::ControllerConfig;
 use super::event::DeviceIdentity;
 use super::failure::{Exchange, Failure};
+use super::program::ExplicitMessage;
 use crate::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
 use crate::wire::encapsulation::{
     Command, EncapsulationStatus, HEADER_LEN, Header, PROTOCOL_VERSION, Packet,
@@ -59,6 +61,17 @@ pub(super) enum Output {
     Closed,
     Malformed(Error),
     Failed(Failure),
+    /// The answer to a message of the program.
+    Answered(Result<Answer, Failure>),
+}
+
+/// An answer that is not looked into.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Answer {
+    pub service: u8,
+    pub status: u8,
+    pub extended: Option<u16>,
+    pub data: Vec<u8>,
 }
 
 /// The connection as the device granted it.
@@ -138,7 +151,7 @@ impl Session {
     /// Closes the connection as far as it was opened, and the session.
     pub fn close(&mut self, now: MonotonicTime) {
         match self.state {
-            State::Open => {
+            State::Open | State::Asked { exchange: Exchange::Message(_), .. } => {
                 let close = ForwardClose {
                     priority_tick: TIME_TICK,
                     timeout_ticks: TIME_OUT_TICKS,
@@ -151,6 +164,27 @@ impl Session {
             }
             State::Idle | State::Asked { .. } => self.unregister(),
             State::Closed => {}
+        }
+    }
+
+    /// Makes a request beside the connection, if none is under way; false if one is.
+    pub fn message(&mut self, now: MonotonicTime, message: &ExplicitMessage) -> bool {
+        if self.state != State::Open {
+            return false;
+        }
+        let exchange = Exchange::Message(message.service);
+        let service = Service(message.service);
+        match unconnected(service, message.class, message.instance, message.attribute, &message.data, None) {
+            Ok(block) => self.ask(now, exchange, Command::SEND_RR_DATA, &block),
+            Err(error) => self.fail(Failure::AnswerMalformed { exchange, error }),
+        }
+        true
+    }
+
+    /// Closes the session of a connection that is no more.
+    pub fn leave(&mut self) {
+        if self.state != State::Closed {
+            self.unregister();
         }
     }
 
@@ -294,6 +328,16 @@ impl Session {
             let (found, expected) = (u32::from(reply.service.0), u32::from(service.0));
             return Err(Error::Invalid { what: "reply service", offset: 0, found, expected });
         }
+        if let Exchange::Message(service) = exchange {
+            self.state = State::Open;
+            self.outputs.push_back(Output::Answered(Ok(Answer {
+                service,
+                status: reply.status.0,
+                extended: reply.extended.first().copied(),
+                data: reply.data.to_vec(),
+            })));
+            return Ok(());
+        }
         if reply.status != GeneralStatus::SUCCESS {
             let failure = Failure::Explicit {
                 exchange,
@@ -402,7 +446,7 @@ impl Session {
         data: Result<Vec<u8>, Error>,
         port: Option<u16>,
     ) {
-        match data.and_then(|data| unconnected(service_of(exchange), class, &data, port)) {
+        match data.and_then(|data| unconnected(service_of(exchange), class, 1, None, &data, port)) {
             Ok(block) => self.ask(now, exchange, Command::SEND_RR_DATA, &block),
             Err(error) => self.fail(Failure::AnswerMalformed { exchange, error }),
         }
@@ -433,6 +477,11 @@ impl Session {
 
     /// A failed Forward_Close leaves nothing more to be done than to end the session.
     fn fail(&mut self, failure: Failure) {
+        if matches!(self.state, State::Asked { exchange: Exchange::Message(_), .. }) {
+            self.state = State::Open;
+            self.outputs.push_back(Output::Answered(Err(failure)));
+            return;
+        }
         let closing = matches!(self.state, State::Asked { exchange: Exchange::ForwardClose, .. });
         self.state = State::Idle;
         self.outputs.push_back(Output::Failed(failure));
@@ -455,6 +504,7 @@ const fn service_of(exchange: Exchange) -> Service {
         Exchange::ForwardOpen => Service::FORWARD_OPEN,
         Exchange::LargeForwardOpen => Service::LARGE_FORWARD_OPEN,
         Exchange::ForwardClose => Service::FORWARD_CLOSE,
+        Exchange::Message(service) => Service(service),
         _ => Service::GET_ATTRIBUTES_ALL,
     }
 }
@@ -490,9 +540,19 @@ fn connection_path(config: &ControllerConfig) -> Vec<u8> {
     path
 }
 
-fn unconnected(service: Service, class: u16, data: &[u8], port: Option<u16>) -> Result<Vec<u8>, Error> {
-    let mut path = [0; 8];
-    let segments = [Segment::class(class), Segment::instance(1)];
+fn unconnected(
+    service: Service,
+    class: u16,
+    instance: u16,
+    attribute: Option<u16>,
+    data: &[u8],
+    port: Option<u16>,
+) -> Result<Vec<u8>, Error> {
+    let mut path = [0; 16];
+    let segments: Vec<_> = [Segment::class(class), Segment::instance(u32::from(instance))]
+        .into_iter()
+        .chain(attribute.map(Segment::attribute))
+        .collect();
     let length = emit_path(&segments, Encoding::Padded, &mut path)?;
     let request = Request { service, path: &path[..length], data };
     let mut message = vec![0; request.buffer_len()];

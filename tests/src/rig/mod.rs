@@ -29,7 +29,9 @@ use axisbridge::north::AdapterEnd;
 use axisbridge::simulate::line::{DriveLine, line};
 use axisbridge::simulate::setup;
 use axisbridge::status::BoxStatus;
-use profile_cip::controller::{Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step};
+use profile_cip::controller::{
+    Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
+};
 use profile_cip::target::adapter::{Adapter, SessionSlot};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::motion_device::SyncState;
@@ -542,6 +544,17 @@ impl Rig {
         }
         while let Some(event) = controller.poll_event() {
             self.events.push(event);
+        }
+        if let Some(action) = controller.poll_stream_action() {
+            if let Some(slot) = self.slot.take() {
+                self.adapter.close(slot);
+            }
+            self.stream_works = action == StreamAction::Reopen;
+            if self.stream_works {
+                let peer = SocketAddrV4::new(CONTROLLER, CONTROLLER_PORT);
+                self.slot = Some(self.adapter.open(now, peer).expect("the box has room for a stream"));
+                controller.tcp_connected(now);
+            }
         }
     }
 

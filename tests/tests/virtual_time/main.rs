@@ -9,6 +9,7 @@ mod indicators;
 mod loss;
 mod network;
 mod programs;
+mod scripts;
 mod stalled;
 mod stopping;
 mod torque;

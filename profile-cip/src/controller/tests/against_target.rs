@@ -9,6 +9,7 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 use super::rig::{COUNTS_PER_UNIT, OFFSET_NS, config, seconds};
 use crate::controller::{
     AttributeSet, AxisSet, Controller, ControllerConfig, DATAGRAM_MAX, Event, Limits, Report, Step,
+    StreamAction,
 };
 use crate::target::adapter::{Adapter, SessionSlot};
 use crate::target::attribute::{Access, AttributeDefinition, DataType, Scope, id};
@@ -26,9 +27,9 @@ use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use crate::target::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
 use crate::wire::encapsulation::IO_PORT;
+use crate::wire::motion::Format;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{AxisStateCode, ControlMode, FaultType, NodeFault};
-use crate::wire::motion::{CommandPosition, Format};
 
 const GRAND_MASTER: [u8; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 const LIMITS: Limits = Limits { velocity: 50.0, acceleration: 500.0, jerk: 10_000.0 };
@@ -38,15 +39,15 @@ const DRIVE_NS: u64 = 250_000;
 const LATENCY_NS: u64 = 60_000;
 
 /// A drive that follows its commands exactly, starts in 5 ms and stops in 3.
-struct Plant {
-    position: f64,
+pub(super) struct Plant {
+    pub position: f64,
     path: VecDeque<(u64, f64)>,
     last: (u64, f64),
     sequence: u32,
     action: (u32, u64),
     reset_id: u32,
-    fault: Option<DriveCondition>,
-    inhibits: u16,
+    pub fault: Option<DriveCondition>,
+    pub inhibits: u16,
     /// Largest change of position in one drive cycle, counts.
     step_max: f64,
 }
@@ -80,7 +81,13 @@ impl Plant {
         let before = self.position;
         match command.command {
             Command::Follow(points) if started => {
-                if points.control_mode == ControlMode::VELOCITY {
+                if points.control_mode == ControlMode::TORQUE {
+                    // Without inertia: friction makes one unit/s of each %.
+                    let units = f64::from(points.values.torque.unwrap_or(0.0)) * seconds(DRIVE_NS);
+                    self.position += units * COUNTS_PER_UNIT;
+                    self.path.clear();
+                    self.last = (system, self.position);
+                } else if points.control_mode == ControlMode::VELOCITY {
                     let units = f64::from(points.values.velocity.unwrap_or(0.0)) * seconds(DRIVE_NS);
                     self.position += units * COUNTS_PER_UNIT;
                     self.path.clear();
@@ -88,7 +95,9 @@ impl Plant {
                 } else {
                     if points.sequence != self.sequence {
                         self.sequence = points.sequence;
-                        let position = points.values.position.map_or(self.position, CommandPosition::as_f64);
+                        let reference = crate::controller::number::float(points.position_reference);
+                        let position = points.values.position.map(|position| position.as_f64() - reference);
+                        let position = position.unwrap_or(self.position);
                         let at = points.target_time.unwrap_or(system).max(system);
                         self.path.push_back((at, position));
                     }
@@ -114,6 +123,9 @@ impl Plant {
             conditions: DriveConditions::of(self.fault.as_slice()),
             start_inhibits: self.inhibits,
             position: crate::controller::number::counts(self.position),
+            velocity: crate::controller::number::real(
+                (self.position - before) / COUNTS_PER_UNIT / seconds(DRIVE_NS),
+            ),
             captured_at: system,
             ..DriveImage::default()
         }
@@ -201,15 +213,17 @@ fn device(axes: usize) -> MotionDevice {
     .unwrap()
 }
 
-type Script = dyn FnMut(&Report, &mut Vec<Plant>);
+pub(super) type Script = dyn FnMut(&Report, &mut Vec<Plant>);
 
 /// Controller and device on one virtual clock.
-struct Pair {
-    controller: Controller,
+pub(super) struct Pair {
+    pub controller: Controller,
     adapter: Adapter,
-    device: MotionDevice,
-    plants: Vec<Plant>,
+    pub device: MotionDevice,
+    pub plants: Vec<Plant>,
     slot: SessionSlot,
+    /// The controller has closed its stream.
+    stream_closed: bool,
     now: u64,
     sequence: u32,
     commands: u64,
@@ -217,12 +231,12 @@ struct Pair {
     lose_actual: fn(u64) -> bool,
     /// From this instant on the device is gone.
     dies_at: Option<u64>,
-    events: Vec<Event>,
-    script: Box<Script>,
+    pub events: Vec<Event>,
+    pub script: Box<Script>,
 }
 
 impl Pair {
-    fn new(config: ControllerConfig, positions: &[f64], program: Vec<Step>) -> Self {
+    pub fn new(config: ControllerConfig, positions: &[f64], program: Vec<Step>) -> Self {
         let mut adapter = adapter(IO_PORT);
         let start = 5_000_000;
         let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000);
@@ -239,6 +253,7 @@ impl Pair {
             device,
             plants: positions.iter().map(|p| Plant::new(*p)).collect(),
             slot,
+            stream_closed: false,
             now: start,
             sequence: 0,
             commands: 0,
@@ -270,7 +285,7 @@ impl Pair {
             let mut moved = false;
             while let Some(length) = self.controller.poll_stream_transmit(&mut buffer) {
                 moved = true;
-                if !self.is_dead() {
+                if !self.is_dead() && !self.stream_closed {
                     assert_eq!(self.adapter.handle_stream(now, self.slot, &buffer[..length]), length);
                 }
             }
@@ -280,14 +295,13 @@ impl Pair {
                 moved = true;
             }
             while let Some(reply) = self.device.poll_reply() {
-                if !matches!(reply, MotionReply::ConnectionLost { .. }) {
-                    assert_eq!(self.adapter.complete(now, &reply), Some(self.slot));
-                } else {
-                    self.adapter.complete(now, &reply);
+                let slot = self.adapter.complete(now, &reply);
+                if !matches!(reply, MotionReply::ConnectionLost { .. }) && !self.stream_closed {
+                    assert_eq!(slot, Some(self.slot));
                 }
                 moved = true;
             }
-            loop {
+            while !self.stream_closed {
                 let length = self.adapter.poll_transmit(now, self.slot, &mut buffer);
                 if length == 0 {
                     break;
@@ -305,10 +319,22 @@ impl Pair {
                     let mut packet = datagram.sequence_count.to_le_bytes().to_vec();
                     packet.extend(datagram.data);
                     let at = self.now + LATENCY_NS;
-                    let connection = self.device.connection().expect("an open connection");
+                    let Some(connection) = self.device.connection() else { continue };
                     assert_eq!(datagram.connection_id, connection.o_to_t_id);
                     self.device.handle_io(MonotonicTime(at), Some(SystemTime(at + OFFSET_NS)), &packet);
                 }
+            }
+            match self.controller.poll_stream_action() {
+                Some(StreamAction::Close) => self.close_stream(),
+                Some(StreamAction::Reopen) => {
+                    self.close_stream();
+                    let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_001);
+                    self.slot = self.adapter.open(now, peer).unwrap();
+                    self.stream_closed = false;
+                    self.controller.tcp_connected(now);
+                    moved = true;
+                }
+                None => {}
             }
             while let Some(event) = self.controller.poll_event() {
                 self.events.push(event);
@@ -316,6 +342,13 @@ impl Pair {
             if !moved {
                 return;
             }
+        }
+    }
+
+    fn close_stream(&mut self) {
+        if !self.stream_closed {
+            self.adapter.close(self.slot);
+            self.stream_closed = true;
         }
     }
 
@@ -347,7 +380,7 @@ impl Pair {
         }
     }
 
-    fn run(&mut self, limit: u64) -> Report {
+    pub fn run(&mut self, limit: u64) -> Report {
         let end = self.now + limit * 1_000_000_000;
         self.controller.tcp_connected(MonotonicTime(self.now));
         self.exchange();
@@ -367,7 +400,7 @@ impl Pair {
         self.controller.report()
     }
 
-    fn log(&self) -> String {
+    pub fn log(&self) -> String {
         self.events.iter().map(|event| format!("{event}\n")).collect()
     }
 }
@@ -391,7 +424,7 @@ fn program() -> Vec<Step> {
     ]
 }
 
-fn configured(axes: usize) -> ControllerConfig {
+pub(super) fn configured(axes: usize) -> ControllerConfig {
     let mut config = config(axes);
     config.list_identity = true;
     config.key.vendor = 0x1234;
@@ -408,7 +441,7 @@ fn configured(axes: usize) -> ControllerConfig {
     config
 }
 
-fn assert_good(report: &Report, pair: &Pair) {
+pub(super) fn assert_good(report: &Report, pair: &Pair) {
     assert_eq!(report.failure, None, "{}", pair.log());
     assert_eq!(pair.device.connection(), None, "closed");
     assert_eq!(pair.device.counters().malformed, 0, "{:?}", pair.device.last_error());
@@ -522,7 +555,7 @@ fn forward_open_is_refused_for_key_power_structure_and_interval() {
     }
 }
 
-fn drive_fault(code: u8, sub_code: u8, action: u8) -> DriveCondition {
+pub(super) fn drive_fault(code: u8, sub_code: u8, action: u8) -> DriveCondition {
     let (fault_type, least) = (FaultType::AXIS, ExceptionAction::MAJOR_FAULT);
     DriveCondition { fault_type, code, sub_code, action, least, ..DriveCondition::default() }
 }

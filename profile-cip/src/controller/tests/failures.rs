@@ -210,8 +210,12 @@ fn a_closed_stream_ends_everything() {
 fn steps_that_cannot_be_done_say_why() {
     let run = |program: Vec<Step>| text(&fail(config(1), Peer::new(&[0.0]), program).1);
     assert_eq!(run(vec![go()]), "axis 1: expected state Running, found state Stopped");
+    // What is certain to fail is found before anything is sent, what depends on where the axis is only then.
+    let refused = |step: Step| Controller::new(config(1), vec![enable(), step]).unwrap_err().to_string();
     let far = Step::MoveAbsolute { axis: 1, position: 3e6, limits: LIMITS };
     let expected = "axis 1: 3000000000 counts are beyond the 32-bit range of Command Position";
+    assert_eq!(refused(far), format!("step 1: {expected}"));
+    let far = Step::MoveRelative { axis: 1, distance: 3e6, limits: LIMITS };
     assert_eq!(run(vec![enable(), far]), expected);
     assert_eq!(
         run(vec![enable(), Step::Together(vec![go(), go()])]),
@@ -219,15 +223,15 @@ fn steps_that_cannot_be_done_say_why() {
     );
     let limits = Limits { jerk: f64::NAN, ..LIMITS };
     assert_eq!(
-        run(vec![enable(), Step::MoveAbsolute { axis: 1, position: 1.0, limits }]),
-        "axis 1: jerk limit: expected a number that is finite and above zero, found NaN"
+        refused(Step::MoveAbsolute { axis: 1, position: 1.0, limits }),
+        "step 1: axis 1: jerk limit: expected a number that is finite and above zero, found NaN"
     );
     let slow = Step::Within { time_out: DurationNs::from_millis(100), step: Box::new(go()) };
     assert!(run(vec![enable(), slow]).starts_with("not finished within 10"));
     let wait = Step::WaitInWindow { axis: 1, window: -1.0, seconds: 0.1 };
     assert!(run(vec![enable(), wait]).starts_with("axis 1: expected within -1 of the command, found 0 away"));
     let error = Controller::new(config(1), vec![Step::Enable(AxisSet::one(2))]).unwrap_err();
-    assert_eq!(error.to_string(), "axis of a step: expected an axis of the configuration, found 2");
+    assert_eq!(error.to_string(), "step 0: axis 2: expected an axis from 1 to 1");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Whole runs of the controller in virtual time.
 
+mod abuse;
 mod against_target;
 mod failures;
+mod features;
 mod peer;
 mod rig;
 mod runs;

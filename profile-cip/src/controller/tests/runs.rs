@@ -294,7 +294,9 @@ fn attributes_are_split_over_requests_and_read_back() {
 fn command_position_as_dint_and_above_511_bytes_a_large_forward_open() {
     let mut config = config(2);
     config.connection_size = 1000;
-    config.axes = vec![AxisSetup { integer_position: true, ..AxisSetup::position(1000.0) }; 2];
+    let mut axis = AxisSetup::position(1000.0);
+    axis.sets.integer_position = true;
+    config.axes = vec![axis; 2];
     let mut rig = Rig::new(config, Peer::new(&[0.0, 0.0]), moves());
     let report = rig.run(30);
     assert_good(&report, &rig);
@@ -388,7 +390,7 @@ fn an_axis_in_velocity_control_jogs_but_does_not_move() {
     let mut rig = Rig::new(config, Peer::new(&[0.0]), program);
     let report = rig.run(10);
     assert_eq!(report.steps_finished, 2);
-    assert_eq!(report.failure.unwrap().to_string(), "axis 1: expected position control for this step");
+    assert_eq!(report.failure.unwrap().to_string(), "axis 1: this step does not go with Velocity Control");
     assert!((report.axes[0].reached.unwrap() - 1.0).abs() < 0.1, "{report}");
     assert!(rig.peer.axes[0].commands.iter().all(|(_, b)| b.control_mode == ControlMode::VELOCITY));
     assert!(rig.peer.axes[0].commands.iter().all(|(_, b)| b.values.position.is_none()));

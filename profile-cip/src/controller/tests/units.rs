@@ -3,7 +3,7 @@
 use super::peer::Peer;
 use super::rig::{COUNTS_PER_UNIT, Rig, config};
 use crate::controller::{AxisSet, Limits, Step};
-use crate::wire::motion::codes::ControlMode;
+use crate::wire::motion::codes::{CommandDataSet, ControlMode};
 use crate::wire::motion::{CommandPosition, CommandValues};
 
 /// Update period of the rig in seconds.
@@ -12,7 +12,7 @@ const PERIOD: f64 = 0.002;
 /// Runs one motion from rest; gives all the commands with their modes, and the device's updates as they came.
 fn run(motion: Step) -> (Vec<(ControlMode, CommandValues)>, Vec<Vec<u8>>) {
     let mut config = config(1);
-    config.axes[0].acceleration_feed_forward = true;
+    config.axes[0].sets.command |= CommandDataSet::ACCELERATION;
     let mut rig = Rig::new(config, Peer::new(&[0.0]), vec![Step::Enable(AxisSet::one(1)), motion]);
     let report = rig.run(10);
     assert_eq!(report.failure, None, "{}", rig.log());

@@ -1,0 +1,345 @@
+//! Reading of TOML tables key by key, with a problem at its place for whatever is wrong.
+
+use std::cell::RefCell;
+use std::fmt::Display;
+use std::ops::{Range, RangeInclusive};
+
+use profile_generic::time::DurationNs;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::config::{Problem, duration};
+
+/// A value with its place.
+pub(super) type Value<'t> = Spanned<DeValue<'t>>;
+
+/// Where problems are collected, so that one look at a file finds them all.
+#[derive(Debug, Default)]
+pub(super) struct Problems(RefCell<Vec<Problem>>);
+
+impl Problems {
+    /// Adds one; `None`, so that it can be returned.
+    pub fn report<T>(&self, span: Range<usize>, title: impl Display, expected: impl Display) -> Option<T> {
+        let (title, expected) = (title.to_string(), expected.to_string());
+        self.0.borrow_mut().push(Problem { span, title, expected, related: None });
+        None
+    }
+
+    /// Adds the errors of the TOML itself.
+    pub fn syntax(&self, errors: &[toml::de::Error]) {
+        self.0.borrow_mut().extend(errors.iter().map(Problem::from_toml));
+    }
+
+    /// What was found, in the order of the file.
+    pub fn take(self) -> Vec<Problem> {
+        self.0.into_inner()
+    }
+}
+
+/// What kind of value this is, for people.
+pub(super) fn kind(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+/// A table whose keys are taken one after the other; what nobody has taken is an unknown key.
+pub(super) struct Keys<'a, 't> {
+    what: &'a str,
+    table: &'a DeTable<'t>,
+    span: Range<usize>,
+    taken: Vec<&'static str>,
+    pub problems: &'a Problems,
+}
+
+/// The table in a value.
+pub(super) fn table<'a, 't>(
+    value: &'a Value<'t>,
+    what: &'a str,
+    problems: &'a Problems,
+) -> Option<Keys<'a, 't>> {
+    match value.get_ref() {
+        DeValue::Table(table) => Some(Keys::new(what, table, value.span(), problems)),
+        other => problems.report(
+            value.span(),
+            format_args!("{what} is {}", kind(other)),
+            "expected a table such as { axis = 1 }",
+        ),
+    }
+}
+
+/// Tells a value that is of the wrong kind or has no meaning.
+pub(super) fn wrong<T>(
+    value: &Value<'_>,
+    key: &str,
+    expected: impl Display,
+    problems: &Problems,
+) -> Option<T> {
+    let title = match value.get_ref() {
+        DeValue::String(text) => format!("`{key}` is \"{text}\""),
+        DeValue::Integer(number) => format!("`{key}` is {number}"),
+        DeValue::Float(number) => format!("`{key}` is {number}"),
+        DeValue::Boolean(value) => format!("`{key}` is {value}"),
+        other => format!("`{key}` is {}", kind(other)),
+    };
+    problems.report(value.span(), title, format_args!("expected {expected}"))
+}
+
+/// A whole number as it is written, in any radix.
+pub(super) fn whole(value: &Value<'_>) -> Option<i128> {
+    let integer = value.get_ref().as_integer()?;
+    i128::from_str_radix(integer.as_str(), integer.radix()).ok()
+}
+
+/// A number; whole ones count too.
+pub(super) fn number(value: &Value<'_>) -> Option<f64> {
+    match value.get_ref() {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        // Decimal digits give the nearest number; other radixes only say small ones.
+        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+        DeValue::Integer(_) => whole(value).and_then(|value| i32::try_from(value).ok()).map(f64::from),
+        _ => None,
+    }
+}
+
+/// A list of words, each from the set.
+pub(super) fn words<T: Copy>(
+    value: &Value<'_>,
+    key: &str,
+    set: &[(&str, T)],
+    problems: &Problems,
+) -> Option<Vec<T>> {
+    let DeValue::Array(items) = value.get_ref() else {
+        return wrong(value, key, "a list of names", problems);
+    };
+    // All of them are looked at before the first bad one decides.
+    let found: Vec<Option<T>> = items.iter().map(|item| word_of(item, key, set, problems)).collect();
+    found.into_iter().collect()
+}
+
+/// Letters and digits alone, in small letters: how names are compared. Where signs stand side by side, as in the names
+/// of marker events, they count as well.
+pub(super) fn folded(name: &str) -> String {
+    let is_sign = |c: Option<&char>| matches!(c, Some('+' | '-'));
+    let letters: Vec<char> = name.chars().collect();
+    let mut folded = String::with_capacity(name.len());
+    for (at, letter) in letters.iter().enumerate() {
+        let beside =
+            is_sign(letters.get(at + 1)) || at.checked_sub(1).is_some_and(|at| is_sign(letters.get(at)));
+        if letter.is_alphanumeric() || (is_sign(Some(letter)) && beside) {
+            folded.push(letter.to_ascii_lowercase());
+        }
+    }
+    folded
+}
+
+/// A word from the set; spelling differs in capitals, blanks and dashes at will.
+pub(super) fn word_of<T: Copy>(
+    value: &Value<'_>,
+    key: &str,
+    set: &[(&str, T)],
+    problems: &Problems,
+) -> Option<T> {
+    let names = || set.iter().map(|(name, _)| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    let DeValue::String(text) = value.get_ref() else {
+        return wrong(value, key, format_args!("one of {}", names()), problems);
+    };
+    let found = set.iter().find(|(name, _)| folded(name) == folded(text));
+    match found {
+        Some((_, word)) => Some(*word),
+        None => problems.report(
+            value.span(),
+            format_args!("`{text}` is no {}", key.replace('_', " ")),
+            format_args!("expected one of {}", names()),
+        ),
+    }
+}
+
+impl<'a, 't> Keys<'a, 't> {
+    pub fn new(what: &'a str, table: &'a DeTable<'t>, span: Range<usize>, problems: &'a Problems) -> Self {
+        Self { what, table, span, taken: Vec::new(), problems }
+    }
+
+    /// Place of the whole table.
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
+    /// Keys that are there, with their places, in the order of the file.
+    pub fn keys(&self) -> impl Iterator<Item = (&'a str, Range<usize>, &'a Value<'t>)> + use<'a, 't> {
+        let mut keys: Vec<_> =
+            self.table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value)).collect();
+        keys.sort_by_key(|(_, span, _)| span.start);
+        keys.into_iter()
+    }
+
+    /// The value of a key, if it is there.
+    pub fn find(&mut self, key: &'static str) -> Option<&'a Value<'t>> {
+        self.taken.push(key);
+        self.table.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    }
+
+    /// The value of a key that has to be there.
+    pub fn need(&mut self, key: &'static str) -> Option<&'a Value<'t>> {
+        let found = self.find(key);
+        if found.is_none() {
+            return self.problems.report(
+                self.span(),
+                format_args!("missing key `{key}` in {}", self.what),
+                format_args!("expected the key `{key}` in this table"),
+            );
+        }
+        found
+    }
+
+    /// Reports the keys that nobody has taken; `None` if there is one.
+    pub fn finish(self) -> Option<()> {
+        let mut good = Some(());
+        for (key, span, _) in self.keys() {
+            if !self.taken.contains(&key) {
+                let known: Vec<_> = self.taken.iter().map(|key| format!("`{key}`")).collect();
+                good = self.problems.report(
+                    span,
+                    format_args!("unknown key `{key}` in {}", self.what),
+                    format_args!("expected one of {}", known.join(", ")),
+                );
+            }
+        }
+        good
+    }
+
+    /// A number that is finite; the default where the key is not there.
+    pub fn number_or(&mut self, key: &'static str, default: Option<f64>) -> Option<f64> {
+        match (self.find(key), default) {
+            (Some(value), _) => self.finite(key, value),
+            (None, Some(default)) => Some(default),
+            (None, None) => self.need(key).and(None),
+        }
+    }
+
+    /// A number that has to be there.
+    pub fn number(&mut self, key: &'static str) -> Option<f64> {
+        self.number_or(key, None)
+    }
+
+    /// A number that may be there: `Some(None)` if it is not, `None` after a problem.
+    #[expect(clippy::option_option, reason = "absent is not wrong")]
+    pub fn maybe_number(&mut self, key: &'static str) -> Option<Option<f64>> {
+        match self.find(key) {
+            Some(value) => self.finite(key, value).map(Some),
+            None => Some(None),
+        }
+    }
+
+    pub fn finite(&self, key: &str, value: &Value<'_>) -> Option<f64> {
+        match number(value) {
+            Some(number) if number.is_finite() => Some(number),
+            Some(number) => self.problems.report(
+                value.span(),
+                format_args!("`{key}` is {number}"),
+                "expected a finite number",
+            ),
+            None => wrong(value, key, "a number", self.problems),
+        }
+    }
+
+    /// A whole number in a range.
+    pub fn integer<T: TryFrom<i128>>(&mut self, key: &'static str, range: RangeInclusive<i128>) -> Option<T> {
+        let value = self.need(key)?;
+        self.in_range(key, value, &range)
+    }
+
+    /// A whole number in a range; the default where the key is not there.
+    pub fn integer_or<T: TryFrom<i128>>(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<i128>,
+        default: T,
+    ) -> Option<T> {
+        match self.find(key) {
+            Some(value) => self.in_range(key, value, &range),
+            None => Some(default),
+        }
+    }
+
+    pub fn in_range<T: TryFrom<i128>>(
+        &self,
+        key: &str,
+        value: &Value<'_>,
+        range: &RangeInclusive<i128>,
+    ) -> Option<T> {
+        let expected = format!("a whole number from {} to {}", range.start(), range.end());
+        let Some(number) = whole(value) else { return wrong(value, key, expected, self.problems) };
+        match T::try_from(number) {
+            Ok(found) if range.contains(&number) => Some(found),
+            _ => self.problems.report(
+                value.span(),
+                format_args!("`{key}` is {number}"),
+                format_args!("expected {expected}"),
+            ),
+        }
+    }
+
+    /// True or false; the default where the key is not there.
+    pub fn boolean_or(&mut self, key: &'static str, default: bool) -> Option<bool> {
+        match self.find(key) {
+            Some(value) => match value.get_ref().as_bool() {
+                Some(value) => Some(value),
+                None => wrong(value, key, "true or false", self.problems),
+            },
+            None => Some(default),
+        }
+    }
+
+    /// A time; the default where the key is not there.
+    pub fn duration_or(&mut self, key: &'static str, default: DurationNs) -> Option<DurationNs> {
+        match self.find(key) {
+            Some(value) => time(value, key, self.problems),
+            None => Some(default),
+        }
+    }
+
+    /// A word from a set.
+    pub fn word<T: Copy>(&mut self, key: &'static str, set: &[(&str, T)]) -> Option<T> {
+        let value = self.need(key)?;
+        word_of(value, key, set, self.problems)
+    }
+
+    /// A word from a set; the default where the key is not there.
+    pub fn word_or<T: Copy>(&mut self, key: &'static str, set: &[(&str, T)], default: T) -> Option<T> {
+        match self.find(key) {
+            Some(value) => word_of(value, key, set, self.problems),
+            None => Some(default),
+        }
+    }
+}
+
+/// A time with its unit.
+pub(super) fn time(value: &Value<'_>, key: &str, problems: &Problems) -> Option<DurationNs> {
+    let DeValue::String(text) = value.get_ref() else {
+        return wrong(value, key, duration::EXPECTED, problems);
+    };
+    duration::parse(text).or_else(|| {
+        let title = format!("`{text}` is no time");
+        problems.report(value.span(), title, format_args!("expected {}", duration::EXPECTED))
+    })
+}
+
+/// Bytes in hex, with blanks at will.
+pub(super) fn hex(value: &Value<'_>, key: &str, problems: &Problems) -> Option<Vec<u8>> {
+    const EXPECTED: &str = "bytes in hex, such as \"01 00 B9 01\"";
+    let DeValue::String(text) = value.get_ref() else { return wrong(value, key, EXPECTED, problems) };
+    let digits: Vec<u32> =
+        text.chars().filter(|c| !c.is_whitespace()).map(|c| c.to_digit(16).unwrap_or(16)).collect();
+    if !digits.len().is_multiple_of(2) || digits.contains(&16) {
+        let expected = format_args!("expected {EXPECTED}");
+        return problems.report(value.span(), format_args!("`{text}` is not in hex"), expected);
+    }
+    Some(digits.chunks(2).filter_map(|two| u8::try_from(two[0] * 16 + two[1]).ok()).collect())
+}
