@@ -8,7 +8,7 @@ use profile_cip::wire::motion::codes::TestStatus;
 use profile_cip::wire::motion::test_service::{HookupTestData, hookup_status};
 use profile_generic::cast;
 use profile_generic::hookup::{Goal, HookupLimits, HookupMove, Outcome, Progress};
-use profile_generic::image::FeedbackSet;
+use profile_generic::image::{AxisFeedback, FeedbackSet};
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::scaling::{NANO, UnitKind};
@@ -184,11 +184,8 @@ impl AxisChannel {
                 return Torque::ZERO;
             }
         }
-        // A torque has a meaning only for a drive that is in torque control.
-        let led = self.feedback.mode == OperatingMode::Torque;
-        let actual = position.filter(|_| led).map(|position| (position, self.feedback.velocity));
         let progress = match test.lead.as_mut() {
-            Some(lead) => lead.step(span, actual),
+            Some(lead) => lead.step(span, seen(&self.feedback)),
             None if now.since(test.since) > TIME_LIMIT => Progress::Ended(Outcome::NoMotion),
             None => Progress::Torque(Torque::ZERO),
         };
@@ -216,6 +213,14 @@ impl AxisChannel {
     }
 }
 
+/// What the move goes by; without it there is no torque. A torque has a meaning only for a drive that is in torque control,
+/// and a position alone says nothing of the speed at which the torque has to end.
+fn seen(feedback: &AxisFeedback) -> Option<(Position, Velocity)> {
+    let known = feedback.present.contains(FeedbackSet::POSITION | FeedbackSet::VELOCITY);
+    let led = feedback.fresh && known && feedback.mode == OperatingMode::Torque;
+    led.then_some((feedback.position, feedback.velocity))
+}
+
 /// The move that an order asks for.
 fn motion(order: &TestOrder, settings: &HookupSettings, start: Position) -> Option<HookupMove> {
     let (goal, speed) = if order.time > 0.0 {
@@ -228,4 +233,26 @@ fn motion(order: &TestOrder, settings: &HookupSettings, start: Position) -> Opti
     };
     let limits = HookupLimits { torque: settings.torque, torque_rate: TORQUE_RATE, speed, time: TIME_LIMIT };
     HookupMove::new(goal, limits, start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_torque_without_a_fresh_position_and_speed_in_torque_control() {
+        let good = AxisFeedback {
+            fresh: true,
+            present: FeedbackSet::POSITION | FeedbackSet::VELOCITY,
+            mode: OperatingMode::Torque,
+            position: Position(5),
+            velocity: Velocity(7),
+            ..AxisFeedback::default()
+        };
+        assert_eq!(seen(&good), Some((Position(5), Velocity(7))));
+        assert_eq!(seen(&AxisFeedback { fresh: false, ..good }), None);
+        assert_eq!(seen(&AxisFeedback { present: FeedbackSet::POSITION, ..good }), None);
+        assert_eq!(seen(&AxisFeedback { present: FeedbackSet::VELOCITY, ..good }), None);
+        assert_eq!(seen(&AxisFeedback { mode: OperatingMode::Position, ..good }), None);
+    }
 }

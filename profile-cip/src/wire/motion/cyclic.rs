@@ -200,8 +200,8 @@ impl CommandBlock {
     /// Reads a block; `block` must hold exactly the block.
     ///
     /// # Errors
-    /// The octets are too few or too many for the data set, or the data set or the position type hold reserved
-    /// codes, whose size is unknown.
+    /// The octets are too few or too many for the data set, the data set or the position type hold reserved codes,
+    /// whose size is unknown, or the Command Target Update is the reserved one.
     pub fn parse(block: &[u8]) -> Result<Self, Error> {
         let reader = &mut Reader::new(block);
         let control_mode = ControlMode(reader.u8(BLOCK)?);
@@ -221,6 +221,12 @@ impl CommandBlock {
             let known = command_control & 0b111;
             return Err(invalid("command control", COMMAND_CONTROL_AT, command_control, known));
         }
+        // A target that nobody has defined is no instant to be somewhere.
+        let target = CommandTarget(command_control & 0b11);
+        if target.0 > CommandTarget::INTERPOLATE.0 {
+            let known = command_control & !0b11 | CommandTarget::INTERPOLATE.0;
+            return Err(invalid("command control", COMMAND_CONTROL_AT, command_control, known));
+        }
         let values = CommandValues::parse(reader, set, position_type == 1)?;
         reader.finish(BLOCK)?;
         Ok(Self {
@@ -230,7 +236,7 @@ impl CommandBlock {
             control_status,
             actual_data_set,
             status_data_set,
-            target: CommandTarget(command_control & 0b11),
+            target,
             values,
         })
     }

@@ -65,6 +65,7 @@ fn wrong_fields_are_named_with_their_place() {
     assert_eq!(refused(|o| o[set] |= 0x10), invalid("command data set", set, 0x13, 0x03));
     let control = AXIS_1 + 8 + 7;
     assert_eq!(refused(|o| o[control] = 0x08), invalid("command control", control, 0x08, 0));
+    assert_eq!(refused(|o| o[control] = 0x03), invalid("command control", control, 0x03, 0x02));
 }
 
 #[test]

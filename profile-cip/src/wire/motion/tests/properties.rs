@@ -41,7 +41,7 @@ prop_compose! {
 }
 
 prop_compose! {
-    fn command_block()(octets in any::<[u8; 6]>(), target in 0u8..4, values in command_values()) -> CommandBlock {
+    fn command_block()(octets in any::<[u8; 6]>(), target in 0u8..3, values in command_values()) -> CommandBlock {
         CommandBlock {
             control_mode: ControlMode(octets[0]),
             feedback_mode: FeedbackMode(octets[1]),
