@@ -8,9 +8,10 @@ use super::axis_object::UpdateTimes;
 use super::io_connection::{Age, Mode, Packet, Update};
 use super::motion_device::{Echo, INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
 use super::time_offset::Offsets;
-use crate::wire::motion::codes::{NodeAlarm, NodeControl, NodeFault};
+use crate::wire::motion::codes::{MotionService, NodeAlarm, NodeControl, NodeFault};
 use crate::wire::motion::fixed::FixedCommand;
 use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, Format};
+use crate::wire::status::GeneralStatus;
 
 /// An update whose form is right.
 enum Checked<'p> {
@@ -314,7 +315,7 @@ impl MotionDevice {
                 }
             }
             if context.remote {
-                self.handle_service(&instance, system_time);
+                self.handle_service(&instance, system_time, verdict);
             }
             self.echo.push(echo);
         }
@@ -333,7 +334,14 @@ impl MotionDevice {
         }
     }
 
-    fn handle_service(&mut self, instance: &CommandInstance<'_>, system_time: Option<SystemTime>) {
+    /// Hands a request to its channel. A test moves the axis, so one in an update whose commands are refused is refused too;
+    /// the other services command nothing.
+    fn handle_service(
+        &mut self,
+        instance: &CommandInstance<'_>,
+        system_time: Option<SystemTime>,
+        verdict: &Verdict,
+    ) {
         let number = usize::from(instance.number);
         let channel = match number.checked_sub(1) {
             None => &mut self.class.service,
@@ -345,6 +353,11 @@ impl MotionDevice {
         if channel.handle(instance.service.as_ref())
             && let Some(request) = &instance.service
         {
+            let refused = matches!(verdict, Verdict::CommandsRefused);
+            if refused && request.service == MotionService::RUN_HOOKUP_TEST {
+                channel.answer(GeneralStatus::DEVICE_STATE_CONFLICT, &[]);
+                return;
+            }
             self.execute_service(number, request, system_time);
         }
     }

@@ -68,6 +68,19 @@ impl Rig {
 }
 
 #[test]
+fn an_update_whose_commands_are_refused_starts_no_test() {
+    let mut rig = Rig::stopped();
+    rig.blocks[0].feedback_mode = FeedbackMode(2);
+    rig.cycle();
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::empty();
+    assert_eq!(rig.start(run(MOTOR, 0, 1.5, 0.0)), GeneralStatus::DEVICE_STATE_CONFLICT.0);
+    assert_eq!(rig.device.counters().untimed, 1);
+    rig.cycles(3);
+    assert_eq!((rig.order(), rig.state(0)), (None, AxisState::Stopped));
+}
+
+#[test]
 fn a_motor_test_goes_by_starting_and_testing_back_to_stopped() {
     let mut rig = Rig::stopped();
     rig.blocks[0].feedback_mode = FeedbackMode(2);
