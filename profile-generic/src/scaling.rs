@@ -110,6 +110,13 @@ impl WrapTracker {
         self.total = total;
     }
 
+    /// Moves the reference of the counter itself by `by` counts: the next value comes in the new reference, and what it
+    /// has moved since the last one is told apart from the change.
+    pub fn shift(&mut self, by: i64) {
+        self.last = self.last.map(|last| last.wrapping_add(by));
+        self.total = self.total.wrapping_add(by);
+    }
+
     /// Forgets where the counter was; the next value is taken as it is. After a loss of communication in
     /// which the counter may have moved by more than half its modulus.
     pub fn restart(&mut self) {

@@ -109,9 +109,14 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let scalings: Vec<_> =
             members.iter().map(|(number, axis)| (*number, scaling(axis), stop_defaults(axis))).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
-        let channel =
-            DeviceChannel::new(number, device_config(device, &members), device_end, &scalings, &mapping)
-                .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
+        let channel = DeviceChannel::new(
+            number,
+            device_config(device, &members, &mapping),
+            device_end,
+            &scalings,
+            &mapping,
+        )
+        .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
         devices.push(channel);
         adapters.push((with_sheet(device, &members, host), adapter_end));
     }
@@ -247,7 +252,7 @@ fn device_type(members: &[(usize, &Axis)]) -> u16 {
     }
 }
 
-fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
+fn device_config(device: &Device, members: &[(usize, &Axis)], mapping: &Mapping) -> DeviceConfig {
     let axis = |(_, axis): &(usize, &Axis)| AxisConfig {
         kind: match axis.function {
             AxisFunction::Drive => ControlKind::Active,
@@ -256,7 +261,8 @@ fn device_config(device: &Device, members: &[(usize, &Axis)]) -> DeviceConfig {
         },
         // Position, velocity and torque; nothing can be enabled that is no drive.
         control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
-        lint_position: false,
+        feedback_modes: mapping.cip.feedback_modes,
+        lint_position: true,
         // Motor and feedback, feedback; a drive shows the box neither its marker nor its phasing.
         hookup_tests: 0b11,
     };

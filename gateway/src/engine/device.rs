@@ -4,6 +4,7 @@ use std::net::SocketAddrV4;
 
 use arrayvec::ArrayVec;
 use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
+use profile_cip::target::axis_object::PositionView;
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::drive_link::DriveAction;
 use profile_cip::target::fault_log::FaultLog;
@@ -303,9 +304,12 @@ impl DeviceChannel {
                 // The update may bring another target; the period stays for the life of the connection.
                 axis.keep_update_period(DurationNs::from_micros(period), TargetUpdate::Interpolate);
             }
-            let (attributes, signals) = (&member.attributes, &*axis);
-            self.device
-                .publish_signals(place, &mut |id, octets| signal_octets(attributes, signals, id, octets));
+            if let Some(view) = self.device.position_view(place) {
+                let (attributes, signals) = (&member.attributes, &*axis);
+                let mut octets =
+                    |id, octets: &mut [u8; 8]| signal_octets(attributes, signals, &view, id, octets);
+                self.device.publish_signals(place, &mut octets);
+            }
             if let Some(image) = self.device.command(place, now) {
                 let enabled = image.action == DriveAction::Enable && member.action != DriveAction::Enable;
                 member.action = image.action;
@@ -419,7 +423,9 @@ impl DeviceChannel {
         match entry.backing {
             mapping::Backing::Signal { .. } => {
                 let mut bytes = [0; 8];
-                let len = signal_octets(&member.attributes, axis, access.id, &mut bytes)
+                let view = self.device.position_view(place);
+                let len = view
+                    .and_then(|view| signal_octets(&member.attributes, axis, &view, access.id, &mut bytes))
                     .ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
                 self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
                 Ok(())
@@ -721,13 +727,14 @@ fn number_of(bytes: Result<&[u8], GeneralStatus>, signed: bool) -> i64 {
 fn signal_octets(
     attributes: &AttributeTable,
     axis: &AxisChannel,
+    view: &PositionView,
     id: u16,
     octets: &mut [u8; 8],
 ) -> Option<usize> {
     let entry = attributes.get(id)?;
     let mapping::Backing::Signal { signal, .. } = entry.backing else { return None };
     let generic = signal_value(axis, signal)?;
-    entry.from_generic(generic, octets).ok().map(|(len, _)| len)
+    entry.from_signal(generic, view, octets).ok()
 }
 
 fn signal_value(axis: &AxisChannel, signal: Signal) -> Option<i64> {

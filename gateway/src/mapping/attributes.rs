@@ -1,12 +1,13 @@
 //! The attributes that the device serves for one axis.
 
+use profile_cip::target::axis_object::PositionView;
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Width};
 
 use super::cip_scaling::CipScaling;
-use super::cip_tables::{CipTables, Served, ServedAttribute, has_direction};
-use super::dictionary::{Access, CipType};
+use super::cip_tables::{CipTables, Served, ServedAttribute, limit_has_sign};
+use super::dictionary::{Access, CipType, PolarityEffect};
 
 /// Who answers for an attribute, with the conversions of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +91,14 @@ pub enum ValueError {
 
 impl AttributeTable {
     pub(super) fn compile(tables: &CipTables, scaling: &CipScaling) -> Option<Self> {
-        let entries = tables.attributes.iter().map(|row| entry(row, scaling)).collect::<Option<_>>()?;
+        let entries = tables
+            .attributes
+            .iter()
+            .map(|row| {
+                let (behind, turns) = behind(tables, row, scaling);
+                entry(row, behind, turns, scaling)
+            })
+            .collect::<Option<_>>()?;
         Some(Self { entries })
     }
 
@@ -106,19 +114,46 @@ impl AttributeTable {
     }
 }
 
-fn entry(row: &ServedAttribute, scaling: &CipScaling) -> Option<AttributeEntry> {
+/// What stands behind an attribute, and whether its sign is turned: an inverted Motion Polarity turns the sign of signals
+/// and exchanges the limits of the two directions (clause 5-2.3.2.1.2, Tables 5-2.14 and 5-2.15).
+fn behind<'t>(tables: &'t CipTables, row: &'t ServedAttribute, scaling: &CipScaling) -> (&'t Served, bool) {
+    if !scaling.inverted {
+        return (&row.served, false);
+    }
+    match row.attribute.polarity {
+        PolarityEffect::None => (&row.served, false),
+        PolarityEffect::Sign => (&row.served, true),
+        PolarityEffect::Swap(with) => {
+            let other = tables.attributes.iter().find(|other| other.attribute.id == with);
+            match (row.served, other.map(|other| &other.served)) {
+                // What is kept for the controller alone stays as the controller has set it.
+                (Served::Parameter { .. }, Some(other @ Served::Parameter { parameter, .. })) => {
+                    (other, parameter.row().is_some_and(|row| limit_has_sign(row.quantity)))
+                }
+                _ => (&row.served, false),
+            }
+        }
+    }
+}
+
+fn entry(
+    row: &ServedAttribute,
+    served: &Served,
+    turns: bool,
+    scaling: &CipScaling,
+) -> Option<AttributeEntry> {
     let attribute = &row.attribute;
-    let backing = match row.served {
+    let backing = match *served {
         Served::Device => Backing::Device,
         Served::Connection => Backing::Connection,
         Served::Shadow => Backing::Shadow,
         Served::Constant(value) => Backing::Constant(value),
         Served::Signal { signal, unit } => {
-            let to_generic = scaling.convert(unit, has_direction(signal.quantity()))?;
+            let to_generic = scaling.convert(unit, turns)?;
             Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
         }
         Served::Parameter { parameter, unit, reject } => {
-            let to_generic = scaling.convert(unit, false)?;
+            let to_generic = scaling.convert(unit, turns)?;
             Backing::Parameter {
                 parameter,
                 to_generic: Conversion::new(to_generic),
@@ -193,14 +228,41 @@ impl AttributeEntry {
             _ => {
                 let outcome = from_generic.convert(generic);
                 let (min, max) = width.range();
-                let wraps = matches!(self.backing, Backing::Signal { signal: Signal::PositionActual, .. });
-                let value = if wraps { outcome.value } else { outcome.value.clamp(min, max) };
+                let value = outcome.value.clamp(min, max);
                 let bytes = value.to_le_bytes();
                 out[..width.bytes()].copy_from_slice(&bytes[..width.bytes()]);
                 outcome.saturated || value != outcome.value
             }
         };
         Ok((width.bytes(), clamped))
+    }
+
+    /// Writes the generic value of a signal as the attribute into `out` and returns the bytes that count; positions as the
+    /// controller sees them. They roll over where the type of the attribute ends.
+    ///
+    /// # Errors
+    /// As for [`AttributeEntry::from_generic`].
+    pub fn from_signal(
+        &self,
+        generic: i64,
+        view: &PositionView,
+        out: &mut [u8; 8],
+    ) -> Result<usize, ValueError> {
+        let seen = match &self.backing {
+            Backing::Signal { signal: Signal::PositionActual, from_generic } => {
+                view.measured(from_generic.convert(generic).value)
+            }
+            Backing::Signal { signal: Signal::PositionCommand, from_generic } => {
+                view.commanded(from_generic.convert(generic).value)
+            }
+            _ => return self.from_generic(generic, out).map(|(len, _)| len),
+        };
+        let width = self.number_width()?;
+        if matches!(width, Width::F32 | Width::F64) {
+            return Err(ValueError::NotConvertible);
+        }
+        *out = seen.to_le_bytes();
+        Ok(width.bytes())
     }
 
     fn number_width(&self) -> Result<Width, ValueError> {

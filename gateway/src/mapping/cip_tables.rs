@@ -209,6 +209,8 @@ pub struct CipTables {
     units: Vec<(String, Quantity, CipUnit)>,
     pub(super) cyclic: Vec<CyclicElement>,
     pub(super) modes: [Option<OperatingMode>; 16],
+    /// Feedback modes that an axis can be enabled with, as bits numbered by the code.
+    pub feedback_modes: u16,
     pub(super) requests: Vec<CipRequest>,
     pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
     pub(super) states: [CipState; DriveState::ALL.len()],
@@ -236,6 +238,11 @@ impl CipTables {
 /// Whether the polarity of an axis turns a quantity (Table 5-2.14).
 pub(super) const fn has_direction(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Position | Quantity::Velocity | Quantity::Acceleration | Quantity::Torque)
+}
+
+/// Whether the limits of the two directions differ in sign. Those of acceleration and deceleration are magnitudes.
+pub(super) const fn limit_has_sign(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Position | Quantity::Velocity | Quantity::Torque)
 }
 
 /// A signal by name.

@@ -216,19 +216,46 @@ impl CipReport {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CipTrackers {
     position: WrapTracker,
+    /// What the controller has moved its reference system by, counts.
+    reference: i64,
+    /// Counts between the cycles that the controller counts and the unrolled count; `None` until it tells a count.
+    anchor: Option<i64>,
 }
 
 impl CipTrackers {
-    /// Forgets where the position was: the next value is taken as it is.
-    pub fn restart(&mut self) {
-        self.position.restart();
-    }
-
-    /// Sets the unrolled count: after the controller has redefined its position.
-    pub fn set_counts(&mut self, counts: i64) {
+    /// The controller counts from here on from where the axis is: `counts` of its position, without what the controller
+    /// has moved its reference system by. The next command is taken within half a cycle of it, or within half the range
+    /// of a DINT.
+    pub fn start(&mut self, counts: i64, reference: i64) {
         // The first value after a restart is taken as it is.
         self.position.restart();
-        self.position.update(counts);
+        self.position.update(counts.saturating_add(reference));
+        self.reference = reference;
+        self.anchor = None;
+    }
+
+    /// Commands come in another reference system: what they have moved on is told apart from the change.
+    fn change_reference(&mut self, reference: i64) {
+        if reference != self.reference {
+            self.position.shift(reference.wrapping_sub(self.reference));
+            self.reference = reference;
+            // Where the controller begins to count the cycles of the new system is its own affair.
+            self.anchor = None;
+        }
+    }
+
+    /// The unrolled count of a commanded position.
+    ///
+    /// With the count of cycles every step is exact, however many cycles it leads over. What the controller calls cycle
+    /// zero is found by the first count: the axis stands within half a cycle of its first command.
+    fn unroll(&mut self, counts: i64, cycle: Option<i64>, cycles: Option<i64>) -> i64 {
+        let near = self.position.update(counts);
+        let (Some(cycle), Some(cycles)) = (cycle, cycles) else { return near };
+        let told = cycles.saturating_mul(cycle).saturating_add(counts);
+        let anchor = *self.anchor.get_or_insert(near.wrapping_sub(told));
+        let total = told.saturating_add(anchor);
+        self.position.set_total(total);
+        total
     }
 }
 
@@ -296,12 +323,13 @@ impl CipProgram {
 
     /// Trackers for [`CipProgram::decode`].
     pub fn trackers(&self) -> CipTrackers {
-        CipTrackers { position: self.tracker }
+        CipTrackers { position: self.tracker, reference: 0, anchor: None }
     }
 
     /// Puts the values of a Command Data Set into a command. Values that are not there become absent.
     /// `reference` is subtracted from positions, in counts: what the controller has moved its reference
-    /// system by.
+    /// system by. A cyclic axis moves the short way to its next position, unless the Unwind Cycle Count says how many
+    /// cycles it is; then every position is exact.
     pub fn decode(
         &self,
         values: &CyclicValues,
@@ -311,16 +339,24 @@ impl CipProgram {
     ) -> CipReport {
         let mut report = CipReport::default();
         command.present = profile_generic::image::CommandSet::empty();
-        for (value, element) in values.0.iter().zip(&self.commands) {
+        trackers.change_reference(reference);
+        let cycles = match values.0[super::device_link::bit::UNWIND_COUNT] {
+            Some(CipValue::Dint(cycles)) => Some(i64::from(cycles)),
+            _ => None,
+        };
+        for (bit, (value, element)) in values.0.iter().zip(&self.commands).enumerate() {
             let (value, element) = match (value, element) {
                 (Some(value), Some(element)) => (*value, element),
                 (None, _) => continue,
+                // They tell how to take the position; they are no values of their own.
+                _ if super::device_link::bit::OF_POSITION.contains(&bit) => continue,
                 (Some(_), None) => {
                     report.unmapped += 1;
                     continue;
                 }
             };
-            let Some(outcome) = element.decode(value, reference, &mut trackers.position) else {
+            let unroll = |counts| trackers.unroll(counts, self.unwind, cycles).saturating_sub(reference);
+            let Some(outcome) = element.decode(value, unroll) else {
                 report.not_finite += 1;
                 continue;
             };
@@ -373,14 +409,22 @@ impl CipProgram {
         outcome.value
     }
 
-    /// An actual value as a REAL; 0 when it is not there.
-    pub(super) fn actual_real(&self, bit: usize, feedback: &AxisFeedback, report: &mut CipReport) -> f32 {
-        let Some((element, generic)) = self.actual(bit, feedback, report) else { return 0.0 };
+    /// An actual value as a REAL; `None` when it is not there, unless its row wants it to be zero then.
+    pub(super) fn actual_real(
+        &self,
+        bit: usize,
+        feedback: &AxisFeedback,
+        report: &mut CipReport,
+    ) -> Option<f32> {
+        let missing = self.actuals.get(bit)?.as_ref()?.missing;
+        let Some((element, generic)) = self.actual(bit, feedback, report) else {
+            return (missing == MissingValue::Zero).then_some(0.0);
+        };
         let (outcome, saturated) = element.conversion.convert_to_f32(generic);
         if saturated {
             report.saturated(element.signal);
         }
-        outcome.value
+        Some(outcome.value)
     }
 
     fn actual(&self, bit: usize, feedback: &AxisFeedback, report: &mut CipReport) -> Option<(&Element, i64)> {
@@ -390,6 +434,11 @@ impl CipProgram {
             report.missing += 1;
         }
         Some((element, value?))
+    }
+
+    /// Counts after which a cyclic axis is where it was; `None` for an axis that is not cyclic.
+    pub(super) fn unwind(&self) -> Option<u32> {
+        self.unwind.and_then(|counts| u32::try_from(counts).ok())
     }
 
     /// Counts of the controller in a generic position.
@@ -493,7 +542,7 @@ impl CipProgram {
 }
 
 impl Element {
-    fn decode(&self, value: CipValue, reference: i64, tracker: &mut WrapTracker) -> Option<Outcome> {
+    fn decode(&self, value: CipValue, unroll: impl FnOnce(i64) -> i64) -> Option<Outcome> {
         if !self.wraps {
             return match value {
                 CipValue::Dint(value) => Some(self.conversion.convert(i64::from(value))),
@@ -506,7 +555,7 @@ impl Element {
             CipValue::Real(value) => split(f64::from(value))?,
             CipValue::Lreal(value) => split(value)?,
         };
-        let counts = self.conversion.convert(tracker.update(whole).saturating_sub(reference));
+        let counts = self.conversion.convert(unroll(whole));
         if fraction == 0.0 {
             return Some(counts);
         }

@@ -24,13 +24,15 @@ pub(super) const DRIVE_ACTIONS: [(&str, DriveAction); 7] = [
 ];
 
 /// Bits of the data sets that the device's images have a place for (Tables 6-2.19 and 6-2.21).
-mod bit {
+pub(super) mod bit {
     pub const POSITION: usize = 0;
     pub const VELOCITY: usize = 1;
     pub const ACCELERATION: usize = 2;
     pub const TORQUE: usize = 3;
     pub const UNWIND_COUNT: usize = 6;
     pub const DISPLACEMENT: usize = 7;
+    /// Elements that belong to the position.
+    pub const OF_POSITION: [usize; 2] = [UNWIND_COUNT, DISPLACEMENT];
 }
 
 impl From<&CommandValues> for CyclicValues {
@@ -66,6 +68,7 @@ impl CipProgram {
     ) -> CipReport {
         let mut report = CipReport::default();
         image.position = self.actual_counts(bit::POSITION, feedback, &mut report);
+        image.unwind = self.unwind();
         image.velocity = self.actual_real(bit::VELOCITY, feedback, &mut report);
         image.acceleration = self.actual_real(bit::ACCELERATION, feedback, &mut report);
         let conditions = self.state(feedback.state).conditions;

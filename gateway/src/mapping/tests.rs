@@ -4,6 +4,7 @@ mod broken_tables;
 mod cip_codes;
 mod cip_dictionary;
 mod cip_program;
+mod cyclic_axis;
 mod sercos_program;
 mod shipped_tables;
 

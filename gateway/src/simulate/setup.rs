@@ -2,6 +2,7 @@
 
 use profile_cip::controller::config::TimeOuts;
 use profile_cip::controller::{AttributeSet, AxisSetup, ControllerConfig, Step};
+use profile_cip::wire::motion::codes::{ActualDataSet, CommandDataSet};
 use profile_generic::time::DurationNs;
 
 use crate::mapping::Mapping;
@@ -28,7 +29,7 @@ const TIMEOUT_MULTIPLIER: u8 = 3;
 /// Controller Update Delay High Limit and Low Limit, in update periods.
 const DELAY_LIMITS: (u8, u8) = (10, 4);
 
-/// A controller for axes with these counts in a unit.
+/// A controller for axes with these counts in a unit. No axis is cyclic, whatever the box has it for: [`make_cyclic`].
 #[must_use]
 pub fn controller(mapping: &Mapping, counts_per_unit: &[f64], update_period_us: u32) -> ControllerConfig {
     let axes = counts_per_unit.iter().map(|counts| {
@@ -44,6 +45,17 @@ pub fn controller(mapping: &Mapping, counts_per_unit: &[f64], update_period_us: 
     config.class_attributes = class_attributes(mapping);
     config.time_outs = TimeOuts { initialization: READY_TIME_OUT, ..TimeOuts::default() };
     config
+}
+
+/// Makes an axis start anew after so many counts: the controller says so to the box, and counts the cycles.
+pub fn make_cyclic(mapping: &Mapping, axis: &mut AxisSetup, unwind: i32) {
+    let rows = &mapping.cip.scaling;
+    axis.unwind = u32::try_from(unwind).ok();
+    axis.sets.command |= CommandDataSet::UNWIND_COUNT;
+    axis.sets.actual |= ActualDataSet::UNWIND_COUNT;
+    axis.attributes.retain(|set| set.selector.id != rows.unwind);
+    axis.attributes.push(AttributeSet::dint(rows.unwind_position, unwind));
+    axis.attributes.push(AttributeSet::usint(rows.unwind, 1));
 }
 
 /// An enable that waits for drives on their way up.
@@ -66,7 +78,7 @@ fn class_attributes(mapping: &Mapping) -> Vec<AttributeSet> {
 }
 
 /// Instance attributes by the names of the dictionary: a closed loop on the motor feedback with stops on the ramp. The
-/// scaling stays as the box has it.
+/// scaling stays as the box has it, but for the unwind: the controller counts on.
 fn instance_attributes(mapping: &Mapping) -> Vec<AttributeSet> {
     let dictionary = &mapping.dictionaries.cip;
     let id = |name: &str| dictionary.attribute(name).map(|row| row.id);
@@ -75,5 +87,6 @@ fn instance_attributes(mapping: &Mapping) -> Vec<AttributeSet> {
         id("Stopping Action").map(|id| AttributeSet::usint(id, 1)),
         id("Position Lock Tolerance").map(|id| AttributeSet::real(id, 1_000.0)),
     ];
-    sets.into_iter().flatten().map(AttributeSet::optional).collect()
+    let counts_on = AttributeSet::usint(mapping.cip.scaling.unwind, 0);
+    sets.into_iter().flatten().chain([counts_on]).map(AttributeSet::optional).collect()
 }

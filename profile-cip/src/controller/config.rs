@@ -119,6 +119,10 @@ pub struct AxisSetup {
     pub sets: DataSets,
     /// What no step may go beyond.
     pub limits: AxisLimits,
+    /// Counts of a machine cycle, for a device that unwinds the axis: Cyclic Unwind Position, attribute 84, which
+    /// `attributes` has to set like Cyclic Unwind Control, attribute 83. Both data sets have to hold the Unwind Cycle Count;
+    /// programs go on counting over the cycles.
+    pub unwind: Option<u32>,
     /// Attributes written before Configuration Complete, in this order.
     pub attributes: Vec<AttributeSet>,
 }
@@ -139,6 +143,7 @@ impl AxisSetup {
             feedback_mode: FeedbackMode(FeedbackSource::MOTOR.0),
             sets: DataSets::default(),
             limits: AxisLimits::default(),
+            unwind: None,
             attributes: Vec::new(),
         }
     }

@@ -44,6 +44,15 @@ pub(super) const fn roll(position: i64) -> i32 {
     i32::from_le_bytes([a, b, c, d])
 }
 
+/// A position within a cycle of `unwind` counts, and its cycle.
+pub(super) fn fold(position: f64, unwind: u32) -> (f64, i32) {
+    let unwind = f64::from(unwind);
+    let within = position.rem_euclid(unwind);
+    // Rounding may lead to the very end of the cycle, which is the beginning of the next.
+    let within = if within < unwind { within } else { 0.0 };
+    (within, roll(counts((position - within) / unwind)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,8 +7,8 @@ use super::axis_state::{AxisState, ControlKind};
 use super::axis_status::allowed;
 use super::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, SetPoints, Withheld};
 use super::io_connection::missed_updates;
-use crate::wire::motion::codes::{ActualDataSet, AxisControl, AxisStatus, ControlMode, StatusDataSet};
-use crate::wire::motion::{ActualBlock, ActualPosition, ActualValues, StatusValues};
+use crate::wire::motion::codes::{ActualDataSet, AxisStatus, ControlMode, StatusDataSet};
+use crate::wire::motion::{ActualBlock, ActualValues, StatusValues};
 
 impl Axis {
     /// What the drive has to do at `now`. `period_ns` and `limit` judge the age of the set-points.
@@ -33,7 +33,7 @@ impl Axis {
                 if age_updates > limit {
                     Command::Withheld(Withheld::Stale)
                 } else {
-                    let position_reference = self.command_reference;
+                    let position_reference = self.references.command();
                     Command::Follow(SetPoints { age_updates, position_reference, ..held.set_points })
                 }
             }
@@ -82,30 +82,35 @@ impl Axis {
 
     /// The cyclic actual block of D-to-C update `update_id`.
     pub fn actual_block(&mut self, update_id: u8, context: &Context) -> ActualBlock {
-        let asked = self.block.actual_data_set;
         let (axis_response, response_status) = self.handshake.response();
-        let position = self.seen_by_controller(self.drive.position);
         let lint = self.config.lint_position && self.block.feedback_mode.position_is_lint();
-        let position =
-            if lint { ActualPosition::Lint(position) } else { ActualPosition::Dint(rolled(position)) };
-        let displaced = axis_response == AxisControl::CHANGE_ACTUAL_POSITION && response_status == 0;
-        let displacement = if displaced { self.displacement } else { 0 };
         ActualBlock {
             control_mode: self.block.control_mode,
             feedback_mode: self.block.feedback_mode.with_lint(lint),
             axis_response,
             response_status,
             axis_state: self.state.code(),
-            actual: ActualValues {
-                position: asked.contains(ActualDataSet::POSITION).then_some(position),
-                velocity: asked.contains(ActualDataSet::VELOCITY).then_some(self.drive.velocity),
-                acceleration: asked.contains(ActualDataSet::ACCELERATION).then_some(self.drive.acceleration),
-                unwind_count: None,
-                position_displacement: asked
-                    .contains(ActualDataSet::POSITION_DISPLACEMENT)
-                    .then_some(displacement),
-            },
+            actual: self.actual_values(lint),
             status: self.status_values(update_id, context),
+        }
+    }
+
+    /// The actual values that the controller asks for and this axis has. A bit for which there is no value is clear in the
+    /// answer, so that nobody takes a zero for a measurement: everything of a converter, what the drive does not tell, and
+    /// the Unwind Cycle Count where nothing is unwound.
+    fn actual_values(&self, lint: bool) -> ActualValues {
+        let asked = self.block.actual_data_set;
+        if self.config.kind == ControlKind::Converter {
+            return ActualValues::default();
+        }
+        let seen = self.seen_by_controller(self.drive.position);
+        let has = |bit| asked.contains(bit);
+        ActualValues {
+            position: has(ActualDataSet::POSITION).then(|| seen.value(lint)),
+            velocity: self.drive.velocity.filter(|_| has(ActualDataSet::VELOCITY)),
+            acceleration: self.drive.acceleration.filter(|_| has(ActualDataSet::ACCELERATION)),
+            unwind_count: seen.unwind_count().filter(|_| has(ActualDataSet::UNWIND_COUNT)),
+            position_displacement: has(ActualDataSet::POSITION_DISPLACEMENT).then(|| self.displacement()),
         }
     }
 
@@ -133,10 +138,4 @@ impl Axis {
         }
         values
     }
-}
-
-/// The low 32 bits of a position: a DINT position rolls over.
-pub(super) fn rolled(position: i64) -> i32 {
-    let [a, b, c, d, ..] = position.to_le_bytes();
-    i32::from_le_bytes([a, b, c, d])
 }

@@ -1,7 +1,8 @@
 //! Cyclic write and read data: attribute lists agreed by service and carried in every update, clauses 6-2.7.1.2.3,
 //! 6-2.7.2.1.6, 5-2.5.1.3 and 5-2.5.1.4.
 //!
-//! A list in use stays valid until the controller uses its successor, so two are kept.
+//! A list in use stays valid until the controller uses its successor: that is the update which hands over. A successor
+//! that was never used gives way to the next one, so two are kept.
 //!
 //! The standard promises that what a list carries is read in every update and applied in the next one. Values stored in
 //! the device keep that promise, and so do signals, which the owner of the device publishes in every cycle
@@ -38,8 +39,11 @@ struct Layout {
 /// The lists of one direction.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CyclicLists {
-    current: Layout,
-    previous: Layout,
+    in_use: Layout,
+    /// Agreed on and not used yet; empty with ID 0 when there is none.
+    next: Layout,
+    /// The ID that was given last.
+    given: u8,
 }
 
 /// Octets to skip so that the elements of an attribute are aligned to their size, at most to 32 bits.
@@ -48,8 +52,19 @@ fn align(at: usize, entry: &Entry) -> usize {
 }
 
 impl CyclicLists {
-    fn layout(&self, id: u8) -> Option<&Layout> {
-        [&self.current, &self.previous].into_iter().find(|layout| layout.id == id)
+    /// The list with this ID, not 0, which is in use from now on.
+    fn take_up(&mut self, id: u8) -> Option<&Layout> {
+        if id == self.next.id {
+            self.in_use = core::mem::take(&mut self.next);
+        }
+        (id == self.in_use.id).then_some(&self.in_use)
+    }
+
+    /// The ID for a new list: ID 0 is the empty list for good, and that of the list in use is taken.
+    fn next_id(&self) -> u8 {
+        let after = |id: u8| id.checked_add(1).unwrap_or(1);
+        let id = after(self.given);
+        if id == self.in_use.id { after(id) } else { id }
     }
 
     fn suits(table: &AttributeTable, id: u16, direction: Direction) -> GeneralStatus {
@@ -90,26 +105,25 @@ impl CyclicLists {
         let fits = size <= CYCLIC_DATA_MAX;
         let good = fits && statuses.iter().all(|s| s.status == 0);
         if good {
-            // ID 0 is the empty list for good, so the count skips it.
-            let id = self.current.id.checked_add(1).unwrap_or(1);
+            let id = self.next_id();
             let signal = |e: &Entry| e.definition.backing == Backing::Signal;
             // Until they are published for the first time there is nothing to be read.
             let incomplete = list.iter().filter_map(|id| table.find(id)).any(signal);
-            let next = Layout { id, attributes: list.iter().collect(), incomplete };
-            self.previous = core::mem::replace(&mut self.current, next);
+            self.next = Layout { id, attributes: list.iter().collect(), incomplete };
+            self.given = id;
         }
         let status = match (good, fits) {
             (true, _) => GeneralStatus::SUCCESS,
             (false, true) => GeneralStatus::ATTRIBUTE_LIST_ERROR,
             (false, false) => GeneralStatus::RESOURCE_UNAVAILABLE,
         };
-        IdStatusList::emit(response, self.current.id, &statuses)
+        IdStatusList::emit(response, self.given, &statuses)
             .map_or((GeneralStatus::REPLY_DATA_TOO_LARGE, 0), |len| (status, len))
     }
 
     /// Applies cyclic write data; all of it or nothing.
     pub fn write(
-        &self,
+        &mut self,
         table: &AttributeTable,
         store: &mut AttributeStore,
         id: u8,
@@ -119,7 +133,7 @@ impl CyclicLists {
         if id == 0 {
             return if data.is_empty() { GeneralStatus::SUCCESS } else { GeneralStatus::TOO_MUCH_DATA };
         }
-        let Some(layout) = self.layout(id) else { return GeneralStatus::INVALID_PARAMETER };
+        let Some(layout) = self.take_up(id) else { return GeneralStatus::INVALID_PARAMETER };
         for apply in [false, true] {
             let mut at = 0;
             for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
@@ -152,7 +166,7 @@ impl CyclicLists {
         store: &mut AttributeStore,
         value: &mut dyn FnMut(u16, &mut [u8; 8]) -> Option<usize>,
     ) {
-        for layout in [&mut self.current, &mut self.previous] {
+        for layout in [&mut self.in_use, &mut self.next] {
             layout.incomplete = false;
             let entries = layout.attributes.iter().filter_map(|id| table.find(*id));
             for entry in entries.filter(|entry| entry.definition.backing == Backing::Signal) {
@@ -170,7 +184,7 @@ impl CyclicLists {
     /// # Errors
     /// There is no list with this ID, or a signal of it has no value now.
     pub fn read(
-        &self,
+        &mut self,
         table: &AttributeTable,
         store: &AttributeStore,
         id: u8,
@@ -179,7 +193,7 @@ impl CyclicLists {
         if id == 0 {
             return Ok(data);
         }
-        let layout = self.layout(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
+        let layout = self.take_up(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
         if layout.incomplete {
             return Err(GeneralStatus::DEVICE_STATE_CONFLICT);
         }
@@ -289,19 +303,41 @@ mod tests {
     }
 
     #[test]
+    fn ids_go_round_past_zero_and_past_the_one_in_use() {
+        let mut lists = CyclicLists::default();
+        let table = table();
+        let store = AttributeStore::new(&table);
+        configure(&mut lists, Direction::Read, &[1]);
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
+        let ids: Vec<u8> = (0..256).map(|_| configure(&mut lists, Direction::Read, &[2]).1[2]).collect();
+        assert_eq!((ids[0], ids[253], ids[254], ids[255]), (2, 255, 2, 3));
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
+    }
+
+    #[test]
     fn the_list_before_stays_until_the_one_after_and_a_bad_list_changes_nothing() {
         let mut lists = CyclicLists::default();
+        let table = table();
+        let store = AttributeStore::new(&table);
+        let invalid = Err(GeneralStatus::INVALID_PARAMETER);
         assert_eq!(configure(&mut lists, Direction::Read, &[1]).0, GeneralStatus::SUCCESS);
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
         assert_eq!(configure(&mut lists, Direction::Read, &[2]).0, GeneralStatus::SUCCESS);
         let (status, body) = configure(&mut lists, Direction::Read, &[1, 9, 5]);
         assert_eq!(status, GeneralStatus::ATTRIBUTE_LIST_ERROR);
         assert_eq!(body, [3, 0, 2, 0, 1, 0, 0, 0, 9, 0, 0x14, 0, 5, 0, 0x2C, 0], "the ID stays 2");
-        let table = table();
-        let store = AttributeStore::new(&table);
-        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
-        assert_eq!(lists.read(&table, &store, 2).map(|d| d.len()), Ok(2));
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4), "still the one in use");
         assert_eq!(configure(&mut lists, Direction::Read, &[3]).0, GeneralStatus::SUCCESS);
-        assert_eq!(lists.read(&table, &store, 1), Err(GeneralStatus::INVALID_PARAMETER));
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4), "two lists later as well");
+        assert_eq!(lists.read(&table, &store, 2), invalid, "never used, and replaced");
+        assert_eq!(
+            lists.read(&table, &store, 0).map(|d| d.len()),
+            Ok(0),
+            "the empty list hands over nothing"
+        );
+        assert_eq!(lists.read(&table, &store, 1).map(|d| d.len()), Ok(4));
+        assert_eq!(lists.read(&table, &store, 3).map(|d| d.len()), Ok(8), "handed over");
+        assert_eq!(lists.read(&table, &store, 1), invalid);
         let write = configure(&mut lists, Direction::Write, &[4]);
         assert_eq!(write.1[6], GeneralStatus::ATTRIBUTE_NOT_SETTABLE.0);
         let many = [1; CYCLIC_ATTRIBUTES_MAX + 1];

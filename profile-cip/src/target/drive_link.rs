@@ -200,12 +200,17 @@ pub struct DriveImage {
     pub start_inhibits: u16,
     /// Start Inhibits - Mfg, attribute 677.
     pub start_inhibits_mfg: u16,
-    /// Actual position in the reference system of power-up, position control units.
+    /// Actual position in the reference system of power-up, position control units, never unwound.
     pub position: i64,
-    /// Actual velocity, velocity control units.
-    pub velocity: f32,
-    /// Actual acceleration, acceleration control units.
-    pub acceleration: f32,
+    /// Cyclic Unwind Position in use, position control units: after so many counts a cyclic axis is where it was. `None`
+    /// for an axis that is not cyclic, or whose controller unwinds it (Control Scaling).
+    pub unwind: Option<u32>,
+    /// Changes when a position control unit becomes something else; changes of the position reference are then forgotten.
+    pub scaling_id: u32,
+    /// Actual velocity, velocity control units; `None` when the drive does not tell it.
+    pub velocity: Option<f32>,
+    /// Actual acceleration, acceleration control units; `None` when the drive does not tell it.
+    pub acceleration: Option<f32>,
     /// Bits of Axis Status that only the drive knows; those that the state machine owns are replaced.
     pub axis_status: AxisStatus,
     /// Axis Status - Mfg.

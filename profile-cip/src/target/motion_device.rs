@@ -20,7 +20,7 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::{AttributeDefinition, AttributeStore, AttributeTable, Scope, TableError, id};
 use super::attribute_worker::{AttributeAccess, AttributeSpace};
-use super::axis_object::{Axis, AxisConfig, Context, FaultWords};
+use super::axis_object::{Axis, AxisConfig, Context, FaultWords, PositionView};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
 use super::drive_link::{AxisCommandImage, DriveImage};
@@ -453,6 +453,12 @@ impl MotionDevice {
         if let Some(slot) = self.slots.get_mut(axis) {
             slot.read_lists.publish(&self.axis_table, &mut slot.store, value);
         }
+    }
+
+    /// How the controller sees the positions of an axis now.
+    #[must_use]
+    pub fn position_view(&self, axis: usize) -> Option<PositionView> {
+        self.slots.get(axis).map(|slot| slot.axis.position_view())
     }
 
     /// The value of an attribute of an axis as it is stored in the device.

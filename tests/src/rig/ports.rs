@@ -33,6 +33,11 @@ impl Bytes {
         &self.bytes[..self.len]
     }
 
+    /// Other bytes in their place, at most [`FRAME_MAX`] of them.
+    pub fn replace(&mut self, bytes: &[u8]) {
+        *self = Self::of(bytes);
+    }
+
     /// The bytes, to be changed.
     pub fn as_mut_slice(&mut self) -> &mut [u8] {
         &mut self.bytes[..self.len]

@@ -8,6 +8,7 @@ mod hookup;
 mod indicators;
 mod loss;
 mod network;
+mod planes;
 mod programs;
 mod scripts;
 mod stalled;

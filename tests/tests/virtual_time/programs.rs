@@ -1,13 +1,11 @@
 //! Programs that go well: where the axes get to, by which states, and how closely they follow.
 
-use std::cell::Cell;
 use std::fmt::Write as _;
-use std::rc::Rc;
 
 use axisbridge::simulate::program::{AxisPlan, standard};
 use axisbridge_tests::rig::motion::{NANO, TURNTABLE, at_rest, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::{AxisSet, Limits, Step};
+use profile_cip::controller::{AxisSet, Step};
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_cip::wire::motion::{CommandFrame, CommandPosition};
@@ -118,57 +116,6 @@ fn a_controlled_stop_ends_a_move_with_the_torque_on() {
     // A second at five revolutions per second, less the speeding up, plus the slowing down: far from 50.
     assert!((4.5..5.5).contains(&commanded), "{commanded}");
     assert!((commanded - really).abs() < 0.001, "{commanded} {really}");
-}
-
-/// A program that turns the turntable far and back.
-fn far_and_back(turns: f64) -> Vec<Step> {
-    let fast = Limits { velocity: 40.0, acceleration: 400.0, jerk: 8_000.0 };
-    vec![
-        Step::Enable(AxisSet::one(1)),
-        Step::MoveAbsolute { axis: 1, position: turns + 0.25, limits: fast },
-        Step::Dwell { seconds: 0.3 },
-        Step::MoveAbsolute { axis: 1, position: 0.125, limits: fast },
-        Step::Dwell { seconds: 0.3 },
-        Step::Disable(AxisSet::one(1)),
-    ]
-}
-
-/// Runs it and looks at the drive at both ends: not one count of the controller away, however far it was.
-fn run_far_and_back(rig: &mut Rig, turns: i64, nano_per_count: i64) {
-    let whole = i32::try_from(turns).expect("some hundred turns");
-    rig.connect(far_and_back(f64::from(whole)));
-    for (steps, target) in [(3, turns * NANO + NANO / 4), (5, NANO / 8)] {
-        rig.run_until(millis(30_000), "an end", |rig| rig.report().steps_finished == steps);
-        let error = rig.position(0) - target;
-        assert!(error.abs() < nano_per_count, "{error} nanorevolutions away at {target}");
-    }
-    let report = rig.run(millis(5_000));
-    assert_eq!(report.failure, None, "{}", rig.log());
-}
-
-#[test]
-fn commands_that_start_anew_after_each_revolution_lead_through_many_of_them_without_drift() {
-    const UNWIND: f64 = 1_000_000.0;
-    let configuration = BOX
-        .replace("motion_resolution = 1_000_000", "motion_resolution = 1_000_000\nunwind_counts = 1_000_000");
-    let mut rig = Rig::ready(Settings { configuration, ..Settings::default() });
-    let folded = Rc::new(Cell::new(0_u32));
-    let counter = Rc::clone(&folded);
-    // The controller of the rig counts on; on the way its positions are folded into one revolution, as those
-    // of a
-    // controller are that knows the unwind.
-    rig.tamper_command = Some(Box::new(move |datagram| {
-        if let Some(at) = command_position(datagram.as_slice()) {
-            let place = &mut datagram.as_mut_slice()[at..at + 8];
-            let position = f64::from_le_bytes(place.try_into().expect("eight bytes"));
-            let within = position.rem_euclid(UNWIND);
-            counter.set(counter.get() + u32::from(within.to_bits() != position.to_bits()));
-            place.copy_from_slice(&within.to_le_bytes());
-        }
-        true
-    }));
-    run_far_and_back(&mut rig, 300, 1_000);
-    assert!(folded.get() > 3_000, "{} commands were folded", folded.get());
 }
 
 #[test]

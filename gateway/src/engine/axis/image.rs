@@ -17,6 +17,7 @@ impl AxisChannel {
             action_id: self.action_id,
             reset_id: self.reset_id,
             test: self.test_report(),
+            scaling_id: self.scaling_id,
             ..DriveImage::default()
         };
         let mut feedback = self.feedback;

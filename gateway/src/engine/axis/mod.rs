@@ -114,6 +114,8 @@ struct Reset {
 #[derive(Debug)]
 pub struct AxisChannel {
     north: CipProgram,
+    /// Counts the programs that were taken.
+    scaling_id: u32,
     trackers: CipTrackers,
     south: Option<(SercosProgram, Trackers)>,
     limits: Limits,
@@ -144,6 +146,8 @@ pub struct AxisChannel {
     reset: Option<Reset>,
     /// Set-points of this number were taken.
     sequence: Option<u32>,
+    /// When set-points were taken last.
+    taken_at: SystemTime,
     /// The fault that has stopped the axis: the first one, until a reset.
     fault: Option<Fault>,
     /// Everything that is wrong now.
@@ -180,6 +184,7 @@ impl AxisChannel {
         let trackers = north.trackers();
         Self {
             north,
+            scaling_id: 0,
             trackers,
             south: None,
             limits,
@@ -203,6 +208,7 @@ impl AxisChannel {
             reset_id: 0,
             reset: None,
             sequence: None,
+            taken_at: SystemTime::default(),
             fault: None,
             faults: FaultSet::new(),
             diagnosis: diagnosis::Diagnosis::default(),
@@ -272,6 +278,7 @@ impl AxisChannel {
         }
         self.trackers = program.trackers();
         self.north = program;
+        self.scaling_id = self.scaling_id.wrapping_add(1);
         true
     }
 

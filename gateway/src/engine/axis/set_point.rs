@@ -10,7 +10,7 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Transition};
-use profile_generic::time::{MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 impl AxisChannel {
     pub(super) fn take_set_points(&mut self, now: MonotonicTime, system: SystemTime, points: &SetPoints) {
@@ -28,7 +28,7 @@ impl AxisChannel {
             // show in a command that wraps.
             self.trackers = self.north.trackers();
             let counts = self.north.counts(self.feedback.position.get()).value;
-            self.trackers.set_counts(counts.saturating_add(points.position_reference));
+            self.trackers.start(counts, points.position_reference);
         }
         let mut fresh = self.command;
         let values = CyclicValues::from(&points.values);
@@ -42,6 +42,13 @@ impl AxisChannel {
         }
         if let Some(cause) = self.beyond_limits(&fresh) {
             self.raise(now, system, Fault::new(cause, system));
+            return;
+        }
+        let counted = points.values.unwind_count.is_some() && mode == OperatingMode::Position;
+        let elapsed = system.since(std::mem::replace(&mut self.taken_at, system));
+        if counted && !first && self.command.mode == mode && self.leaps(&fresh, elapsed) {
+            // Position and count that do not belong together: one of them is of the cycle before or after.
+            self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
             return;
         }
         let other_mode = self.command.mode != mode;
@@ -78,6 +85,20 @@ impl AxisChannel {
             Err(UpdateError::NotNewer { .. }) => {}
             Err(error) => self.lose_command(now, system, Loss::Update(error)),
         }
+    }
+
+    /// Whether a position is further from the present command than the axis may move in the time between updates. The
+    /// present command lies up to three periods before the one that the last update brought.
+    fn leaps(&self, fresh: &AxisCommand, elapsed: DurationNs) -> bool {
+        const PERIODS: i64 = 4;
+        const SECOND: i128 = 1_000_000_000;
+        let (Some(limit), Some(interpolator)) = (self.limits.velocity, &self.interpolator) else {
+            return false;
+        };
+        let span = i128::from((interpolator.config().period * PERIODS + elapsed).0.max(0));
+        let way = i128::from(fresh.position.get()) - i128::from(self.command.position.get());
+        // A tenth to spare, as everywhere.
+        way.abs() * 10 * SECOND > i128::from(limit.get()).abs() * 11 * span
     }
 
     pub(super) fn beyond_limits(&self, command: &AxisCommand) -> Option<FaultCause> {

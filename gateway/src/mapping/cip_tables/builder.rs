@@ -47,6 +47,7 @@ impl CipTables {
             builder.cyclic(row);
         }
         builder.modes(rows);
+        builder.feedback_modes(rows);
         builder.requests(rows);
         builder.drive_actions(rows);
         builder.states(rows);
@@ -226,6 +227,14 @@ impl Builder<'_> {
             {
                 *slot = Some(mode);
             }
+        }
+    }
+
+    fn feedback_modes(&mut self, rows: &CipGenericFile) {
+        for row in &rows.feedback_mode {
+            let code = self.byte_code("Feedback Mode", "feedback_mode", &row.feedback_mode);
+            self.tables.feedback_modes |=
+                code.and_then(|code| 1_u16.checked_shl(u32::from(code))).unwrap_or(0);
         }
     }
 

@@ -23,6 +23,8 @@ pub struct CipGenericFile {
     pub cyclic: Vec<CyclicRow>,
     /// Control modes.
     pub mode: Vec<CipModeRow>,
+    /// Feedback modes that an axis can be enabled with.
+    pub feedback_mode: Vec<FeedbackModeRow>,
     /// Axis control requests.
     pub request: Vec<RequestRow>,
     /// What the device asks of a drive.
@@ -193,6 +195,16 @@ pub struct CipModeRow {
     pub control_mode: Name,
     /// Operating mode.
     pub mode: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A feedback mode that an axis can be enabled with.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeedbackModeRow {
+    /// Feedback mode.
+    pub feedback_mode: Name,
     /// Where it comes from.
     pub source: Source,
 }

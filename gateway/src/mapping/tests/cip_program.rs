@@ -24,8 +24,10 @@ fn takes_position_as_float_and_as_integer_across_the_wrap() {
 fn a_value_that_is_not_there_is_absent_and_an_element_without_a_row_is_reported() {
     let program = shipped().cip_program(&rotary_counts()).unwrap();
     let mut command = AxisCommand { velocity: Velocity(5), ..AxisCommand::default() };
-    let values = CommandValues { torque: Some(-12.5), unwind_count: Some(1), ..CommandValues::default() };
-    let report = program.decode(&CyclicValues::from(&values), 0, &mut program.trackers(), &mut command);
+    let values = CommandValues { torque: Some(-12.5), ..CommandValues::default() };
+    let mut values = CyclicValues::from(&values);
+    values.0[4] = Some(CipValue::Dint(1));
+    let report = program.decode(&values, 0, &mut program.trackers(), &mut command);
     assert_eq!(
         (command.get(Signal::TorqueCommand), command.get(Signal::VelocityCommand)),
         (Some(-125_000), None)
@@ -79,7 +81,7 @@ fn fills_the_image_of_the_device() {
     let mut image = DriveImage { action_id: 7, ..DriveImage::default() };
     let report = program.drive_image(&feedback, &FaultSet::new(), &mut image);
     assert_eq!((image.position, image.action_id, report.missing), (3_000_000_000, 7, 1));
-    assert_eq!((image.velocity.to_bits(), image.captured_at), ((-0.5_f32).to_bits(), 42));
+    assert_eq!((image.velocity, image.captured_at), (Some(-0.5), 42));
     assert!(image.bus_up && image.start_complete && !image.stop_complete);
     // Bits 2, 3, 5, 17 and 22 (Table 5-2.60).
     assert_eq!(image.axis_status.bits(), 0x0042_002C);

@@ -18,7 +18,7 @@ use super::events::EventChecks;
 use super::following::Following;
 use super::handshake::Handshake;
 use super::misbehaviour::Spoil;
-use super::number::{counts, float, real, roll};
+use super::number::{counts, float, fold, real, roll};
 use super::report::AxisReport;
 use super::sets::DataSets;
 use super::trajectory::State;
@@ -181,7 +181,9 @@ impl Axis {
         self.handshake.handle(block.axis_response, block.response_status);
         self.advance_reference();
         self.seen.handle(block, &mut self.report, &mut event);
-        let Some(position) = self.seen.handle_position(block.actual.position, time.at) else { return };
+        let Some(position) = self.seen.handle_position(&block.actual, self.setup.unwind, time.at) else {
+            return;
+        };
         let units = float(position) / self.scale();
         self.report.actual = Some(units);
         if !self.is_running() {
@@ -208,6 +210,7 @@ impl Axis {
         control_status.set(ControlStatus::CONFIGURATION_COMPLETE, configured);
         let displacement = self.displacement();
         let zero = |bit: CommandDataSet| sets.command.contains(bit).then_some(0);
+        let (position, cycles) = self.command_position();
         CommandBlock {
             control_mode: match spoil.wrong_mode {
                 Some((axes, mode)) if axes.contains(self.instance()) => ControlMode(mode),
@@ -220,24 +223,27 @@ impl Axis {
             status_data_set: sets.status | StatusDataSet::FAULT | StatusDataSet::AXIS_STATUS,
             target,
             values: CommandValues {
-                position: sent(CommandDataSet::POSITION, ControlMode::POSITION)
-                    .then(|| self.command_position()),
+                position: sent(CommandDataSet::POSITION, ControlMode::POSITION).then_some(position),
                 velocity: sent(CommandDataSet::VELOCITY, ControlMode::VELOCITY)
                     .then(|| in_units(self.command.velocity)),
                 acceleration: sent(CommandDataSet::ACCELERATION, ControlMode::ACCELERATION)
                     .then(|| in_units(self.command.acceleration)),
                 torque: sent(CommandDataSet::TORQUE, ControlMode::TORQUE).then(|| real(self.torque)),
-                unwind_count: zero(CommandDataSet::UNWIND_COUNT),
+                unwind_count: zero(CommandDataSet::UNWIND_COUNT).map(|_| cycles),
                 position_displacement: displacement.or(zero(CommandDataSet::POSITION_DISPLACEMENT)),
             },
         }
     }
 
-    fn command_position(&self) -> CommandPosition {
-        if self.setup.sets.integer_position {
-            CommandPosition::Integer(roll(counts(self.command.position)))
+    /// Command Position, and the cycle of an axis that the device unwinds.
+    fn command_position(&self) -> (CommandPosition, i32) {
+        let whole = self.setup.sets.integer_position;
+        let position = if whole { float(counts(self.command.position)) } else { self.command.position };
+        let (position, cycles) = self.setup.unwind.map_or((position, 0), |unwind| fold(position, unwind));
+        if whole {
+            (CommandPosition::Integer(roll(counts(position))), cycles)
         } else {
-            CommandPosition::Float(self.command.position)
+            (CommandPosition::Float(position), cycles)
         }
     }
 }

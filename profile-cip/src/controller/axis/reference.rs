@@ -85,7 +85,7 @@ impl Axis {
     /// Command Position has 32 bits: a position beyond them, after endless turning, is counted anew from
     /// what the device gives.
     pub(super) fn rebased(&mut self, actual: i64) -> i64 {
-        if i32::try_from(actual).is_ok() {
+        if i32::try_from(actual).is_ok() || self.setup.unwind.is_some() {
             return actual;
         }
         let rolled = i64::from(crate::controller::number::roll(actual));

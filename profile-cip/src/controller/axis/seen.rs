@@ -7,7 +7,9 @@ use crate::controller::event::Event;
 use crate::controller::number::{float, seconds, unroll};
 use crate::controller::report::AxisReport;
 use crate::wire::motion::codes::{AxisIoStatus, AxisStateCode, AxisStatus, ControlMode, FaultType};
-use crate::wire::motion::{ActualBlock, ActualPosition, AlarmRecord, EventNotification, FaultRecord};
+use crate::wire::motion::{
+    ActualBlock, ActualPosition, ActualValues, AlarmRecord, EventNotification, FaultRecord,
+};
 use profile_generic::time::SystemTime;
 
 /// Records that wait for an expectation; older ones give way.
@@ -93,9 +95,22 @@ impl Seen {
         }
     }
 
-    /// Takes the actual position; returns it unrolled.
-    pub fn handle_position(&mut self, position: Option<ActualPosition>, at: SystemTime) -> Option<i64> {
-        let position = match position? {
+    /// Takes the actual position; returns it unrolled. Of an axis that the device unwinds nobody knows without the count
+    /// where it is.
+    pub fn handle_position(
+        &mut self,
+        actual: &ActualValues,
+        unwind: Option<u32>,
+        at: SystemTime,
+    ) -> Option<i64> {
+        let position = match actual.position? {
+            within if let Some(unwind) = unwind => {
+                let within = match within {
+                    ActualPosition::Dint(position) => i64::from(position),
+                    ActualPosition::Lint(position) => position,
+                };
+                i64::from(actual.unwind_count?) * i64::from(unwind) + within
+            }
             ActualPosition::Dint(raw) => self.actual.map_or(i64::from(raw), |near| unroll(near, raw)),
             ActualPosition::Lint(position) => position,
         };

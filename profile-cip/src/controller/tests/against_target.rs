@@ -123,9 +123,9 @@ impl Plant {
             conditions: DriveConditions::of(self.fault.as_slice()),
             start_inhibits: self.inhibits,
             position: crate::controller::number::counts(self.position),
-            velocity: crate::controller::number::real(
+            velocity: Some(crate::controller::number::real(
                 (self.position - before) / COUNTS_PER_UNIT / seconds(DRIVE_NS),
-            ),
+            )),
             captured_at: system,
             ..DriveImage::default()
         }
@@ -194,7 +194,7 @@ fn adapter(io_port: u16) -> Adapter {
 }
 
 fn device(axes: usize) -> MotionDevice {
-    let axis = AxisConfig { control_modes: 0b1_0110, ..AxisConfig::default() };
+    let axis = AxisConfig { control_modes: 0b1_0110, feedback_modes: 0b1111, ..AxisConfig::default() };
     let attribute = |number, data_type| {
         AttributeDefinition::new(Scope::Instance, number, data_type, Access::Set, "attribute of the tests")
     };

@@ -1,6 +1,5 @@
 //! Events of an axis: what the device evaluates itself, and the positions that the controller gets to see.
 
-use super::super::axis_report::rolled;
 use super::super::drive_link::DriveImage;
 use super::Axis;
 use crate::wire::motion::codes::{EventChecking, EventType};
@@ -13,13 +12,17 @@ const WATCHES: [(usize, bool, EventType); 4] = [
     (1, false, EventType::WATCH_2_REVERSE),
 ];
 
-/// Counts from `from` to the first place on the way to `to` that shows as `mark`, a position that rolls over with 32 bits;
-/// `None` if the way does not reach such a place. Standing on it is not reaching it.
-fn distance_to(mark: i32, from: i64, to: i64, forward: bool) -> Option<u64> {
+/// Counts after which a position that is not unwound shows as the same: a DINT rolls over.
+const DINT_RANGE: u64 = 1 << 32;
+
+/// Counts from `from` to the first place on the way to `to` that shows as `mark`, a position that is the same again after
+/// `range` counts; `None` if the way does not reach such a place. Standing on it is not reaching it.
+fn distance_to(mark: i32, from: i64, to: i64, range: u64, forward: bool) -> Option<u64> {
     let way = if forward { to.checked_sub(from) } else { from.checked_sub(to) };
     let way = u64::try_from(way?).ok()?;
-    let gap = if forward { mark.wrapping_sub(rolled(from)) } else { rolled(from).wrapping_sub(mark) };
-    let gap = u64::from(gap.cast_unsigned());
+    let gap = i128::from(mark) - i128::from(from);
+    let gap = u64::try_from((if forward { gap } else { -gap }).rem_euclid(i128::from(range))).ok()?;
+    let gap = if gap == 0 { range } else { gap };
     (1..=way).contains(&gap).then_some(gap)
 }
 
@@ -31,14 +34,9 @@ fn instant(before: u64, after: u64, part: u64, way: u64) -> u64 {
 }
 
 impl Axis {
-    /// A position of the drive as the controller counts it: in the reference system that it has chosen.
-    pub fn seen_by_controller(&self, position: i64) -> i64 {
-        position.wrapping_add(self.actual_reference)
-    }
-
     /// An event that the drive was looking for; `position` is in the reference system of power-up.
     pub fn notify_event(&mut self, event: EventType, status: u8, position: i64, time_stamp: u64) -> bool {
-        let position = rolled(self.seen_by_controller(position));
+        let position = self.seen_by_controller(position).dint();
         self.events.notify(event, status, position, time_stamp)
     }
 
@@ -60,11 +58,12 @@ impl Axis {
     }
 
     fn watch(&mut self, before: &DriveImage, now: &DriveImage) {
-        let (from, to) = (self.seen_by_controller(before.position), self.seen_by_controller(now.position));
+        let (from, to) = (self.references.actual(before.position), self.references.actual(now.position));
+        let range = now.unwind.map_or(DINT_RANGE, u64::from);
         let marks = self.events.parameters().watch_positions;
         for (number, forward, event) in WATCHES {
             let Some(mark) = marks[number].filter(|_| self.events.is_checking(event)) else { continue };
-            if let Some(gap) = distance_to(mark, from, to, forward) {
+            if let Some(gap) = distance_to(mark, from, to, range, forward) {
                 let at = instant(before.captured_at, now.captured_at, gap, to.abs_diff(from));
                 self.events.notify(event, 0, mark, at);
             }
@@ -86,7 +85,7 @@ impl Axis {
         let lasted = core::time::Duration::from_nanos(now.captured_at.saturating_sub(since));
         if lasted.as_secs_f64() >= seconds {
             self.torque_since = None;
-            let position = rolled(self.seen_by_controller(now.position));
+            let position = self.seen_by_controller(now.position).dint();
             self.events.notify(EventType::HOME_TORQUE, 0, position, now.captured_at);
         }
     }
@@ -114,8 +113,14 @@ mod tests {
             ("more than an i64", 7, i64::MIN, i64::MAX, true, None),
         ];
         for (what, mark, from, to, forward, expected) in rows {
-            assert_eq!(distance_to(mark, from, to, forward), expected, "{what}");
+            assert_eq!(distance_to(mark, from, to, DINT_RANGE, forward), expected, "{what}");
         }
+        let cyclic = |mark, from, to, forward| distance_to(mark, from, to, 360, forward);
+        assert_eq!(cyclic(10, 355, 375, true), Some(15), "across the end of a cycle");
+        assert_eq!(cyclic(350, 5, -15, false), Some(15), "and back");
+        assert_eq!(cyclic(10, 10, 369, true), None, "not around yet");
+        assert_eq!(cyclic(10, 10, 370, true), Some(360), "once around");
+        assert_eq!(cyclic(400, 0, 1_000, true), Some(40), "a mark beyond the cycle is the place in it");
     }
 
     #[test]

@@ -322,6 +322,7 @@ fn alarms_of(place: usize, word: u64) -> impl Iterator<Item = (AlarmType, u8)> {
 impl Axis {
     pub fn set_drive(&mut self, image: DriveImage) {
         let before = core::mem::replace(&mut self.drive, image);
+        self.watch_scaling(&before);
         self.check_events(&before);
     }
 

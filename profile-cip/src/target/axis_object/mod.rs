@@ -7,11 +7,14 @@
 mod events;
 mod fault;
 mod follow;
+mod reference;
 mod request;
 mod test;
 
 pub use fault::FaultWords;
 pub(super) use fault::Faults;
+pub use reference::PositionView;
+use reference::References;
 
 use super::axis_control::AxisControlHandshake;
 use super::axis_state::{AxisConditions, AxisEvent, AxisState, ControlKind};
@@ -23,7 +26,8 @@ use super::motion_device::SequenceSettings;
 use super::status_report::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, TestStatus,
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, FeedbackMode, FeedbackSource,
+    TestStatus,
 };
 use crate::wire::motion::test_service::HookupTestData;
 use crate::wire::motion::{CommandBlock, CommandValues};
@@ -42,6 +46,10 @@ mod sub_code {
     pub const MODE_NOT_SUPPORTED: u8 = 1;
     /// The update lacks the set-point of its Control Mode.
     pub const SET_POINT_MISSING: u8 = 2;
+    /// The Feedback Mode is not one of the axis, or not to be changed now.
+    pub const FEEDBACK_NOT_SUPPORTED: u8 = 3;
+    /// Position control was asked for between the two steps of a change of reference.
+    pub const REFERENCE_CHANGING: u8 = 4;
     /// The drive went offline while energized.
     pub const DRIVE_LOST: u8 = 1;
 }
@@ -60,6 +68,8 @@ pub struct AxisConfig {
     pub kind: ControlKind,
     /// Control modes that may be enabled, as bits numbered by the mode code (bit 1 position, bit 2 velocity, ...).
     pub control_modes: u16,
+    /// Feedback Modes that the axis can work with, as bits numbered by the code (bit 2 motor, bit 3 load, ...).
+    pub feedback_modes: u16,
     /// Whether the position may be reported as LINT when the controller asks for it.
     pub lint_position: bool,
     /// Hookup tests that can be run, as bits numbered by the code of the test (Table 5-2.94).
@@ -69,6 +79,10 @@ pub struct AxisConfig {
 impl AxisConfig {
     fn supports(&self, mode: ControlMode) -> bool {
         mode != ControlMode::NO_CONTROL && mode.0 < 16 && self.control_modes & (1 << mode.0) != 0
+    }
+
+    fn supports_feedback(&self, mode: FeedbackMode) -> bool {
+        self.feedback_modes & (1 << mode.source().0) != 0
     }
 }
 
@@ -120,9 +134,9 @@ pub(super) struct Axis {
     reset: Option<AxisControl>,
     /// The axis left an energized state without a stop of its own and has not stopped yet.
     winding_down: bool,
-    pub(super) actual_reference: i64,
-    pub(super) command_reference: i64,
-    pub(super) displacement: i32,
+    pub(super) references: References,
+    /// Feedback Mode with which the axis was enabled.
+    feedback_source: FeedbackSource,
     pub(super) axis_status: Reported<(AxisStatus, u32)>,
     pub(super) io_status: Reported<(AxisIoStatus, u32)>,
     pub(super) safety: Reported<SafetyStatus>,
@@ -165,9 +179,8 @@ impl Axis {
             reset_id: 0,
             reset: None,
             winding_down: false,
-            actual_reference: 0,
-            command_reference: 0,
-            displacement: 0,
+            references: References::default(),
+            feedback_source: FeedbackSource::default(),
             axis_status: Reported::new(),
             io_status: Reported::new(),
             safety: Reported::new(),
@@ -305,9 +318,7 @@ impl Axis {
         self.handshake.reset();
         self.block = CommandBlock::default();
         self.held = None;
-        self.actual_reference = 0;
-        self.command_reference = 0;
-        self.displacement = 0;
+        self.references.reset();
         self.axis_status = Reported::new();
         self.io_status = Reported::new();
         self.safety = Reported::new();

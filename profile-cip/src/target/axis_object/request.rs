@@ -4,7 +4,7 @@ use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
 use super::super::drive_link::SetPoints;
 use super::{Axis, Context, Held, RAMP_AND_DISABLE, UpdateTimes, fault_code, has_set_point, sub_code};
 use crate::wire::motion::CommandBlock;
-use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode};
+use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode, FeedbackMode};
 use crate::wire::status::GeneralStatus;
 use profile_generic::time::MonotonicTime;
 
@@ -17,6 +17,7 @@ impl Axis {
         now: MonotonicTime,
         context: &Context,
     ) {
+        let before = ControlMode(self.block.control_mode.0 & 0x0F);
         self.block = *block;
         let mode = ControlMode(block.control_mode.0 & 0x0F);
         if has_set_point(mode, &block.values) {
@@ -38,8 +39,11 @@ impl Axis {
             self.raise_illegal_mode(sub_code::SET_POINT_MISSING, context);
         }
         let controls = matches!(self.state, AxisState::Starting | AxisState::Running);
-        if controls && self.config.kind == ControlKind::Active && !self.config.supports(mode) {
-            self.raise_illegal_mode(sub_code::MODE_NOT_SUPPORTED, context);
+        if controls
+            && self.config.kind == ControlKind::Active
+            && let Some(sub_code) = self.illegal_change(before, mode, block.feedback_mode)
+        {
+            self.raise_illegal_mode(sub_code, context);
         }
         if let Some(request) = self.handshake.request(block.axis_control) {
             self.begin(request, block, context);
@@ -59,6 +63,24 @@ impl Axis {
         self.axis_status.acknowledge(received);
         self.io_status.acknowledge(received);
         self.safety.acknowledge(received);
+    }
+
+    /// Why an axis that is energized cannot go on with these modes (clause 6-2.7.1.2.2 and exception 60, Illegal Control
+    /// Mode, which stands for both modes).
+    fn illegal_change(&self, before: ControlMode, mode: ControlMode, feedback: FeedbackMode) -> Option<u8> {
+        if !self.config.supports(mode) {
+            Some(sub_code::MODE_NOT_SUPPORTED)
+        } else if self.is_testing() {
+            // A test follows no set-points and was started without an Enable.
+            None
+        } else if feedback.source() != self.feedback_source {
+            // The drive would measure its position with another encoder from one cycle to the next.
+            Some(sub_code::FEEDBACK_NOT_SUPPORTED)
+        } else if mode != before && !self.may_follow(mode) {
+            Some(sub_code::REFERENCE_CHANGING)
+        } else {
+            None
+        }
     }
 
     pub(super) fn raise_illegal_mode(&mut self, sub_code: u8, context: &Context) {
@@ -108,7 +130,7 @@ impl Axis {
             }
             AxisControl::STOP_PROCESS => self.stop_process(),
             AxisControl::CHANGE_ACTUAL_POSITION | AxisControl::CHANGE_COMMAND_POSITION => {
-                Some(self.displace(request, block.values.position_displacement))
+                Some(self.change_reference(request, block))
             }
             _ => Some(GeneralStatus::SERVICE_NOT_SUPPORTED),
         };
@@ -129,21 +151,14 @@ impl Axis {
         }
         let ready = context.remote && !context.node_fault && self.drive.online && !self.inhibited();
         let mode = ControlMode(self.block.control_mode.0 & 0x0F);
-        if !self.config.supports(mode) {
+        let feedback = self.block.feedback_mode;
+        if !self.config.supports(mode) || !self.config.supports_feedback(feedback) {
             return Some(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
+        if !self.may_follow(mode) {
+            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+        }
+        self.feedback_source = feedback.source();
         if ready && self.fire(AxisEvent::Enable) { None } else { Some(GeneralStatus::OBJECT_STATE_CONFLICT) }
-    }
-
-    pub(super) fn displace(&mut self, request: AxisControl, displacement: Option<i32>) -> GeneralStatus {
-        let Some(displacement) = displacement else { return GeneralStatus::NOT_ENOUGH_DATA };
-        let reference = if request == AxisControl::CHANGE_ACTUAL_POSITION {
-            self.displacement = displacement;
-            &mut self.actual_reference
-        } else {
-            &mut self.command_reference
-        };
-        *reference = reference.saturating_add(i64::from(displacement));
-        GeneralStatus::SUCCESS
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{EPOCH, PERIOD, Rig};
 use crate::target::event_channel::EventCounters;
-use crate::wire::motion::codes::{EventChecking, EventType};
+use crate::wire::motion::codes::{AxisControl, EventChecking, EventType};
 use crate::wire::motion::event::{ActualEvents, ExtendedEventData};
 use crate::wire::motion::{CommandEvents, EventAck, EventNotification};
 
@@ -100,7 +100,9 @@ fn positions_are_in_the_reference_system_of_the_controller_and_roll_over() {
     let rearm = EventChecking::REG_1_POSITIVE | EventChecking::REG_1_POSITIVE_REARM;
     rig.drives[0].image.events_checking = EventChecking::EVENTS;
     arm(&mut rig, rearm, None);
-    rig.device.slots[0].axis.actual_reference = 1_000;
+    rig.blocks[0].axis_control = AxisControl::CHANGE_ACTUAL_POSITION;
+    rig.blocks[0].values.position_displacement = Some(1_000);
+    rig.cycle();
     assert!(rig.device.notify_event(0, EventType::REGISTRATION_1_POSITIVE, 0, -1, 5));
     let far = (1 << 40) + i64::from(i32::MAX);
     assert!(rig.device.notify_event(0, EventType::REGISTRATION_1_POSITIVE, 0, far, 6));

@@ -29,6 +29,7 @@ fn config() -> DeviceConfig {
         axes: vec![AxisConfig {
             kind: ControlKind::Active,
             control_modes: modes.iter().map(|mode| 1 << mode.0).sum(),
+            feedback_modes: 0b1111,
             lint_position: true,
             ..AxisConfig::default()
         }],
@@ -315,7 +316,7 @@ fn enable_run_and_stop_in_velocity_control() {
     assert_eq!(rig.actual().axis_state.0, 4);
     rig.command.axis_control = AxisControl::NONE;
     rig.command.values = velocity(2.5);
-    rig.drive.image.velocity = 2.25;
+    rig.drive.image.velocity = Some(2.25);
     rig.cycle();
     assert_eq!(rig.actual().axis_response, AxisControl::NONE);
     assert_eq!(rig.actual().actual, ActualValues { velocity: Some(2.25), ..ActualValues::default() });
@@ -335,8 +336,8 @@ fn enable_run_and_stop_in_velocity_control() {
 fn position_and_torque_and_the_actual_value_that_was_asked_for() {
     let mut rig = FixedRig::running();
     rig.drive.image.position = 0x1_0000_0003;
-    rig.drive.image.velocity = 0.5;
-    rig.drive.image.acceleration = -4.0;
+    rig.drive.image.velocity = Some(0.5);
+    rig.drive.image.acceleration = Some(-4.0);
     rig.command.control_mode = ControlMode::POSITION;
     // The LINT that this asks for has no room: the position stays a DINT.
     rig.command.feedback_mode = FeedbackMode(FeedbackSource::MOTOR.0).with_lint(true);

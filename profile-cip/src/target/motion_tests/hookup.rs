@@ -150,9 +150,10 @@ fn a_test_begins_only_where_the_standard_allows_it() {
     assert_eq!(rig.start(run(FEEDBACK, 1, 1.0, 0.0)), 0, "a passive test needs no torque");
     assert_eq!(rig.start(run(FEEDBACK, 1, 1.0, 0.0)), conflict, "one at a time");
     assert_eq!(rig.command(0).action, DriveAction::PowerUp);
-    let mut rig = Rig::running();
+    let mut rig = Rig::stopped();
     rig.blocks[0].feedback_mode = FeedbackMode(2);
-    rig.cycle();
+    rig.request_all(AxisControl::ENABLE);
+    rig.cycles(5);
     assert_eq!(rig.start(run(MOTOR, 0, 1.0, 0.0)), conflict);
     assert_eq!(rig.start(run(FEEDBACK, 1, 1.0, 0.0)), conflict);
     assert_eq!(rig.state(0), AxisState::Running, "nothing has happened to it");

@@ -6,6 +6,7 @@ mod fixed;
 mod handshake;
 mod hookup;
 mod indicators;
+mod planes;
 mod refusals;
 mod requests;
 mod reset;
@@ -62,6 +63,8 @@ impl FakeDrive {
         let image = DriveImage {
             online: true,
             bus_up: true,
+            velocity: Some(0.0),
+            acceleration: Some(0.0),
             events,
             events_checking: events,
             ..DriveImage::default()
@@ -138,8 +141,9 @@ impl Rig {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
+            feedback_modes: 0b1101,
+            lint_position: true,
             hookup_tests: 0b11,
-            ..AxisConfig::default()
         };
         let config = DeviceConfig {
             format: Format::Variable,
