@@ -5,27 +5,31 @@ use super::Error;
 /// Reads values one after the other; running over the end is an [`Error::Truncated`], never a panic.
 #[derive(Debug, Clone)]
 pub struct Reader<'a> {
-    bytes: &'a [u8],
+    rest: &'a [u8],
     at: usize,
 }
 
 impl<'a> Reader<'a> {
     /// Starts at the first byte.
+    #[inline]
     pub const fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, at: 0 }
+        Self { rest: bytes, at: 0 }
     }
 
     /// Offset of the next byte, in bytes from the start.
+    #[inline]
     pub const fn offset(&self) -> usize {
         self.at
     }
 
     /// Bytes not read yet.
+    #[inline]
     pub const fn remaining(&self) -> usize {
-        self.bytes.len() - self.at
+        self.rest.len()
     }
 
     /// Whether everything has been read.
+    #[inline]
     pub const fn is_empty(&self) -> bool {
         self.remaining() == 0
     }
@@ -34,27 +38,33 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what` if fewer are left; nothing is consumed then.
+    #[inline]
     pub fn take(&mut self, what: &'static str, count: usize) -> Result<&'a [u8], Error> {
-        let available = self.remaining();
-        if count > available {
-            return Err(Error::Truncated { what, offset: self.at, needed: count, available });
-        }
-        let part = &self.bytes[self.at..self.at + count];
+        let Some((part, rest)) = self.rest.split_at_checked(count) else {
+            return Err(Error::Truncated {
+                what,
+                offset: self.at,
+                needed: count,
+                available: self.rest.len(),
+            });
+        };
+        self.rest = rest;
         self.at += count;
         Ok(part)
     }
 
     /// Everything that is left.
+    #[inline]
     pub fn rest(&mut self) -> &'a [u8] {
-        let part = &self.bytes[self.at..];
-        self.at = self.bytes.len();
-        part
+        self.at += self.rest.len();
+        core::mem::take(&mut self.rest)
     }
 
     /// The next `N` bytes as an array.
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], Error> {
         let mut out = [0; N];
         out.copy_from_slice(self.take(what, N)?);
@@ -65,6 +75,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u8(&mut self, what: &'static str) -> Result<u8, Error> {
         Ok(self.array::<1>(what)?[0])
     }
@@ -73,6 +84,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u16(&mut self, what: &'static str) -> Result<u16, Error> {
         Ok(u16::from_le_bytes(self.array(what)?))
     }
@@ -81,6 +93,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u32(&mut self, what: &'static str) -> Result<u32, Error> {
         Ok(u32::from_le_bytes(self.array(what)?))
     }
@@ -89,19 +102,22 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u64(&mut self, what: &'static str) -> Result<u64, Error> {
         Ok(u64::from_le_bytes(self.array(what)?))
     }
 
     /// The next byte without consuming it.
+    #[inline]
     pub fn peek(&self) -> Option<u8> {
-        self.bytes.get(self.at).copied()
+        self.rest.first().copied()
     }
 
     /// Succeeds only if nothing is left behind the part named `what`.
     ///
     /// # Errors
     /// [`Error::Trailing`] with the count of bytes too many.
+    #[inline]
     pub fn finish(&self, what: &'static str) -> Result<(), Error> {
         match self.remaining() {
             0 => Ok(()),

@@ -11,16 +11,19 @@ pub struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// Starts at the first byte.
+    #[inline]
     pub const fn new(bytes: &'a mut [u8]) -> Self {
         Self { bytes, at: 0 }
     }
 
     /// Bytes written so far.
+    #[inline]
     pub const fn written(&self) -> usize {
         self.at
     }
 
     /// Bytes that still fit.
+    #[inline]
     pub const fn remaining(&self) -> usize {
         self.bytes.len() - self.at
     }
@@ -29,6 +32,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what` if fewer are left; nothing is written then.
+    #[inline]
     pub fn reserve(&mut self, what: &'static str, count: usize) -> Result<&mut [u8], Error> {
         let available = self.remaining();
         if count > available {
@@ -43,6 +47,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn slice(&mut self, what: &'static str, part: &[u8]) -> Result<(), Error> {
         self.reserve(what, part.len())?.copy_from_slice(part);
         Ok(())
@@ -52,6 +57,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn zeros(&mut self, what: &'static str, count: usize) -> Result<(), Error> {
         self.reserve(what, count)?.fill(0);
         Ok(())
@@ -61,6 +67,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u8(&mut self, what: &'static str, value: u8) -> Result<(), Error> {
         self.slice(what, &[value])
     }
@@ -69,6 +76,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u16(&mut self, what: &'static str, value: u16) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
     }
@@ -77,6 +85,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u32(&mut self, what: &'static str, value: u32) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
     }
@@ -85,6 +94,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what`.
+    #[inline]
     pub fn u64(&mut self, what: &'static str, value: u64) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
     }
@@ -93,6 +103,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Error::Truncated`] naming `what` if those two bytes have not been written yet.
+    #[inline]
     pub fn patch_u16(&mut self, what: &'static str, offset: usize, value: u16) -> Result<(), Error> {
         let available = self.at.saturating_sub(offset);
         if available < 2 {

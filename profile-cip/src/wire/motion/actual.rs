@@ -143,8 +143,16 @@ impl ActualValues {
     /// Octets of the values.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.data_set().iter().count() * 4
-            + 4 * usize::from(matches!(self.position, Some(ActualPosition::Lint(_))))
+        let lint = matches!(self.position, Some(ActualPosition::Lint(_)));
+        let values = [
+            self.position.is_some(),
+            lint,
+            self.velocity.is_some(),
+            self.acceleration.is_some(),
+            self.unwind_count.is_some(),
+            self.position_displacement.is_some(),
+        ];
+        values.map(|present| 4 * usize::from(present)).iter().sum()
     }
 
     /// Whether there is no value at all.
@@ -153,6 +161,7 @@ impl ActualValues {
         self.data_set().is_empty()
     }
 
+    #[inline]
     pub(super) fn parse(reader: &mut Reader<'_>, set: ActualDataSet, lint: bool) -> Result<Self, Error> {
         let has = |bit| set.contains(bit);
         Ok(Self {
@@ -217,6 +226,7 @@ impl StatusValues {
         self.data_set().is_empty()
     }
 
+    #[inline]
     fn parse(reader: &mut Reader<'_>, set: StatusDataSet) -> Result<Self, Error> {
         let mut values = Self::default();
         if set.contains(StatusDataSet::FAULT) {
@@ -285,16 +295,22 @@ impl ActualBlock {
     /// # Errors
     /// The octets are too few or too many for the data sets, or a data set has a reserved or vendor specific bit,
     /// whose size is unknown.
+    #[inline]
     pub fn parse(block: &[u8]) -> Result<Self, Error> {
         let reader = &mut Reader::new(block);
-        let control_mode = ControlMode(reader.u8(BLOCK)?);
-        let feedback_mode = FeedbackMode(reader.u8(BLOCK)?);
-        let axis_response = AxisControl(reader.u8(BLOCK)?);
-        let response_status = reader.u8(BLOCK)?;
-        reader.u8(BLOCK)?;
-        let actual_set = ActualDataSet::from_bits_retain(reader.u8(BLOCK)?);
-        let status_set = StatusDataSet::from_bits_retain(reader.u8(BLOCK)?);
-        let axis_state = AxisStateCode(reader.u8(BLOCK)?);
+        let [
+            control_mode,
+            feedback_mode,
+            axis_response,
+            response_status,
+            _,
+            actual_set,
+            status_set,
+            axis_state,
+        ] = reader.array(BLOCK)?;
+        let feedback_mode = FeedbackMode(feedback_mode);
+        let actual_set = ActualDataSet::from_bits_retain(actual_set);
+        let status_set = StatusDataSet::from_bits_retain(status_set);
         if actual_set.reserved() != 0 {
             let known = actual_set.bits() & !actual_set.reserved();
             return Err(invalid("actual data set", ACTUAL_SET_AT, actual_set.bits(), known));
@@ -306,7 +322,15 @@ impl ActualBlock {
         let actual = ActualValues::parse(reader, actual_set, feedback_mode.position_is_lint())?;
         let status = StatusValues::parse(reader, status_set)?;
         reader.finish(BLOCK)?;
-        Ok(Self { control_mode, feedback_mode, axis_response, response_status, axis_state, actual, status })
+        Ok(Self {
+            control_mode: ControlMode(control_mode),
+            feedback_mode,
+            axis_response: AxisControl(axis_response),
+            response_status,
+            axis_state: AxisStateCode(axis_state),
+            actual,
+            status,
+        })
     }
 
     /// Octets that [`ActualBlock::emit`] writes; a multiple of four.
@@ -320,19 +344,22 @@ impl ActualBlock {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u8(BLOCK, self.control_mode.0)?;
         let feedback_mode = match self.actual.position {
             Some(ActualPosition::Lint(_)) => self.feedback_mode.with_lint(true),
             Some(ActualPosition::Dint(_)) => self.feedback_mode.with_lint(false),
             None => self.feedback_mode,
         };
-        writer.u8(BLOCK, feedback_mode.0)?;
-        writer.u8(BLOCK, self.axis_response.0)?;
-        writer.u8(BLOCK, self.response_status)?;
-        writer.u8(BLOCK, 0)?;
-        writer.u8(BLOCK, self.actual.data_set().bits())?;
-        writer.u8(BLOCK, self.status.data_set().bits())?;
-        writer.u8(BLOCK, self.axis_state.0)?;
+        let header: [u8; HEADER_LEN] = [
+            self.control_mode.0,
+            feedback_mode.0,
+            self.axis_response.0,
+            self.response_status,
+            0,
+            self.actual.data_set().bits(),
+            self.status.data_set().bits(),
+            self.axis_state.0,
+        ];
+        writer.slice(BLOCK, &header)?;
         self.actual.emit(writer)?;
         self.status.emit(writer)
     }

@@ -94,9 +94,14 @@ impl CommandValues {
             Some(CommandPosition::Integer(_)) => 4,
             None => 0,
         };
-        let mut others = self.data_set();
-        others.remove(CommandDataSet::POSITION);
-        position + others.iter().count() * 4
+        let others = [
+            self.velocity.is_some(),
+            self.acceleration.is_some(),
+            self.torque.is_some(),
+            self.unwind_count.is_some(),
+            self.position_displacement.is_some(),
+        ];
+        position + others.map(|present| 4 * usize::from(present)).iter().sum::<usize>()
     }
 
     /// Whether there is no value at all.
@@ -105,6 +110,7 @@ impl CommandValues {
         self.data_set().is_empty()
     }
 
+    #[inline]
     pub(super) fn parse(
         reader: &mut Reader<'_>,
         set: CommandDataSet,
@@ -202,16 +208,20 @@ impl CommandBlock {
     /// # Errors
     /// The octets are too few or too many for the data set, the data set or the position type hold reserved codes,
     /// whose size is unknown, or the Command Target Update is the reserved one.
+    #[inline]
     pub fn parse(block: &[u8]) -> Result<Self, Error> {
         let reader = &mut Reader::new(block);
-        let control_mode = ControlMode(reader.u8(BLOCK)?);
-        let feedback_mode = FeedbackMode(reader.u8(BLOCK)?);
-        let axis_control = AxisControl(reader.u8(BLOCK)?);
-        let control_status = ControlStatus::from_bits_retain(reader.u8(BLOCK)?);
-        let set = CommandDataSet::from_bits_retain(reader.u8(BLOCK)?);
-        let actual_data_set = ActualDataSet::from_bits_retain(reader.u8(BLOCK)?);
-        let status_data_set = StatusDataSet::from_bits_retain(reader.u8(BLOCK)?);
-        let command_control = reader.u8(BLOCK)?;
+        let [
+            control_mode,
+            feedback_mode,
+            axis_control,
+            control_status,
+            set,
+            actual_data_set,
+            status_data_set,
+            command_control,
+        ] = reader.array(BLOCK)?;
+        let set = CommandDataSet::from_bits_retain(set);
         if set.reserved() != 0 {
             let known = set.bits() & !set.reserved();
             return Err(invalid("command data set", COMMAND_SET_AT, set.bits(), known));
@@ -230,12 +240,12 @@ impl CommandBlock {
         let values = CommandValues::parse(reader, set, position_type == 1)?;
         reader.finish(BLOCK)?;
         Ok(Self {
-            control_mode,
-            feedback_mode,
-            axis_control,
-            control_status,
-            actual_data_set,
-            status_data_set,
+            control_mode: ControlMode(control_mode),
+            feedback_mode: FeedbackMode(feedback_mode),
+            axis_control: AxisControl(axis_control),
+            control_status: ControlStatus::from_bits_retain(control_status),
+            actual_data_set: ActualDataSet::from_bits_retain(actual_data_set),
+            status_data_set: StatusDataSet::from_bits_retain(status_data_set),
             target,
             values,
         })
@@ -252,15 +262,18 @@ impl CommandBlock {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        writer.u8(BLOCK, self.control_mode.0)?;
-        writer.u8(BLOCK, self.feedback_mode.0)?;
-        writer.u8(BLOCK, self.axis_control.0)?;
-        writer.u8(BLOCK, self.control_status.bits())?;
-        writer.u8(BLOCK, self.values.data_set().bits())?;
-        writer.u8(BLOCK, self.actual_data_set.bits())?;
-        writer.u8(BLOCK, self.status_data_set.bits())?;
         let integer = matches!(self.values.position, Some(CommandPosition::Integer(_)));
-        writer.u8(BLOCK, (u8::from(integer) << POSITION_TYPE_SHIFT) | (self.target.0 & 0b11))?;
+        let header: [u8; HEADER_LEN] = [
+            self.control_mode.0,
+            self.feedback_mode.0,
+            self.axis_control.0,
+            self.control_status.bits(),
+            self.values.data_set().bits(),
+            self.actual_data_set.bits(),
+            self.status_data_set.bits(),
+            (u8::from(integer) << POSITION_TYPE_SHIFT) | (self.target.0 & 0b11),
+        ];
+        writer.slice(BLOCK, &header)?;
         self.values.emit(writer)
     }
 }

@@ -47,14 +47,18 @@ pub struct ActualInstance<'a> {
 }
 
 /// Parses a block if there is one, and gives its errors their place in the frame.
+#[inline]
 fn block<'a, T>(
     octets: &'a [u8],
     offset: &mut usize,
-    parse: fn(&'a [u8]) -> Result<T, Error>,
+    parse: impl FnOnce(&'a [u8]) -> Result<T, Error>,
 ) -> Result<Option<T>, Error> {
     let base = *offset;
     *offset += octets.len();
-    (!octets.is_empty()).then(|| parse(octets).map_err(|error| at(base, error))).transpose()
+    if octets.is_empty() {
+        return Ok(None);
+    }
+    parse(octets).map(Some).map_err(|error| at(base, error))
 }
 
 macro_rules! frame {
@@ -65,6 +69,17 @@ macro_rules! frame {
         valid: $valid:expr, $cyclic:ident, $second:ident: $second_block:ident, $events:ident, $service:ident
     ) => {
         impl<'a> $instance<'a> {
+            /// What [`Self::from_blocks`] refuses. It keeps nothing, so an instance is not put together only to be checked.
+            fn check(blocks: Blocks<'a>) -> Result<(), Error> {
+                let mut offset = blocks.offset;
+                block(blocks.cyclic, &mut offset, |octets| $cyclic::parse(octets).map(drop))?;
+                block(blocks.read_write, &mut offset, |octets| $second_block::parse(octets).map(drop))?;
+                block(blocks.event, &mut offset, |octets| $events::parse(octets).map(drop))?;
+                block(blocks.service, &mut offset, |octets| $service::parse(octets).map(drop))?;
+                Ok(())
+            }
+
+            #[inline]
             fn from_blocks(blocks: Blocks<'a>) -> Result<Self, Error> {
                 let mut offset = blocks.offset;
                 Ok(Self {
@@ -78,10 +93,10 @@ macro_rules! frame {
 
             fn sizes(&self) -> Sizes {
                 Sizes {
-                    cyclic: self.cyclic.map_or(0, |b| b.buffer_len()),
-                    read_write: self.$second.map_or(0, |b| b.buffer_len()),
+                    cyclic: self.cyclic.as_ref().map_or(0, $cyclic::buffer_len),
+                    read_write: self.$second.as_ref().map_or(0, $second_block::buffer_len),
                     event: self.events.as_ref().map_or(0, $events::buffer_len),
-                    service: self.service.map_or(0, |b| b.buffer_len()),
+                    service: self.service.as_ref().map_or(0, $service::buffer_len),
                 }
             }
 
@@ -96,11 +111,15 @@ macro_rules! frame {
             /// # Errors
             /// The buffer is too short, or a size exceeds 255 words.
             pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-                self.sizes().emit(writer, self.number)?;
-                self.cyclic.map_or(Ok(()), |b| b.emit(writer))?;
-                self.$second.map_or(Ok(()), |b| b.emit(writer))?;
+                self.emit_sized(writer, self.sizes())
+            }
+
+            fn emit_sized(&self, writer: &mut Writer<'_>, sizes: Sizes) -> Result<(), Error> {
+                sizes.emit(writer, self.number)?;
+                self.cyclic.as_ref().map_or(Ok(()), |b| b.emit(writer))?;
+                self.$second.as_ref().map_or(Ok(()), |b| b.emit(writer))?;
                 self.events.as_ref().map_or(Ok(()), |b| b.emit(writer))?;
-                self.service.map_or(Ok(()), |b| b.emit(writer))
+                self.service.as_ref().map_or(Ok(()), |b| b.emit(writer))
             }
         }
 
@@ -145,7 +164,7 @@ macro_rules! frame {
                     let start = reader.offset();
                     let blocks = Blocks::take(&mut reader)?;
                     sequence.check(blocks.number, start)?;
-                    $instance::from_blocks(blocks)?;
+                    $instance::check(blocks)?;
                 }
                 reader.finish("instance data blocks")?;
                 Ok(Self { header, body: checked.clone().rest() })
@@ -227,7 +246,8 @@ macro_rules! frame {
             /// # Errors
             /// The buffer is too short, a size exceeds 255 words, or there are 255 instances already.
             pub fn instance(&mut self, instance: &$instance<'_>) -> Result<(), Error> {
-                let needed = instance.buffer_len();
+                let sizes = instance.sizes();
+                let needed = sizes.total();
                 let available = self.writer.remaining();
                 if needed > available {
                     let offset = self.head.len() + self.writer.written();
@@ -237,7 +257,7 @@ macro_rules! frame {
                 let count = self.header.instance_count.checked_add(1);
                 let count = count.ok_or(Error::OutOfRange { what: "instance count", value: max + 1, max })?;
                 // With the room proven, only a size over 255 words can fail, and that before anything is written.
-                instance.emit(&mut self.writer)?;
+                instance.emit_sized(&mut self.writer, sizes)?;
                 self.header.instance_count = count;
                 Ok(())
             }

@@ -45,6 +45,7 @@ pub(super) struct Blocks<'a> {
 
 impl<'a> Blocks<'a> {
     /// Takes one instance data block off `reader` and checks that its sizes agree with each other.
+    #[inline]
     pub fn take(reader: &mut Reader<'a>) -> Result<Self, Error> {
         let start = reader.offset();
         let [number, _, instance, cyclic, main, read_write, event, service] = reader.array(HEADER)?;

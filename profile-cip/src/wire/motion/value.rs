@@ -11,18 +11,22 @@ pub(crate) trait ReadValue {
 }
 
 impl ReadValue for Reader<'_> {
+    #[inline]
     fn i32(&mut self, what: &'static str) -> Result<i32, Error> {
         Ok(self.u32(what)?.cast_signed())
     }
 
+    #[inline]
     fn i64(&mut self, what: &'static str) -> Result<i64, Error> {
         Ok(self.u64(what)?.cast_signed())
     }
 
+    #[inline]
     fn f32(&mut self, what: &'static str) -> Result<f32, Error> {
         Ok(f32::from_bits(self.u32(what)?))
     }
 
+    #[inline]
     fn f64(&mut self, what: &'static str) -> Result<f64, Error> {
         Ok(f64::from_bits(self.u64(what)?))
     }
@@ -37,18 +41,22 @@ pub(crate) trait WriteValue {
 }
 
 impl WriteValue for Writer<'_> {
+    #[inline]
     fn i32(&mut self, what: &'static str, value: i32) -> Result<(), Error> {
         self.u32(what, value.cast_unsigned())
     }
 
+    #[inline]
     fn i64(&mut self, what: &'static str, value: i64) -> Result<(), Error> {
         self.u64(what, value.cast_unsigned())
     }
 
+    #[inline]
     fn f32(&mut self, what: &'static str, value: f32) -> Result<(), Error> {
         self.u32(what, value.to_bits())
     }
 
+    #[inline]
     fn f64(&mut self, what: &'static str, value: f64) -> Result<(), Error> {
         self.u64(what, value.to_bits())
     }
