@@ -12,7 +12,8 @@ use profile_generic::time::DurationNs;
 const MOVES: usize = 2_000;
 
 /// A rig whose axes go there and back.
-fn shuttle() -> Rig {
+#[must_use]
+pub fn shuttle() -> Rig {
     let mut rig = Rig::ready(Settings::default());
     let there_and_back = [moves(TURNTABLE_END, SLIDE_END), moves(0.0, 0.0)];
     let program = std::iter::once(Step::Enable(both())).chain(there_and_back.into_iter().cycle().take(MOVES));

@@ -1,8 +1,10 @@
-//! What the code of a cycle costs: codecs, the SERCOS master, the translation, the whole cycle of the engine.
+//! What the code of a cycle costs: codecs, explicit requests, the SERCOS master, the translation, the whole cycle of
+//! the engine.
 //!
 //! Methods, numbers and what they do not say stand in `docs/performance.md`.
 
 mod engine;
+mod explicit;
 mod master;
 mod motion;
 mod translation;
@@ -17,6 +19,7 @@ fn main() {
         .measurement_time(Duration::from_millis(1_500))
         .configure_from_args();
     motion::bench(&mut criterion);
+    explicit::bench(&mut criterion);
     master::bench(&mut criterion);
     translation::bench(&mut criterion);
     engine::bench(&mut criterion);

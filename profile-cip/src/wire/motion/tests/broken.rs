@@ -94,6 +94,24 @@ fn sizes_that_disagree_with_the_content_are_refused() {
 }
 
 #[test]
+fn what_passes_the_check_is_read_to_its_end() {
+    let octets = full();
+    let mut passed = 0;
+    for at in 8..octets.len() {
+        for value in 0..=u8::MAX {
+            let mut octets = octets.clone();
+            octets[at] = value;
+            if let Ok(frame) = CommandFrame::parse(&octets) {
+                passed += 1;
+                let announced = usize::from(frame.header().instance_count);
+                assert_eq!(frame.instances().count(), announced, "octet {at} is {value:#04x}");
+            }
+        }
+    }
+    assert!(passed > octets.len(), "values and reserved octets may be anything");
+}
+
+#[test]
 fn truncation_at_every_octet_is_refused() {
     let octets = full();
     for len in 0..octets.len() {
