@@ -62,6 +62,7 @@ impl Attributes {
         let request = |service, attribute, data: &[u8]| {
             MotionRequest::Explicit(ExplicitRequest {
                 token: Token(1),
+                originator: *CLIENT.ip(),
                 service,
                 path: ObjectPath { class: CLASS, instance: 1, attribute, ..ObjectPath::default() },
                 data: data.iter().copied().collect(),
