@@ -15,6 +15,7 @@ use profile_cip::target::motion_device::{DeviceConfig, MotionDevice};
 use profile_cip::target::motion_link::{
     ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, ObjectPath, Token,
 };
+use profile_cip::wire::motion::Format;
 use profile_cip::wire::motion::codes::{EventChecking, MotionService};
 use profile_cip::wire::status::Service;
 use profile_generic::time::MonotonicTime;
@@ -52,6 +53,7 @@ impl Attributes {
             ..AxisConfig::default()
         };
         let config = DeviceConfig {
+            format: Format::Variable,
             axes: vec![axis, axis],
             attributes: attributes.collect(),
             power_structure_class_id: 1,
