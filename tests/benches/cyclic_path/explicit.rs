@@ -16,7 +16,7 @@ use profile_cip::target::motion_link::{
     ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, ObjectPath, Token,
 };
 use profile_cip::wire::motion::Format;
-use profile_cip::wire::motion::codes::{EventChecking, MotionService};
+use profile_cip::wire::motion::codes::MotionService;
 use profile_cip::wire::status::Service;
 use profile_generic::time::MonotonicTime;
 
@@ -46,12 +46,7 @@ impl Attributes {
             let data_type = DataType::from_name(row.data_type.name())?;
             Some(AttributeDefinition::new(Scope::Instance, row.id, data_type, Access::Set, &row.name))
         });
-        let axis = AxisConfig {
-            kind: ControlKind::Active,
-            control_modes: 0b110,
-            events: EventChecking::empty(),
-            ..AxisConfig::default()
-        };
+        let axis = AxisConfig { kind: ControlKind::Active, control_modes: 0b110, ..AxisConfig::default() };
         let config = DeviceConfig {
             format: Format::Variable,
             axes: vec![axis, axis],
