@@ -187,6 +187,8 @@ mod tests {
         assert_eq!(lists.status(CyclicDirection::Read), None);
         lists.handle(&block(1, 0, &[1, 0, 0, 0]));
         assert_eq!((lists.status(CyclicDirection::Read), lists.value(2)), (None, None), "the old list");
+        lists.handle(&block(1, 0, &[5; 8]));
+        assert_eq!(lists.value(1), None, "the old list, though it is as long");
         lists.handle(&block(2, 0, &[1, 0, 0, 0, 9, 8, 7, 6]));
         assert_eq!(lists.status(CyclicDirection::Read), Some(0));
         assert_eq!((lists.value(1), lists.value(2)), (Some(&[1][..]), Some(&[9, 8, 7, 6][..])));

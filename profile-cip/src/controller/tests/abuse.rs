@@ -98,6 +98,8 @@ fn a_loss_that_nothing_expects_is_a_failure() {
     let mut pair = Pair::new(configured(1), &[0.0], program);
     let report = pair.run(60);
     assert_eq!(report.failed_step, Some(3), "a step that needs the connection");
+    let text = report.failure.unwrap().to_string();
+    assert!(text.starts_with("connection timed out from device to controller"), "{text}");
 }
 
 #[test]

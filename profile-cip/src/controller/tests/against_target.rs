@@ -50,6 +50,9 @@ pub(super) struct Plant {
     pub inhibits: u16,
     /// Largest change of position in one drive cycle, counts.
     step_max: f64,
+    /// Largest change of that step from one drive cycle to the next, counts.
+    pub brake_max: f64,
+    step: f64,
 }
 
 impl Plant {
@@ -64,6 +67,8 @@ impl Plant {
             fault: None,
             inhibits: 0,
             step_max: 0.0,
+            brake_max: 0.0,
+            step: 0.0,
         }
     }
 
@@ -109,7 +114,10 @@ impl Plant {
                 self.last = (system, self.position);
             }
         }
-        self.step_max = self.step_max.max((self.position - before).abs());
+        let step = self.position - before;
+        self.brake_max = self.brake_max.max((step - self.step).abs());
+        self.step = step;
+        self.step_max = self.step_max.max(step.abs());
         let stopped = !enabled && since >= 3_000_000;
         DriveImage {
             online: true,
@@ -224,6 +232,8 @@ pub(super) struct Pair {
     slot: SessionSlot,
     /// The controller has closed its stream.
     stream_closed: bool,
+    /// When the controller is told to end.
+    pub interrupt_at: Option<u64>,
     now: u64,
     sequence: u32,
     commands: u64,
@@ -254,6 +264,7 @@ impl Pair {
             plants: positions.iter().map(|p| Plant::new(*p)).collect(),
             slot,
             stream_closed: false,
+            interrupt_at: None,
             now: start,
             sequence: 0,
             commands: 0,
@@ -393,6 +404,10 @@ impl Pair {
                 drive += DRIVE_NS;
                 (self.script)(&self.controller.report(), &mut self.plants);
                 self.drive_cycle();
+            }
+            if self.interrupt_at.is_some_and(|at| self.now >= at) {
+                self.interrupt_at = None;
+                self.controller.interrupt(MonotonicTime(self.now));
             }
             self.controller.handle_time(MonotonicTime(self.now), SystemTime(self.now + OFFSET_NS));
             self.exchange();

@@ -6,7 +6,7 @@ use crate::controller::condition::{AlarmPattern, Condition, FaultPattern, Number
 use crate::controller::limits::AxisLimits;
 use crate::controller::program::{CyclicAttribute, CyclicDirection, ExplicitMessage, Redefine};
 use crate::controller::sets::DataSets;
-use crate::controller::{AxisSet, ControllerConfig, Event, Limits, Report, Scaling, Step};
+use crate::controller::{AxisSet, ControllerConfig, Event, Failure, Limits, Report, Scaling, Step};
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{
     ActualDataSet, AxisControl, AxisStateCode, AxisStatus, CommandDataSet, CommandTarget, ControlMode,
@@ -405,6 +405,31 @@ fn a_fault_that_nothing_expects_is_found_at_the_end() {
         text.starts_with("expected no fault that nothing expected, found axis 1: Axis Fault code 11"),
         "{text}"
     );
+}
+
+#[test]
+fn an_interrupted_run_ends_on_the_ramp_and_disabled() {
+    for program in [
+        vec![Step::Enable(ONE), go(50.0)],
+        vec![
+            Step::Enable(ONE),
+            mode(ControlMode::VELOCITY),
+            Step::RunAt { axis: 1, velocity: 20.0, acceleration: 500.0, jerk: 10_000.0 },
+            Step::Dwell { seconds: 60.0 },
+        ],
+    ] {
+        let mut pair = Pair::new(configured(1), &[0.0], program);
+        pair.interrupt_at = Some(1_000_000_000);
+        let report = pair.run(60);
+        assert_eq!(report.failure, Some(Failure::Interrupted), "{}", pair.log());
+        use AxisStateCode as S;
+        assert_eq!(report.axes[0].states.kept().last(), Some(&S::STOPPED));
+        assert_eq!((report.axes[0].faults.total, pair.device.connection()), (0, None), "closed orderly");
+        // 500 units/s² for an update of 2 ms change the velocity by 1 unit/s, 0.25 counts a drive cycle; a jump from
+        // full speed would be 5.
+        let jump = pair.plants[0].brake_max;
+        assert!(jump < 0.3, "{jump} counts of change between two drive cycles");
+    }
 }
 
 #[test]
