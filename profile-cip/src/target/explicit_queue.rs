@@ -1,7 +1,8 @@
 //! Explicit requests that wait for their turn, and the one that is worked on.
 
+use core::net::Ipv4Addr;
+
 use arrayvec::ArrayVec;
-use profile_generic::time::SystemTime;
 
 use super::attribute_worker::AttributeWorker;
 use super::motion_link::{ExplicitRequest, Token};
@@ -9,16 +10,25 @@ use super::motion_link::{ExplicitRequest, Token};
 /// Explicit requests that may wait.
 const WAITING_MAX: usize = 8;
 
+/// The request in progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Current {
+    pub token: Token,
+    pub instance: usize,
+    /// Who asked.
+    pub originator: Ipv4Addr,
+    /// It does more than read.
+    pub changes: bool,
+}
+
 /// The queue.
 #[derive(Default)]
 pub(super) struct ExplicitQueue {
     waiting: ArrayVec<ExplicitRequest, WAITING_MAX>,
-    /// Token and instance of the request in progress.
-    pub current: Option<(Token, usize)>,
+    /// The request in progress.
+    pub current: Option<Current>,
     /// The attribute service of the request in progress.
     pub worker: AttributeWorker,
-    /// System time at which the requests were looked at last.
-    pub system_time: Option<SystemTime>,
 }
 
 impl ExplicitQueue {

@@ -69,6 +69,8 @@ pub(super) struct IoConnection {
     update_id: Option<u8>,
     /// Arrival of the last update that was applied.
     last_fresh: Option<MonotonicTime>,
+    /// The newest update was applied.
+    applied: bool,
     /// Header of the last accepted C-to-D packet.
     pub header: Option<CommandHeader>,
     pub mode: Mode,
@@ -92,6 +94,7 @@ impl IoConnection {
             last_heard: now,
             update_id: None,
             last_fresh: None,
+            applied: false,
             header: None,
             mode: Mode::Asynchronous,
             next_transmit: MonotonicTime(now.0.saturating_add(period)),
@@ -153,9 +156,20 @@ impl IoConnection {
     /// An update with data was accepted, to be applied or not.
     pub fn accepted(&mut self, id: u8, now: MonotonicTime, fresh: bool) {
         self.update_id = Some(id);
+        self.applied = fresh;
         if fresh || self.last_fresh.is_none() {
             self.last_fresh = Some(now);
         }
+    }
+
+    /// An update without valid data has come: what the one before it commanded does not stand any more.
+    pub fn invalid(&mut self) {
+        self.applied = false;
+    }
+
+    /// Whether the controller commands now: its newest update was applied, and none is overdue.
+    pub fn is_current(&self, now: MonotonicTime) -> bool {
+        self.applied && self.missed(now) == 0
     }
 
     /// Update ID of the last accepted update with data.

@@ -29,6 +29,7 @@ mod list;
 mod list_job;
 pub mod motion_link;
 pub mod motion_open;
+mod motion_owner;
 mod node;
 mod object;
 pub mod object_list;

@@ -517,7 +517,7 @@ impl MotionDevice {
                 self.reply(MotionReply::ResetPrepared { token, granted: !self.is_in_use() });
             }
         }
-        self.run_explicit(system_time);
+        self.run_explicit(now, system_time);
     }
 
     /// The next reply to the explicit side.
@@ -554,6 +554,7 @@ impl MotionDevice {
             return refuse(INTERVAL_NOT_ACCEPTABLE);
         }
         self.connection = Some(IoConnection::new(parameters, now));
+        self.break_off_foreign();
         self.start_over();
         let system_time = system_time.map_or(0, |t| t.0);
         self.slots.iter_mut().for_each(|slot| slot.axis.open(system_time));
@@ -630,7 +631,7 @@ impl MotionDevice {
             }
         }
         self.step(system_time);
-        self.run_explicit(system_time);
+        self.run_explicit(now, system_time);
     }
 
     pub(super) fn step(&mut self, system_time: Option<SystemTime>) {

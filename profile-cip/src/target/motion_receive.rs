@@ -147,6 +147,7 @@ impl MotionDevice {
         let before = connection.node_control();
         if !header.node_control.contains(NodeControl::DATA_VALID) {
             connection.heard(sequence, now);
+            connection.invalid();
             connection.header = Some(header);
             connection.answer(header.update_id, now);
             self.counters.not_valid += 1;

@@ -6,17 +6,20 @@
 //! Set_Attribute_Single. Motor and inertia tests answer "service not supported": they measure what only the drive can,
 //! and nothing that runs a drive here has a procedure for them.
 //!
-//! What may set an axis in motion or shift its time, Run_Hookup_Test and Group_Sync, is taken by explicit message only
-//! from the owner of the I/O connection; anybody else is told "privilege violation".
+//! While a connection is open, what does more than read is taken by explicit message only from its owner
+//! ([`super::motion_owner`]), and a test only while the owner's updates are fresh.
 
-use profile_generic::time::SystemTime;
+use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::id;
 use super::attribute_worker::AttributeSpace;
 use super::cyclic_list::Direction;
+use super::explicit_queue::Current;
+use super::io_connection::IoConnection;
 use super::list_job::{BODY_MAX, ListFormat};
 use super::motion_device::MotionDevice;
 use super::motion_link::{EXPLICIT_DATA_MAX, ExplicitReply, ExplicitRequest, MotionReply};
+use super::motion_owner::common;
 use super::time_offset::Offsets;
 use crate::wire::Writer;
 use crate::wire::motion::codes::{AlarmType, FaultType, MotionService, SyncStatus};
@@ -27,14 +30,6 @@ use crate::wire::status::GeneralStatus;
 
 /// Class code of the Motion Device Axis Object.
 pub const MOTION_AXIS_CLASS: u16 = 0x42;
-
-/// Explicit service codes of the object that are not in the service channel.
-mod common {
-    pub const GET_ATTRIBUTE_LIST: u8 = 0x03;
-    pub const SET_ATTRIBUTE_LIST: u8 = 0x04;
-    pub const GET_ATTRIBUTE_SINGLE: u8 = 0x0E;
-    pub const SET_ATTRIBUTE_SINGLE: u8 = 0x10;
-}
 
 /// Reads a request body that has one length and no other.
 fn exact<T>(
@@ -239,7 +234,7 @@ impl MotionDevice {
         match instance.checked_sub(1) {
             None => {
                 let header = self.connection.as_ref().and_then(|c| c.header);
-                let period = self.connection.as_ref().map_or(0, super::io_connection::IoConnection::period);
+                let period = self.connection.as_ref().map_or(0, IoConnection::period);
                 let control = header.map_or(0, |h| u64::from(h.node_control.bits()));
                 let values = [
                     (id::NODE_CONTROL, control),
@@ -342,20 +337,24 @@ impl MotionDevice {
 
     /// Works on the explicit requests, one at a time.
     ///
-    /// `system_time` is that of the moment, for services that compare it.
-    pub(super) fn run_explicit(&mut self, system_time: Option<SystemTime>) {
-        self.explicit.system_time = system_time;
+    /// The times are those of the moment, for services that compare them.
+    pub(super) fn run_explicit(&mut self, now: MonotonicTime, system_time: Option<SystemTime>) {
         loop {
             if self.explicit.current.is_none() {
                 let Some(request) = self.explicit.pop() else { return };
-                self.start_explicit(&request, system_time);
+                self.start_explicit(&request, now, system_time);
             } else if !self.continue_explicit() {
                 return;
             }
         }
     }
 
-    fn start_explicit(&mut self, request: &ExplicitRequest, system_time: Option<SystemTime>) {
+    fn start_explicit(
+        &mut self,
+        request: &ExplicitRequest,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+    ) {
         let token = request.token;
         let answer = |device: &mut Self, status: GeneralStatus, body: &[u8]| {
             let mut reply = ExplicitReply::status(token, status.0);
@@ -373,6 +372,10 @@ impl MotionDevice {
             answer(self, GeneralStatus::PATH_SEGMENT_ERROR, &[]);
             return;
         }
+        if self.is_foreign(request) {
+            answer(self, GeneralStatus::PRIVILEGE_VIOLATION, &[]);
+            return;
+        }
         let mut response = [0; EXPLICIT_DATA_MAX];
         let started = match (request.service, request.path.attribute) {
             (common::GET_ATTRIBUTE_LIST, _) => Started::List(ListFormat::CommonGet),
@@ -384,10 +387,11 @@ impl MotionDevice {
             }
             (service, _) => {
                 let service = MotionService(service);
-                let guarded = matches!(service, MotionService::GROUP_SYNC | MotionService::RUN_HOOKUP_TEST);
-                let owner = self.connection.as_ref().map(|c| c.parameters.originator);
-                if guarded && owner.is_some_and(|owner| owner != request.originator) {
-                    Started::Answered(GeneralStatus::PRIVILEGE_VIOLATION, 0)
+                // A test moves the axis. In the service channel the update that brings it has been judged; this message
+                // says nothing about the updates.
+                let stale = self.connection.as_ref().is_some_and(|connection| !connection.is_current(now));
+                if stale && service == MotionService::RUN_HOOKUP_TEST {
+                    Started::Answered(GeneralStatus::DEVICE_STATE_CONFLICT, 0)
                 } else {
                     self.start_service(instance, service, &request.data, system_time, &mut response)
                 }
@@ -399,7 +403,7 @@ impl MotionDevice {
                 let sets = matches!(format, ListFormat::CommonSet | ListFormat::SingleSet(_));
                 self.progress.attribute_set |= sets;
                 match self.explicit.worker.start(format, &request.data, EXPLICIT_DATA_MAX) {
-                    Ok(()) => self.explicit.current = Some((token, instance)),
+                    Ok(()) => self.explicit.current = Some(Self::current(request, instance)),
                     Err(status) => answer(self, status, &[]),
                 }
             }
@@ -408,7 +412,7 @@ impl MotionDevice {
 
     /// Carries the current request on; returns whether it has ended.
     fn continue_explicit(&mut self) -> bool {
-        let Some((token, instance)) = self.explicit.current else { return false };
+        let Some(Current { token, instance, .. }) = self.explicit.current else { return false };
         self.publish(instance);
         let mut worker = core::mem::take(&mut self.explicit.worker);
         let Some(mut space) = self.space(instance) else { return false };
@@ -459,12 +463,13 @@ impl MotionDevice {
             self.run_service(0);
             return;
         }
-        let Some((_, instance)) = self.explicit.current else { return };
+        let Some(Current { instance, .. }) = self.explicit.current else { return };
         let mut worker = core::mem::take(&mut self.explicit.worker);
         let taken = self.space(instance).is_some_and(|mut space| worker.complete(ticket, answer, &mut space));
         self.explicit.worker = worker;
         if taken {
-            self.run_explicit(self.explicit.system_time);
+            // The requests behind it begin with the next poll, which knows the time.
+            self.continue_explicit();
         }
     }
 }

@@ -268,32 +268,50 @@ fn a_passive_test_watches_without_torque_until_the_drive_reports() {
 }
 
 #[test]
-fn only_the_owner_of_the_connection_may_start_a_test_by_explicit_message() {
-    let mut rig = Rig::stopped();
-    rig.blocks[0].feedback_mode = FeedbackMode(2);
-    rig.cycle();
-    let foreign = |request| match request {
-        MotionRequest::Explicit(request) => {
-            MotionRequest::Explicit(super::super::motion_link::ExplicitRequest {
-                originator: Ipv4Addr::new(10, 0, 0, 9),
-                ..request
-            })
-        }
-        other => other,
+fn a_test_is_not_begun_by_explicit_message_while_the_updates_are_stale() {
+    let device = GeneralStatus::DEVICE_STATE_CONFLICT.0;
+    let ask = |rig: &mut Rig, token| {
+        reply_of(rig.request(explicit(token, 0x53, 1, None, &run(MOTOR, 0, 1.0, 0.0)))).1
     };
-    let body = run(MOTOR, 0, 1.0, 0.0);
-    let reply = rig.request(foreign(explicit(1, 0x53, 1, None, &body)));
-    assert_eq!(reply_of(reply), (1, GeneralStatus::PRIVILEGE_VIOLATION.0, vec![]));
-    let reply = rig.request(foreign(explicit(2, 0x1C, 0, None, &GRANDMASTER)));
-    assert_eq!(reply_of(reply), (2, GeneralStatus::PRIVILEGE_VIOLATION.0, vec![]));
-    let reply = rig.request(foreign(explicit(3, 0x4B, 1, None, &[1, 0, 0, 0, 0x8A, 2, 0, 1])));
-    assert_eq!(reply_of(reply).1, 0, "reading is free");
-    assert_eq!((rig.state(0), rig.order()), (AxisState::Stopped, None));
-    let reply = rig.request(explicit(4, 0x53, 1, None, &body));
-    assert_eq!(reply_of(reply), (4, 0, vec![]));
-    assert_eq!(rig.state(0), AxisState::Starting);
-    let reply = rig.request(explicit(5, 0x54, 1, None, &[]));
-    assert_eq!(reply_of(reply), (5, 0, vec![1, 0, 0, 0, 0, 0, 0, 0]));
+    let ready = || {
+        let mut rig = Rig::stopped();
+        rig.blocks[0].feedback_mode = FeedbackMode(2);
+        rig.cycle();
+        rig
+    };
+    // Half a period overdue is jitter, one missed update is not; the next good one is enough again.
+    let mut rig = ready();
+    rig.now += PERIOD / 4;
+    assert_eq!(ask(&mut rig, 1), 0);
+    let mut rig = ready();
+    rig.silence();
+    assert_eq!((ask(&mut rig, 1), rig.state(0), rig.order()), (device, AxisState::Stopped, None));
+    let passive = explicit(2, 0x53, 1, None, &run(FEEDBACK, 1, 1.0, 0.0));
+    assert_eq!(reply_of(rig.request(passive)).1, device);
+    rig.cycle();
+    assert_eq!((ask(&mut rig, 3), rig.state(0)), (0, AxisState::Starting));
+    // An update that came in time and was refused is none.
+    let mut rig = ready();
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::empty();
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    assert_eq!(
+        (rig.device.counters().untimed, ask(&mut rig, 1), rig.state(0)),
+        (1, device, AxisState::Stopped)
+    );
+    // Neither is one whose data are said to be not valid.
+    let mut rig = ready();
+    rig.control = NodeControl::REMOTE_CONTROL;
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    assert_eq!(
+        (rig.device.counters().not_valid, ask(&mut rig, 1), rig.state(0)),
+        (1, device, AxisState::Stopped)
+    );
+    rig.control |= NodeControl::DATA_VALID;
+    rig.cycle();
+    assert_eq!(ask(&mut rig, 2), 0);
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod fixed;
 mod handshake;
 mod hookup;
 mod indicators;
+mod owner;
 mod planes;
 mod refusals;
 mod requests;

@@ -257,6 +257,7 @@ fn explicit_requests_wait_for_the_drive_and_for_each_other() {
     let access = rig.device.poll_attribute_access().expect("an access");
     rig.device.complete_attribute(access.ticket, Ok(&[4, 3, 2, 1]));
     assert_eq!(reply_of(rig.device.poll_reply()), (1, 0, vec![4, 3, 2, 1]));
+    rig.device.poll(rig.now(), rig.system());
     for token in 2..=9 {
         assert_eq!(reply_of(rig.device.poll_reply()), (token, 0, vec![2]));
     }
