@@ -34,4 +34,12 @@ pub enum ServeError {
         /// The system's error.
         source: io::Error,
     },
+    /// The system starts no thread for the server, or no runtime in it.
+    #[error("cannot serve {address}: cannot start its thread: {source}")]
+    Thread {
+        /// The address asked for.
+        address: SocketAddrV4,
+        /// The system's error.
+        source: io::Error,
+    },
 }

@@ -4,20 +4,21 @@
 //! the way to the motion device, which runs in the cycle thread:
 //!
 //! ```text
-//! TCP streams --reader--> |          | --MotionRequest--> queue --> DeviceEnd (cycle thread)
-//!             <--writer-- |  server  | <--MotionReply---- queue <--
-//! UDP datagrams --------> |  (task)  | --> recording, log, statistics
+//! TCP streams    <--> |         | --MotionRequest--> queue --> DeviceEnd (cycle thread)
+//! UDP datagrams  <--> | adapter | <--MotionReply---- queue <--
+//!                     |         | --> recording, log, statistics
 //! ```
 //!
-//! One task owns the adapter. Each stream has a task of its own that holds at most one buffer of input and
-//! one of output, so that a peer that stalls holds up nobody else.
+//! One thread a device owns all of that and answers a request in the turn in which it comes. A stream has at
+//! most one buffer of input and one of output, so that a peer that stalls holds up nobody else.
 
-mod connection;
+mod core;
 mod error;
 mod link;
 mod server;
 mod sockets;
 mod statistics;
+mod stream;
 
 #[cfg(test)]
 mod tests;
@@ -25,22 +26,23 @@ mod tests;
 pub(crate) use tests::test_adapter_config;
 
 use std::net::SocketAddrV4;
+use std::thread::JoinHandle;
 
-use tokio::sync::watch;
-use tokio::task::JoinHandle;
+use tokio::sync::{oneshot, watch};
 
 pub use error::ServeError;
 pub use link::{AdapterEnd, DeviceEnd, QUEUE_LEN, motion_link};
 pub use server::{ExplicitServer, STALL_LIMIT};
 pub use statistics::Statistics;
 
-/// A server that runs as a task. It ends when this is dropped.
+/// A server that runs in a thread of its own. It ends when this is dropped.
 #[derive(Debug)]
 pub struct Handle {
     address: SocketAddrV4,
     statistics: watch::Receiver<Statistics>,
     stop: watch::Sender<bool>,
-    task: JoinHandle<Statistics>,
+    ended: oneshot::Receiver<()>,
+    thread: JoinHandle<()>,
 }
 
 impl Handle {
@@ -59,19 +61,30 @@ impl Handle {
     /// Ends the server and all its streams, and returns what it has counted.
     pub async fn stop(self) -> Statistics {
         self.stop.send_replace(true);
-        match self.task.await {
-            Ok(statistics) => statistics,
-            Err(_) => self.statistics.borrow().clone(),
-        }
+        // The sender is gone when the server is, however it ended; what is left of the thread takes no time.
+        let _ = self.ended.await;
+        let _ = self.thread.join();
+        self.statistics.borrow().clone()
     }
 }
 
-/// Runs the server as a task of the current runtime.
-#[must_use]
-pub fn spawn(server: ExplicitServer) -> Handle {
+/// Runs the server in a thread of its own.
+///
+/// # Errors
+/// The system starts no thread, or no runtime in it.
+pub fn spawn(server: ExplicitServer) -> Result<Handle, ServeError> {
     let address = server.local_address();
     let statistics = server.statistics();
     let (stop, stopped) = watch::channel(false);
-    let task = tokio::spawn(server.run(stopped));
-    Handle { address, statistics, stop, task }
+    let (end, ended) = oneshot::channel::<()>();
+    let system = |source| ServeError::Thread { address, source };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
+    let inside = runtime.enter();
+    let running = server.start()?;
+    drop(inside);
+    let thread = std::thread::Builder::new().name("axisbridge-north".to_owned()).spawn(move || {
+        runtime.block_on(running.run(stopped));
+        drop((runtime, end));
+    });
+    Ok(Handle { address, statistics, stop, ended, thread: thread.map_err(system)? })
 }

@@ -1,26 +1,27 @@
-//! The server: one task that owns the adapter and moves bytes, requests and time to and from it.
+//! The server: sockets, adapter and time in one future, answered in the turn in which a request comes.
 
-use std::collections::HashMap;
 use std::fmt;
-use std::io;
+use std::future::{Future, poll_fn};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::sync::Arc;
+use std::pin::pin;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
-use profile_cip::target::adapter::{Adapter, DEVICE_TIMEOUT};
+use profile_cip::target::adapter::Adapter;
 use profile_cip::target::event::Event;
-use profile_cip::target::motion_link::{MotionReply, MotionRequest, OpenParameters};
+use profile_cip::target::motion_link::OpenParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
-use tokio::net::{TcpStream, UdpSocket};
-use tokio::sync::{mpsc, watch};
-use tokio::task::{Id, JoinError, JoinSet};
+use tokio::io::ReadBuf;
+use tokio::net::{TcpListener, TcpStream, UdpSocket};
+use tokio::sync::watch;
 use tokio::time::sleep;
 
-use super::connection::{BUFFER_LEN, Connection, Ending, Message, Task};
+use super::core::Core;
 use super::error::ServeError;
 use super::link::AdapterEnd;
 use super::sockets::{Sockets, prepare};
 use super::statistics::Statistics;
+use super::stream::{Ending, Stream};
 use crate::capture::recorder::Tap;
 use crate::sys::clock::{monotonic_now, realtime_now};
 
@@ -30,39 +31,27 @@ const PORT_EXPLICIT: u16 = profile_cip::wire::encapsulation::EXPLICIT_PORT;
 /// Streams there are at once, those among them that are on their way out. The adapter serves fewer.
 const STREAMS_MAX: usize = 2 * profile_cip::target::adapter::SESSIONS_MAX;
 
-/// Messages of the streams' tasks that may wait. A task waits when there is no room.
-const MESSAGES_MAX: usize = 2 * STREAMS_MAX;
-
 /// Longest datagram worth reading: List requests are shorter.
 const DATAGRAM_LEN_MAX: usize = 1500;
-
-/// Longest answer to a datagram.
-const ANSWER_LEN_MAX: usize = 256;
 
 /// A peer that does not take 4 KiB in this time is dropped.
 pub const STALL_LIMIT: Duration = Duration::from_secs(30);
 
-/// How often the motion device's replies are looked for while it owes one: the resolution of the runtime's
-/// timers.
+/// How long the sockets are polled after something has moved before the thread sleeps.
 ///
-/// The cycle thread does not wake this task, because that would be a system call in its cycle, into a runtime
-/// whose locks it would have to wait for. A reply is late by a millisecond, which no explicit message minds.
-const POLL_AWAITING: DurationNs = DurationNs::from_millis(1);
-
-/// How often they are looked for otherwise: the loss of a connection comes unasked.
-const POLL_IDLE: DurationNs = DurationNs::from_millis(20);
+/// Whoever asks once mostly asks again, and to be woken costs more than to answer. It is bounded, so that a quiet
+/// server costs nothing, and below the priority of the cycle thread.
+const POLL_FOR: DurationNs = DurationNs::from_micros(60);
 
 /// How often the application is called and the statistics are published.
 const ATTEND_PERIOD: DurationNs = DurationNs::from_millis(500);
 
 /// How long nothing is accepted after accepting has failed, or read after receiving has.
-const RETRY: Duration = Duration::from_millis(100);
+const RETRY: DurationNs = DurationNs::from_millis(100);
 
 type Attend = Box<dyn FnMut(&mut Adapter) + Send>;
-type OnEvent = Box<dyn FnMut(&Event) + Send>;
-type OnOpen = Box<dyn FnMut(&OpenParameters) + Send>;
 
-/// The server of one device: listens once bound, answers in [`ExplicitServer::run`].
+/// The server of one device: listens once bound, answers once it runs, see [`super::spawn`].
 pub struct ExplicitServer {
     sockets: Sockets,
     pub(super) stall_limit: Duration,
@@ -70,11 +59,6 @@ pub struct ExplicitServer {
     published: watch::Sender<Statistics>,
     attend: Option<Attend>,
     attend_at: MonotonicTime,
-    /// Whether the last stream was refused: told once, until one is accepted.
-    refusing: bool,
-    tasks: JoinSet<Ending>,
-    inbox: mpsc::Receiver<Message>,
-    outbox: mpsc::Sender<Message>,
 }
 
 impl fmt::Debug for ExplicitServer {
@@ -83,28 +67,8 @@ impl fmt::Debug for ExplicitServer {
     }
 }
 
-/// What needs no socket: the adapter, the streams' buffers, the motion device.
-struct Core {
-    adapter: Adapter,
-    link: AdapterEnd,
-    tap: Option<Tap>,
-    on_event: Option<OnEvent>,
-    on_open: Option<OnOpen>,
-    /// Where answers to datagrams come from.
-    address: SocketAddrV4,
-    connections: HashMap<Id, Connection>,
-    /// A request for which the queue to the motion device had no room.
-    held: Option<MotionRequest>,
-    /// Replies the motion device owes.
-    owed: u64,
-    /// Until when they are worth waiting for.
-    owed_until: MonotonicTime,
-    poll_at: MonotonicTime,
-    statistics: Statistics,
-}
-
 impl ExplicitServer {
-    /// Listens at TCP and UDP port 44818 of `address`; to be called inside a tokio runtime.
+    /// Listens at TCP and UDP port 44818 of `address`.
     ///
     /// # Errors
     /// [`ServeError`], when the address or port cannot be had.
@@ -129,24 +93,10 @@ impl ExplicitServer {
     ) -> Result<Self, ServeError> {
         let config = adapter.config();
         let sockets = Sockets::open(address, config.interface.netmask, config.qos.explicit)?;
-        let (outbox, inbox) = mpsc::channel(MESSAGES_MAX);
         let now = monotonic_now();
         let bound = sockets.address;
         let ip = if bound.ip().is_unspecified() { config.interface.address } else { *bound.ip() };
-        let core = Core {
-            address: SocketAddrV4::new(ip, bound.port()),
-            adapter,
-            link,
-            tap,
-            on_event: None,
-            on_open: None,
-            connections: HashMap::with_capacity(STREAMS_MAX),
-            held: None,
-            owed: 0,
-            owed_until: now,
-            poll_at: now,
-            statistics: Statistics::default(),
-        };
+        let core = Core::new(adapter, link, tap, SocketAddrV4::new(ip, bound.port()), now);
         Ok(Self {
             sockets,
             stall_limit: STALL_LIMIT,
@@ -154,10 +104,6 @@ impl ExplicitServer {
             published: watch::Sender::new(Statistics::default()),
             attend: None,
             attend_at: now,
-            refusing: false,
-            tasks: JoinSet::new(),
-            inbox,
-            outbox,
         })
     }
 
@@ -196,49 +142,63 @@ impl ExplicitServer {
         self.published.subscribe()
     }
 
-    /// Answers until `stop` holds `true` or its sender is gone; then all streams are closed and their tasks
-    /// ended.
-    pub async fn run(mut self, mut stop: watch::Receiver<bool>) -> Statistics {
-        let mut receivers = JoinSet::new();
-        let udp = Arc::clone(&self.sockets.udp);
-        for socket in std::iter::once(udp).chain(self.sockets.broadcast.drain(..)) {
-            receivers.spawn(receive(socket, self.outbox.clone()));
-        }
-        // Nothing is accepted before this time.
-        let mut accept_after = tokio::time::Instant::now();
+    /// Hands the sockets to the runtime of the caller.
+    ///
+    /// # Errors
+    /// [`ServeError::System`], when it does not take them.
+    pub(super) fn start(self) -> Result<Running, ServeError> {
+        let Self { sockets, stall_limit, core, published, attend, attend_at } = self;
+        let traffic = Traffic::new(sockets, stall_limit)?;
+        Ok(Running { traffic, core, published, attend, attend_at })
+    }
+}
+
+/// A server whose sockets are at work.
+pub(super) struct Running {
+    traffic: Traffic,
+    core: Core,
+    published: watch::Sender<Statistics>,
+    attend: Option<Attend>,
+    attend_at: MonotonicTime,
+}
+
+impl Running {
+    /// Answers until `stop` holds `true` or its sender is gone; then all streams are closed. To be run by a runtime
+    /// of one thread that has nothing else to do.
+    pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
+        let mut stopped = pin!(stop.wait_for(|stop| *stop));
+        let mut poll_until = MonotonicTime::ZERO;
         loop {
             let now = monotonic_now();
             self.step(now);
-            let pause = self.wake_at() - monotonic_now();
-            let pause = Duration::from_nanos(u64::try_from(pause.0).unwrap_or(0));
-            tokio::select! {
-                () = stopped(&mut stop) => break,
-                Some(message) = self.inbox.recv() => self.take(message),
-                Some(ended) = self.tasks.join_next_with_id() => self.ended(ended),
-                accepted = async {
-                    tokio::time::sleep_until(accept_after).await;
-                    self.sockets.listener.accept().await
-                } => match accepted {
-                    Ok((stream, peer)) => self.accept(stream, peer),
-                    Err(error) => {
-                        tracing::warn!(at = %self.sockets.address, %error, "cannot accept a stream");
-                        accept_after = tokio::time::Instant::now() + RETRY;
-                    }
-                },
-                () = sleep(pause) => {}
+            let polling = now < poll_until;
+            let wake_at = self.core.wake_at().min(self.attend_at).min(self.traffic.wake_at(now));
+            let pause = Duration::from_nanos(u64::try_from((wake_at - now).0).unwrap_or(0));
+            let mut asleep = pin!((!polling).then(|| sleep(pause)));
+            let turn = poll_fn(|cx| {
+                // An error is a sender that is gone: that is a wish to stop as well.
+                if stopped.as_mut().poll(cx).is_ready() {
+                    return Poll::Ready(Turn::Stop);
+                }
+                if self.traffic.turn(cx, monotonic_now(), &mut self.core) {
+                    return Poll::Ready(Turn::Moved);
+                }
+                let waited = asleep.as_mut().as_pin_mut().is_none_or(|timer| timer.poll(cx).is_ready());
+                if waited { Poll::Ready(Turn::Idle) } else { Poll::Pending }
+            });
+            match turn.await {
+                Turn::Stop => break,
+                Turn::Moved => poll_until = monotonic_now() + POLL_FOR,
+                // Lets the runtime look at the sockets.
+                Turn::Idle if polling => tokio::task::yield_now().await,
+                Turn::Idle => {}
             }
         }
-        let streams: Vec<Id> = self.core.connections.keys().copied().collect();
-        for id in streams {
-            self.core.close(id, false);
-        }
-        receivers.shutdown().await;
-        self.tasks.shutdown().await;
+        self.traffic.close(&mut self.core);
         self.publish();
-        self.core.statistics
     }
 
-    /// Everything that can be done at this moment.
+    /// Everything that can be done at this moment without a socket.
     fn step(&mut self, now: MonotonicTime) {
         if self.attend_at <= now {
             self.attend_at = now + ATTEND_PERIOD;
@@ -250,270 +210,179 @@ impl ExplicitServer {
         self.core.step(now);
     }
 
-    fn wake_at(&self) -> MonotonicTime {
-        self.core.wake_at().min(self.attend_at)
-    }
-
     fn publish(&mut self) {
         let statistics = &mut self.core.statistics;
-        statistics.streams = self.core.connections.len();
+        statistics.streams = self.traffic.streams.len();
         statistics.adapter.clone_from(self.core.adapter.counters());
         self.published.send_replace(statistics.clone());
     }
+}
 
-    fn accept(&mut self, stream: TcpStream, peer: SocketAddr) {
-        let (SocketAddr::V4(peer), Ok(SocketAddr::V4(local))) = (peer, stream.local_addr()) else { return };
-        let crowded = self.tasks.len() >= STREAMS_MAX;
-        let slot = if crowded { None } else { self.core.adapter.open(monotonic_now(), peer) };
+/// What one turn of the server came to.
+enum Turn {
+    Moved,
+    Idle,
+    Stop,
+}
+
+/// A socket for datagrams; after an error it is left alone for a while.
+#[derive(Debug)]
+struct Datagrams {
+    socket: UdpSocket,
+    to: SocketAddrV4,
+    quiet_until: MonotonicTime,
+}
+
+/// All sockets at work.
+#[derive(Debug)]
+struct Traffic {
+    listener: TcpListener,
+    /// Nothing is accepted before this time.
+    accept_after: MonotonicTime,
+    /// The first one is bound to the device's address: answers go out there, whichever a question came in by.
+    datagrams: Vec<Datagrams>,
+    streams: Vec<Stream>,
+    stall_limit: Duration,
+    /// Whether the last stream was refused: told once, until one is accepted.
+    refusing: bool,
+    buffer: Box<[u8; DATAGRAM_LEN_MAX]>,
+}
+
+impl Traffic {
+    fn new(sockets: Sockets, stall_limit: Duration) -> Result<Self, ServeError> {
+        let (listener, udp) = sockets.register()?;
+        let datagrams = udp.into_iter().map(|(socket, to)| Datagrams {
+            socket,
+            to,
+            quiet_until: MonotonicTime::ZERO,
+        });
+        Ok(Self {
+            listener,
+            accept_after: MonotonicTime::ZERO,
+            datagrams: datagrams.collect(),
+            streams: Vec::with_capacity(STREAMS_MAX),
+            stall_limit,
+            refusing: false,
+            buffer: Box::new([0; DATAGRAM_LEN_MAX]),
+        })
+    }
+
+    /// Moves what can be moved now; whether anything was. The task is woken when there is more.
+    fn turn(&mut self, cx: &mut Context<'_>, now: MonotonicTime, core: &mut Core) -> bool {
+        let mut moved = false;
+        self.streams.retain_mut(|stream| match stream.turn(cx, now, core) {
+            Ok(one) => {
+                moved |= one;
+                true
+            }
+            Err(ending) => {
+                moved = true;
+                ended(stream, ending, core);
+                false
+            }
+        });
+        self.accept(cx, now, core) | self.receive(cx, now, core) | moved
+    }
+
+    /// When a time-out of the sockets is due.
+    fn wake_at(&self, now: MonotonicTime) -> MonotonicTime {
+        let streams = self.streams.iter().filter_map(Stream::wake_at);
+        let quiet = self.datagrams.iter().map(|one| one.quiet_until).chain([self.accept_after]);
+        streams.chain(quiet.filter(|at| now < *at)).min().unwrap_or(MonotonicTime::MAX)
+    }
+
+    fn close(&mut self, core: &mut Core) {
+        for mut stream in self.streams.drain(..) {
+            stream.leave(core, false);
+            let _ = stream.shut_down();
+        }
+    }
+
+    fn accept(&mut self, cx: &mut Context<'_>, now: MonotonicTime, core: &mut Core) -> bool {
+        if now < self.accept_after {
+            return false;
+        }
+        match self.listener.poll_accept(cx) {
+            Poll::Pending => return false,
+            Poll::Ready(Ok((tcp, peer))) => self.open(tcp, peer, now, core),
+            Poll::Ready(Err(error)) => {
+                tracing::warn!(%error, "cannot accept a stream");
+                self.accept_after = now + RETRY;
+            }
+        }
+        true
+    }
+
+    fn open(&mut self, tcp: TcpStream, peer: SocketAddr, now: MonotonicTime, core: &mut Core) {
+        let (SocketAddr::V4(peer), Ok(SocketAddr::V4(local))) = (peer, tcp.local_addr()) else { return };
+        let crowded = self.streams.len() >= STREAMS_MAX;
+        let slot = if crowded { None } else { core.adapter.open(now, peer) };
         let Some(slot) = slot else {
             if !self.refusing {
                 tracing::warn!(%peer, at = %local, "stream refused: all places are taken");
             }
             self.refusing = true;
-            self.core.statistics.refused += 1;
+            core.statistics.refused += 1;
             return;
         };
         self.refusing = false;
-        if let Err(error) = prepare(&stream) {
+        if let Err(error) = prepare(&tcp) {
             tracing::debug!(%peer, %error, "a stream cannot be set up as it should be");
         }
-        self.core.statistics.accepted += 1;
+        core.statistics.accepted += 1;
         tracing::debug!(%peer, at = %local, "stream opened");
-        if let Some(tap) = &mut self.core.tap {
+        if let Some(tap) = &mut core.tap {
             tap.opened(realtime_now(), peer, local);
         }
-        let (to_reader, read_buffers) = mpsc::channel(1);
-        let (to_writer, write_buffers) = mpsc::channel(1);
-        let (server, stall_limit) = (self.outbox.clone(), self.stall_limit);
-        let task = Task { stream, server, read_buffers, write_buffers, stall_limit };
-        let id = self.tasks.spawn(task.run()).id();
-        let spare = Some(Vec::with_capacity(BUFFER_LEN));
-        let connection = Connection { peer, local, slot, input: None, spare, to_reader, to_writer };
-        self.core.connections.insert(id, connection);
+        self.streams.push(Stream::new(tcp, (peer, local), slot, self.stall_limit));
     }
 
-    fn take(&mut self, message: Message) {
-        match message {
-            Message::Received(id, bytes) => self.core.received(id, bytes),
-            Message::Sent(id, buffer) => {
-                if let Some(connection) = self.core.connections.get_mut(&id) {
-                    connection.spare = Some(buffer);
-                }
+    /// Takes one datagram of each socket and answers it.
+    fn receive(&mut self, cx: &mut Context<'_>, now: MonotonicTime, core: &mut Core) -> bool {
+        let mut moved = false;
+        for index in 0..self.datagrams.len() {
+            let Datagrams { socket, to, quiet_until } = &mut self.datagrams[index];
+            if now < *quiet_until {
+                continue;
             }
-            Message::Finished(id) => self.core.close(id, true),
-            Message::Datagram { from, to, bytes } => {
-                let sent = self.core.datagram(from, to, &bytes).map(|(answer, len)| {
-                    // A full send buffer loses a datagram, as the network may.
-                    self.sockets.udp.try_send_to(&answer[..len], SocketAddr::V4(from))
-                });
-                if let Some(Err(error)) = sent {
-                    self.core.statistics.datagrams_unsent += 1;
-                    tracing::debug!(peer = %from, %error, "an answer cannot be sent");
+            let mut buffer = ReadBuf::new(&mut self.buffer[..]);
+            let from = match socket.poll_recv_from(cx, &mut buffer) {
+                Poll::Pending => continue,
+                Poll::Ready(Ok(SocketAddr::V4(from))) => from,
+                Poll::Ready(Ok(SocketAddr::V6(_))) => continue,
+                Poll::Ready(Err(error)) => {
+                    tracing::debug!(at = %to, %error, "cannot receive datagrams");
+                    *quiet_until = now + RETRY;
+                    continue;
                 }
+            };
+            moved = true;
+            let Some((answer, len)) = core.datagram(from, *to, buffer.filled()) else { continue };
+            // A full send buffer loses a datagram, as the network may.
+            let sent = self.datagrams[0].socket.try_send_to(&answer[..len], SocketAddr::V4(from));
+            if let Err(error) = sent {
+                core.statistics.datagrams_unsent += 1;
+                tracing::debug!(peer = %from, %error, "an answer cannot be sent");
             }
         }
-    }
-
-    fn ended(&mut self, ended: Result<(Id, Ending), JoinError>) {
-        let (id, ending) = match ended {
-            Ok((id, ending)) => (id, Some(ending)),
-            Err(error) => {
-                tracing::error!(%error, "the task of a stream broke down");
-                (error.id(), None)
-            }
-        };
-        let peer = self.core.connections.get(&id).map(|connection| connection.peer);
-        let peer = peer.map_or_else(|| "a peer that had left".to_owned(), |peer| peer.to_string());
-        match ending {
-            Some(Ending::Stalled) => {
-                self.core.statistics.stalled += 1;
-                let limit = self.stall_limit;
-                tracing::warn!(peer, ?limit, "stream dropped: the peer does not take what is sent to it");
-            }
-            Some(Ending::Failed(error)) => tracing::debug!(peer, %error, "stream broken"),
-            Some(Ending::Closed) | None => {}
-        }
-        self.core.close(id, false);
+        moved
     }
 }
 
-impl Core {
-    fn step(&mut self, now: MonotonicTime) {
-        while let Some(reply) = self.link.reply() {
-            self.statistics.motion_replies += 1;
-            self.owed = self.owed.saturating_sub(u64::from(answers(&reply)));
-            self.adapter.complete(now, &reply);
+/// Lets go of a stream that has ended.
+fn ended(stream: &mut Stream, ending: Ending, core: &mut Core) {
+    let peer = stream.peer;
+    match ending {
+        Ending::Stalled => {
+            core.statistics.stalled += 1;
+            tracing::warn!(%peer, "stream dropped: the peer does not take what is sent to it");
         }
-        if self.adapter.wake_at().is_some_and(|at| at <= now) {
-            self.adapter.handle_timeout(now);
-        }
-        self.move_bytes(now);
-        self.send_requests(now);
-        self.link.tell_connections(self.adapter.explicit_connections());
-        while let Some(event) = self.adapter.poll_event() {
-            self.note(&event);
-        }
-        let waiting = self.held.is_some() || (self.owed > 0 && now < self.owed_until);
-        self.poll_at = now + if waiting { POLL_AWAITING } else { POLL_IDLE };
-    }
-
-    fn wake_at(&self) -> MonotonicTime {
-        self.adapter.wake_at().map_or(self.poll_at, |at| at.min(self.poll_at))
-    }
-
-    /// Moves what can be moved between the streams and the adapter, and closes those that are done.
-    fn move_bytes(&mut self, now: MonotonicTime) {
-        let mut done = Vec::new();
-        for (id, connection) in &mut self.connections {
-            let slot = connection.slot;
-            if let Some((bytes, mut taken)) = connection.input.take() {
-                taken += self.adapter.handle_stream(now, slot, &bytes[taken..]);
-                if taken < bytes.len() {
-                    connection.input = Some((bytes, taken));
-                } else {
-                    // There is one read buffer, so there is room; only a task that has ended does not take
-                    // it.
-                    let _ = connection.to_reader.try_send(bytes);
-                }
-            }
-            if let Some(mut buffer) = connection.spare.take() {
-                buffer.resize(BUFFER_LEN, 0);
-                let count = self.adapter.poll_transmit(now, slot, &mut buffer);
-                buffer.truncate(count);
-                if count == 0 {
-                    connection.spare = Some(buffer);
-                } else {
-                    if let Some(tap) = &mut self.tap {
-                        tap.stream(realtime_now(), connection.local, connection.peer, &buffer);
-                    }
-                    let _ = connection.to_writer.try_send(buffer);
-                }
-            }
-            if self.adapter.is_done(slot) {
-                done.push(*id);
-            }
-        }
-        for id in done {
-            self.close(id, false);
-        }
-    }
-
-    /// Hands the adapter's requests to the motion device, as far as there is room.
-    fn send_requests(&mut self, now: MonotonicTime) {
-        let mut was_held = self.held.is_some();
-        while let Some(request) = self.held.take().or_else(|| self.adapter.poll_motion()) {
-            if let (MotionRequest::Open(open), Some(on_open)) = (&request, &mut self.on_open) {
-                on_open(open);
-            }
-            if let Err(request) = self.link.request(request) {
-                self.statistics.motion_requests_held += u64::from(!was_held);
-                self.held = Some(request);
-                return;
-            }
-            was_held = false;
-            self.statistics.motion_requests += 1;
-            self.owed += 1;
-            self.owed_until = now + DEVICE_TIMEOUT;
-        }
-    }
-
-    fn received(&mut self, id: Id, bytes: Vec<u8>) {
-        let Some(connection) = self.connections.get_mut(&id) else { return };
-        if let Some(tap) = &mut self.tap {
-            tap.stream(realtime_now(), connection.peer, connection.local, &bytes);
-        }
-        connection.input = Some((bytes, 0));
-    }
-
-    /// Lets go of a stream; its task sends what it has and ends.
-    fn close(&mut self, id: Id, by_peer: bool) {
-        let Some(connection) = self.connections.remove(&id) else { return };
-        self.adapter.close(connection.slot);
-        let (from, to) =
-            if by_peer { (connection.peer, connection.local) } else { (connection.local, connection.peer) };
-        tracing::debug!(peer = %connection.peer, by_peer, "stream closed");
-        if let Some(tap) = &mut self.tap {
-            tap.closed(realtime_now(), from, to);
-        }
-    }
-
-    /// The answer to a datagram.
-    fn datagram(
-        &mut self,
-        from: SocketAddrV4,
-        to: SocketAddrV4,
-        bytes: &[u8],
-    ) -> Option<([u8; ANSWER_LEN_MAX], usize)> {
-        self.statistics.datagrams += 1;
-        if let Some(tap) = &mut self.tap {
-            tap.datagram(realtime_now(), from, to, 0, bytes);
-        }
-        let mut answer = [0; ANSWER_LEN_MAX];
-        let len = self.adapter.handle_datagram(bytes, &mut answer)?;
-        if let Some(tap) = &mut self.tap {
-            let tos = self.adapter.config().qos.explicit << 2;
-            tap.datagram(realtime_now(), self.address, from, tos, &answer[..len]);
-        }
-        Some((answer, len))
-    }
-
-    fn note(&mut self, event: &Event) {
-        let statistics = &mut self.statistics;
-        statistics.events += 1;
-        match event {
-            Event::MotionOpened { .. } => statistics.motion_opened += 1,
-            Event::MotionClosed { .. } => statistics.motion_closed += 1,
-            Event::MotionLost { .. } => statistics.motion_lost += 1,
-            _ => {}
-        }
-        match event {
-            Event::MotionLost { .. }
-            | Event::ExplicitLost { .. }
-            | Event::SessionLost { .. }
-            | Event::DeviceSilent { .. }
-            | Event::OpenRefused { .. }
-            | Event::Reset { .. } => {
-                tracing::warn!("{event}");
-            }
-            _ => tracing::info!("{event}"),
-        }
-        if let Some(on_event) = &mut self.on_event {
-            on_event(event);
-        }
-    }
-}
-
-/// Whether a message of the motion device is the answer to a request.
-const fn answers(reply: &MotionReply) -> bool {
-    !matches!(reply, MotionReply::ConnectionLost { .. })
-}
-
-async fn stopped(stop: &mut watch::Receiver<bool>) {
-    // An error is a sender that is gone: that is a wish to stop as well.
-    let _ = stop.wait_for(|stop| *stop).await;
-}
-
-/// Hands the datagrams of a socket to the server.
-async fn receive(socket: Arc<UdpSocket>, server: mpsc::Sender<Message>) {
-    let to = match socket.local_addr() {
-        Ok(SocketAddr::V4(to)) => to,
-        Ok(SocketAddr::V6(_)) | Err(_) => SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, PORT_EXPLICIT),
-    };
-    let mut buffer = [0; DATAGRAM_LEN_MAX];
-    loop {
-        let received: io::Result<(usize, SocketAddr)> = socket.recv_from(&mut buffer).await;
-        match received {
-            Ok((len, SocketAddr::V4(from))) => {
-                let bytes = buffer[..len].to_vec();
-                if server.send(Message::Datagram { from, to, bytes }).await.is_err() {
-                    return;
-                }
-            }
-            Ok((_, SocketAddr::V6(_))) => {}
-            Err(error) => {
-                tracing::debug!(at = %to, %error, "cannot receive datagrams");
-                sleep(RETRY).await;
+        Ending::Failed(error) => tracing::debug!(%peer, %error, "stream broken"),
+        Ending::Closed => {
+            if let Err(error) = stream.shut_down() {
+                tracing::debug!(%peer, %error, "stream broken");
             }
         }
     }
+    stream.leave(core, false);
 }

@@ -2,7 +2,6 @@
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddrV4};
-use std::sync::Arc;
 
 use socket2::{Domain, Protocol, SockAddr, Socket, TcpKeepalive, Type};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
@@ -20,14 +19,13 @@ const SEND_BUFFER_LEN: usize = 32 * 1024;
 /// Port numbers tried when any free one will do: the one TCP gets may be taken for UDP.
 const FREE_PORT_TRIES: usize = 16;
 
-/// The open sockets.
+/// The open sockets. Nothing is lost between their opening and their use: the kernel keeps it.
 #[derive(Debug)]
 pub(super) struct Sockets {
-    pub listener: TcpListener,
-    /// Answers go out here, whichever socket a question came in by.
-    pub udp: Arc<UdpSocket>,
+    tcp: Socket,
+    udp: Socket,
     /// Broadcasts do not come to a socket that is bound to one address.
-    pub broadcast: Vec<Arc<UdpSocket>>,
+    broadcast: Vec<(Socket, SocketAddrV4)>,
     pub address: SocketAddrV4,
 }
 
@@ -44,6 +42,16 @@ impl Sockets {
                 Err(error) => return Err(error),
             }
         };
+        let broadcast = broadcast_addresses(*address.ip(), netmask)
+            .filter_map(|ip| open_broadcast(SocketAddrV4::new(ip, address.port())))
+            .collect();
+        Ok(Self { tcp, udp, broadcast, address })
+    }
+
+    /// Hands all of them to the runtime of the caller: the listener, and the sockets for datagrams with their
+    /// addresses, the one that is bound to the device's own address first.
+    pub fn register(self) -> Result<(TcpListener, Vec<(UdpSocket, SocketAddrV4)>), ServeError> {
+        let Self { tcp, udp, broadcast, address } = self;
         let system = |transport: Transport| {
             move |source| ServeError::System {
                 address,
@@ -52,15 +60,11 @@ impl Sockets {
                 source,
             }
         };
-        let broadcast = broadcast_addresses(*address.ip(), netmask)
-            .filter_map(|ip| open_broadcast(SocketAddrV4::new(ip, address.port())))
-            .collect();
-        Ok(Self {
-            listener: TcpListener::from_std(tcp.into()).map_err(system(Transport::Tcp))?,
-            udp: Arc::new(UdpSocket::from_std(udp.into()).map_err(system(Transport::Udp))?),
-            broadcast,
-            address,
-        })
+        let listener = TcpListener::from_std(tcp.into()).map_err(system(Transport::Tcp))?;
+        let datagrams = std::iter::once((udp, address)).chain(broadcast).map(|(socket, to)| {
+            UdpSocket::from_std(socket.into()).map(|socket| (socket, to)).map_err(system(Transport::Udp))
+        });
+        Ok((listener, datagrams.collect::<Result<_, _>>()?))
     }
 }
 
@@ -122,17 +126,17 @@ fn broadcast_addresses(address: Ipv4Addr, netmask: Ipv4Addr) -> impl Iterator<It
 }
 
 /// A socket for broadcasts. Without it the device works, but tools do not find it by themselves.
-fn open_broadcast(address: SocketAddrV4) -> Option<Arc<UdpSocket>> {
-    let opened = || -> io::Result<UdpSocket> {
+fn open_broadcast(address: SocketAddrV4) -> Option<(Socket, SocketAddrV4)> {
+    let opened = || -> io::Result<Socket> {
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
         socket.set_nonblocking(true)?;
         // Every device of this host gets the broadcast.
         socket.set_reuse_address(true)?;
         socket.bind(&SockAddr::from(address))?;
-        UdpSocket::from_std(socket.into())
+        Ok(socket)
     };
     match opened() {
-        Ok(socket) => Some(Arc::new(socket)),
+        Ok(socket) => Some((socket, address)),
         Err(error) => {
             tracing::warn!(%address, %error, "broadcast ListIdentity requests will not be heard");
             None

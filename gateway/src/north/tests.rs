@@ -141,7 +141,7 @@ async fn sessions_identity_and_lists_over_tcp_and_udp() {
     let (server, _device) = bind(61);
     let handle = spawn(
         server.attend(|adapter| adapter.set_health(Health { minor_recoverable: true, ..Health::default() })),
-    );
+    ).unwrap();
     let mut client = Client::register(handle.address()).await;
     // Vendor ID, product name, status: no I/O connection (3 in bits 7..4), minor recoverable fault (bit 8).
     assert_eq!(client.get(PATH_IDENTITY, 1).await, [0x34, 0x12]);
@@ -175,7 +175,7 @@ async fn a_forward_open_reaches_the_motion_device_and_its_answer_comes_back() {
     let (told, mut events) = tokio::sync::mpsc::unbounded_channel();
     let server = server.on_event(move |event| told.send(*event).unwrap());
     let device = Device::start(end, willing);
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut client = Client::register(handle.address()).await;
 
     let opened = client.ask(&motion_open(5)).await;
@@ -212,7 +212,7 @@ async fn a_forward_open_reaches_the_motion_device_and_its_answer_comes_back() {
 #[tokio::test]
 async fn a_refusal_and_the_loss_of_the_connection_come_from_the_device() {
     let (server, mut end) = bind(63);
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut client = Client::register(handle.address()).await;
     let device = |end: &mut DeviceEnd, outcome| {
         loop {
@@ -264,7 +264,7 @@ async fn a_full_queue_holds_a_request_until_the_device_makes_room() {
     }
     let server =
         ExplicitServer::bind_port(SocketAddrV4::new(address, 0), adapter(address), link, None).unwrap();
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut client = Client::register(handle.address()).await;
     client.send_message(&client::message(Service(0x4B), PATH_AXIS_1, &[7])).await;
     tokio::time::sleep(Duration::from_millis(20)).await;
@@ -284,7 +284,7 @@ async fn a_recording_shows_both_directions() {
     let (link, _device) = motion_link();
     let at = SocketAddrV4::new(address, 0);
     let server = ExplicitServer::bind_port(at, adapter(address), link, taps.pop()).unwrap();
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut client = Client::register(handle.address()).await;
     client.get(PATH_IDENTITY, 1).await;
     let socket = UdpSocket::bind((Ipv4Addr::new(127, 0, 0, 165), 0)).await.unwrap();

@@ -205,7 +205,7 @@ pub fn start(
                 }
             });
         info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
-        servers.push(north::spawn(server));
+        servers.push(north::spawn(server)?);
     }
     if let Some(modbus) = config.modbus {
         let server = runtime

@@ -60,7 +60,7 @@ async fn explicit_messages_carry_their_code_point_over_tcp_and_udp() {
         let (link, _device) = motion_link();
         let at = SocketAddrV4::new(address, 0);
         let server = ExplicitServer::bind_port(at, Adapter::new(config).unwrap(), link, None).unwrap();
-        let handle = spawn(server);
+        let handle = spawn(server).unwrap();
         let mut client = Client::register(handle.address()).await;
         client.get(PATH_IDENTITY, 1).await;
         let socket = UdpSocket::bind((Ipv4Addr::new(127, 0, 0, 181), 0)).await.unwrap();
@@ -87,7 +87,7 @@ async fn data_of_the_motion_connection_carry_the_code_point_of_its_priority() {
     let at = SocketAddrV4::new(address, 0);
     let server = ExplicitServer::bind_port(at, Adapter::new(config).unwrap(), link, None).unwrap();
     let server = server.on_open(move |open| marker.mark(open.t_to_o_dscp).unwrap());
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut client = Client::register(handle.address()).await;
     for (serial, (priority, dscp)) in (1..).zip([
         (Priority::SCHEDULED, 47),

@@ -18,7 +18,7 @@ fn under(mut packet: Vec<u8>, handle: [u8; 4]) -> Vec<u8> {
 #[tokio::test]
 async fn session_handle_used_from_another_socket() {
     let (server, _device) = bind(91);
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut owner = Client::register(handle.address()).await;
     let stolen = session_handle(&owner.packet(Command::SEND_RR_DATA, &[]));
     let mut thief = Client::connect(handle.address()).await;
@@ -40,7 +40,7 @@ async fn session_handle_used_from_another_socket() {
 #[tokio::test]
 async fn unregister_session_of_another_session() {
     let (server, _device) = bind(92);
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let mut owner = Client::register(handle.address()).await;
     let stolen = session_handle(&owner.packet(Command::SEND_RR_DATA, &[]));
     let mut thief = Client::register(handle.address()).await;
@@ -54,7 +54,7 @@ async fn unregister_session_of_another_session() {
 #[tokio::test]
 async fn eleven_list_services_in_one_datagram() {
     let (server, _device) = bind(93);
-    let handle = spawn(server);
+    let handle = spawn(server).unwrap();
     let socket = UdpSocket::bind((Ipv4Addr::new(127, 0, 0, 193), 0)).await.unwrap();
     let one = client::packet(Command::LIST_SERVICES, 0, &[]);
     socket.send_to(&one.repeat(11), handle.address()).await.unwrap();
@@ -76,7 +76,8 @@ fn a_client_that_stalls_after_four_bytes_cannot_reach_the_cycle() {
     let (server, mut end) = runtime.block_on(async { bind(94) });
     let address = server.local_address();
     let (_stop, stopped) = tokio::sync::watch::channel(false);
-    let mut running = Box::pin(server.run(stopped));
+    let running = runtime.block_on(async { server.start().unwrap() });
+    let mut running = Box::pin(running.run(stopped));
     let _stalled = runtime.block_on(async {
         let mut stalled = Client::connect(address).await;
         stalled.stream.write_all(&[0x65, 0, 4, 0]).await.unwrap();

@@ -1,14 +1,15 @@
 //! Explicit round trips over loopback: the explicit server of Axisbridge and the adapter of `ciplink`, in turn.
 //!
 //! Both servers run in this process, each at an address of its own. A client is a thread with a plain socket and one
-//! request under way: it sends a Get_Attribute_Single of the product name and waits for the whole answer.
+//! request under way: it sends a Get_Attribute_Single of the product name and waits for the whole answer. A third server
+//! parses nothing and sends the same octets each time, from one blocking thread a stream: what sockets alone cost.
 //!
 //! ```text
 //! axisbridge-peer-bench [REQUESTS] [RUNS]     each client sends REQUESTS (20000) in each of RUNS (5)
 //! ```
 
 use std::io::{Read, Write};
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpListener, TcpStream};
 use std::sync::{Arc, Barrier};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -115,6 +116,29 @@ fn run(name: &str, address: SocketAddr, clients: usize, requests: usize) {
     println!("{name:<10} {clients:>7} {rate:>8} {:>8} {:>8} {:>8}", us(at(500)), us(at(990)), us(at(999)));
 }
 
+/// Answers every packet with octets that stand ready.
+fn bare_server() -> SocketAddr {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+    let address = listener.local_addr().expect("a bound socket");
+    let mut reply = vec![0x6F, 0, u8::try_from(PRODUCT.len()).expect("a short name"), 0];
+    reply.resize(HEADER_LEN, 0);
+    reply.extend(PRODUCT.as_bytes());
+    thread::spawn(move || {
+        for stream in listener.incoming() {
+            let (mut stream, reply) = (stream.expect("a stream"), reply.clone());
+            stream.set_nodelay(true).expect("a TCP socket");
+            thread::spawn(move || {
+                let mut buffer = [0; 512];
+                while stream.read(&mut buffer).is_ok_and(|len| len > 0) {
+                    let sent = stream.write_all(if buffer[0] == REGISTER[0] { &REGISTER } else { &reply });
+                    sent.expect("a stream");
+                }
+            });
+        }
+    });
+    address
+}
+
 /// The adapter that a box with one axis has.
 fn adapter() -> Adapter {
     Adapter::new(AdapterConfig {
@@ -172,7 +196,7 @@ fn main() {
     let inside = runtime.enter();
     let (link, _device) = motion_link();
     let server = ExplicitServer::bind_port(SocketAddrV4::new(OURS, 0), adapter(), link, None);
-    let ours = north::spawn(server.expect("a free port"));
+    let ours = north::spawn(server.expect("a free port")).expect("a thread");
 
     let other = OtherAdapter::start(OtherConfig {
         identity: AdapterIdentity { product_name: PRODUCT.into(), ..AdapterIdentity::default() },
@@ -183,11 +207,14 @@ fn main() {
     })
     .expect("a free port");
 
+    let bare = bare_server();
+
     println!("server     clients  trips/s   p50 us   p99 us p99.9 us");
     for clients in [1, 4] {
         for _ in 0..runs {
             run("axisbridge", SocketAddr::V4(ours.address()), clients, requests);
             run("ciplink", other.addr(), clients, requests);
+            run("sockets", bare, clients, requests);
         }
     }
     other.stop();
