@@ -2,6 +2,7 @@
 //!
 //! * [`wire`]: what stands in the Ethernet frame and in the service channel, as values.
 //! * [`master`]: the master role, from the first CP0 telegram to cyclic operation.
+//! * [`police`]: judges everything on the wire by the rules; carries the tests.
 //! * [`slave`]: the slave role, with a simulated drive behind it.
 //!
 //! Everything here is sans-IO: frames and the time go in as arguments, frames and events come out. Nothing
@@ -14,5 +15,6 @@
 #![forbid(unsafe_code)]
 
 pub mod master;
+pub mod police;
 pub mod slave;
 pub mod wire;

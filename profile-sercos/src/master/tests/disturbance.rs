@@ -1,6 +1,7 @@
 //! A line that loses and damages frames at random: the master neither panics nor takes what is damaged.
 
 use super::*;
+use crate::police::bus::Cable;
 use proptest::prelude::*;
 
 /// A small generator, so that a case is told by its seed.
@@ -30,7 +31,7 @@ proptest! {
     /// Losses and header damage up to one in a hundred frames do not keep the master from CP4.
     #[test]
     fn the_way_up_stands_noise(seed: u64, per_mille in 0u64..10) {
-        let mut rig = Rig::new(&[1, 2, 3]);
+        let mut rig = Rig::of(&[1, 2, 3]);
         rig.master.set_target_phase(Phase::CP0);
         rig.state(State::Cp0);
         rig.cable = noise(seed, per_mille, true);
@@ -44,7 +45,7 @@ proptest! {
     /// Anything may happen to the frames: no panic, and the master is somewhere sensible afterwards.
     #[test]
     fn any_damage_is_survived(seed: u64, per_mille in 0u64..300, target in 0u8..6) {
-        let mut rig = Rig::new(&[1, 2, 3]);
+        let mut rig = Rig::of(&[1, 2, 3]);
         rig.cable = noise(seed, per_mille, false);
         rig.auto_proceed = false;
         rig.master.set_target_phase(Phase(target));

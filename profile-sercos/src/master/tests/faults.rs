@@ -10,7 +10,7 @@ fn fix_crc(frame: &mut [u8]) {
 
 /// A disturbed cable in CP4: what is refused, and that nothing else comes of it.
 fn disturbed(cable: fn(&mut Vec<u8>) -> bool, reason: Refusal) {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.up_to(Phase::CP4);
     rig.cycles(5);
     rig.log.clear();
@@ -77,7 +77,7 @@ fn refused_frames_change_nothing() {
 
 #[test]
 fn frames_on_the_other_port_are_refused() {
-    let mut rig = Rig::new(&[1]);
+    let mut rig = Rig::of(&[1]);
     rig.up_to(Phase::CP4);
     rig.now = rig.master.wake_at().unwrap();
     let Some(Output::Transmit { frame, .. }) = rig.master.poll(rig.now) else { panic!("no frame") };
@@ -88,7 +88,7 @@ fn frames_on_the_other_port_are_refused() {
 
 #[test]
 fn three_missing_telegrams_lose_every_slave() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.up_to(Phase::CP4);
     rig.cable = Box::new(|_| false);
     rig.cycles(2 + 1);
@@ -122,7 +122,7 @@ fn a_vanishing_slave_leaves_the_others_running() {
         (Phase::CP4, State::Start4),
         (Phase::CP4, State::Cp4),
     ] {
-        let mut rig = Rig::new(&[1, 2, 3]);
+        let mut rig = Rig::of(&[1, 2, 3]);
         rig.auto_proceed = !matches!(state, State::Await2 | State::Await3);
         let target = if state == State::Cp1 { Phase::CP1 } else { Phase::CP4 };
         rig.master.set_target_phase(target);
@@ -153,7 +153,7 @@ fn a_vanishing_slave_leaves_the_others_running() {
 
 #[test]
 fn a_slave_that_vanishes_in_cp0_changes_the_scan() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.master.set_target_phase(Phase::CP0);
     rig.state(State::Cp0);
     rig.line.peers[1].faults.gone = true;
@@ -165,7 +165,7 @@ fn a_slave_that_vanishes_in_cp0_changes_the_scan() {
 
 #[test]
 fn a_lost_slave_that_returns_is_reported_and_stays_out() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.up_to(Phase::CP4);
     rig.cycles(3);
     let pending = rig.master.svc_submit(SlaveId(1), SvcRequest::read(Idn::FSP_TYPE)).unwrap();
@@ -196,7 +196,7 @@ fn refused_checks_show_what_is_wrong() {
     for (check, phase, state) in
         [(Idn::CP3_CHECK, Phase::CP2, State::Await2), (Idn::CP4_CHECK, Phase::CP3, State::Await3)]
     {
-        let mut rig = Rig::new(&[1, 2]);
+        let mut rig = Rig::of(&[1, 2]);
         rig.line.peers[1].faults.invalid = Some((check, wrong.clone()));
         rig.master.set_target_phase(Phase::CP4);
         let failed = Event::CheckFailed { slave: SlaveId(1), phase };
@@ -218,7 +218,7 @@ fn refused_checks_show_what_is_wrong() {
 
 #[test]
 fn a_slave_that_stays_busy_is_named() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.line.peers[0].faults.busy_at = Some(Idn::CYCLE_TIME);
     rig.auto_proceed = false;
     rig.master.set_target_phase(Phase::CP4);
@@ -232,18 +232,18 @@ fn a_slave_that_stays_busy_is_named() {
 
 #[test]
 fn a_slave_without_handshake_is_named() {
-    let mut rig = Rig::new(&[1]);
+    let mut rig = Rig::of(&[1]);
     rig.auto_proceed = false;
     rig.master.set_target_phase(Phase::CP4);
     rig.state(State::Await2);
     rig.line.peers[0].faults.deaf = true;
     let failure = SvcFailure::HandshakeTimeout { cycles: 10 };
-    assert_eq!(rig.request(0, SvcRequest::read(Idn::FSP_TYPE)), Err(failure));
+    assert_eq!(rig.result(0, SvcRequest::read(Idn::FSP_TYPE)), Err(failure));
 }
 
 #[test]
 fn error_replies_are_named_and_stop_the_way_up() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.line.peers[1].faults.error_at = Some((Idn::CYCLE_TIME, 0x7007));
     rig.auto_proceed = false;
     rig.master.set_target_phase(Phase::CP4);
@@ -265,7 +265,7 @@ fn error_replies_are_named_and_stop_the_way_up() {
 
 #[test]
 fn slow_commands_are_waited_for() {
-    let mut rig = Rig::new(&[1, 2]);
+    let mut rig = Rig::of(&[1, 2]);
     rig.line.peers[0].faults.command_cycles = 20;
     rig.up_to(Phase::CP4);
     let polls = |index: usize| {
@@ -280,7 +280,7 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
     for (state, from, to) in
         [(State::Leave2, Phase::CP2, Phase::CP3), (State::Leave3, Phase::CP3, Phase::CP4)]
     {
-        let mut rig = Rig::new(&[1, 2]);
+        let mut rig = Rig::of(&[1, 2]);
         rig.master.set_target_phase(Phase::CP4);
         rig.state(if state == State::Leave2 { State::Await2 } else { State::Await3 });
         rig.line.peers[0].faults.stubborn = true;
@@ -301,7 +301,7 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
 
 #[test]
 fn contradicting_classes_are_refused() {
-    let mut rig = Rig::new(&[1]);
+    let mut rig = Rig::of(&[1]);
     let both = [0x01, 0x01, 0x01, 0x02].to_vec();
     rig.line.peers[0].parameters.get_mut(&Idn::SCP_CLASSES).unwrap().bytes = both;
     rig.auto_proceed = false;
@@ -336,7 +336,7 @@ fn too_many_slaves_stay_in_cp0() {
 
 #[test]
 fn nobody_there() {
-    let mut rig = Rig::new(&[]);
+    let mut rig = Rig::of(&[]);
     rig.cable = Box::new(|_| false);
     rig.master.set_target_phase(Phase::CP4);
     rig.run_until("alone", |rig| rig.log.contains(&Event::NoSlaves));

@@ -3,6 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use profile_generic::time::MonotonicTime;
+
+use crate::police::bus::{Stations, Watch};
 use crate::wire::cp12;
 use crate::wire::header::{HEADER_LEN, Header, Kind, Phase};
 use crate::wire::idn::Idn;
@@ -62,6 +65,8 @@ pub struct Peer {
     busy_polls: u32,
     cycle: u16,
     dialogue: bool,
+    /// S-0-0127 was executed in this CP2; without it the slave ignores CP3.
+    checked: bool,
     /// Values it produces: C-CON counts with every AT while this is set.
     pub producing: bool,
 }
@@ -138,6 +143,7 @@ impl Peer {
             busy_polls: 0,
             cycle: 0,
             dialogue: false,
+            checked: false,
             producing: true,
         }
     }
@@ -162,6 +168,7 @@ impl Peer {
         self.switching = header.phase.switching();
         if !self.switching {
             if self.phase != header.phase.phase() {
+                self.checked &= header.phase.phase() > Phase::CP2;
                 self.status = SvcStatus::empty();
                 if header.phase.phase() >= Phase::CP2 {
                     self.status = SvcStatus::VALID;
@@ -244,6 +251,7 @@ impl Peer {
             (Element::Data, true) if COMMANDS.contains(&idn) => {
                 let mut status = u16::try_from(info & 3).unwrap();
                 if status == 3 {
+                    self.checked |= idn == Idn::CP3_CHECK;
                     if let Some((check, invalid)) = &self.faults.invalid
                         && *check == idn
                     {
@@ -318,6 +326,9 @@ impl Peer {
     }
 
     fn telegram(&mut self, header: &Header, data: &mut [u8], topology: u16) {
+        if self.phase > Phase::CP2 && !self.checked {
+            return;
+        }
         let (kind, number) = (header.telegram.kind(), header.telegram.number());
         let (svc, device) = self.place(kind, topology);
         let inserting = !self.switching || self.faults.stubborn;
@@ -381,11 +392,13 @@ impl Line {
     pub fn new(addresses: &[u16]) -> Line {
         Line { peers: addresses.iter().map(|&address| Peer::new(address)).collect() }
     }
+}
 
-    /// Passes a frame through the line and back.
-    pub fn pass(&mut self, frame: &mut [u8]) {
+impl Stations for Line {
+    fn handle_time(&mut self, _: MonotonicTime) {}
+
+    fn pass(&mut self, _: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool {
         let header = Header::parse(frame).expect("the master sends good headers");
-        let data = &mut frame[HEADER_LEN..];
         for peer in self.peers.iter_mut().filter(|peer| !peer.faults.gone) {
             if header.telegram.is_mst() {
                 peer.mst(&header);
@@ -393,26 +406,42 @@ impl Line {
         }
         if self.peers.first().is_some_and(|peer| peer.phase == Phase::CP0) {
             if header.telegram.kind() == Kind::At {
-                self.scan(&header, data);
+                self.scan(&header, frame, watch);
             }
-            return;
+            return true;
         }
         for (topology, peer) in (1u16..).zip(&mut self.peers).filter(|(_, peer)| !peer.faults.gone) {
-            peer.telegram(&header, data, topology);
+            let before = frame.to_vec();
+            peer.telegram(&header, &mut frame[HEADER_LEN..], topology);
+            watch(topology, true, &before, frame);
         }
+        true
     }
+}
 
-    fn scan(&mut self, header: &Header, data: &mut [u8]) {
+impl Line {
+    fn scan(&mut self, header: &Header, frame: &mut [u8], watch: &mut Watch<'_>) {
         let peers = self.peers.iter().filter(|peer| !peer.faults.gone);
-        let mut count = 0u16;
-        for (index, peer) in peers.enumerate() {
-            if !header.phase.switching() {
-                data[2 + 2 * index..][..2].copy_from_slice(&peer.address.to_le_bytes());
+        let count = peers.clone().count();
+        for (topology, peer) in (1u16..).zip(peers) {
+            let before = frame.to_vec();
+            if header.phase.switching() {
+                watch(topology, true, &before, frame);
+                continue;
             }
-            count += 1;
+            let data = &mut frame[HEADER_LEN..];
+            data[2 * usize::from(topology)..][..2].copy_from_slice(&peer.address.to_le_bytes());
+            data[..2].copy_from_slice(&(topology + 1).to_le_bytes());
+            watch(topology, true, &before, frame);
         }
-        if !header.phase.switching() {
-            data[..2].copy_from_slice(&(2 * count).to_le_bytes());
+        for topology in (1..count).rev() {
+            if header.phase.switching() {
+                continue;
+            }
+            let before = frame.to_vec();
+            let counter = u16::from_le_bytes([frame[HEADER_LEN], frame[HEADER_LEN + 1]]) + 1;
+            frame[HEADER_LEN..][..2].copy_from_slice(&counter.to_le_bytes());
+            watch(u16::try_from(topology).unwrap(), false, &before, frame);
         }
     }
 }

@@ -1,0 +1,240 @@
+//! A master and its slaves in virtual time, under a police.
+//!
+//! Time jumps from cycle to cycle. The telegrams of a cycle go out back to back, pass every station, and come
+//! back in the same moment. A breach of a rule ends the test unless it is excused.
+
+use std::fmt;
+
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::{Breach, Police, PoliceConfig, wire_time};
+use crate::master::Master;
+use crate::master::config::{ConfigError, MasterConfig};
+use crate::master::event::{Event, Output, Port, SlaveId, Ticket};
+use crate::master::phase::State;
+use crate::master::svc::request::{SvcOutcome, SvcRequest};
+use crate::slave::{self, Application, Forward, Line};
+use crate::wire::header::{FRAME_LEN_MAX, Phase};
+
+/// Smallest gap between two frames: 12 bytes at 100 Mbit/s.
+const GAP: DurationNs = DurationNs(960);
+
+/// Is told about a passage: topology address, outward, frame before and behind the station, where it may be changed.
+pub type Watch<'a> = dyn FnMut(u16, bool, &[u8], &mut [u8]) + 'a;
+
+/// What a station does besides: topology address, outward, the frame as it leaves the station.
+pub type Misdeed = Box<dyn FnMut(u16, bool, &mut [u8])>;
+
+/// What is behind the master's first port.
+pub trait Stations {
+    /// Looks after the time-outs of all stations.
+    fn handle_time(&mut self, now: MonotonicTime);
+
+    /// Sends a frame through the stations, which change it, and tells `watch` about each of them. Returns whether
+    /// it comes back.
+    fn pass(&mut self, now: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool;
+}
+
+impl<A: Application> Stations for Line<A> {
+    fn handle_time(&mut self, now: MonotonicTime) {
+        Line::handle_time(self, now);
+    }
+
+    fn pass(&mut self, now: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool {
+        let mut copy = [0; FRAME_LEN_MAX];
+        let Some(before) = copy.get_mut(..frame.len()) else { return false };
+        before.copy_from_slice(frame);
+        let mut station = |slave: &mut slave::Slave<A>, address, port, frame: &mut [u8]| {
+            let forward = slave.handle_frame(now, port, frame);
+            watch(address, port == slave::Port::One, before, frame);
+            if before != frame {
+                before.copy_from_slice(frame);
+            }
+            forward
+        };
+        let slaves = self.slaves_mut();
+        let mut turned = None;
+        for (index, (address, slave)) in (1u16..).zip(slaves.iter_mut()).enumerate() {
+            if station(slave, address, slave::Port::One, frame) != Forward::Through {
+                turned = Some((index, address));
+                break;
+            }
+        }
+        let Some((last, address)) = turned else { return false };
+        for (slave, back) in slaves[..last].iter_mut().rev().zip(1..) {
+            station(slave, address - back, slave::Port::Two, frame);
+        }
+        true
+    }
+}
+
+/// What happens to a frame on a cable; false when it does not arrive.
+pub type Cable = Box<dyn FnMut(&mut Vec<u8>) -> bool>;
+
+/// A master, what is behind its port, and the police.
+pub struct VirtualBus<S> {
+    /// The virtual time.
+    pub now: MonotonicTime,
+    /// The master.
+    pub master: Master,
+    /// The slaves.
+    pub line: S,
+    /// The police.
+    pub police: Police,
+    /// Breaches for which the test goes on; none by default. They stay in the police's list.
+    pub excused: Box<dyn Fn(&Breach) -> bool>,
+    /// Makes the master do what it does not do by itself: changes its frames before anybody sees them.
+    pub outward: Cable,
+    /// Makes a station do what it does not do by itself.
+    pub station: Misdeed,
+    /// Disturbs the frames on their way back, behind all stations.
+    pub cable: Cable,
+    /// Events of the master.
+    pub log: Vec<Event>,
+    /// Start and phase byte of each cycle.
+    pub cycles: Vec<(MonotonicTime, u8)>,
+    /// Calls `proceed` where the master awaits its application.
+    pub auto_proceed: bool,
+    judged: usize,
+}
+
+impl<S: fmt::Debug> fmt::Debug for VirtualBus<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("VirtualBus").field("now", &self.now).field("state", &self.master.state()).finish()
+    }
+}
+
+impl<S: Stations> VirtualBus<S> {
+    /// A silent bus.
+    ///
+    /// # Errors
+    /// What the master finds wrong with its configuration.
+    pub fn new(config: MasterConfig, line: S) -> Result<VirtualBus<S>, ConfigError> {
+        Ok(VirtualBus {
+            now: MonotonicTime::ZERO,
+            master: Master::new(config)?,
+            line,
+            police: Police::new(PoliceConfig::default(), MonotonicTime::ZERO),
+            excused: Box::new(|_| false),
+            outward: Box::new(|_| true),
+            station: Box::new(|_, _, _| {}),
+            cable: Box::new(|_| true),
+            log: Vec::new(),
+            cycles: Vec::new(),
+            auto_proceed: true,
+            judged: 0,
+        })
+    }
+
+    /// One wake-up: a cycle with all its frames, and the events. Without telegrams a millisecond passes.
+    ///
+    /// # Panics
+    /// When a rule is broken that is not excused.
+    pub fn step(&mut self) {
+        let Some(at) = self.master.wake_at() else {
+            self.now = self.now + DurationNs::from_millis(1);
+            return;
+        };
+        self.now = self.now.max(at);
+        self.line.handle_time(self.now);
+        let mut out = Vec::new();
+        while let Some(Output::Transmit { frame, .. }) = self.master.poll(self.now) {
+            out.push(frame.to_vec());
+        }
+        if let Some(first) = out.first() {
+            self.cycles.push((self.now, first[15]));
+        }
+        let mut start = self.now;
+        for mut frame in out {
+            if !(self.outward)(&mut frame) {
+                continue;
+            }
+            let police = &mut self.police;
+            police.sent(start, &frame);
+            let misdeed = &mut self.station;
+            let mut watch = |slave, outward, before: &[u8], after: &mut [u8]| {
+                misdeed(slave, outward, after);
+                police.passed(start, slave, outward, before, after);
+            };
+            let back = self.line.pass(self.now, &mut frame, &mut watch);
+            start = start + wire_time(frame.len()) + GAP;
+            if back && (self.cable)(&mut frame) {
+                // What the master refuses it counts by itself.
+                let _ = self.master.handle_frame(self.now, Port::One, &frame);
+            }
+        }
+        for breach in &self.police.breaches()[self.judged..] {
+            assert!((self.excused)(breach), "{breach}");
+        }
+        self.judged = self.police.breaches().len();
+        while let Some(event) = self.master.poll_event() {
+            if self.auto_proceed && matches!(event, Event::AwaitingApplication { .. }) {
+                // Refused only when the target has changed meanwhile.
+                let _ = self.master.proceed();
+            }
+            self.log.push(event);
+        }
+    }
+
+    /// Lets so many cycles pass.
+    pub fn cycles(&mut self, cycles: usize) {
+        (0..cycles).for_each(|_| self.step());
+    }
+
+    /// Lets cycles pass until `done`.
+    ///
+    /// # Panics
+    /// After 20000 cycles; `what` says what did not happen.
+    pub fn run_until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        for _ in 0..20_000 {
+            if done(self) {
+                return;
+            }
+            self.step();
+        }
+        let report: Vec<_> = self.master.report(SlaveId(0)).iter().map(ToString::to_string).collect();
+        let state = self.master.state();
+        panic!("never {what}: {state:?} at {}, {:#?}\n{report:#?}", self.now, self.log);
+    }
+
+    /// Goes to a phase.
+    pub fn up_to(&mut self, phase: Phase) {
+        self.master.set_target_phase(phase);
+        self.run_until("up", |bus| bus.log.contains(&Event::Phase(phase)));
+    }
+
+    /// Lets cycles pass until the master is in this state.
+    pub fn state(&mut self, state: State) {
+        self.run_until("in the state", |bus| bus.master.state() == state);
+    }
+
+    /// Whether an event has come.
+    #[must_use]
+    pub fn saw(&self, event: &Event) -> bool {
+        self.log.contains(event)
+    }
+
+    /// The outcome of a request, if it is there.
+    #[must_use]
+    pub fn outcome(&self, wanted: Ticket) -> Option<&SvcOutcome> {
+        self.log.iter().find_map(|event| match event {
+            Event::Svc { ticket, outcome } if *ticket == wanted => Some(outcome),
+            _ => None,
+        })
+    }
+
+    /// Runs a request to its outcome.
+    ///
+    /// # Panics
+    /// When the slave takes no requests, or without an outcome after 3000 cycles.
+    pub fn request(&mut self, slave: SlaveId, request: SvcRequest) -> SvcOutcome {
+        let Ok(ticket) = self.master.svc_submit(slave, request) else { panic!("{slave} takes no request") };
+        for _ in 0..3000 {
+            self.step();
+            if let Some(outcome) = self.outcome(ticket) {
+                return outcome.clone();
+            }
+        }
+        panic!("no outcome from {slave}");
+    }
+}
