@@ -1,5 +1,6 @@
 use super::peer::Faults;
 use super::*;
+use crate::police::{Offender, Rule};
 use crate::wire::svc::Element;
 use crate::wire::svc_error::SvcError;
 
@@ -284,6 +285,8 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
         rig.master.set_target_phase(Phase::CP4);
         rig.state(if state == State::Leave2 { State::Await2 } else { State::Await3 });
         rig.line.peers[0].faults.stubborn = true;
+        let late = Rule::InsertsWhileSwitching { phase: from };
+        rig.excused = Box::new(move |breach| breach.rule == late && breach.offender == Offender::Slave(1));
         let failed = Event::SwitchFailed { from, to, slave: Some(SlaveId(0)) };
         rig.run_until("failed", |rig| rig.log.contains(&failed));
         assert_eq!(
