@@ -251,11 +251,8 @@ struct Traffic {
 impl Traffic {
     fn new(sockets: Sockets, stall_limit: Duration) -> Result<Self, ServeError> {
         let (listener, udp) = sockets.register()?;
-        let datagrams = udp.into_iter().map(|(socket, to)| Datagrams {
-            socket,
-            to,
-            quiet_until: MonotonicTime::ZERO,
-        });
+        let datagrams =
+            udp.into_iter().map(|(socket, to)| Datagrams { socket, to, quiet_until: MonotonicTime::ZERO });
         Ok(Self {
             listener,
             accept_after: MonotonicTime::ZERO,

@@ -141,7 +141,8 @@ async fn sessions_identity_and_lists_over_tcp_and_udp() {
     let (server, _device) = bind(61);
     let handle = spawn(
         server.attend(|adapter| adapter.set_health(Health { minor_recoverable: true, ..Health::default() })),
-    ).unwrap();
+    )
+    .unwrap();
     let mut client = Client::register(handle.address()).await;
     // Vendor ID, product name, status: no I/O connection (3 in bits 7..4), minor recoverable fault (bit 8).
     assert_eq!(client.get(PATH_IDENTITY, 1).await, [0x34, 0x12]);
