@@ -75,6 +75,8 @@ pub(super) struct IoConnection {
     pub header: Option<CommandHeader>,
     pub mode: Mode,
     next_transmit: MonotonicTime,
+    /// How much before its time an update may go in synchronous operation, ns.
+    early: u64,
     /// Sequence count of the last D-to-C packet.
     pub transmit_sequence: u16,
     /// Update ID of the last D-to-C update.
@@ -86,7 +88,8 @@ pub(super) struct IoConnection {
 }
 
 impl IoConnection {
-    pub fn new(parameters: OpenParameters, now: MonotonicTime) -> Self {
+    /// An open connection that is asked for its updates every `poll_interval_ns`.
+    pub fn new(parameters: OpenParameters, poll_interval_ns: u64, now: MonotonicTime) -> Self {
         let period = u64::from(parameters.rpi_us).saturating_mul(1000);
         Self {
             parameters,
@@ -98,6 +101,7 @@ impl IoConnection {
             header: None,
             mode: Mode::Asynchronous,
             next_transmit: MonotonicTime(now.0.saturating_add(period)),
+            early: poll_interval_ns / 2,
             transmit_sequence: 0,
             sent_update_id: 0,
             answer: None,
@@ -235,7 +239,8 @@ impl IoConnection {
             return;
         }
         let period = i64::try_from(self.period()).unwrap_or(i64::MAX).max(1);
-        let planned = i64::try_from(self.next_transmit.0.saturating_sub(now.0)).unwrap_or(i64::MAX);
+        // Negative when it is overdue, as it is whenever an update and a command meet in one cycle of the device.
+        let planned = self.next_transmit.since(now).as_nanos();
         // The multiple of the period from that start which is nearest to the plan.
         let off = planned.saturating_sub(in_ns).rem_euclid(period);
         let correction = if off > period / 2 { period - off } else { -off };
@@ -257,13 +262,21 @@ impl IoConnection {
 
     /// If a D-to-C update is due: its Update ID. Schedules the one after it.
     pub fn take_transmit(&mut self, now: MonotonicTime) -> Option<u8> {
-        if now < self.transmit_at() {
+        // This call is the nearest to what is due until then. Before the cycles are known, an update is the answer to
+        // the controller's or comes after waiting for it, so that none goes early.
+        let nearest = MonotonicTime(now.0.saturating_add(self.early));
+        let due = match self.mode {
+            Mode::Asynchronous => now >= self.next_transmit,
+            Mode::Pending { at, .. } => now >= self.next_transmit || nearest >= at,
+            Mode::Synchronous => nearest >= self.next_transmit,
+        };
+        if !due {
             return None;
         }
         let period = self.period();
         let answered = self.answer.take();
         let id = match self.mode {
-            Mode::Pending { first_update_id, at } if now >= at => {
+            Mode::Pending { first_update_id, at } if nearest >= at => {
                 self.mode = Mode::Synchronous;
                 self.next_transmit = MonotonicTime(at.0.saturating_add(period));
                 first_update_id

@@ -74,6 +74,10 @@ pub struct DeviceConfig {
     pub power_structure_class_id: u32,
     /// Whether the device has a synchronized system time (CIP Sync).
     pub supports_sync: bool,
+    /// How far apart the calls of [`MotionDevice::poll_transmit`] are, ns. In synchronous operation an update goes with
+    /// the call that is nearest to its time: with periods of the same length, half of the updates would otherwise miss
+    /// theirs by a hair and come a whole call late. 0: no update goes before its time.
+    pub poll_interval_ns: u64,
     /// Time to produce a D-to-C update before its cycle starts, ns (Transmission Processing Time, clause 7-1.3).
     pub transmission_processing_ns: u64,
 }
@@ -553,7 +557,7 @@ impl MotionDevice {
         if parameters.rpi_us == 0 || parameters.timeout_us == 0 {
             return refuse(INTERVAL_NOT_ACCEPTABLE);
         }
-        self.connection = Some(IoConnection::new(parameters, now));
+        self.connection = Some(IoConnection::new(parameters, self.config.poll_interval_ns, now));
         self.break_off_foreign();
         self.start_over();
         let system_time = system_time.map_or(0, |t| t.0);

@@ -216,6 +216,7 @@ fn device(axes: usize) -> MotionDevice {
         ],
         power_structure_class_id: 0x0A0B_0C0D,
         supports_sync: true,
+        poll_interval_ns: 0,
         transmission_processing_ns: 200_000,
     })
     .unwrap()

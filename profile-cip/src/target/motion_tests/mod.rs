@@ -139,6 +139,11 @@ impl Rig {
 
     /// A device with these attributes.
     pub fn with(attributes: Vec<AttributeDefinition>) -> Self {
+        Self::polled_every(0, attributes)
+    }
+
+    /// A device with these attributes that is asked for updates at this interval, ns.
+    pub fn polled_every(poll_interval_ns: u64, attributes: Vec<AttributeDefinition>) -> Self {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
@@ -152,6 +157,7 @@ impl Rig {
             attributes,
             power_structure_class_id: 0x1234,
             supports_sync: true,
+            poll_interval_ns,
             transmission_processing_ns: 100_000,
         };
         let mut device = MotionDevice::new(config).expect("a device");
@@ -371,12 +377,16 @@ impl Rig {
 
     /// An open connection with both axes Stopped.
     pub fn stopped() -> Self {
-        let mut rig = Self::new();
-        rig.open();
-        rig.configure();
-        rig.cycles(3);
-        assert_eq!((rig.state(0), rig.state(1)), (AxisState::Stopped, AxisState::Stopped));
-        rig
+        Self::new().connected()
+    }
+
+    /// The same with an open connection and both axes Stopped.
+    pub fn connected(mut self) -> Self {
+        self.open();
+        self.configure();
+        self.cycles(3);
+        assert_eq!((self.state(0), self.state(1)), (AxisState::Stopped, AxisState::Stopped));
+        self
     }
 
     /// An open connection with both axes Running.

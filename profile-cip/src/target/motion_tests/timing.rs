@@ -180,6 +180,38 @@ fn synchronous_production_stays_aligned_with_the_controllers_cycle() {
     assert_eq!(rig.device.node_fault(), NodeFault::NONE);
 }
 
+/// A device that is asked once in a bus cycle, at instants that are never exact: one update goes each time, in step with
+/// the controller's cycles wherever in the bus cycle these begin, and none comes a cycle late.
+#[test]
+fn an_update_goes_with_the_call_nearest_to_its_time() {
+    for phase in [0, 100_000, 250_000, 499_000, 501_000, 750_000, 860_000, 999_000_u64] {
+        let mut rig = Rig::polled_every(1_000_000, definitions()).connected();
+        rig.control |= NodeControl::SYNC_CONTROL;
+        rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::UPDATE_DIAGNOSTICS;
+        let start = rig.now;
+        let mut sent = Vec::new();
+        for call in 0..200_u64 {
+            // Up to 40 us early or late, in no order.
+            let jitter = (call * 7919) % 81_000;
+            rig.now = start + call * 1_000_000 + jitter;
+            if call.is_multiple_of(PERIOD / 1_000_000) {
+                rig.command_packet();
+                let mut header = rig.command_header();
+                header.time_stamp = Some(EPOCH + start + call * 1_000_000 - phase);
+                let packet = rig.packet_with(&header);
+                rig.send(&packet);
+            }
+            if rig.run_device() {
+                sent.push(call);
+            }
+        }
+        assert!(rig.device.is_synchronous());
+        let steps: Vec<u64> = sent.windows(2).map(|pair| pair[1] - pair[0]).skip(20).collect();
+        let expected = PERIOD / 1_000_000;
+        assert!(steps.iter().all(|step| *step == expected), "phase {phase}: {steps:?}");
+    }
+}
+
 /// Sends an update whose time stamp is `age` ns old; negative is ahead.
 fn send_aged(rig: &mut Rig, age: i64) {
     rig.command_packet();
