@@ -217,6 +217,95 @@ fn an_axis_that_is_held_starts_again_without_a_jump_and_lets_go_when_its_control
     assert_eq!(state(&rig), AxisState::MajorFaulted);
 }
 
+/// A rig whose turntable goes at 2 rev/s, or stands, when it is aborted by Stopping Action `action`; `then` follows.
+fn aborted(action: u8, moving: bool, then: Vec<Step>) -> Rig {
+    let mut rig = Rig::ready(Settings::default());
+    let mut program = vec![attributes(action, false), Step::Enable(TURNTABLE)];
+    if moving {
+        program.push(Step::Mode { axis: 1, mode: ControlMode::VELOCITY });
+        program.push(Step::RunAt { axis: 1, velocity: 2.0, acceleration: 50.0, jerk: 1_000.0 });
+    }
+    program.push(Step::Dwell { seconds: 0.5 });
+    let before = program.len();
+    program.push(Step::Abort(TURNTABLE));
+    program.extend(then);
+    rig.connect(program);
+    rig.run_until(millis(10_000), "the motion", |rig| rig.report().steps_finished == before);
+    assert_eq!(rig.velocity(0) > 19 * NANO / 10, moving, "{}", rig.velocity(0));
+    rig.run_until(millis(50), "Aborting", |rig| rig.axis_states(0).contains(&AxisState::Aborting));
+    rig
+}
+
+#[test]
+fn an_abort_that_holds_ends_in_major_faulted_with_torque() {
+    // 5-2.3.16.1.1: the last state is always Major Faulted, and the fault action says what becomes of the torque.
+    for action in [3, 4] {
+        for moving in [false, true] {
+            let mut rig = aborted(action, moving, vec![Step::Dwell { seconds: 100.0 }]);
+            let stop = rig.run_until(millis(2_000), "rest", |rig| state(rig) == AxisState::MajorFaulted);
+            assert!(rig.velocity(0).abs() <= NANO / 10, "Major Faulted only at rest: {}", rig.velocity(0));
+            assert_eq!(stop > millis(10), moving, "{stop}");
+            // Beyond every time limit of a stop, once.
+            rig.run_for(millis(if action == 3 && moving { 35_000 } else { 500 }));
+            assert_eq!(
+                (state(&rig), shown(&rig).2),
+                (AxisState::MajorFaulted, true),
+                "for as long as it takes"
+            );
+            assert_eq!(rig.drive(0).actual().report, Report::Halted);
+        }
+    }
+}
+
+/// A turntable that its abort holds in Major Faulted, and where it stands.
+fn held_after_abort(then: Vec<Step>) -> (Rig, i64) {
+    let dwell = vec![Step::Dwell { seconds: 0.5 }];
+    let mut rig = aborted(3, true, [dwell, then].concat());
+    rig.run_for(millis(400));
+    assert_eq!((state(&rig), shown(&rig).2), (AxisState::MajorFaulted, true));
+    let place = rig.position(0);
+    (rig, place)
+}
+
+#[test]
+fn a_hold_after_an_abort_is_let_go_by_a_reset_a_shutdown_and_the_end_of_the_connection() {
+    let still = |rig: &Rig, place: i64| (rig.position(0) - place).abs() < NANO / 100;
+    let dwell = Step::Dwell { seconds: 0.5 };
+    // A Fault Reset leads to Stopped, without torque and without motion.
+    let (mut rig, place) = held_after_abort(vec![Step::FaultReset(TURNTABLE), dwell.clone()]);
+    rig.run_until(millis(2_000), "Stopped", |rig| state(rig) == AxisState::Stopped);
+    assert!(!shown(&rig).2 && still(&rig, place));
+
+    // An axis in Major Faulted with a shutdown is as in Shutdown: free of torque (5-2.6.2.12 and .13).
+    let reset = Step::FaultReset(TURNTABLE);
+    let then = vec![Step::Shutdown(TURNTABLE), dwell.clone(), reset, dwell, Step::ShutdownReset(TURNTABLE)];
+    let (mut rig, place) = held_after_abort(then);
+    let done = rig.report().steps_finished;
+    rig.run_until(millis(1_000), "the shutdown", |rig| rig.report().steps_finished == done + 2);
+    assert_eq!((state(&rig), shown(&rig).2), (AxisState::MajorFaulted, false), "acknowledged when it is so");
+    rig.run_until(millis(2_000), "Shutdown", |rig| state(rig) == AxisState::Shutdown);
+    rig.run_until(millis(2_000), "Stopped", |rig| state(rig) == AxisState::Stopped);
+    assert!(!shown(&rig).2 && still(&rig, place));
+
+    // So does a harder reaction, as to a controller that is gone; a new connection switches nothing on.
+    let (mut rig, place) = held_after_abort(vec![Step::Dwell { seconds: 100.0 }]);
+    rig.kill_controller();
+    rig.run_for(millis(2_000));
+    assert_eq!((state(&rig), rig.torque_free()), (AxisState::MajorFaulted, true));
+    let lost = rig.watched[0].changes.len();
+    rig.connect(vec![Step::Dwell { seconds: 0.5 }, Step::Enable(TURNTABLE), Step::Disable(TURNTABLE)]);
+    rig.run_until(millis(5_000), "the dwell", |rig| rig.report().steps_finished == 1);
+    assert_eq!((state(&rig), rig.watched[0].changes.len()), (AxisState::Stopped, lost));
+    assert!(still(&rig, place));
+    assert_eq!(rig.run(millis(20_000)).failure, None, "{}", rig.log());
+
+    // A controller that closes the connection leaves no axis with torque.
+    let (mut rig, place) = held_after_abort(vec![Step::Reconnect, Step::Dwell { seconds: 0.5 }]);
+    rig.run_until(millis(2_000), "Initializing", |rig| state(rig) == AxisState::Initializing);
+    rig.run_until(millis(5_000), "the end of Initializing", |rig| state(rig) != AxisState::Initializing);
+    assert!(!shown(&rig).2 && still(&rig, place), "an axis is not ready before it is free of torque");
+}
+
 #[test]
 fn what_the_box_cannot_do_is_refused() {
     for (number, value) in [(id::STOPPING_ACTION, 5), (id::SHUTDOWN_ACTION, 1), (id::FLYING_START_ENABLE, 2)]

@@ -195,7 +195,9 @@ impl AxisChannel {
         image.tracking &= step == SequenceStep::Running;
         image.stop_complete = match step {
             SequenceStep::Holding => true,
-            SequenceStep::Off => image.stop_complete,
+            // A fault that ends in a hold has stopped the axis as well: the state is Major Faulted whatever becomes of the
+            // torque (CIP Volume 9, 5-2.3.16.1.1).
+            SequenceStep::Off => image.stop_complete || self.holds(),
             _ => false,
         };
     }

@@ -3,7 +3,7 @@
 use super::{AxisChannel, Loss};
 use crate::mapping::CyclicValues;
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
-use profile_generic::fault::{Fault, FaultCause};
+use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
 use profile_generic::mode::OperatingMode;
@@ -113,6 +113,13 @@ impl AxisChannel {
             self.loss = Some(loss);
             let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(self.command_loss);
             self.raise(now, system, fault);
+        } else if self.state() == DriveState::FaultReaction
+            && self.action == Action::Halt
+            && self.command_loss > Reaction::HoldPosition
+        {
+            // A fault has stopped the axis already and would hold it; without a controller the configured reaction counts.
+            let transition = self.drive.machine.raise_fault(self.command_loss);
+            self.follow(now, system, transition);
         }
     }
 

@@ -126,7 +126,9 @@ impl Axis {
             AxisControl::ENABLE => Some(GeneralStatus::OBJECT_STATE_CONFLICT),
             AxisControl::DISABLE if !state.is_energized() => Some(GeneralStatus::SUCCESS),
             AxisControl::SHUTDOWN if matches!(state, AxisState::Shutdown | AxisState::MajorFaulted) => {
-                Some(GeneralStatus::SUCCESS)
+                // Out of a hold the state is there before the torque has gone.
+                let powered = self.drive.online && self.drive.power_enabled;
+                (!powered).then_some(GeneralStatus::SUCCESS)
             }
             AxisControl::ABORT if matches!(state, AxisState::Aborting | AxisState::MajorFaulted) => {
                 Some(GeneralStatus::SUCCESS)
@@ -153,6 +155,8 @@ impl Axis {
             AxisState::Starting | AxisState::Running => DriveAction::Enable,
             AxisState::Stopping if self.shutdown => DriveAction::Shutdown,
             AxisState::Stopping => DriveAction::Disable,
+            // With a shutdown beneath its fault the axis is free of torque, also where the fault's own action holds it.
+            AxisState::MajorFaulted if self.shutdown => DriveAction::Shutdown,
             AxisState::Aborting | AxisState::MajorFaulted => DriveAction::Abort,
             AxisState::Shutdown => DriveAction::Shutdown,
         };

@@ -259,10 +259,11 @@ impl Axis {
     /// Follows the state table. Returns whether the event had an effect.
     fn fire(&mut self, event: AxisEvent) -> bool {
         let Some(next) = self.state.next(self.config.kind, event, &self.conditions()) else { return false };
-        // Close and loss take an axis out of motion without a Stopping state of its own.
-        let unconnected = matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss);
-        let moves = self.config.kind == ControlKind::Active && self.state.is_energized();
-        self.winding_down |= unconnected && moves;
+        // Close and loss take an axis out of motion, and a new connection out of a hold, without a Stopping state of its own.
+        let unconnected =
+            matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss | AxisEvent::Reconnection);
+        let energized = self.state.is_energized() || self.drive.power_enabled;
+        self.winding_down |= unconnected && energized && self.config.kind == ControlKind::Active;
         // A category 2 stop ends with the power structure on, and the drive goes on doing what Disable asked for.
         self.holding =
             event == AxisEvent::StopComplete && next == AxisState::Stopped && self.drive.power_enabled;
@@ -288,6 +289,8 @@ impl Axis {
         self.fire(AxisEvent::Reconnection);
         self.forget(system_time);
         self.faults.record_cleared(ClearingEvent::CONNECTION_RESET, system_time);
+        // At once: a stop that ended before the connection is no answer to what is asked for now.
+        self.update_action();
     }
 
     /// The controller closed the connection.

@@ -155,6 +155,74 @@ fn shutdown_under_a_fault_is_a_sub_state() {
     }
 }
 
+/// A rig whose first axis is held in Major Faulted.
+fn held() -> Rig {
+    let mut rig = Rig::running();
+    rig.drives[0].holds = true;
+    assert_eq!(ask(&mut rig, AxisControl::ABORT, 3), (AxisControl::ABORT, 0));
+    assert_eq!(ask(&mut rig, AxisControl::NONE, 1), (AxisControl::NONE, 0));
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::MajorFaulted, DriveAction::Abort));
+    rig
+}
+
+#[test]
+fn an_abort_that_holds_ends_in_major_faulted_with_the_power_structure_on() {
+    // Table 5-2.61 has the bit in Major Faulted after a category 2 stop.
+    let mut rig = held();
+    let power = |rig: &mut Rig| {
+        let reply =
+            super::services::reply_of(rig.request(super::services::explicit(9, 0x0E, 1, Some(651), &[])));
+        reply.2[0] & 8 != 0
+    };
+    assert!(power(&mut rig));
+    rig.cycles(100);
+    assert_eq!((rig.state(0), power(&mut rig)), (AxisState::MajorFaulted, true));
+    // A shutdown takes the torque and is acknowledged when it has gone (5-2.6.2.13).
+    rig.drives[0].stuck = true;
+    assert_eq!(ask(&mut rig, AxisControl::SHUTDOWN, 3), (AxisControl::NONE, 0));
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::MajorFaulted, DriveAction::Shutdown));
+    rig.drives[0].stuck = false;
+    rig.cycles(2);
+    assert_eq!((answer(&rig), power(&mut rig)), ((AxisControl::SHUTDOWN, 0), false));
+    assert_eq!(ask(&mut rig, AxisControl::FAULT_RESET, 3), (AxisControl::FAULT_RESET, 0));
+    assert_eq!(rig.state(0), AxisState::Shutdown);
+    // Nobody sees the torque of a drive that is gone: the shutdown does not wait for it.
+    let mut rig = held();
+    rig.drives[0].image.online = false;
+    rig.drives[0].stuck = true;
+    assert_eq!(ask(&mut rig, AxisControl::SHUTDOWN, 2), (AxisControl::SHUTDOWN, 0));
+}
+
+#[test]
+fn an_axis_that_was_held_is_not_ready_before_it_has_let_go() {
+    let mut rig = held();
+    rig.drives[0].stuck = true;
+    rig.close();
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Initializing, DriveAction::Disable));
+    rig.open();
+    rig.configure();
+    rig.cycles(5);
+    assert_eq!((rig.state(0), rig.state(1)), (AxisState::Initializing, AxisState::Stopped));
+    rig.drives[0].stuck = false;
+    rig.cycles(4);
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Stopped, DriveAction::PowerUp));
+    // After a loss the drive may go on holding until somebody connects.
+    let mut rig = held();
+    for _ in 0..20 {
+        rig.silence();
+        rig.device.poll(rig.now(), rig.system());
+    }
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::MajorFaulted, DriveAction::Abort));
+    while rig.device.poll_reply().is_some() {}
+    rig.drives[0].stuck = true;
+    rig.open();
+    rig.cycles(5);
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Initializing, DriveAction::Disable));
+    rig.drives[0].stuck = false;
+    rig.cycles(4);
+    assert_eq!(rig.state(0), AxisState::Stopped);
+}
+
 #[test]
 fn abort_is_a_controller_initiated_exception() {
     let mut rig = Rig::running();

@@ -56,6 +56,8 @@ pub(super) struct FakeDrive {
     pub stuck: bool,
     /// The fault comes back at once after a reset.
     pub sticky: bool,
+    /// An abort ends at rest with torque.
+    pub holds: bool,
 }
 
 impl FakeDrive {
@@ -70,7 +72,7 @@ impl FakeDrive {
             events_checking: events,
             ..DriveImage::default()
         };
-        Self { image, stuck: false, sticky: false }
+        Self { image, stuck: false, sticky: false, holds: false }
     }
 
     fn step(&mut self, command: &AxisCommandImage) {
@@ -91,7 +93,8 @@ impl FakeDrive {
             let enabled = matches!(command.action, DriveAction::Enable | DriveAction::Test);
             self.image.start_complete = enabled;
             self.image.tracking = command.action == DriveAction::Enable;
-            self.image.power_enabled = enabled;
+            let held = self.holds && command.action == DriveAction::Abort;
+            self.image.power_enabled = enabled || held;
             self.image.stop_complete = !enabled;
         }
     }
