@@ -3,10 +3,13 @@
 use core::fmt;
 
 use super::failure::Failure;
+use super::format;
 use super::limits::AxisLimits;
 use super::sets::{DataSets, cyclic_len};
+use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode, FeedbackSource, TimeDataSet};
+use crate::wire::motion::{Format, fixed};
 use profile_generic::time::DurationNs;
 
 /// Most axis instances of one connection; the EtherNet/IP part of the standard (IEC 61800-7-302) allows 16.
@@ -17,6 +20,10 @@ pub const CONNECTION_SIZE_MAX: u16 = 1400;
 const SERVICE_ROOM: usize = 192;
 /// Room of the service channel below which hardly an attribute fits.
 const SERVICE_ROOM_MIN: usize = 32;
+
+/// Connection size of the fixed format: 16 octets and the sequence count, clause 6-2.7.3.
+#[expect(clippy::cast_possible_truncation, reason = "18")]
+pub const CONNECTION_SIZE_FIXED: u16 = (SEQUENCE_COUNT_LEN + fixed::LEN) as u16;
 
 /// A value to be written by Set_Axis_Attributes_List.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -199,10 +206,12 @@ pub struct ControllerConfig {
     pub power_structure: Option<u32>,
     /// Controller Update Period in microseconds, which is the RPI of both directions.
     pub rpi_us: u32,
+    /// Format of the motion connection. What the fixed one has not, no step may ask for.
+    pub format: Format,
     /// Connection Timeout Multiplier code, 0..=7 for 4..512 intervals.
     pub timeout_multiplier: u8,
     /// Connection size of both directions in bytes with the 2-byte sequence count; above 511 the connection
-    /// is opened with Large_Forward_Open.
+    /// is opened with Large_Forward_Open. In the fixed format [`CONNECTION_SIZE_FIXED`].
     pub connection_size: u16,
     /// Connection ID for the D-to-C datagrams.
     pub t_to_o_id: u32,
@@ -211,7 +220,8 @@ pub struct ControllerConfig {
     /// Grand master clock of the controller, bytes as in the Time Sync object; `None` runs asynchronously: no
     /// Group_Sync, no time stamps.
     pub grand_master: Option<[u8; 8]>,
-    /// Update for which the commands are meant, in synchronous operation.
+    /// Update for which the commands are meant: in the variable format in synchronous operation, in the fixed one what
+    /// Command Control (attribute 92) is set to.
     pub command_target: CommandTarget,
     /// D-to-C updates older than this many update periods count as late.
     pub update_delay_low_limit: u8,
@@ -245,6 +255,7 @@ impl ControllerConfig {
             key: KeyExpectation::default(),
             power_structure: None,
             rpi_us: 2_000,
+            format: Format::Variable,
             timeout_multiplier: 1,
             connection_size,
             t_to_o_id: 0x4258_0001,
@@ -258,6 +269,25 @@ impl ControllerConfig {
             axes,
             time_outs: TimeOuts::default(),
         }
+    }
+
+    /// A connection of the fixed format for this axis, asynchronous as that always is. What travels of the axis is
+    /// [`DataSets::fixed`] for its Control Mode.
+    #[must_use]
+    pub fn fixed(axis: AxisSetup) -> Self {
+        let sets = DataSets::fixed(axis.control_mode);
+        let mut config = Self::new(None, vec![AxisSetup { sets, ..axis }]);
+        config.set_fixed();
+        config
+    }
+
+    /// Changes the connection over to the fixed format: no grand master, no time data, 18 bytes. The data sets of the axis
+    /// have to be those of [`DataSets::fixed`], or what else an update has room for.
+    pub const fn set_fixed(&mut self) {
+        self.format = Format::Fixed;
+        self.grand_master = None;
+        self.connection_size = CONNECTION_SIZE_FIXED;
+        self.time_data = TimeDataSet::empty();
     }
 
     /// The Controller Update Period.
@@ -289,7 +319,9 @@ impl ControllerConfig {
             return bad("timeout_multiplier", f64::from(self.timeout_multiplier), "0 to 7");
         }
         let least = cyclic_len(&self.axes) + SERVICE_ROOM_MIN;
-        if usize::from(self.connection_size) < least || self.connection_size > CONNECTION_SIZE_MAX {
+        if self.format == Format::Fixed {
+            format::check_fixed(self).map_err(|wanted| ConfigError::Fixed { wanted })?;
+        } else if usize::from(self.connection_size) < least || self.connection_size > CONNECTION_SIZE_MAX {
             let wanted = "room for the data sets of all axes and a service, and at most 1400";
             return bad("connection_size", f64::from(self.connection_size), wanted);
         }
@@ -333,6 +365,11 @@ pub enum ConfigError {
         /// What it may be.
         wanted: &'static str,
     },
+    /// Something that the fixed connection format cannot carry.
+    Fixed {
+        /// What it can.
+        wanted: &'static str,
+    },
     /// A step of the program that would fail for certain.
     Step {
         /// Place in the program, from 0.
@@ -346,6 +383,7 @@ impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Value { what, value, wanted } => write!(f, "{what}: expected {wanted}, found {value}"),
+            Self::Fixed { wanted } => write!(f, "the fixed connection format has {wanted}"),
             Self::Step { step, failure } => write!(f, "step {step}: {failure}"),
         }
     }

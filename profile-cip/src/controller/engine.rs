@@ -10,6 +10,7 @@ use super::config::{ConfigError, ControllerConfig};
 use super::event::Event;
 use super::executor::Executor;
 use super::failure::Failure;
+use super::fault_reader::FaultReader;
 use super::link::Link;
 use super::misbehaviour::Abuse;
 use super::node::NodeSeen;
@@ -64,6 +65,10 @@ pub struct Controller {
     pub(super) connections: u32,
     /// The answer to the explicit message under way.
     pub(super) answer: Option<Result<Answer, Failure>>,
+    /// In the fixed format: the service that was sent as a message, by instance and transaction ID.
+    pub(super) carried: Option<(u8, u8)>,
+    /// In the fixed format: faults that the updates do not name.
+    pub(super) faults: FaultReader,
     stream: Option<StreamAction>,
 }
 
@@ -80,9 +85,12 @@ impl Controller {
         Ok(Self {
             phase: Phase::Idle,
             session: Session::new(&config),
-            link: Link::new(config.connection_size),
+            link: Link::new(config.format, config.connection_size),
             services: Services::new(config.time_outs.service),
-            axes: (1..).zip(config.axes.iter().cloned()).map(|(n, setup)| Axis::new(n, setup)).collect(),
+            axes: (1..)
+                .zip(config.axes.iter().cloned())
+                .map(|(n, setup)| Axis::new(n, config.format, setup))
+                .collect(),
             executor: Executor::new(program),
             events: VecDeque::with_capacity(EVENTS_MAX),
             report: Report::default(),
@@ -98,6 +106,8 @@ impl Controller {
             loss_expected: false,
             connections: 0,
             answer: None,
+            carried: None,
+            faults: FaultReader::default(),
             stream: None,
             config,
         })
@@ -210,7 +220,7 @@ impl Controller {
     /// A datagram that came to the I/O port.
     pub fn handle_datagram(&mut self, now: MonotonicTime, system_time: SystemTime, bytes: &[u8]) {
         match self.link.receive(now, bytes) {
-            Ok(Some((arrival, frame))) => self.handle_update(now, system_time, arrival, &frame),
+            Ok(Some((arrival, update))) => self.handle_update(now, system_time, arrival, &update),
             Ok(None) => {}
             Err(error) => self.malformed(error),
         }
@@ -257,7 +267,7 @@ impl Controller {
                     self.phase = Phase::FirstUpdate { since: now };
                     self.next_tick = Some(now);
                 }
-                Output::Answered(answer) => self.answer = Some(answer),
+                Output::Answered(asker, answer) => self.take_answer(now, asker, answer),
                 Output::Closed => {
                     if self.phase == Phase::Reconnecting {
                         self.restart();
@@ -269,6 +279,7 @@ impl Controller {
                 }
             }
         }
+        self.carry_services(now);
     }
 
     pub(super) fn record_failure(&mut self, failure: Failure) {
@@ -294,6 +305,7 @@ impl Controller {
             _ if self.lost.is_some() || self.abuse.vanished => self.close(now),
             Phase::Synchronizing { .. } | Phase::Initializing { .. } | Phase::Program => {
                 self.services.clear();
+                self.faults.restart();
                 self.node_fault_reset = false;
                 self.disabling = false;
                 // A motion that cannot be stopped smoothly is stopped by the Disable that follows.
@@ -346,7 +358,7 @@ impl Controller {
         self.config.connection_serial = self.config.connection_serial.wrapping_add(1);
         self.config.t_to_o_id = self.config.t_to_o_id.wrapping_add(1);
         self.session = Session::new(&self.config);
-        self.link = Link::new(self.config.connection_size);
+        self.link = Link::new(self.config.format, self.config.connection_size);
         self.services = Services::new(self.config.time_outs.service);
         self.axes.iter_mut().for_each(Axis::reconnect);
         self.traffic = Traffic::default();
@@ -358,6 +370,8 @@ impl Controller {
         self.lost = None;
         self.loss_expected = false;
         self.answer = None;
+        self.carried = None;
+        self.faults = FaultReader::default();
         self.next_tick = None;
         self.phase = Phase::Idle;
         self.stream = Some(StreamAction::Reopen);

@@ -128,6 +128,13 @@ pub enum Failure {
         /// General status.
         status: u8,
     },
+    /// The answer to a list of attributes is without one of them, or its value has another length.
+    AttributeMissing {
+        /// Instance number; 0 is the class.
+        instance: u8,
+        /// Attribute ID.
+        attribute: u16,
+    },
     /// The device refused a request of the service channel.
     ServiceRefused {
         /// Instance number; 0 is the class.
@@ -265,6 +272,16 @@ pub enum Failure {
         needed: usize,
         /// Bytes of the connection.
         size: u16,
+    },
+    /// A step asks for something that the fixed connection format cannot carry.
+    NotInFormat {
+        /// What the format has instead, or has not.
+        what: &'static str,
+    },
+    /// Position control without Actual Position in the updates: the fixed connection format brings another value.
+    NoPosition {
+        /// Instance number.
+        axis: u8,
     },
     /// A request does not fit the connection.
     ServiceTooLong {
@@ -414,6 +431,9 @@ impl fmt::Display for Failure {
             Self::AttributeRefused { instance, attribute, status: s } => {
                 write!(f, "{}: attribute {attribute} refused with {}", Instance(instance), status(s))
             }
+            Self::AttributeMissing { instance, attribute } => {
+                write!(f, "{}: no value of attribute {attribute} in the answer", Instance(instance))
+            }
             Self::ServiceRefused { instance, service, status: s } => {
                 write!(f, "{}: {service} refused with {}", Instance(instance), status(s))
             }
@@ -464,6 +484,10 @@ impl fmt::Display for Failure {
             }
             Self::DataTooLong { needed, size } => {
                 write!(f, "the data sets of the axes need {needed} bytes, the connection has {size}")
+            }
+            Self::NotInFormat { what } => write!(f, "the fixed connection format has {what}"),
+            Self::NoPosition { axis } => {
+                write!(f, "axis {axis}: expected the position as actual value, which position control needs")
             }
             Self::ServiceTooLong { instance, service, room } => write!(
                 f,

@@ -8,9 +8,10 @@ use super::services::Room;
 use super::session::Opened;
 use super::sets::ACTUAL_HEADER_MAX;
 use crate::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
+use crate::wire::motion::fixed::{FixedActual, FixedCommand};
 use crate::wire::motion::header::CommandHeader;
-use crate::wire::motion::{CommandInstance, CommandWriter};
-use crate::wire::{Error, motion};
+use crate::wire::motion::{ActualFrame, CommandInstance, CommandWriter, Format};
+use crate::wire::{Error, Writer};
 use profile_generic::time::MonotonicTime;
 
 /// Largest C-to-D header: 8 bytes, time stamp, time offset.
@@ -31,10 +32,30 @@ pub(super) enum Arrival {
     Overtaken,
 }
 
+/// A D-to-C update in the format of the connection.
+#[derive(Debug)]
+pub(super) enum Update<'a> {
+    Variable(ActualFrame<'a>),
+    Fixed(FixedActual),
+}
+
+impl Update<'_> {
+    fn id(&self) -> u8 {
+        match self {
+            Self::Variable(frame) => frame.header().update_id,
+            Self::Fixed(actual) => actual.update_id,
+        }
+    }
+}
+
+/// Room of a service as an unconnected message: the 504 bytes that a device has to take, less service, path and status.
+const MESSAGE_ROOM: Room = Room { request: 480, response: 480 };
+
 /// The connection.
 #[derive(Debug)]
 pub(super) struct Link {
     opened: Option<Opened>,
+    format: Format,
     size: usize,
     frame: Vec<u8>,
     length: Option<usize>,
@@ -56,10 +77,11 @@ struct Received {
 }
 
 impl Link {
-    pub fn new(size: u16) -> Self {
+    pub fn new(format: Format, size: u16) -> Self {
         let size = usize::from(size);
         Self {
             opened: None,
+            format,
             size,
             frame: vec![0; CLASS1_HEADER_LEN + size],
             length: None,
@@ -103,14 +125,21 @@ impl Link {
         self.received.map(|received| received.at)
     }
 
-    /// Whether so many bytes of cyclic data of all axes fit, to the device and from it.
+    /// Whether so many bytes of cyclic data of all axes fit, to the device and from it. What an update of the fixed format
+    /// has room for is checked with the data sets.
     pub fn fits(&self, (command, actual): (usize, usize)) -> bool {
+        if self.format == Format::Fixed {
+            return true;
+        }
         let fixed = |header: usize| SEQUENCE_COUNT_LEN + header;
         fixed(COMMAND_HEADER_MAX) + command <= self.size && fixed(ACTUAL_HEADER_MAX) + actual <= self.size
     }
 
     /// Room for a service beside so many bytes of cyclic data of all axes, of which the largest axis has so many.
     pub fn room(&self, all: (usize, usize), largest: (usize, usize)) -> Room {
+        if self.format == Format::Fixed {
+            return MESSAGE_ROOM;
+        }
         let cut = |header: usize, all: usize, axis: usize| {
             let fixed = SEQUENCE_COUNT_LEN + header + all + SERVICE_HEADERS;
             let instance = INSTANCE_MAX.saturating_sub(axis + SERVICE_HEADERS);
@@ -132,13 +161,38 @@ impl Link {
         fresh: bool,
         spoil: &Spoil,
     ) -> Result<(), Error> {
-        let Some(opened) = self.opened else { return Ok(()) };
         let end = CLASS1_HEADER_LEN + self.size - SEQUENCE_COUNT_LEN;
         let mut writer = CommandWriter::new(&mut self.frame[CLASS1_HEADER_LEN..end], header)?;
         for instance in instances {
             writer.instance(&instance)?;
         }
         let length = writer.finish();
+        self.send_written(now, length, fresh, spoil)
+    }
+
+    /// As [`Link::send`], in the fixed format.
+    pub fn send_fixed(
+        &mut self,
+        now: MonotonicTime,
+        command: &FixedCommand,
+        fresh: bool,
+        spoil: &Spoil,
+    ) -> Result<(), Error> {
+        let mut writer = Writer::new(&mut self.frame[CLASS1_HEADER_LEN..]);
+        command.emit(&mut writer)?;
+        let length = writer.written();
+        self.send_written(now, length, fresh, spoil)
+    }
+
+    /// Puts the datagram around an update that has been written.
+    fn send_written(
+        &mut self,
+        now: MonotonicTime,
+        length: usize,
+        fresh: bool,
+        spoil: &Spoil,
+    ) -> Result<(), Error> {
+        let Some(opened) = self.opened else { return Ok(()) };
         let length = length.saturating_sub(usize::from(spoil.cut));
         self.sequence_count = self.sequence_count.wrapping_add(u16::from(fresh));
         self.encapsulation_sequence = self.encapsulation_sequence.wrapping_add(1);
@@ -208,7 +262,7 @@ impl Link {
         &mut self,
         now: MonotonicTime,
         bytes: &'a [u8],
-    ) -> Result<Option<(Arrival, motion::ActualFrame<'a>)>, Error> {
+    ) -> Result<Option<(Arrival, Update<'a>)>, Error> {
         let datagram = Class1Datagram::parse(bytes)?;
         if self.opened.is_none_or(|opened| opened.t_to_o_id != datagram.connection_id) {
             return Ok(None);
@@ -219,8 +273,11 @@ impl Link {
             let (value, max) = (clip(datagram.data.len()), clip(room));
             return Err(Error::OutOfRange { what: "connection data", value, max });
         }
-        let frame = motion::ActualFrame::parse(datagram.data)?;
-        let update_id = frame.header().update_id;
+        let update = match self.format {
+            Format::Variable => Update::Variable(ActualFrame::parse(datagram.data)?),
+            Format::Fixed => Update::Fixed(FixedActual::parse(datagram.data)?),
+        };
+        let update_id = update.id();
         let arrival = self.received.map_or(Arrival::Fresh { lost: 0 }, |last| {
             let behind = datagram.encapsulation_sequence.wrapping_sub(last.encapsulation_sequence);
             let step = update_id.wrapping_sub(last.update_id);
@@ -240,7 +297,7 @@ impl Link {
                 at: now,
             });
         }
-        Ok(Some((arrival, frame)))
+        Ok(Some((arrival, update)))
     }
 }
 
@@ -279,7 +336,7 @@ mod tests {
 
     #[test]
     fn arrivals_are_told_apart() {
-        let mut link = Link::new(200);
+        let mut link = Link::new(Format::Variable, 200);
         let mut receive = |id, sequence, count, update_id| {
             if !link.is_open() {
                 link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
@@ -302,20 +359,22 @@ mod tests {
     #[test]
     fn the_room_of_a_service_leaves_the_cyclic_data_theirs() {
         // 500 - 2 - 24 - 2 x 32 - 12 and 500 - 2 - 44 - 2 x 56 - 12, in whole words.
-        let room = Link::new(500).room((64, 112), (32, 56));
+        let room = Link::new(Format::Variable, 500).room((64, 112), (32, 56));
         assert_eq!((room.request, room.response), (396, 328));
         // Block sizes are counted in one byte: 1020 - 32 - 12 and 1020 - 56 - 12.
-        let room = Link::new(1400).room((32, 56), (32, 56));
+        let room = Link::new(Format::Variable, 1400).room((32, 56), (32, 56));
         assert_eq!((room.request, room.response), (976, 952));
-        assert_eq!(Link::new(20).room((32, 56), (32, 56)).request, 0);
+        assert_eq!(Link::new(Format::Variable, 20).room((32, 56), (32, 56)).request, 0);
         assert!(
-            Link::new(102).fits((76, 56)) && !Link::new(101).fits((76, 56)) && !Link::new(101).fits((0, 56))
+            Link::new(Format::Variable, 102).fits((76, 56))
+                && !Link::new(Format::Variable, 101).fits((76, 56))
+                && !Link::new(Format::Variable, 101).fits((0, 56))
         );
     }
 
     #[test]
     fn updates_are_held_delayed_doubled_cut_and_skipped() {
-        let mut link = Link::new(200);
+        let mut link = Link::new(Format::Variable, 200);
         link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
         let mut buffer = [0; 300];
         // What goes out after each update: encapsulation sequence and length.
@@ -354,7 +413,7 @@ mod tests {
 
     #[test]
     fn an_update_longer_than_the_connection_is_refused() {
-        let mut link = Link::new(9);
+        let mut link = Link::new(Format::Variable, 9);
         link.open(Opened { o_to_t_id: 1, t_to_o_id: 2, destination: None });
         let error = link.receive(MonotonicTime(0), &update(2, 1, 1, 1)).unwrap_err();
         assert_eq!(error.to_string(), "connection data: expected at most 7, found 8");

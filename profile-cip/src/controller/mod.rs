@@ -18,6 +18,7 @@
 
 mod axis;
 mod axis_set;
+mod carrier;
 pub mod condition;
 pub mod config;
 mod cyclic_lists;
@@ -26,7 +27,9 @@ pub mod event;
 mod events;
 mod executor;
 pub mod failure;
+mod fault_reader;
 mod following;
+mod format;
 mod handshake;
 pub mod limits;
 mod link;

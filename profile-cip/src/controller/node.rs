@@ -40,14 +40,7 @@ const fn bit(code: u8) -> u16 {
 impl NodeSeen {
     pub fn handle(&mut self, header: &ActualHeader, report: &mut Report, mut event: impl FnMut(Event)) {
         self.status = header.node_status;
-        if header.node_fault != self.fault {
-            self.fault = header.node_fault;
-            if self.fault != NodeFault::NONE {
-                report.node_fault = Some(self.fault);
-                self.open_faults |= bit(self.fault.0);
-            }
-            event(Event::NodeFault(self.fault));
-        }
+        self.handle_fault(header.node_fault, report, &mut event);
         if header.node_alarm != self.alarm {
             self.alarm = header.node_alarm;
             if self.alarm != NodeAlarm::NONE {
@@ -62,6 +55,19 @@ impl NodeSeen {
             self.lost.handle(counters.lost_updates);
             self.late.handle(counters.late_updates);
         }
+    }
+
+    /// Takes the fault code.
+    pub fn handle_fault(&mut self, fault: NodeFault, report: &mut Report, mut event: impl FnMut(Event)) {
+        if fault == self.fault {
+            return;
+        }
+        self.fault = fault;
+        if fault != NodeFault::NONE {
+            report.node_fault = Some(fault);
+            self.open_faults |= bit(fault.0);
+        }
+        event(Event::NodeFault(fault));
     }
 
     /// Takes a fault that waits for an expectation; one that is still there counts in any case.

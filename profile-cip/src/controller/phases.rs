@@ -9,6 +9,7 @@
 //! | GroupSync | Group_Sync, again and again; time stamps | device synchronized, and no skew seen here |
 //! | AxisConfiguration | Set_Axis_Attributes_List to one axis after the other | answered |
 //! | AxisScaling | Get_Axis_Attributes_List of the scaling, where it is the device's | answered |
+//! | Completion | fixed format only: Set_Axis_Attributes_List of Command Control and Control Status | answered |
 //! | Synchronizing | cyclic blocks, Configuration Complete, Sync Control | Sync Mode |
 //! | Initializing | the same | every axis has left Initializing |
 //! | Program | the same, with the commands of the steps | the steps have finished |
@@ -17,18 +18,22 @@
 //! | Closing | Forward_Close, UnRegisterSession | answered, or nobody answers |
 //! | Closed | | |
 //!
-//! Without a grand master GroupSync and Synchronizing are left out and no time stamps are sent.
+//! Without a grand master GroupSync and Synchronizing are left out and no time stamps are sent. In the fixed format
+//! services are explicit messages, see `carrier.rs`.
 //! Whatever fails leads to Stopping if the connection is still there, and to Closing otherwise.
 
 use super::axis::Axis;
-use super::config::Scaling;
+use super::config::{AttributeSet, Scaling};
 use super::engine::{Controller, push};
 use super::event::Event;
 use super::executor::{Context, report_refused};
 use super::failure::Failure;
 use super::services::{Outcome, Ticket};
+use crate::wire::motion::Format;
 use crate::wire::motion::attribute_list::AttributeSelector;
-use crate::wire::motion::codes::{AxisControl, AxisStateCode, NodeFault, NodeStatus, SyncStatus};
+use crate::wire::motion::codes::{
+    AxisControl, AxisStateCode, CommandTarget, ControlStatus, NodeFault, NodeStatus, SyncStatus,
+};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Time between two Group_Sync requests.
@@ -39,6 +44,11 @@ const SKEW_PERIODS: i64 = 4;
 const MOTION_SCALING_CONFIGURATION: u16 = 45;
 const MOTION_RESOLUTION: u16 = 78;
 const DRIVE_SCALING: u8 = 1;
+/// Attributes that a service sets where the updates do not carry them (footnote of Table 5-2.16).
+const CONTROL_STATUS: u16 = 89;
+const COMMAND_CONTROL: u16 = 92;
+/// Command Position Data Type in Command Control: DINT.
+const DINT: u8 = 0b0100;
 
 /// Where a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +60,7 @@ pub(super) enum Phase {
     GroupSync { since: MonotonicTime, ticket: Option<Ticket>, next: MonotonicTime, last: SyncStatus },
     AxisConfiguration { instance: u8, ticket: Ticket },
     AxisScaling { instance: u8, ticket: Ticket },
+    Completion { ticket: Ticket },
     Synchronizing { since: MonotonicTime },
     Initializing { since: MonotonicTime },
     Program,
@@ -81,6 +92,7 @@ impl Controller {
             }
             Phase::AxisConfiguration { instance, ticket } => self.configure_next(now, instance, ticket)?,
             Phase::AxisScaling { instance, ticket } => self.take_scaling(now, instance, ticket)?,
+            Phase::Completion { ticket } => self.complete_configuration(now, ticket)?,
             Phase::Synchronizing { since } => {
                 let waited = now - since;
                 if self.node.status.contains(NodeStatus::SYNC_MODE) {
@@ -149,10 +161,27 @@ impl Controller {
             self.configure_axis(instance + 1)?
         } else if self.config.grand_master.is_some() {
             Phase::Synchronizing { since: now }
+        } else if self.config.format == Format::Fixed {
+            let room = self.room();
+            let sets = completion(self.config.command_target);
+            Phase::Completion { ticket: self.services.set(instance, &sets, room)? }
         } else {
             self.event(Event::Started { synchronous: false });
             Phase::Initializing { since: now }
         };
+        Ok(())
+    }
+
+    /// The device has been told that it is configured. One that knows it without being told refuses the attributes.
+    fn complete_configuration(&mut self, now: MonotonicTime, ticket: Ticket) -> Result<(), Failure> {
+        let Some(result) = self.services.take(ticket) else { return Ok(()) };
+        if let Outcome::Set { refused } = result? {
+            let sets = completion(self.config.command_target);
+            let events = &mut self.events;
+            report_refused(1, &sets, &refused, &mut |event| push(events, event))?;
+        }
+        self.event(Event::Started { synchronous: false });
+        self.phase = Phase::Initializing { since: now };
         Ok(())
     }
 
@@ -230,6 +259,8 @@ impl Controller {
 
     fn run_program(&mut self, now: MonotonicTime) -> Result<(), Failure> {
         let room = self.room();
+        let fault_unread = self.faults.is_busy();
+        let fault_coming = fault_unread && self.reads_faults();
         let events = &mut self.events;
         let mut event = |event| push(events, event);
         let mut context = Context {
@@ -238,6 +269,8 @@ impl Controller {
             services: &mut self.services,
             session: &mut self.session,
             answer: &mut self.answer,
+            fault_unread,
+            fault_coming,
             config: &mut self.config,
             link: &self.link,
             room,
@@ -280,10 +313,23 @@ impl Controller {
             }
         }
         let enabled = self.axes.iter().any(|axis| is_enabled(axis.state()));
-        if self.disabling && (!enabled || waited > patience * 2) {
+        // Which fault it was belongs into the report.
+        let reading = self.faults.is_busy() && self.reads_faults();
+        if self.disabling && (!(enabled || reading) || waited > patience * 2) {
             self.close(now);
         }
     }
+}
+
+/// Command Control as one value: the type of the position, and the update that commands are meant for.
+pub(super) fn command_control(target: CommandTarget) -> AttributeSet {
+    AttributeSet::usint(COMMAND_CONTROL, DINT | target.0).optional()
+}
+
+/// What ends the configuration in the fixed format, in this order.
+fn completion(target: CommandTarget) -> [AttributeSet; 2] {
+    let complete = ControlStatus::CONFIGURATION_COMPLETE.bits();
+    [command_control(target), AttributeSet::usint(CONTROL_STATUS, complete).optional()]
 }
 
 /// States from which an axis has to be disabled before the connection may be closed.

@@ -3,9 +3,11 @@
 use super::axis::check_torque_step;
 use super::config::{AxisSetup, ControllerConfig, Scaling};
 use super::failure::Failure;
+use super::format::check_step;
 use super::program::{Redefine, Step};
 use super::sets::cyclic_len;
 use super::trajectory::{Limits, Profile, State};
+use crate::wire::motion::Format;
 
 impl Step {
     /// Finds what makes the step fail for certain on axes set up like this: an axis that is not there or not scaled,
@@ -17,6 +19,9 @@ impl Step {
         let count = u8::try_from(config.axes.len()).unwrap_or(u8::MAX);
         if let Some(axis) = self.unknown_axis(count) {
             return Err(Failure::UnknownAxis { axis, count });
+        }
+        if config.format == Format::Fixed {
+            check_step(self, config)?;
         }
         match self {
             Self::MoveAbsolute { axis, position, limits } => {
@@ -53,7 +58,7 @@ impl Step {
                 let (Redefine::To(value) | Redefine::By(value)) = *change;
                 in_range(scaled(config, *axis)?, *axis, value)
             }
-            Self::DataSets { axis, sets } => {
+            Self::DataSets { axis, sets } if config.format == Format::Variable => {
                 let mut axes = config.axes.clone();
                 axes[usize::from(*axis) - 1].sets = *sets;
                 let needed = cyclic_len(&axes);

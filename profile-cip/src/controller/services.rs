@@ -10,6 +10,7 @@ use super::config::{AttributeSet, MAX_AXES};
 use super::event::AttributeValue;
 use super::failure::Failure;
 use super::program::CyclicDirection;
+use super::session::Answer;
 use crate::wire::Error;
 use crate::wire::motion::attribute_list::{
     AttributeSelector, GetItem, GetResponse, HEAD_LEN, ListWriter, SetResponse,
@@ -240,6 +241,34 @@ impl Services {
         let transaction_id = self.transactions[usize::from(job.instance)];
         let data = &job.bodies.front()?.bytes;
         Some((job.instance, ServiceRequest { transaction_id, service: job.service, data }))
+    }
+
+    /// Takes what came of the request with this transaction ID, made as an explicit message.
+    pub fn handle_answer(
+        &mut self,
+        now: MonotonicTime,
+        (instance, transaction_id): (u8, u8),
+        answer: Result<Answer, Failure>,
+    ) {
+        match answer {
+            Ok(answer) => {
+                let response = ServiceResponse {
+                    transaction_id,
+                    service: MotionService(answer.service),
+                    general_status: answer.status,
+                    extended_status: 0,
+                    data: &answer.data,
+                };
+                self.handle(now, instance, &response);
+            }
+            Err(failure) => {
+                let asked = self.request().map(|(asked, request)| (asked, request.transaction_id));
+                if asked == Some((instance, transaction_id)) {
+                    self.finish(|_| Err(failure));
+                    self.advance(now);
+                }
+            }
+        }
     }
 
     /// Takes a response; one that answers nothing under way is a repetition and does not count.

@@ -30,7 +30,7 @@ use crate::wire::forward_close::ForwardClose;
 use crate::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
 use crate::wire::list_identity::IdentityItem;
 use crate::wire::message_router::{Reply, Request};
-use crate::wire::motion::FORMAT_REVISION;
+use crate::wire::motion::{FORMAT_REVISION, Format};
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters, Priority, SMALL_SIZE_MAX};
 use crate::wire::register_session::RegisterSession;
 use crate::wire::sockaddr::{SOCKADDR_LEN, SockaddrInfo};
@@ -41,7 +41,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 /// Longest packet that the device may send: far more than any answer to what is asked here.
 const PACKET_MAX: usize = 4096;
 /// Class code of the Motion Device Axis Object.
-const MOTION_DEVICE_AXIS: u16 = 0x42;
+pub(super) const MOTION_DEVICE_AXIS: u16 = 0x42;
 const IDENTITY: u16 = 1;
 const CONNECTION_MANAGER: u16 = 6;
 /// Connection point of the configuration block of format revision 1, clause 7-1.1.
@@ -61,8 +61,17 @@ pub(super) enum Output {
     Closed,
     Malformed(Error),
     Failed(Failure),
-    /// The answer to a message of the program.
-    Answered(Result<Answer, Failure>),
+    /// The answer to a message.
+    Answered(Asker, Result<Answer, Failure>),
+}
+
+/// Whose message it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asker {
+    /// A step of the program.
+    Program,
+    /// The services, where the connection has no channel for them: instance and transaction ID.
+    Services(u8, u8),
 }
 
 /// An answer that is not looked into.
@@ -102,7 +111,10 @@ pub(super) struct Session {
     outputs: VecDeque<Output>,
     time_out: DurationNs,
     list_identity: bool,
+    /// Whose message is under way, or was last.
+    asker: Asker,
     rpi_us: u32,
+    variable: bool,
     triad: ConnectionTriad,
     path: Vec<u8>,
     timeout_multiplier: u8,
@@ -122,7 +134,9 @@ impl Session {
             outputs: VecDeque::with_capacity(8),
             time_out: config.time_outs.explicit,
             list_identity: config.list_identity,
+            asker: Asker::Program,
             rpi_us: config.rpi_us,
+            variable: config.format == Format::Variable,
             triad: ConnectionTriad {
                 connection_serial: config.connection_serial,
                 originator_vendor: config.originator_vendor,
@@ -168,15 +182,19 @@ impl Session {
     }
 
     /// Makes a request beside the connection, if none is under way; false if one is.
-    pub fn message(&mut self, now: MonotonicTime, message: &ExplicitMessage) -> bool {
+    pub fn message(&mut self, now: MonotonicTime, asker: Asker, message: &ExplicitMessage) -> bool {
         if self.state != State::Open {
             return false;
         }
+        self.asker = asker;
         let exchange = Exchange::Message(message.service);
         let service = Service(message.service);
         match unconnected(service, message.class, message.instance, message.attribute, &message.data, None) {
             Ok(block) => self.ask(now, exchange, Command::SEND_RR_DATA, &block),
-            Err(error) => self.fail(Failure::AnswerMalformed { exchange, error }),
+            Err(error) => {
+                let failure = Failure::AnswerMalformed { exchange, error };
+                self.outputs.push_back(Output::Answered(asker, Err(failure)));
+            }
         }
         true
     }
@@ -330,12 +348,13 @@ impl Session {
         }
         if let Exchange::Message(service) = exchange {
             self.state = State::Open;
-            self.outputs.push_back(Output::Answered(Ok(Answer {
+            let answer = Answer {
                 service,
                 status: reply.status.0,
                 extended: reply.extended.first().copied(),
                 data: reply.data.to_vec(),
-            })));
+            };
+            self.outputs.push_back(Output::Answered(self.asker, Ok(answer)));
             return Ok(());
         }
         if reply.status != GeneralStatus::SUCCESS {
@@ -410,7 +429,7 @@ impl Session {
             redundant_owner: false,
             connection_type: ConnectionType::POINT_TO_POINT,
             priority: Priority::URGENT,
-            variable: true,
+            variable: self.variable,
             size: self.connection_size,
         };
         let large = self.connection_size > SMALL_SIZE_MAX;
@@ -479,7 +498,7 @@ impl Session {
     fn fail(&mut self, failure: Failure) {
         if matches!(self.state, State::Asked { exchange: Exchange::Message(_), .. }) {
             self.state = State::Open;
-            self.outputs.push_back(Output::Answered(Err(failure)));
+            self.outputs.push_back(Output::Answered(self.asker, Err(failure)));
             return;
         }
         let closing = matches!(self.state, State::Asked { exchange: Exchange::ForwardClose, .. });

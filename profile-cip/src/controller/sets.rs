@@ -2,7 +2,7 @@
 
 use super::config::AxisSetup;
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
-use crate::wire::motion::codes::{ActualDataSet, CommandDataSet, FeedbackMode, StatusDataSet};
+use crate::wire::motion::codes::{ActualDataSet, CommandDataSet, ControlMode, FeedbackMode, StatusDataSet};
 
 /// Largest D-to-C header: 8 bytes, time stamp, time offset, update and time diagnostics.
 pub(super) const ACTUAL_HEADER_MAX: usize = 44;
@@ -19,9 +19,10 @@ pub struct DataSets {
     /// Position is velocity feed-forward, and so on. Torque, unwind count and displacement are zero where
     /// nothing else is asked.
     pub command: CommandDataSet,
-    /// Actual values asked for. The controller itself needs Actual Position.
+    /// Actual values asked for. The controller itself needs Actual Position; in the fixed format it makes do with Actual
+    /// Velocity out of position control.
     pub actual: ActualDataSet,
-    /// Status asked for. The controller itself needs the fault record and Axis Status.
+    /// Status asked for. The controller itself needs the fault record and Axis Status; the fixed format has none.
     pub status: StatusDataSet,
     /// Send Command Position as DINT instead of LREAL.
     pub integer_position: bool,
@@ -40,6 +41,19 @@ impl Default for DataSets {
 }
 
 impl DataSets {
+    /// What an update of the fixed format has room for: the value of the Control Mode, a position as DINT, and one actual
+    /// value, the position in position control and the velocity otherwise.
+    #[must_use]
+    pub fn fixed(mode: ControlMode) -> Self {
+        let position = mode == ControlMode::POSITION;
+        Self {
+            command: CommandDataSet::empty(),
+            actual: if position { ActualDataSet::POSITION } else { ActualDataSet::VELOCITY },
+            status: StatusDataSet::empty(),
+            integer_position: true,
+        }
+    }
+
     /// Bytes of the axis in a C-to-D update, in any Control Mode and with a Position Displacement.
     pub(super) fn command_len(&self) -> usize {
         let position = if self.integer_position { WORD } else { LONG };

@@ -4,14 +4,17 @@ use super::axis::{Axis, UpdateTime};
 use super::engine::{Controller, push};
 use super::event::Event;
 use super::failure::Failure;
-use super::link::Arrival;
+use super::fault_reader::FaultRead;
+use super::link::{Arrival, Update};
+use super::misbehaviour::Spoil;
 use super::phases::Phase;
 use super::report::Report;
 use super::services::Room;
 use crate::wire::Error;
-use crate::wire::motion::codes::{CommandTarget, NodeControl, NodeStatus, TimeDataSet};
+use crate::wire::motion::codes::{CommandTarget, NodeControl, NodeFault, NodeStatus, TimeDataSet};
+use crate::wire::motion::fixed::{FixedActual, FixedCommand};
 use crate::wire::motion::header::CommandHeader;
-use crate::wire::motion::{ActualFrame, CommandInstance};
+use crate::wire::motion::{ActualFrame, CommandInstance, CommandValues, Format};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// Update IDs.
@@ -41,10 +44,14 @@ impl Traffic {
         self.sent_at[usize::from(update_id)] = really.then_some(now);
     }
 
-    fn handle_update(&mut self, now: MonotonicTime, received: u8, report: &mut Report) {
+    fn handle_update(&mut self, now: MonotonicTime, report: &mut Report) {
         if let Some(before) = self.received_at.replace(now) {
             report.interval.add(now - before);
         }
+    }
+
+    /// The device has processed this update of ours.
+    fn handle_received(&mut self, now: MonotonicTime, received: u8, report: &mut Report) {
         if let Some(sent) = self.sent_at[usize::from(received)].take() {
             report.round_trip.add(now - sent);
         }
@@ -57,9 +64,8 @@ impl Controller {
         now: MonotonicTime,
         system_time: SystemTime,
         arrival: Arrival,
-        frame: &ActualFrame<'_>,
+        update: &Update<'_>,
     ) {
-        let header = frame.header();
         match arrival {
             Arrival::Fresh { lost } => {
                 self.report.updates += 1;
@@ -71,9 +77,71 @@ impl Controller {
                 return;
             }
         }
+        self.traffic.handle_update(now, &mut self.report);
+        match update {
+            Update::Variable(frame) => self.handle_variable(now, system_time, frame),
+            Update::Fixed(actual) => self.handle_fixed(system_time, actual),
+        }
+    }
+
+    /// An update of the fixed format: no time stamp, and nothing about what the device received.
+    fn handle_fixed(&mut self, system_time: SystemTime, actual: &FixedActual) {
+        self.node.status = actual.node_status;
+        self.faults.handle(actual);
+        if !actual.node_status.contains(NodeStatus::FAULT) {
+            self.note_node_fault(NodeFault::NONE);
+        }
+        // Before that only the head says something.
+        if actual.node_status.contains(NodeStatus::DATA_VALID)
+            && let Some(axis) = self.axes.first_mut()
+        {
+            let time = UpdateTime { at: system_time, ahead: self.config.period() * 2 };
+            let events = &mut self.events;
+            axis.handle(&actual.block(), time, |event| push(events, event));
+        }
+    }
+
+    fn note_node_fault(&mut self, fault: NodeFault) {
+        let events = &mut self.events;
+        self.node.handle_fault(fault, &mut self.report, |event| push(events, event));
+    }
+
+    /// Whether attributes can be read that the updates of the fixed format do not bring.
+    pub(super) const fn reads_faults(&self) -> bool {
+        !self.abuse.vanished && !self.abuse.stream_dropped
+    }
+
+    /// In the fixed format: finds out by services which fault there is.
+    fn read_faults(&mut self, now: MonotonicTime) {
+        if self.config.format != Format::Fixed || !self.reads_faults() {
+            return;
+        }
+        let room = self.room();
+        match self.faults.poll(&mut self.services, room) {
+            Ok(None) => {}
+            Ok(Some(FaultRead::Node { fault, over })) => {
+                self.note_node_fault(fault);
+                if over {
+                    self.note_node_fault(NodeFault::NONE);
+                }
+            }
+            Ok(Some(FaultRead::Axis(record))) => {
+                let events = &mut self.events;
+                if let Some(axis) = self.axes.first_mut() {
+                    axis.handle_fault(record, |event| push(events, event));
+                }
+            }
+            // On the way out the failure before counts.
+            Err(_) if matches!(self.phase, Phase::Stopping { .. }) => {}
+            Err(failure) => self.fail(now, failure),
+        }
+    }
+
+    fn handle_variable(&mut self, now: MonotonicTime, system_time: SystemTime, frame: &ActualFrame<'_>) {
+        let header = frame.header();
         let events = &mut self.events;
         self.node.handle(header, &mut self.report, |event| push(events, event));
-        self.traffic.handle_update(now, header.last_received_id, &mut self.report);
+        self.traffic.handle_received(now, header.last_received_id, &mut self.report);
         self.offset.handle_received(header.last_received_id);
         let synchronous = header.node_status.contains(NodeStatus::SYNC_MODE);
         // A device without time synchronization sends time stamps of zero.
@@ -121,6 +189,7 @@ impl Controller {
             self.event(Event::ConnectionLost);
         }
         self.services.advance(now);
+        self.read_faults(now);
         if let Err(failure) = self.advance(now) {
             self.fail(now, failure);
         }
@@ -167,6 +236,7 @@ impl Controller {
         matches!(
             self.phase,
             Phase::Synchronizing { .. }
+                | Phase::Completion { .. }
                 | Phase::Initializing { .. }
                 | Phase::Program
                 | Phase::Stopping { .. }
@@ -220,6 +290,9 @@ impl Controller {
         node_control.set(NodeControl::DATA_VALID, !first);
         node_control.set(NodeControl::SYNC_CONTROL, configured && timed);
         node_control.set(NodeControl::FAULT_RESET, self.node_fault_reset);
+        if self.config.format == Format::Fixed {
+            return self.send_fixed(now, node_control, first, fresh, &spoil);
+        }
         let time_offset = if timed {
             let offset = stamp.0.wrapping_sub(tick.0).cast_signed();
             self.offset.measure(offset, update_id)
@@ -255,6 +328,43 @@ impl Controller {
             .filter(|instance| instance.cyclic.is_some() || instance.service.is_some());
         self.link.send(now, &header, instances, fresh, &spoil)?;
         self.traffic.note_sent(now, update_id, !spoil.skip);
+        self.report.cycles += 1;
+        Ok(())
+    }
+
+    /// An update of the fixed format. The first one says nothing but its head; commands begin with Configuration Complete.
+    fn send_fixed(
+        &mut self,
+        now: MonotonicTime,
+        node_control: NodeControl,
+        first: bool,
+        fresh: bool,
+        spoil: &Spoil,
+    ) -> Result<(), Error> {
+        let update_id = self.traffic.update_id;
+        let configured = self.is_configured();
+        let head = FixedCommand {
+            update_id: update_id.wrapping_sub(spoil.update_id_back),
+            node_control,
+            ..FixedCommand::default()
+        };
+        let command = match self.axes.first().filter(|_| !first) {
+            Some(axis) => {
+                let block = axis.block(configured, CommandTarget::IMMEDIATE, spoil);
+                FixedCommand {
+                    control_mode: block.control_mode,
+                    feedback_mode: block.feedback_mode,
+                    axis_control: block.axis_control,
+                    actual_data_set: block.actual_data_set,
+                    status_data_set: block.status_data_set,
+                    values: if configured { block.values } else { CommandValues::default() },
+                    ..head
+                }
+            }
+            None => head,
+        };
+        self.link.send_fixed(now, &command, fresh, spoil)?;
+        self.traffic.note_sent(now, update_id, false);
         self.report.cycles += 1;
         Ok(())
     }

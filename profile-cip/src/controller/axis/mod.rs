@@ -15,6 +15,7 @@ use super::config::{AxisSetup, Scaling};
 use super::cyclic_lists::CyclicLists;
 use super::event::Event;
 use super::events::EventChecks;
+use super::failure::Failure;
 use super::following::Following;
 use super::handshake::Handshake;
 use super::misbehaviour::Spoil;
@@ -27,7 +28,9 @@ use crate::wire::motion::codes::{
     FeedbackMode, StatusDataSet,
 };
 use crate::wire::motion::event::{ACTUAL_EVENTS_BARE, COMMAND_EVENTS_MAX};
-use crate::wire::motion::{ActualBlock, CommandBlock, CommandPosition, CommandValues, FaultRecord};
+use crate::wire::motion::{
+    ActualBlock, CommandBlock, CommandPosition, CommandValues, FaultRecord, Format, StatusValues,
+};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// What a D-to-C update says beside the axis' own block.
@@ -47,6 +50,8 @@ pub(super) struct Axis {
     pub report: AxisReport,
     pub seen: Seen,
     pub lists: CyclicLists,
+    /// Whether an update has room for one value of 32 bits each way.
+    fixed: bool,
     /// Sets and modes are those of now; steps change them.
     setup: AxisSetup,
     /// Counts in a unit, once that is known.
@@ -65,8 +70,9 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    pub fn new(instance: u8, setup: AxisSetup) -> Self {
+    pub fn new(instance: u8, format: Format, setup: AxisSetup) -> Self {
         Self {
+            fixed: format == Format::Fixed,
             handshake: Handshake::default(),
             events: EventChecks::default(),
             report: AxisReport { axis: instance, ..AxisReport::default() },
@@ -132,7 +138,28 @@ impl Axis {
     /// Whether the device follows the command.
     pub fn is_running(&self) -> bool {
         let tracking = self.seen.status.is_none_or(|s| s.contains(AxisStatus::TRACKING_COMMAND));
-        self.seen.state == Some(AxisStateCode::RUNNING) && tracking && self.seen.actual.is_some()
+        self.seen.state == Some(AxisStateCode::RUNNING) && tracking && self.place().is_some()
+    }
+
+    /// The actual values asked for: in the variable format always with the position.
+    pub fn asked(&self) -> ActualDataSet {
+        let always = if self.fixed { ActualDataSet::empty() } else { ActualDataSet::POSITION };
+        self.setup.sets.actual | always
+    }
+
+    /// Whether the position is among the actual values.
+    pub fn has_position(&self) -> bool {
+        self.asked().contains(ActualDataSet::POSITION)
+    }
+
+    /// Whether the actual value that is asked for in the fixed format has come.
+    pub fn is_seen(&self) -> bool {
+        !self.fixed || self.place().is_some()
+    }
+
+    /// Where the axis is, in counts; zero for one that is led without a position.
+    pub(super) fn place(&self) -> Option<i64> {
+        if self.has_position() { self.seen.actual } else { Some(0) }
     }
 
     /// Distance between command and actual position, in units.
@@ -150,7 +177,24 @@ impl Axis {
         &self.setup.sets
     }
 
-    /// Changes what travels in the updates.
+    /// Changes what travels in the updates. In the fixed format another actual value comes instead of the one before:
+    /// under a motion, and from the position in position control, that would blind the controller.
+    pub fn change_sets(&mut self, sets: DataSets) -> Result<(), Failure> {
+        let axis = self.instance();
+        if self.fixed && sets.actual != self.setup.sets.actual {
+            if self.is_moving() {
+                return Err(Failure::AxisBusy { axis });
+            }
+            if [self.mode, self.setup.control_mode].contains(&ControlMode::POSITION) {
+                return Err(Failure::NoPosition { axis });
+            }
+            self.seen.forget_motion();
+        }
+        self.setup.sets = sets;
+        Ok(())
+    }
+
+    /// Changes back what travels in the updates.
     pub fn set_sets(&mut self, sets: DataSets) {
         self.setup.sets = sets;
     }
@@ -181,6 +225,10 @@ impl Axis {
         self.handshake.handle(block.axis_response, block.response_status);
         self.advance_reference();
         self.seen.handle(block, &mut self.report, &mut event);
+        if !self.has_position() {
+            // A position that is no longer told is nowhere to go on from.
+            return;
+        }
         let Some(position) = self.seen.handle_position(&block.actual, self.setup.unwind, time.at) else {
             return;
         };
@@ -195,6 +243,12 @@ impl Axis {
             self.report.following_error_max = self.report.following_error_max.max(error);
             self.report.following_samples += 1;
         }
+    }
+
+    /// Takes a fault record that was read beside the updates.
+    pub fn handle_fault(&mut self, fault: FaultRecord, mut event: impl FnMut(Event)) {
+        let status = StatusValues { fault: Some(fault), ..StatusValues::default() };
+        self.seen.handle_records(&status, &mut self.report, &mut event);
     }
 
     /// The cyclic command block for the command planned last.
@@ -219,18 +273,27 @@ impl Axis {
             feedback_mode: self.setup.feedback_mode,
             axis_control: self.handshake.code(),
             control_status,
-            actual_data_set: sets.actual | ActualDataSet::POSITION,
-            status_data_set: sets.status | StatusDataSet::FAULT | StatusDataSet::AXIS_STATUS,
+            actual_data_set: self.asked(),
+            status_data_set: if self.fixed {
+                StatusDataSet::empty()
+            } else {
+                sets.status | StatusDataSet::FAULT | StatusDataSet::AXIS_STATUS
+            },
             target,
-            values: CommandValues {
-                position: sent(CommandDataSet::POSITION, ControlMode::POSITION).then_some(position),
-                velocity: sent(CommandDataSet::VELOCITY, ControlMode::VELOCITY)
-                    .then(|| in_units(self.command.velocity)),
-                acceleration: sent(CommandDataSet::ACCELERATION, ControlMode::ACCELERATION)
-                    .then(|| in_units(self.command.acceleration)),
-                torque: sent(CommandDataSet::TORQUE, ControlMode::TORQUE).then(|| real(self.torque)),
-                unwind_count: zero(CommandDataSet::UNWIND_COUNT).map(|_| cycles),
-                position_displacement: displacement.or(zero(CommandDataSet::POSITION_DISPLACEMENT)),
+            // One value alone: a standing axis, of which the references are changed, needs no other.
+            values: if self.fixed && displacement.is_some() {
+                CommandValues { position_displacement: displacement, ..CommandValues::default() }
+            } else {
+                CommandValues {
+                    position: sent(CommandDataSet::POSITION, ControlMode::POSITION).then_some(position),
+                    velocity: sent(CommandDataSet::VELOCITY, ControlMode::VELOCITY)
+                        .then(|| in_units(self.command.velocity)),
+                    acceleration: sent(CommandDataSet::ACCELERATION, ControlMode::ACCELERATION)
+                        .then(|| in_units(self.command.acceleration)),
+                    torque: sent(CommandDataSet::TORQUE, ControlMode::TORQUE).then(|| real(self.torque)),
+                    unwind_count: zero(CommandDataSet::UNWIND_COUNT).map(|_| cycles),
+                    position_displacement: displacement.or(zero(CommandDataSet::POSITION_DISPLACEMENT)),
+                }
             },
         }
     }

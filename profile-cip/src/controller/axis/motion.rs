@@ -55,7 +55,7 @@ impl Axis {
     /// The command would pass a limit of the axis; the motion is being stopped.
     pub fn plan(&mut self, target: MonotonicTime, applies_at: SystemTime) -> Result<(), Failure> {
         self.planned_for = target;
-        let Some(actual) = self.seen.actual else { return Ok(()) };
+        let Some(actual) = self.place() else { return Ok(()) };
         if !self.is_running() {
             self.motion = Motion::None;
             self.torque = 0.0;
@@ -215,6 +215,9 @@ impl Axis {
 
     /// Begins to change over to another Control Mode; it is in force when the axis is no longer busy.
     pub fn change_mode(&mut self, mode: ControlMode) -> Result<DurationNs, Failure> {
+        if mode == ControlMode::POSITION && !self.has_position() {
+            return Err(Failure::NoPosition { axis: self.instance() });
+        }
         if !self.is_running() || mode == self.mode {
             self.setup.control_mode = mode;
             return Ok(DurationNs::ZERO);

@@ -26,6 +26,14 @@ impl Axis {
         if self.is_moving() {
             return Err(Failure::AxisBusy { axis });
         }
+        if !self.has_position() {
+            return Err(Failure::NoPosition { axis });
+        }
+        if self.fixed && self.seen.state == Some(AxisStateCode::RUNNING) {
+            // The one command value is the set-point of the mode.
+            let what = "room for a Position Displacement only while the axis is not Running";
+            return Err(Failure::NotInFormat { what });
+        }
         let present = self.command.position;
         let displacement = match change {
             Redefine::To(position) => position * scale - present,

@@ -8,7 +8,7 @@ use crate::controller::number::{float, seconds, unroll};
 use crate::controller::report::AxisReport;
 use crate::wire::motion::codes::{AxisIoStatus, AxisStateCode, AxisStatus, ControlMode, FaultType};
 use crate::wire::motion::{
-    ActualBlock, ActualPosition, ActualValues, AlarmRecord, EventNotification, FaultRecord,
+    ActualBlock, ActualPosition, ActualValues, AlarmRecord, EventNotification, FaultRecord, StatusValues,
 };
 use profile_generic::time::SystemTime;
 
@@ -64,18 +64,18 @@ impl Seen {
         if let Some((status, _)) = block.status.io_status {
             self.io_status = Some(status);
         }
-        self.handle_records(block, report, event);
+        self.handle_records(&block.status, report, event);
     }
 
     /// A record stays in the updates until the device has seen that it arrived; it counts once.
-    fn handle_records(
+    pub fn handle_records(
         &mut self,
-        block: &ActualBlock,
+        status: &StatusValues,
         report: &mut AxisReport,
         event: &mut impl FnMut(Event),
     ) {
         let axis = report.axis;
-        if let Some(fault) = block.status.fault
+        if let Some(fault) = status.fault
             && self.last_fault.replace(fault) != Some(fault)
         {
             event(Event::AxisFault { axis, fault });
@@ -86,7 +86,7 @@ impl Seen {
                 report.faults.push(fault);
             }
         }
-        if let Some(alarm) = block.status.alarm
+        if let Some(alarm) = status.alarm
             && self.last_alarm.replace(alarm) != Some(alarm)
         {
             event(Event::AxisAlarm { axis, alarm });
@@ -128,6 +128,13 @@ impl Seen {
     /// The position reference has changed: the difference to the position before is no movement.
     pub fn rereference(&mut self) {
         self.at = SystemTime(u64::MAX);
+        self.estimated_velocity = 0.0;
+    }
+
+    /// Another actual value is asked for: neither where the axis was nor how fast it went counts any more.
+    pub fn forget_motion(&mut self) {
+        self.actual = None;
+        self.told_velocity = None;
         self.estimated_velocity = 0.0;
     }
 

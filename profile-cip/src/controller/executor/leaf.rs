@@ -9,9 +9,12 @@ use crate::controller::event::Event;
 use crate::controller::failure::Failure;
 use crate::controller::misbehaviour::Misbehaviour;
 use crate::controller::number::span;
+use crate::controller::phases::command_control;
 use crate::controller::program::{AxisSet, CyclicAttribute, CyclicDirection, Step};
 use crate::controller::services::{Outcome, Ticket};
+use crate::controller::session::Asker;
 use crate::controller::trajectory::Limits;
+use crate::wire::motion::Format;
 use crate::wire::motion::codes::{EventChecking, NodeFault, TestStatus};
 use crate::wire::motion::event::{ACTUAL_EVENTS_BARE, COMMAND_EVENTS_MAX};
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -88,11 +91,17 @@ pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<Run, Failure> {
         }
         Step::DataSets { axis, sets } => {
             let (axis, before) = (*axis, *cx.axis(*axis)?.sets());
-            cx.axis(axis)?.set_sets(*sets);
+            cx.axis(axis)?.change_sets(*sets)?;
             check_room(cx).inspect_err(|_| cx.axes[usize::from(axis) - 1].set_sets(before))?;
         }
         Step::TimeData(set) => cx.config.time_data = *set,
-        Step::Target(target) => cx.config.command_target = *target,
+        Step::Target(target) => {
+            cx.config.command_target = *target;
+            if cx.config.format == Format::Fixed {
+                let sets = [AttributeSet { required: true, ..command_control(*target) }];
+                run.ticket = Some(cx.services.set(1, &sets, cx.room)?);
+            }
+        }
         Step::RedefinePosition { axis, change } => cx.axis(*axis)?.redefine(*change)?,
         Step::Stop { axis, acceleration, jerk } => {
             // The velocity limit has no part in slowing down.
@@ -133,7 +142,6 @@ pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<Run, Failure> {
             cx.abuse.begin(*kind);
             cx.drop_stream |= *kind == Misbehaviour::DropTcp;
         }
-        Step::Reconnect => cx.reconnect = true,
         _ => {}
     }
     Ok(run)
@@ -232,6 +240,9 @@ pub(super) fn go_on(
             Ok(run.within >= WINDOW_UPDATES)
         }
         Step::NodeFaultReset => {
+            if cx.fault_coming {
+                return Ok(false);
+            }
             let faulted = cx.node.fault != NodeFault::NONE;
             *cx.node_fault_reset = faulted;
             if faulted && waited > time_out.unwrap_or(cx.config.time_outs.axis_control) {
@@ -239,6 +250,16 @@ pub(super) fn go_on(
                 return Err(Failure::NodeFault(cx.node.fault));
             }
             Ok(!faulted)
+        }
+        Step::DataSets { axis, .. } => {
+            // In the fixed format another actual value has to be there before a step may count on it.
+            let limit = time_out.unwrap_or(cx.config.time_outs.axis_control);
+            let there = cx.axis(*axis)?.is_seen();
+            if !there && waited > limit { Err(Failure::StepTimeOut { waited }) } else { Ok(there) }
+        }
+        Step::Target(target) if run.ticket.is_some() => {
+            let sets = [AttributeSet { required: true, ..command_control(*target) }];
+            take_set(1, &sets, run, cx)
         }
         Step::ReadAttributes { axis, .. } => take_read(*axis, run, cx),
         Step::SetAttributes { axis, attributes } => take_set(*axis, attributes, run, cx),
@@ -263,7 +284,7 @@ pub(super) fn go_on(
         Step::TestResult { axis, status, .. } => await_test(*axis, *status, step, run, cx, time_out),
         Step::Explicit { message, status } => {
             if !run.done {
-                run.done = cx.session.message(cx.now, message);
+                run.done = cx.session.message(cx.now, Asker::Program, message);
                 return Ok(false);
             }
             let Some(answer) = cx.answer.take() else { return Ok(false) };
@@ -274,7 +295,14 @@ pub(super) fn go_on(
         }
         Step::Expect { condition, within } => expect(condition, *within, run, cx),
         Step::Misbehave(_) => Ok(!cx.abuse.is_under_way()),
-        Step::Reconnect => Ok(cx.connection > run.connection),
+        Step::Reconnect => {
+            // A fault that is being read would be forgotten with the connection.
+            if !run.done && !cx.fault_coming {
+                run.done = true;
+                cx.reconnect = true;
+            }
+            Ok(cx.connection > run.connection)
+        }
         Step::Ask { axes, request } => {
             // It has been sent once before the next step can take it back.
             if !run.done {

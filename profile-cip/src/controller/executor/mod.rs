@@ -26,6 +26,10 @@ pub(super) struct Context<'a> {
     pub session: &'a mut Session,
     /// The answer to the explicit message under way.
     pub answer: &'a mut Option<Result<Answer, Failure>>,
+    /// A fault is there or may be of which is not known which one it is.
+    pub fault_unread: bool,
+    /// It is being read.
+    pub fault_coming: bool,
     pub config: &'a mut ControllerConfig,
     pub link: &'a Link,
     pub room: Room,

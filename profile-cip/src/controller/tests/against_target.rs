@@ -155,7 +155,7 @@ impl Plant {
     }
 }
 
-fn adapter(io_port: u16) -> Adapter {
+fn adapter(format: Format, io_port: u16) -> Adapter {
     let address = Ipv4Addr::new(10, 0, 0, 9);
     Adapter::new(AdapterConfig {
         identity: IdentityConfig {
@@ -186,7 +186,7 @@ fn adapter(io_port: u16) -> Adapter {
         },
         qos: QosConfig::default(),
         motion: MotionConfig {
-            format: Format::Variable,
+            format,
             rpi_min_us: 500,
             rpi_max_us: 32_000,
             rpi_multiple_us: 500,
@@ -201,13 +201,13 @@ fn adapter(io_port: u16) -> Adapter {
     .unwrap()
 }
 
-fn device(axes: usize) -> MotionDevice {
+fn device(format: Format, axes: usize) -> MotionDevice {
     let axis = AxisConfig { control_modes: 0b1_0110, feedback_modes: 0b1111, ..AxisConfig::default() };
     let attribute = |number, data_type| {
         AttributeDefinition::new(Scope::Instance, number, data_type, Access::Set, "attribute of the tests")
     };
     MotionDevice::new(DeviceConfig {
-        format: Format::Variable,
+        format,
         axes: vec![axis; axes],
         attributes: vec![
             attribute(441, DataType::Real),
@@ -215,7 +215,7 @@ fn device(axes: usize) -> MotionDevice {
             AttributeDefinition { range: Some((0.0, 3.0)), ..attribute(629, DataType::Usint) },
         ],
         power_structure_class_id: 0x0A0B_0C0D,
-        supports_sync: true,
+        supports_sync: format == Format::Variable,
         poll_interval_ns: 0,
         transmission_processing_ns: 200_000,
     })
@@ -248,11 +248,11 @@ pub(super) struct Pair {
 
 impl Pair {
     pub fn new(config: ControllerConfig, positions: &[f64], program: Vec<Step>) -> Self {
-        let mut adapter = adapter(IO_PORT);
+        let mut adapter = adapter(config.format, IO_PORT);
         let start = 5_000_000;
         let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000);
         let slot = adapter.open(MonotonicTime(start), peer).unwrap();
-        let mut device = device(positions.len());
+        let mut device = device(config.format, positions.len());
         device.set_sync(SyncState {
             grandmaster: Some(GRAND_MASTER),
             synchronized: true,
@@ -277,9 +277,14 @@ impl Pair {
         }
     }
 
+    /// The controller is set up otherwise than the device.
+    pub fn with_controller(&mut self, config: ControllerConfig) {
+        self.controller = Controller::new(config, Vec::new()).unwrap();
+    }
+
     /// The device takes its I/O at another port.
     fn with_io_port(mut self, port: u16) -> Self {
-        self.adapter = adapter(port);
+        self.adapter = adapter(Format::Variable, port);
         let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000);
         self.slot = self.adapter.open(MonotonicTime(self.now), peer).unwrap();
         self

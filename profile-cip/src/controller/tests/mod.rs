@@ -4,6 +4,7 @@ mod abuse;
 mod against_target;
 mod failures;
 mod features;
+mod fixed;
 mod peer;
 mod rig;
 mod runs;

@@ -119,7 +119,7 @@ fn the_whole_table() {
                     Output::Closed => "closed".to_owned(),
                     Output::Malformed(error) => format!("malformed: {error}"),
                     Output::Failed(failure) => format!("failed: {failure}"),
-                    Output::Answered(_) => "answered".to_owned(),
+                    Output::Answered(..) => "answered".to_owned(),
                 })
                 .collect();
             let packets: Vec<_> = sent(&mut session).iter().map(|packet| name(packet)).collect();

@@ -230,6 +230,20 @@ impl From<&ActualBlock> for FixedActual {
 }
 
 impl FixedActual {
+    /// What the update has of the cyclic block of the variable format: everything but status data.
+    #[must_use]
+    pub fn block(&self) -> ActualBlock {
+        ActualBlock {
+            control_mode: self.control_mode,
+            feedback_mode: self.feedback_mode,
+            axis_response: self.axis_response,
+            response_status: self.response_status,
+            axis_state: self.axis_state,
+            actual: self.actual,
+            ..ActualBlock::default()
+        }
+    }
+
     /// Reads an update.
     ///
     /// # Errors
