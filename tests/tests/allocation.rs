@@ -1,15 +1,19 @@
 //! The cycle of the box touches no heap once the bus is in CP4: weighed with a counting allocator, the
 //! engine alone.
 
+use std::cell::Cell;
+use std::rc::Rc;
+
 use allocation_counter::measure;
 use axisbridge_tests::rig::explicit::Client;
-use axisbridge_tests::rig::fixed::{self, FixedController};
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
-use profile_cip::controller::{Event, Step};
+use profile_cip::controller::sets::DataSets;
+use profile_cip::controller::{AxisSet, Event, Misbehaviour, Step};
 use profile_cip::target::axis_state::AxisState;
-use profile_cip::wire::motion::codes::{AxisControl, EventChecking};
+use profile_cip::wire::class1::CLASS1_HEADER_LEN;
+use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_generic::fault::FaultCause;
 use profile_generic::quantity::Position;
@@ -92,25 +96,43 @@ fn events_in_the_telegrams_and_over_the_service_channel_allocate_nothing() {
 
 #[test]
 fn the_fixed_format_allocates_nothing() {
-    let mut rig = Rig::ready(fixed::settings());
-    let mut controller = FixedController::open(&mut rig, 18).expect("a connection");
-    controller.configure(&mut rig, fixed::INTERPOLATE);
-    controller.request(&mut rig, AxisControl::ENABLE);
-    let applied = rig.engine.axes()[0].counters().commands;
-    let found = weigh(&mut rig, 1_000, |rig, number| {
-        // Faster and faster, then a lost update, an update of the other format, and silence.
-        let step = u16::try_from(number.min(500)).unwrap_or(500);
-        controller.command.values.velocity = Some(f32::from(step) / 250.0);
-        match number {
-            0..=598 => controller.send(rig),
-            599 => controller.command.update_id = controller.command.update_id.wrapping_add(1),
-            600..=699 => controller.send(rig),
-            700 => controller.send_octets(rig, &[6, 2, 0, 5, 0, 0, 0, 0]),
-            _ => {}
+    let mut rig = Rig::ready(Settings::fixed());
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    config.axes[0].sets = DataSets::fixed(ControlMode::VELOCITY);
+    let one = AxisSet::first(1);
+    rig.connect_with(
+        config,
+        vec![
+            Step::Enable(one),
+            Step::RunAt { axis: 1, velocity: 2.0, acceleration: 2.0, jerk: 100.0 },
+            Step::Misbehave(Misbehaviour::SkipUpdates { updates: 1 }),
+            Step::Dwell { seconds: 100.0 },
+        ],
+    );
+    rig.run_until(millis(20_000), "the axis enabled", |rig| rig.report().steps_finished == 1);
+    // The format octet of an update, behind the class 1 header.
+    let other = Rc::new(Cell::new(false));
+    let spoil = Rc::clone(&other);
+    rig.tamper_command = Some(Box::new(move |bytes| {
+        if spoil.take() {
+            bytes.as_mut_slice()[CLASS1_HEADER_LEN] = 6;
         }
+        true
+    }));
+    let applied = rig.engine.axes()[0].counters().commands;
+    let found = weigh(&mut rig, 2_000, |rig, number| match number {
+        1_600 => other.set(true),
+        1_800 => {
+            rig.kill_controller();
+        }
+        1_599 => assert!(rig.velocity(0) > 1_900_000_000, "{}", rig.velocity(0)),
+        _ => {}
     });
     assert_eq!(found, []);
+    assert!(!other.get(), "an update of the other format came");
     assert!(rig.engine.axes()[0].counters().commands > applied + 600, "the axis was led");
+    assert!(rig.torque_free(), "and stopped");
 }
 
 #[test]

@@ -9,6 +9,8 @@ use axisbridge_tests::process::{Running, axisbridge};
 /// Addresses of this test alone.
 const BOX: &str = "127.0.0.46";
 const CONTROLLER: &str = "127.0.1.46";
+const FIXED_BOX: &str = "127.0.0.47";
+const FIXED_CONTROLLER: &str = "127.0.1.47";
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples").join(name)
@@ -55,20 +57,18 @@ fn a_check_prints_the_plan_and_sends_nothing() {
     assert!(plan.ends_with("2 axes, 8 steps; nothing was sent\n"), "{plan}");
 }
 
-#[test]
-fn a_script_moves_the_axes_of_a_box() {
-    let configuration = std::fs::read_to_string(example("../gateway/src/cli/demo.toml"))
-        .expect("the demonstration's configuration")
-        .replace("127.0.0.2", BOX);
-    let configuration = file("script-box.toml", &configuration);
+/// Starts a box with this configuration.
+fn start(name: &str, configuration: &str) -> Running {
     let mut command = Command::new(axisbridge());
-    command.args(["run", "--config"]).arg(configuration);
-    let _box = Running::start("run", command.stdout(Stdio::null()).stderr(Stdio::null()));
-    let places = ["--target", BOX, "--bind", CONTROLLER, "--json"];
-    // The box needs its time until it listens.
+    command.args(["run", "--config"]).arg(file(name, configuration));
+    Running::start("run", command.stdout(Stdio::null()).stderr(Stdio::null()))
+}
+
+/// Runs a shipped script as soon as the box listens; it has to pass. Gives its JSON object.
+fn passes(name: &str, places: &[&str]) -> serde_json::Value {
     let end = Instant::now() + Duration::from_secs(60);
     let output = loop {
-        let output = script(&example("scripts/first-move.toml"), &places);
+        let output = script(&example(name), places);
         if !output.stdout.is_empty() || Instant::now() > end {
             break output;
         }
@@ -78,6 +78,26 @@ fn a_script_moves_the_axes_of_a_box() {
         .unwrap_or_else(|error| panic!("one JSON object, {error}: {}", text(&output.stderr)));
     assert_eq!(result["passed"], true, "{result}");
     assert_eq!(output.status.code(), Some(0));
+    result
+}
+
+#[test]
+fn a_script_runs_over_the_fixed_format() {
+    let _box = start("fixed-box.toml", &axisbridge_tests::rig::FIXED_BOX.replace("10.0.0.2", FIXED_BOX));
+    let places = ["--target", FIXED_BOX, "--bind", FIXED_CONTROLLER, "--json"];
+    let result = passes("scripts/fixed-format.toml", &places);
+    assert!(result["axes"][0]["actual"].as_f64().is_some_and(|at| (at - 10.25).abs() < 0.01), "{result}");
+    assert!(result["updates"]["interval"]["count"].as_u64().is_some_and(|count| count > 20), "{result}");
+}
+
+#[test]
+fn a_script_moves_the_axes_of_a_box() {
+    let configuration = std::fs::read_to_string(example("../gateway/src/cli/demo.toml"))
+        .expect("the demonstration's configuration")
+        .replace("127.0.0.2", BOX);
+    let _box = start("script-box.toml", &configuration);
+    let places = ["--target", BOX, "--bind", CONTROLLER, "--json"];
+    let result = passes("scripts/first-move.toml", &places);
     assert_eq!(result["steps"][1]["line"], 29);
     assert_eq!(result["steps"][1]["result"], "passed");
     assert!(result["steps"][1]["seconds"].as_f64().is_some_and(|seconds| seconds > 0.1), "{result}");

@@ -10,7 +10,6 @@
 //! prints the seed.
 
 pub mod explicit;
-pub mod fixed;
 pub mod motion;
 pub mod network;
 pub mod ports;
@@ -29,6 +28,7 @@ use axisbridge::north::AdapterEnd;
 use axisbridge::simulate::line::{DriveLine, line};
 use axisbridge::simulate::setup;
 use axisbridge::status::BoxStatus;
+use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
 };
@@ -36,6 +36,7 @@ use profile_cip::target::adapter::{Adapter, SessionSlot};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::motion_device::SyncState;
 use profile_cip::wire::encapsulation::IO_PORT;
+use profile_cip::wire::motion::Format;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
@@ -48,6 +49,9 @@ use self::ports::{Bytes, NorthQueue, SouthQueue};
 
 /// The configuration of the box: a turntable (axis 1, revolutions) and a slide (axis 2, millimetres).
 pub const BOX: &str = include_str!("box.toml");
+
+/// The configuration of a box with the turntable alone, over the fixed connection format.
+pub const FIXED_BOX: &str = include_str!("fixed.toml");
 
 /// Update period of the controller in microseconds: two cycles of the bus.
 pub const UPDATE_PERIOD_US: u32 = 4_000;
@@ -86,6 +90,14 @@ pub struct Settings {
     pub knobs: Knobs,
     /// What the network's dice start from.
     pub seed: u64,
+}
+
+impl Settings {
+    /// [`FIXED_BOX`] and its one drive.
+    #[must_use]
+    pub fn fixed() -> Self {
+        Self { configuration: FIXED_BOX.to_owned(), drives: vec![(1, UnitKind::Rotary)], ..Self::default() }
+    }
 }
 
 impl Default for Settings {
@@ -282,7 +294,12 @@ impl Rig {
     #[must_use]
     pub fn controller_config(&self) -> ControllerConfig {
         let counts: Vec<_> = self.config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
-        setup::controller(&self.mapping, &counts, UPDATE_PERIOD_US)
+        let mut config = setup::controller(&self.mapping, &counts, UPDATE_PERIOD_US);
+        if self.config.devices[0].connection_format == Format::Fixed {
+            config.set_fixed();
+            config.axes.iter_mut().for_each(|axis| axis.sets = DataSets::fixed(axis.control_mode));
+        }
+        config
     }
 
     /// Connects a controller that carries out `program`; one that was there before is gone.

@@ -10,10 +10,14 @@ use profile_generic::time::DurationNs;
 
 /// Runs a script from its file; all of its steps have to pass.
 fn run(name: &str) -> (Rig, Report) {
+    run_on(name, Settings::default())
+}
+
+fn run_on(name: &str, settings: Settings) -> (Rig, Report) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/scripts").join(name);
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let script = Script::load(&path, &mapping).unwrap_or_else(|error| panic!("{error}"));
-    let mut rig = Rig::ready(Settings::default());
+    let mut rig = Rig::ready(settings);
     rig.connect_with(script.config, script.steps.clone());
     let report = rig.run(DurationNs::from_secs(120));
     let at = report.failed_step.and_then(|step| script.titles.get(step));
@@ -105,4 +109,17 @@ fn faults_and_recovery() {
 fn connection_abuse() {
     let (_, report) = run("connection-abuse.toml");
     assert!(report.axes[0].reached.expect("axis 1 ran").abs() < 0.002);
+}
+
+#[test]
+fn fixed_format() {
+    let (rig, report) = run_on("fixed-format.toml", Settings::fixed());
+    assert!(
+        (report.axes[0].reached.expect("axis 1 ran") - 10.25).abs() < 0.002,
+        "in the redefined reference"
+    );
+    let codes: Vec<u8> = report.axes[0].faults.kept().iter().map(|fault| fault.code).collect();
+    assert_eq!(codes.first(), Some(&60), "Illegal Control Mode\n{}", rig.log());
+    assert!(rig.log().contains("the class: read 32=[03] 33=[00]"), "{}", rig.log());
+    assert!(rig.log().contains("node fault: Data Format Error"), "{}", rig.log());
 }

@@ -6,6 +6,7 @@ use profile_cip::controller::config::{KeyExpectation, MAX_AXES, TimeOuts};
 use profile_cip::controller::limits::AxisLimits;
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AttributeSet, AxisSetup, ControllerConfig, Scaling};
+use profile_cip::wire::motion::Format;
 use profile_cip::wire::motion::codes::{
     ActualDataSet, CommandDataSet, CommandTarget, ControlMode, FeedbackMode, FeedbackSource, StatusDataSet,
     TimeDataSet,
@@ -68,6 +69,9 @@ const TIMES: &[(&str, TimeDataSet)] = &[
     ("update_diagnostics", TimeDataSet::UPDATE_DIAGNOSTICS),
     ("time_diagnostics", TimeDataSet::TIME_DIAGNOSTICS),
 ];
+const FORMATS: &[(&str, Format)] = &[("variable", Format::Variable), ("fixed", Format::Fixed)];
+/// Keys for which an update of the fixed format has no room.
+const VARIABLE_ONLY: [&str; 3] = ["grand_master", "size", "time_data"];
 const POSITION_TYPES: &[(&str, bool)] = &[("LREAL", false), ("DINT", true)];
 
 /// Time data of a list.
@@ -99,6 +103,30 @@ pub struct Places {
     pub target: Option<Ipv4Addr>,
     /// This controller's own address.
     pub bind: Option<Ipv4Addr>,
+}
+
+/// The format of the connection, ahead of everything else: what an axis has by itself follows from it. What is wrong with
+/// it is told with the rest of `[connection]`.
+pub(super) fn format(value: Option<&Value<'_>>) -> Format {
+    let named = value.and_then(|value| value.get_ref().as_table()).and_then(|table| table.get("format"));
+    let fixed = named.and_then(|value| value.get_ref().as_str()) == Some("fixed");
+    if fixed { Format::Fixed } else { Format::Variable }
+}
+
+/// The fixed format has no time stamps and one size.
+fn fixed(keys: &mut Keys<'_, '_>, config: &mut ControllerConfig) -> Option<()> {
+    let problems = keys.problems;
+    for key in VARIABLE_ONLY {
+        if let Some(value) = keys.find(key) {
+            let title = format_args!("`{key}` does not go with the fixed format");
+            return problems.report(value.span(), title, "expected it with format = \"variable\" only");
+        }
+    }
+    if let Some(value) = keys.find("synchronous").filter(|value| value.get_ref().as_bool() != Some(false)) {
+        return wrong(value, "synchronous", "false: the fixed format has no time stamps", problems);
+    }
+    config.set_fixed();
+    Some(())
 }
 
 /// Reads `[connection]` into the configuration.
@@ -134,25 +162,11 @@ pub(super) fn connection(
         };
         config.timeout_multiplier = u8::try_from(code).unwrap_or(DEFAULT_MULTIPLIER);
     }
-    let synchronous = keys.boolean_or("synchronous", true)?;
-    config.grand_master = match keys.find("grand_master") {
-        Some(value) => {
-            let bytes = hex(value, "grand_master", problems)?;
-            let Ok(id) = <[u8; 8]>::try_from(bytes.as_slice()) else {
-                return wrong(value, "grand_master", "8 bytes in hex", problems);
-            };
-            Some(id)
-        }
-        None => Some(setup::HOST_CLOCK),
-    }
-    .filter(|_| synchronous);
-    if let Some(value) = keys.find("size") {
-        config.connection_size = keys.in_range("size", value, &(50..=1400))?;
+    match keys.word_or("format", FORMATS, Format::Variable)? {
+        Format::Fixed => fixed(&mut keys, config)?,
+        Format::Variable => variable(&mut keys, config)?,
     }
     config.command_target = keys.word_or("command_target", TARGETS, CommandTarget::INTERPOLATE)?;
-    if let Some(value) = keys.find("time_data") {
-        config.time_data = time_data(value, problems)?;
-    }
     config.list_identity = keys.boolean_or("list_identity", true)?;
     config.update_delay_low_limit = keys.integer_or("late_after", 1..=255, 4)?;
     if let Some(value) = keys.find("give_up_after") {
@@ -173,6 +187,30 @@ pub(super) fn connection(
     }
     keys.finish()?;
     Some(places)
+}
+
+/// Synchronization, size and time data of the variable format.
+fn variable(keys: &mut Keys<'_, '_>, config: &mut ControllerConfig) -> Option<()> {
+    let problems = keys.problems;
+    let synchronous = keys.boolean_or("synchronous", true)?;
+    config.grand_master = match keys.find("grand_master") {
+        Some(value) => {
+            let bytes = hex(value, "grand_master", problems)?;
+            let Ok(id) = <[u8; 8]>::try_from(bytes.as_slice()) else {
+                return wrong(value, "grand_master", "8 bytes in hex", problems);
+            };
+            Some(id)
+        }
+        None => Some(setup::HOST_CLOCK),
+    }
+    .filter(|_| synchronous);
+    if let Some(value) = keys.find("size") {
+        config.connection_size = keys.in_range("size", value, &(50..=1400))?;
+    }
+    if let Some(value) = keys.find("time_data") {
+        config.time_data = time_data(value, problems)?;
+    }
+    Some(())
 }
 
 fn micros(period: DurationNs) -> u32 {
@@ -268,6 +306,7 @@ pub(super) struct MotionDefaults {
 /// Reads `[axis.N]`, from 1 on without gaps.
 pub(super) fn axes(
     value: Option<&Value<'_>>,
+    format: Format,
     dictionary: &CipDictionary,
     problems: &Problems,
 ) -> Option<Vec<(AxisSetup, MotionDefaults)>> {
@@ -285,7 +324,7 @@ pub(super) fn axes(
             good = false;
             continue;
         };
-        found[number - 1] = axis(value, dictionary, problems);
+        found[number - 1] = axis(value, format, dictionary, problems);
         good &= found[number - 1].is_some();
     }
     if !good {
@@ -305,6 +344,7 @@ pub(super) fn axes(
 
 fn axis(
     value: &Value<'_>,
+    format: Format,
     dictionary: &CipDictionary,
     problems: &Problems,
 ) -> Option<(AxisSetup, MotionDefaults)> {
@@ -323,6 +363,9 @@ fn axis(
     let source = keys.word_or("feedback", FEEDBACKS, FeedbackSource::MOTOR)?;
     let lint = keys.word_or("actual_position_type", &[("DINT", false), ("LINT", true)], false)?;
     setup.feedback_mode = FeedbackMode(source.0).with_lint(lint);
+    if format == Format::Fixed {
+        setup.sets = DataSets::fixed(setup.control_mode);
+    }
     setup.sets = data_sets(&mut keys, setup.sets)?;
     if let Some(value) = keys.find("limits") {
         setup.limits = limits(value, problems)?;

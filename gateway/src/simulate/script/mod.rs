@@ -135,7 +135,8 @@ fn read(table: &DeTable<'_>, source: &str, mapping: &Mapping, problems: &Problem
         None => None,
     };
     let unexpected = keys.word_or("unexpected_faults", &[("fail", true), ("ignore", false)], true);
-    let axes = connection::axes(keys.find("axis"), dictionary, problems);
+    let format = connection::format(table.get("connection"));
+    let axes = connection::axes(keys.find("axis"), format, dictionary, problems);
     let (setups, motion): (Vec<_>, Vec<_>) = axes.clone().unwrap_or_default().into_iter().unzip();
     let mut config = ControllerConfig::new(None, setups);
     let places = connection::connection(keys.find("connection"), &mut config, dictionary, problems);

@@ -2,7 +2,9 @@
 
 use super::*;
 use profile_cip::controller::Scaling;
-use profile_cip::wire::motion::codes::{AxisStatus, CommandTarget, ControlMode};
+use profile_cip::controller::sets::DataSets;
+use profile_cip::wire::motion::Format;
+use profile_cip::wire::motion::codes::{AxisStatus, CommandTarget, ControlMode, TimeDataSet};
 
 /// A head for the steps below; the first step begins on line 7.
 const HEAD: &str = "[connection]
@@ -128,6 +130,16 @@ fn a_head_with_something_wrong_is_shown_at_its_place() {
         "[connection\n[axis.1]",
         "[axis.1]\ncounts_per_unit = 1\ncounts_per_unit = 2",
         "unexpected_faults = \"maybe\"\n[axis.1]",
+        "[connection]\nformat = \"short\"\n[axis.1]",
+        "[connection]\nformat = \"fixed\"\nsynchronous = true\n[axis.1]",
+        "[connection]\nformat = \"fixed\"\nsize = 400\n[axis.1]",
+        "[connection]\nformat = \"fixed\"\ngrand_master = \"0011223344556677\"\n[axis.1]",
+        "[connection]\nformat = \"fixed\"\ntime_data = []\n[axis.1]",
+        "[connection]\nformat = \"fixed\"\n[axis.1]\n[axis.2]",
+        "[connection]\nformat = \"fixed\"\n[axis.1]\nstatus = [\"fault\"]",
+        "[connection]\nformat = \"fixed\"\n[axis.1]\nposition_type = \"LREAL\"",
+        "[connection]\nformat = \"fixed\"\n[axis.1]\nactual = [\"position\", \"velocity\"]",
+        "[connection]\nformat = \"fixed\"\n[axis.1]\nactual_position_type = \"LINT\"",
     ];
     let mapping = mapping();
     let table: String =
@@ -189,6 +201,50 @@ attributes = { \"Stopping Action\" = { value = \"Current Decel & Disable\", opti
 ",
     );
     insta::assert_debug_snapshot!((script.title, script.places, script.config));
+}
+
+/// A head of the fixed format; the first step begins on line 6.
+const FIXED: &str = "[connection]
+format = \"fixed\"
+[axis.1]
+mode = \"velocity\"
+counts_per_unit = 1000
+";
+
+#[test]
+fn the_fixed_format_has_its_own_head() {
+    let config = good(FIXED).config;
+    assert_eq!((config.format, config.connection_size, config.grand_master), (Format::Fixed, 18, None));
+    assert_eq!(config.axes[0].sets, DataSets::fixed(ControlMode::VELOCITY));
+    assert_eq!(config.time_data, TimeDataSet::empty());
+    let text = "[connection]\nformat = \"fixed\"\nsynchronous = false\n[axis.1]\nmode = \"velocity\"\nactual = [\"position\"]\n";
+    assert_eq!(good(text).config.axes[0].sets, DataSets::fixed(ControlMode::POSITION));
+}
+
+#[test]
+fn a_step_that_the_fixed_format_cannot_carry_is_shown_at_its_place() {
+    let steps = [
+        "cyclic_read_list = { axis = 1, attributes = [\"Axis State\"] }",
+        "arm = { axis = 1, events = [\"Reg 1 Pos Edge\"] }",
+        "expect_event = { axis = 1, type = \"Registration 1 Positive Edge\" }",
+        "time_data = []",
+        "data_sets = { axis = 1, status = [\"fault\"] }",
+        "data_sets = { axis = 1, actual = [\"position\", \"velocity\"] }",
+        "feedback = { axis = 1, source = \"motor\", actual_position_type = \"LINT\" }",
+        "misbehave = { stale_time_stamp = \"20 ms\" }",
+        "expect = { synchronous = true }",
+        "expect = { lost_updates = 2 }",
+        "expect = { axis = 1, status = [\"Torque Control Mode\"] }",
+        "expect_alarm = { axis = 1, code = 5 }",
+        "together = [{ enable = 1 }, { sequence = [{ time_data = [] }] }]",
+        "run_hookup_test = { axis = 1, type = \"feedback\", channel = 1, distance = 1.0, time = 2.0 }",
+    ];
+    let mapping = mapping();
+    let table: String = steps
+        .iter()
+        .map(|step| format!("{step}\n{}", problems(&format!("{FIXED}[[step]]\n{step}\n"), &mapping)))
+        .collect();
+    insta::assert_snapshot!(table);
 }
 
 #[test]
@@ -410,5 +466,5 @@ fn the_shipped_scripts_are_sound() {
         assert!(script.title.is_some() && script.steps.len() > 3, "{}", path.display());
         count += 1;
     }
-    assert_eq!(count, 4);
+    assert_eq!(count, 5);
 }
