@@ -199,6 +199,32 @@ impl Ratio {
     pub const fn then(self, next: Self) -> Option<Self> {
         Self::reduce(self.num as i128 * next.num as i128, self.den as i128 * next.den as i128)
     }
+
+    /// This ratio followed by `next`, as near to the product as 64 bits allow: off by less than one part in 2^62. For
+    /// units that are no fractions of each other anyway, a radian and a turn. `None` when the product is zero or beyond
+    /// 2^63 either way.
+    pub fn then_nearest(self, next: Self) -> Option<Self> {
+        if let Some(exact) = self.then(next) {
+            return Some(exact).filter(|ratio| ratio.num != 0);
+        }
+        let num = i128::from(self.num) * i128::from(next.num);
+        let den = i128::from(self.den) * i128::from(next.den);
+        let (mut upper, mut lower) = (num.unsigned_abs(), den.unsigned_abs());
+        // The last convergent of the continued fraction whose terms fit.
+        let (mut before, mut last) = ((0_u128, 1_u128), (1_u128, 0_u128));
+        while lower != 0 {
+            let whole = upper / lower;
+            let term = |last: u128, before: u128| {
+                let term = whole.checked_mul(last)?.checked_add(before)?;
+                i64::try_from(term).is_ok().then_some(term)
+            };
+            let (Some(num), Some(den)) = (term(last.0, before.0), term(last.1, before.1)) else { break };
+            (before, last) = (last, (num, den));
+            (upper, lower) = (lower, upper % lower);
+        }
+        let (top, bottom) = (i64::try_from(last.0).ok()?, i64::try_from(last.1).ok()?);
+        Self::new(if num < 0 { -top } else { top }, bottom).filter(|ratio| ratio.num != 0)
+    }
 }
 
 impl Default for Ratio {
@@ -307,6 +333,7 @@ const fn significant_bits(value: u128) -> u32 {
 
 #[cfg(test)]
 mod tests {
+
     use super::*;
     use proptest::prelude::*;
 
@@ -412,6 +439,28 @@ mod tests {
 
     fn any_ratio() -> impl Strategy<Value = Ratio> {
         (any::<i64>(), any::<i64>()).prop_filter_map("not a ratio", |(num, den)| Ratio::new(num, den))
+    }
+
+    /// Beyond 64 bits the nearest fraction is found, and its error is what it promises.
+    #[test]
+    fn products_beyond_64_bits_come_near() {
+        let radian = Ratio::new(78_256_779_000_000_000, 491_701_844).unwrap();
+        for gear in [(65_537, 7_919), (4_294_967_291, 4_294_967_279), (7, 4_294_967_291), (-13, 7)] {
+            for power in [Ratio::new(1, 1_000).unwrap(), Ratio::new(100, 1).unwrap()] {
+                let gear = Ratio::new(gear.0, gear.1).unwrap();
+                let near = radian.then_nearest(gear).unwrap().then_nearest(power).unwrap();
+                let exact = 78_256_779e9 / 491_701_844.0 * gear.num as f64 / gear.den as f64
+                    * power.num as f64
+                    / power.den as f64;
+                let got = near.num as f64 / near.den as f64;
+                assert!(((got - exact) / exact).abs() < 1e-15, "{near}: {got} for {exact}");
+            }
+        }
+        let large = Ratio::new(i64::MAX, 1).unwrap();
+        assert_eq!(large.then_nearest(large), None);
+        assert_eq!(large.inverse().unwrap().then_nearest(large.inverse().unwrap()), None);
+        assert_eq!(large.then_nearest(Ratio::new(0, 1).unwrap()), None);
+        assert_eq!(large.then_nearest(large.inverse().unwrap()), Some(Ratio::ONE));
     }
 
     proptest! {

@@ -16,6 +16,7 @@ use super::file::{
     AxisTable, DeviceTable, DriveTable, File, IdentityTable, LimitsTable, RealtimeTable, SercosTable,
     UpdatePeriodTable,
 };
+use super::rated;
 use super::{
     AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link,
     LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
@@ -749,7 +750,19 @@ impl Checker {
     fn drive(&mut self, table: &DriveTable) -> Option<Drive> {
         let name = self.name("drive", &table.name);
         let address = self.number(&table.address, "the SERCOS address", 1..=SERCOS_ADDRESS_MAX);
-        Some(Drive { name: name?, address: address?, set_scaling: table.set_scaling.unwrap_or(false) })
+        let rated = match &table.rated_torque {
+            None => Some(None),
+            Some(text) => match rated::parse(text.get_ref()) {
+                Some(rated) => Some(Some(rated)),
+                None => self.report(
+                    text.span(),
+                    format_args!("`{}` is no torque or force", text.get_ref()),
+                    rated::EXPECTED,
+                ),
+            },
+        };
+        let set_scaling = table.set_scaling.unwrap_or(false);
+        Some(Drive { name: name?, address: address?, set_scaling, rated: rated? })
     }
 
     /// A name that other parts of the file refer to.

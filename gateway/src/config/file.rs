@@ -251,4 +251,7 @@ pub struct DriveTable {
     /// Whether the drive's scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
     /// Default: false.
     pub set_scaling: Option<bool>,
+    /// Rated (continuous stall) torque or force of its motor, such as `"2.5 Nm"` or `"200 N"`: needed where the drive's
+    /// torque values are in newton metre, newton or their inch units. Default: not known.
+    pub rated_torque: Option<Spanned<String>>,
 }

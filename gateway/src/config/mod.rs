@@ -9,6 +9,7 @@ mod connection_format;
 mod diagnostic;
 pub(crate) mod duration;
 pub mod file;
+mod rated;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ use profile_generic::time::DurationNs;
 pub use diagnostic::{ConfigError, Diagnostic, Report};
 pub(crate) use diagnostic::{Problem, diagnose};
 
-use crate::mapping::CaptureMode;
+use crate::mapping::{CaptureMode, Rated};
 use crate::sys::realtime;
 
 /// Axes of one box: what its status block, its recorder and its cycle have room for.
@@ -349,6 +350,8 @@ pub struct Drive {
     pub address: u16,
     /// Whether its scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
     pub set_scaling: bool,
+    /// Rated torque or force of its motor, where it is known.
+    pub rated: Option<Rated>,
 }
 
 #[cfg(test)]

@@ -149,7 +149,7 @@ fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
         .iter()
         .map(|axis| {
             let drive = &sercos.drives[axis.drive];
-            (drive.address, needs(axis, drive.set_scaling))
+            (drive.address, needs(axis, drive))
         })
         .collect();
     Ok(SercosBus::new(master, drives)?)
@@ -163,7 +163,7 @@ fn kind(axis: &Axis) -> UnitKind {
 }
 
 /// What the commissioning has to achieve.
-fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
+fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
     let limits = &axis.limits;
     let mut parameters = Vec::new();
     let mut limit =
@@ -174,7 +174,7 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
     limit(Parameter::TORQUE_LIMIT_NEGATIVE, limits.torque.map(|value| -value.0));
     limit(Parameter::POSITION_ERROR_TOLERANCE, limits.following_error.map(|value| value.0));
     SercosAxis {
-        units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated_torque: None },
+        units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: drive.rated },
         // A drive that is only looked at is set up in one mode, because its telegram belongs to one; it is never on.
         modes: match axis.function {
             AxisFunction::Drive => [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
@@ -185,7 +185,7 @@ fn needs(axis: &Axis, set_scaling: bool) -> SercosAxis {
             }
         },
         modulo: false,
-        set_scaling,
+        set_scaling: drive.set_scaling,
         parameters,
         captures: axis.events,
     }

@@ -402,20 +402,16 @@ impl SercosBus {
             drive.stage = Stage::Ready;
             let taken = match failure {
                 Some(failure) => {
-                    notice(Notice::Commissioning { axis: index(axis), failure });
+                    notice(Notice::Commissioning { axis: index(axis), address: drive.address, failure });
                     false
                 }
                 None if phase == Phase::CP2 => drive.connect(axis, mapping, &mut self.master, slave, notice),
-                None => match mapping.sercos_program(&drive.needs, &drive.facts) {
-                    Ok(program) => {
-                        axes[axis].set_south(program);
-                        true
+                None => {
+                    for difference in drive.facts.differences(&mapping.dictionaries.sercos) {
+                        notice(Notice::Difference { axis: index(axis), difference });
                     }
-                    Err(error) => {
-                        notice(Notice::Program { axis: index(axis), error });
-                        false
-                    }
-                },
+                    drive.take(axis, mapping, axes, notice)
+                }
             };
             if !taken {
                 // The others go on without it.
@@ -493,6 +489,26 @@ impl SercosBus {
 }
 
 impl Drive {
+    /// Gives the axis the program of its drive, once all is known of it.
+    fn take(
+        &self,
+        axis: usize,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) -> bool {
+        match mapping.sercos_program(&self.needs, &self.facts) {
+            Ok(program) => {
+                axes[axis].set_south(program);
+                true
+            }
+            Err(error) => {
+                notice(Notice::Program { axis: index(axis), address: self.address, error });
+                false
+            }
+        }
+    }
+
     fn lose(&mut self) {
         self.slave = None;
         self.stage = Stage::Absent;
@@ -502,7 +518,7 @@ impl Drive {
         match mapping.commissioning(&self.needs, phase, &self.facts) {
             Ok(plan) => self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan))),
             Err(error) => {
-                notice(Notice::Program { axis: index(axis), error });
+                notice(Notice::Program { axis: index(axis), address: self.address, error });
                 self.lose();
             }
         }
@@ -520,7 +536,7 @@ impl Drive {
         let telegram = match mapping.telegram(&self.needs, &self.facts) {
             Ok(telegram) => telegram,
             Err(error) => {
-                notice(Notice::Program { axis: index(axis), error });
+                notice(Notice::Program { axis: index(axis), address: self.address, error });
                 return false;
             }
         };
@@ -530,7 +546,7 @@ impl Drive {
         for (instance, slave_produces, idns) in both {
             let Some(connection) = ConnectionConfig::new(instance, slave_produces, idns) else {
                 let error = crate::mapping::SercosError::Full("a connection");
-                notice(Notice::Program { axis: index(axis), error });
+                notice(Notice::Program { axis: index(axis), address: self.address, error });
                 return false;
             };
             connections.push(ConnectionConfig { allowed_losses: self.allowed_losses, ..connection });

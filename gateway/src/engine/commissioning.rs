@@ -5,7 +5,9 @@
 
 use profile_sercos::master::Master;
 use profile_sercos::master::event::{SlaveId, Ticket};
-use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
+use profile_sercos::master::svc::request::{
+    Shape, SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest,
+};
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
@@ -35,6 +37,8 @@ pub struct Commissioning {
     at: usize,
     /// The value of a write, or the element of a read, under way.
     part: usize,
+    /// How that element is transferred, where the attribute has told it.
+    shape: Option<Shape>,
     ticket: Option<Ticket>,
     failure: Option<StepFailure>,
     /// Steps that failed and were allowed to.
@@ -89,21 +93,35 @@ impl Commissioning {
         self.ticket = None;
         match &outcome.result {
             Ok(reply) => {
-                // On the way to the data the master reads it by itself; asked for alone it is the data.
-                let alone = outcome.operation == SvcOperation::Read(Element::Attribute);
-                let alone = outcome.data.as_slice().first_chunk().filter(|_| alone);
-                let attribute = alone.map(|bytes| Attribute(u32::from_le_bytes(*bytes)));
-                if let Some(attribute) = reply.attribute.or(attribute) {
-                    facts.note_attribute(outcome.idn, attribute);
+                let (idn, bytes) = (outcome.idn, outcome.data.as_slice());
+                // On the way to other elements the master reads it by itself.
+                if let Some(attribute) = reply.attribute {
+                    facts.note_attribute(idn, attribute);
                 }
-                let data = matches!(
+                match outcome.operation {
+                    SvcOperation::Read(Element::Attribute) => {
+                        if let Some(word) = bytes.first_chunk() {
+                            facts.note_attribute(idn, Attribute(u32::from_le_bytes(*word)));
+                        }
+                    }
+                    SvcOperation::Read(Element::Unit) => facts.note_unit(idn, bytes),
+                    SvcOperation::Read(Element::Minimum) => facts.note_limit(idn, false, bytes),
+                    SvcOperation::Read(Element::Maximum) => facts.note_limit(idn, true, bytes),
+                    SvcOperation::Read(Element::Data) | SvcOperation::Write(Element::Data) => {
+                        facts.note_data(idn, bytes);
+                    }
+                    _ => {}
+                }
+                self.next_part(facts);
+            }
+            // An element that is not there tells nothing; the drive may have the parameter all the same.
+            Err(SvcFailure::Refused { .. })
+                if matches!(
                     outcome.operation,
-                    SvcOperation::Read(Element::Data) | SvcOperation::Write(Element::Data)
-                );
-                if data {
-                    facts.note_data(outcome.idn, outcome.data.as_slice());
-                }
-                self.next_step();
+                    SvcOperation::Read(Element::Unit | Element::Minimum | Element::Maximum)
+                ) =>
+            {
+                self.next_part(facts);
             }
             Err(failure) => {
                 if failure.is_absent() {
@@ -121,12 +139,14 @@ impl Commissioning {
                 let data = SvcData::inline(candidates.get(self.part)?)?;
                 Some(SvcRequest::write(*idn, data))
             }
-            Step::Read { idn, attribute, data, .. } => match self.part {
-                // Reading the data reads the attribute first, so that one request serves both.
-                0 if *data => Some(SvcRequest::read(*idn).with_buffer(Vec::with_capacity(BUFFER_LEN))),
-                0 if *attribute => Some(SvcRequest::new(*idn, SvcOperation::Read(Element::Attribute))),
-                _ => None,
-            },
+            Step::Read { idn, elements, .. } => {
+                let request = SvcRequest::new(*idn, SvcOperation::Read(*elements.get(self.part)?));
+                let request = request.with_buffer(Vec::with_capacity(BUFFER_LEN));
+                Some(match self.shape {
+                    Some(shape) => request.with_shape(shape),
+                    None => request,
+                })
+            }
             Step::Command { idn, .. } => (self.part == 0).then(|| SvcRequest::command(*idn)),
         }
     }
@@ -134,6 +154,29 @@ impl Commissioning {
     fn next_step(&mut self) {
         self.at += 1;
         self.part = 0;
+        self.shape = None;
+    }
+
+    /// On to the next element of a read, or to the next step.
+    fn next_part(&mut self, facts: &DriveFacts) {
+        let Some(Step::Read { idn, elements, .. }) = self.plan.steps.get(self.at) else {
+            self.next_step();
+            return;
+        };
+        self.part += 1;
+        let attribute = facts.attribute(*idn);
+        let variable = attribute.is_some_and(|attribute| attribute.is_list());
+        // A text or a list has no smallest and largest value.
+        let limit = |element: Option<&Element>| matches!(element, Some(Element::Minimum | Element::Maximum));
+        while variable && limit(elements.get(self.part)) {
+            self.part += 1;
+        }
+        self.shape = attribute.filter(|_| elements.get(self.part) != Some(&Element::Unit)).map(|attribute| {
+            if variable { Shape::List } else { Shape::Fixed(attribute.item_length().bytes()) }
+        });
+        if self.part >= elements.len() {
+            self.next_step();
+        }
     }
 
     fn failed(&mut self, idn: Idn, failure: SvcFailure) {

@@ -11,7 +11,7 @@ use profile_sercos::master::event::Event;
 
 use super::axis::Loss;
 use super::commissioning::StepFailure;
-use crate::mapping::SercosError;
+use crate::mapping::{Difference, SercosError};
 
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,6 +41,8 @@ pub enum Notice {
     Commissioning {
         /// The axis.
         axis: u8,
+        /// The SERCOS address of its drive.
+        address: u16,
         /// What failed.
         failure: StepFailure,
     },
@@ -55,8 +57,17 @@ pub enum Notice {
     Program {
         /// The axis.
         axis: u8,
+        /// The SERCOS address of its drive.
+        address: u16,
         /// Why.
         error: SercosError,
+    },
+    /// The drive says of a parameter what the dictionary does not say; the drive is followed.
+    Difference {
+        /// The axis.
+        axis: u8,
+        /// What differs.
+        difference: Difference,
     },
     /// An axis changed its generic state.
     State {
@@ -143,6 +154,7 @@ impl Notice {
             | Self::Commissioning { axis, .. }
             | Self::PassedOver { axis, .. }
             | Self::Program { axis, .. }
+            | Self::Difference { axis, .. }
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
             | Self::Fault { axis, .. }
@@ -160,11 +172,17 @@ impl fmt::Display for Notice {
             Self::DriveMissing { address, .. } => {
                 write!(f, "expected a drive with SERCOS address {address} on the bus, found none")
             }
-            Self::Commissioning { failure, .. } => {
-                write!(f, "commissioning failed: {failure}; the drive is left out")
+            Self::Commissioning { address, failure, .. } => {
+                write!(
+                    f,
+                    "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
+                )
             }
             Self::PassedOver { failure, .. } => write!(f, "commissioning goes on without: {failure}"),
-            Self::Program { error, .. } => write!(f, "the drive cannot be used: {error}; it is left out"),
+            Self::Program { address, error, .. } => {
+                write!(f, "the drive with SERCOS address {address} cannot be used: {error}; it is left out")
+            }
+            Self::Difference { difference, .. } => write!(f, "{difference}; the drive is followed"),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),

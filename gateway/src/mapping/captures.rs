@@ -11,7 +11,7 @@ use profile_sercos::wire::idn::Idn;
 
 use super::compile_sercos::{Compiler, SercosAxis, Telegram};
 use super::dictionary::SercosDictionary;
-use super::scaling::DriveFacts;
+use super::drive_facts::DriveFacts;
 use super::sercos_tables::SercosTables;
 
 /// Latches, counters and inputs of a drive, each.
@@ -108,6 +108,13 @@ fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
     } else {
         data.chunks_exact(2).any(|item| idn.0.to_le_bytes() == [item[0], item[1], 0, 0])
     }
+}
+
+/// Whether a value that an axis can do without may stand in a telegram: the drive has it, and the list of what it takes
+/// there, if it has one, names it.
+pub(super) fn may_be_cyclic(tables: &SercosTables, facts: &DriveFacts, idn: Idn, to_drive: bool) -> bool {
+    let list = tables.configurable[usize::from(to_drive)];
+    !facts.is_missing(idn) && (facts.data(list).is_none() || is_listed(list, idn, facts))
 }
 
 /// Puts what the drive allows into the telegrams.
@@ -368,7 +375,7 @@ impl Compiler<'_> {
             place,
             to_generic: Conversion::new(lsb.generic),
             to_drive: Conversion::new(lsb.generic.inverse()?),
-            modulo: lsb.modulo.unwrap_or(whole),
+            modulo: lsb.modulo.map_or(whole, |(range, _)| range),
         })
     }
 }

@@ -2,12 +2,20 @@
 
 use profile_generic::program::Width;
 use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::svc::Element;
 
 use super::captures::{self, CaptureMode};
 use super::compile_sercos::{Compiler, SercosAxis, SercosError, Telegram, mode_rules};
 use super::dictionary::SercosDictionary;
-use super::scaling::DriveFacts;
-use super::sercos_tables::{SercosTables, StepKind, StepRule};
+use super::drive_facts::DriveFacts;
+use super::sercos_tables::{Elements, SercosTables, StepKind, StepRule};
+
+/// Elements that say what a value means.
+const DESCRIPTION: [Element; 4] = [Element::Attribute, Element::Unit, Element::Minimum, Element::Maximum];
+
+/// The same, and the value.
+const ALL: [Element; 5] =
+    [Element::Attribute, Element::Unit, Element::Minimum, Element::Maximum, Element::Data];
 
 /// What happens when a drive refuses a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,15 +38,13 @@ pub enum Step {
         /// What happens when it refuses all.
         refused: Refused,
     },
-    /// Reads elements 3 and 7 and notes them in the [`DriveFacts`].
+    /// Reads elements and notes them in the [`DriveFacts`].
     Read {
         /// The parameter.
         idn: Idn,
-        /// Element 3.
-        attribute: bool,
-        /// Element 7.
-        data: bool,
-        /// What happens when the drive refuses.
+        /// The elements, in this order. A drive may do without unit, minimum and maximum.
+        elements: Elements,
+        /// What happens when the drive refuses element 3 or 7.
         refused: Refused,
     },
     /// Executes a procedure command.
@@ -89,7 +95,12 @@ fn applies(rule: &StepRule, axis: &SercosAxis) -> bool {
 impl Compiler<'_> {
     fn step(&self, rule: &StepRule, steps: &mut Vec<Step>) -> Result<(), SercosError> {
         let refused = if rule.fail { Refused::Fail } else { Refused::Continue };
-        match rule.kind {
+        let read = |steps: &mut Vec<Step>, idns: Vec<Idn>, elements: &[Element]| {
+            for idn in idns {
+                steps.push(Step::Read { idn, elements: elements.iter().copied().collect(), refused });
+            }
+        };
+        match rule.kind.clone() {
             StepKind::WriteValue(idn, value) => {
                 let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
                 let candidates = vec![encode(idn, value, width)?];
@@ -101,8 +112,16 @@ impl Compiler<'_> {
                 for ((_, generic), rule) in values.zip(rules) {
                     let Some(entry) = self.parameter(rule)? else { continue };
                     let Some(conversion) = entry.to_drive else { continue };
-                    let value = conversion.convert(*generic).value;
-                    let candidates = vec![encode(entry.idn, value, entry.width)?];
+                    let outcome = conversion.convert(*generic);
+                    if outcome.saturated {
+                        let unlimited = conversion.within(i64::MIN, i64::MAX).convert(*generic).value;
+                        return Err(SercosError::Limit {
+                            idn: entry.idn,
+                            value: unlimited,
+                            limits: (conversion.min, conversion.max),
+                        });
+                    }
+                    let candidates = vec![encode(entry.idn, outcome.value, entry.width)?];
                     steps.push(Step::Write { idn: entry.idn, candidates, refused });
                 }
             }
@@ -112,9 +131,7 @@ impl Compiler<'_> {
                     steps.push(Step::Write { idn: slot.idn, candidates, refused });
                 }
             }
-            StepKind::Read { idn, attribute, data } => {
-                steps.push(Step::Read { idn, attribute, data, refused })
-            }
+            StepKind::Read { idn, elements } => steps.push(Step::Read { idn, elements, refused }),
             StepKind::ReadScaling => {
                 let mut idns: Vec<Idn> = Vec::new();
                 for idn in self.tables.scalings.iter().flat_map(|rule| rule.idns()) {
@@ -122,21 +139,21 @@ impl Compiler<'_> {
                         idns.push(idn);
                     }
                 }
-                for idn in idns {
-                    steps.push(Step::Read { idn, attribute: true, data: true, refused });
-                }
+                idns.extend(self.tables.polarity_idns());
+                read(steps, idns, &ALL);
             }
             StepKind::ReadTelegram => {
                 let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
-                for idn in telegram.command.into_iter().chain(telegram.feedback) {
-                    steps.push(Step::Read { idn, attribute: true, data: false, refused });
-                }
+                read(steps, telegram.command.into_iter().chain(telegram.feedback).collect(), &DESCRIPTION);
             }
-            StepKind::ReadCaptures => {
-                for idn in captures::idns(self.tables) {
-                    steps.push(Step::Read { idn, attribute: true, data: false, refused });
-                }
+            StepKind::ReadParameters => {
+                // What is in a telegram was read for it.
+                let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
+                let cyclic = |idn: &Idn| telegram.command.contains(idn) || telegram.feedback.contains(idn);
+                let idns = self.tables.parameters.iter().map(|rule| rule.idn).filter(|idn| !cyclic(idn));
+                read(steps, idns.collect(), &DESCRIPTION);
             }
+            StepKind::ReadCaptures => read(steps, captures::idns(self.tables), &DESCRIPTION),
             StepKind::Command(idn) => steps.push(Step::Command { idn, refused }),
         }
         Ok(())

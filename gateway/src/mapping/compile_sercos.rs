@@ -10,14 +10,15 @@ use profile_generic::program::{
     StateTable, Trackers, Width,
 };
 use profile_generic::quantity::Quantity;
-use profile_generic::ratio::Ratio;
+use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
 
 use super::captures::{self, CaptureMode, CaptureProgram};
 use super::dictionary::{IdnUnit, SercosDictionary};
-use super::scaling::{AxisUnits, DriveFacts, Lsb, ScalingError, power_of_ten};
-use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, SercosTables};
+use super::drive_facts::DriveFacts;
+use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
+use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, Polarity, SercosTables};
 
 /// Operating modes of one axis: the slots S-0-0032..35.
 pub const MAX_MODES: usize = 4;
@@ -98,6 +99,16 @@ pub enum SercosError {
     /// A table does not fit the program.
     #[error("{0} does not fit the program of an axis")]
     Full(&'static str),
+    /// A value beyond the minimum or maximum that the drive gives.
+    #[error("{idn}: expected {} to {} by elements 5 and 6 of the drive, got {value}", limits.0, limits.1)]
+    Limit {
+        /// The IDN.
+        idn: Idn,
+        /// The value in the drive's unit.
+        value: i64,
+        /// Minimum and maximum.
+        limits: (i64, i64),
+    },
     /// A value that the parameter of the drive cannot hold.
     #[error("{idn}: {value} does not fit a {width}")]
     Range {
@@ -177,6 +188,7 @@ pub struct SercosProgram {
     captures: CaptureProgram,
     parameters: Vec<ParameterEntry>,
     rejected: Vec<Parameter>,
+    position_step: Option<i64>,
 }
 
 impl Telegram {
@@ -226,10 +238,11 @@ fn signals(
                 if list.iter().any(|(known, _)| *known == signal) {
                     continue;
                 }
-                match (facts.is_missing(row.idn), row.refuse) {
-                    (true, true) => return Err(SercosError::Missing { idn: row.idn, signal }),
-                    (true, false) => {}
-                    (false, _) => list.push((signal, row.idn)),
+                if row.refuse && facts.is_missing(row.idn) {
+                    return Err(SercosError::Missing { idn: row.idn, signal });
+                }
+                if row.refuse || captures::may_be_cyclic(tables, facts, row.idn, signal.is_command()) {
+                    list.push((signal, row.idn));
                 }
             }
         }
@@ -263,24 +276,68 @@ pub(super) fn unit_of(
     idn: Idn,
     quantity: Quantity,
 ) -> Result<Lsb, SercosError> {
-    let plain = Lsb { quantity, generic: Ratio::ONE, modulo: None };
+    let plain = Lsb { quantity, generic: Ratio::ONE, zero: 0, modulo: None };
     let row = dictionary.idn(idn);
     match row.map(|row| &row.unit) {
         None | Some(IdnUnit::None) => Ok(plain),
         Some(IdnUnit::Fixed { unit, decimals }) => {
-            let found = tables.units.iter().find(|(known, of, _)| known == unit && *of == quantity);
-            let (_, _, ratio) = found.ok_or_else(|| ScalingError::Unknown(unit.clone()))?;
-            let decimals = facts.attribute(idn).map_or(*decimals, |attribute| attribute.decimals());
-            let power = power_of_ten(idn, -i64::from(decimals))?;
-            let generic = ratio.then(power).ok_or(ScalingError::Overflow(idn))?;
+            let generic = fixed_unit(tables, facts, idn, quantity, Some((unit, *decimals)))?;
             Ok(Lsb { generic, ..plain })
         }
         Some(IdnUnit::Scaled(scaling)) => {
             let rule = tables.scalings.iter().find(|rule| rule.scaling == *scaling);
             let rule = rule.ok_or_else(|| ScalingError::Unknown(scaling.clone()))?;
-            Ok(rule.lsb(units, facts, dictionary)?)
+            let feed = |idn| feed_constant(tables, dictionary, facts, idn);
+            Ok(rule.lsb(&ScalingSource { axis: units, facts, dictionary, feed: &feed })?)
         }
     }
+}
+
+/// Generic units in one count of a value whose unit does not follow from scaling parameters. The drive's elements 3 and
+/// 4 count more than the dictionary.
+fn fixed_unit(
+    tables: &SercosTables,
+    facts: &DriveFacts,
+    idn: Idn,
+    quantity: Quantity,
+    dictionary: Option<(&String, u8)>,
+) -> Result<Ratio, SercosError> {
+    let mut units = tables.units.iter().filter(|known| known.quantity == quantity);
+    let found = match (facts.unit(idn), dictionary) {
+        (Some(text), _) => units.find(|known| known.is(text)).ok_or_else(|| ScalingError::Unit {
+            idn,
+            expected: quantity,
+            got: text.to_owned(),
+        })?,
+        (None, Some((unit, _))) => {
+            units.find(|known| known.unit == *unit).ok_or_else(|| ScalingError::Unknown(unit.clone()))?
+        }
+        (None, None) => return Err(ScalingError::NotRead(idn).into()),
+    };
+    let decimals = dictionary.map_or(0, |(_, decimals)| decimals);
+    let decimals = facts.attribute(idn).map_or(decimals, |attribute| attribute.decimals());
+    let power = power_of_ten(idn, -i64::from(decimals))?;
+    Ok(found.ratio.then(power).ok_or(ScalingError::Overflow(idn))?)
+}
+
+/// Nanounits that a linear load moves in a nanoturn.
+fn feed_constant(
+    tables: &SercosTables,
+    dictionary: &SercosDictionary,
+    facts: &DriveFacts,
+    idn: Idn,
+) -> Result<Ratio, ScalingError> {
+    let value = facts.number(idn, dictionary).ok_or(ScalingError::NotRead(idn))?;
+    let value = Ratio::new(above_zero(idn, value)?, 1).ok_or(ScalingError::Overflow(idn))?;
+    let unit = match dictionary.idn(idn).map(|row| &row.unit) {
+        Some(IdnUnit::Fixed { unit, decimals }) => Some((unit, *decimals)),
+        _ => None,
+    };
+    let unit = fixed_unit(tables, facts, idn, Quantity::None, unit).map_err(|error| match error {
+        SercosError::Scaling(error) => error,
+        _ => ScalingError::NotRead(idn),
+    })?;
+    value.then(unit).ok_or(ScalingError::Overflow(idn))
 }
 
 impl SercosProgram {
@@ -309,8 +366,10 @@ impl SercosProgram {
             captures: CaptureProgram::default(),
             parameters: Vec::new(),
             rejected: Vec::new(),
+            position_step: None,
         };
         let compiler = Compiler { tables, dictionary, axis, facts };
+        program.position_step = compiler.position_step()?;
         let mut offset = WORD_BYTES;
         for (signal, idn) in command_signals {
             let field = compiler.field(signal, idn, &mut offset)?;
@@ -458,6 +517,12 @@ impl SercosProgram {
         self.rejected.contains(&parameter)
     }
 
+    /// The longest way from one position command to the next: in a drive that works modulo a longer one would lead the
+    /// other way round. Nanounits.
+    pub fn position_step(&self) -> Option<i64> {
+        self.position_step
+    }
+
     /// The drive's captures.
     pub fn captures(&self) -> &CaptureProgram {
         &self.captures
@@ -484,17 +549,55 @@ impl Compiler<'_> {
     fn field(&self, signal: Signal, idn: Idn, offset: &mut u16) -> Result<Field, SercosError> {
         let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
         let lsb = self.unit(idn, signal.quantity())?;
-        let absolute = signal.quantity() == Quantity::Position && signal != Signal::FollowingError;
-        let (ratio, modulo) = if signal.is_command() {
-            // An absolute position that leaves the range of the drive is clamped and reported.
-            (lsb.generic.inverse().ok_or(ScalingError::Overflow(idn))?, lsb.modulo.filter(|_| absolute))
+        let absolute = signal.quantity() == Quantity::Position
+            && !matches!(signal, Signal::FollowingError | Signal::PositionOffset);
+        let wraps = lsb.modulo.filter(|_| absolute);
+        if let Some((value, idn)) = wraps
+            && value - 1 > width.range().1
+        {
+            let expected = "a range whose end fits the length of the position";
+            return Err(ScalingError::Value { idn, expected, value }.into());
+        }
+        let wraps = wraps.map(|(range, _)| range);
+        let generic = if self.is_inverted(signal)? { negative(lsb.generic) } else { Some(lsb.generic) };
+        let generic = generic.ok_or(ScalingError::Overflow(idn))?;
+        let (conversion, modulo) = if signal.is_command() {
+            // What leaves the range of the drive is clamped and reported.
+            let to_drive = to_drive(idn, generic, lsb.zero)?;
+            let limits = self.facts.limits(idn, self.dictionary).filter(|_| wraps.is_none());
+            (limits.map_or(to_drive, |(min, max)| to_drive.within(min, max)), wraps)
         } else {
-            let range = (width.bits() == 32).then_some(FULL_RANGE);
-            (lsb.generic, lsb.modulo.or(range).filter(|_| absolute))
+            let range = (width.bits() == 32).then_some(FULL_RANGE).filter(|_| absolute);
+            (from_drive(idn, generic, lsb.zero)?, wraps.or(range))
         };
-        let field = Field { signal, offset: *offset, width, conversion: Conversion::new(ratio), modulo };
+        let field = Field { signal, offset: *offset, width, conversion, modulo };
         *offset += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
         Ok(field)
+    }
+
+    /// Whether the sign of a value in the telegram is not that of the axis: the drive inverts each value by a bit of its
+    /// own, and the axis goes the way of the actual position.
+    fn is_inverted(&self, signal: Signal) -> Result<bool, SercosError> {
+        let rule = self.tables.signal(signal).and_then(|rule| rule.polarity);
+        let Some((own, axis)) = rule.zip(self.tables.direction) else { return Ok(false) };
+        let bit = |polarity: Polarity| match self.facts.number(polarity.idn, self.dictionary) {
+            Some(word) => Ok(word >> polarity.bit & 1 != 0),
+            None if self.facts.is_missing(polarity.idn) => Ok(false),
+            None => Err(ScalingError::NotRead(polarity.idn)),
+        };
+        Ok(bit(own)? != bit(axis)?)
+    }
+
+    /// The longest step of a position command that leads a drive with modulo positions the way that is meant.
+    fn position_step(&self) -> Result<Option<i64>, SercosError> {
+        let Some(rule) = self.tables.signal(Signal::PositionCommand) else { return Ok(None) };
+        if self.facts.is_missing(rule.idn) {
+            return Ok(None);
+        }
+        let lsb = self.unit(rule.idn, Quantity::Position)?;
+        // One count less than half, for the rounding of both ends.
+        let half = lsb.modulo.map(|(range, _)| range / 2 - 1);
+        Ok(half.map(|half| lsb.generic.convert(half, Rounding::Floor).value))
     }
 
     /// The entry of a parameter; `None` when the drive lacks it or does not tell its unit.
@@ -502,8 +605,15 @@ impl Compiler<'_> {
         if self.facts.is_missing(rule.idn) {
             return Ok(None);
         }
-        let Some(width) = self.facts.width(rule.idn, self.dictionary) else { return Ok(None) };
-        let lsb = match self.unit(rule.idn, rule.quantity) {
+        let width = self.facts.width(rule.idn, self.dictionary).filter(|width| !width.is_float());
+        let Some(width) = width else { return Ok(None) };
+        let unit = if rule.unit_by_drive {
+            let generic = fixed_unit(self.tables, self.facts, rule.idn, rule.quantity, None);
+            generic.map(|generic| Lsb { quantity: rule.quantity, generic, zero: 0, modulo: None })
+        } else {
+            self.unit(rule.idn, rule.quantity)
+        };
+        let lsb = match unit {
             Ok(lsb) => lsb,
             // A quantity that no mode needs may well be unscaled: the parameter is served as if it were
             // missing.
@@ -511,15 +621,32 @@ impl Compiler<'_> {
             Err(error) => return Err(error),
         };
         let overflow = || ScalingError::Overflow(rule.idn);
-        let from_drive =
-            lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
-        let to_drive = from_drive.inverse().ok_or_else(overflow)?;
+        let ratio = lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
+        let limits = self.facts.limits(rule.idn, self.dictionary).unwrap_or(width.range());
+        let outward = to_drive(rule.idn, ratio, lsb.zero)?.within(limits.0, limits.1);
+        let inward = from_drive(rule.idn, ratio, lsb.zero)?;
         Ok(Some(ParameterEntry {
             parameter: rule.parameter,
             idn: rule.idn,
             width,
-            to_drive: rule.to_drive.then(|| Conversion::new(to_drive)),
-            from_drive: rule.from_drive.then(|| Conversion::new(from_drive)),
+            to_drive: rule.to_drive.then_some(outward),
+            from_drive: rule.from_drive.then_some(inward),
         }))
     }
+}
+
+fn negative(ratio: Ratio) -> Option<Ratio> {
+    Ratio::new(ratio.num().checked_neg()?, ratio.den())
+}
+
+/// From the generic unit to counts.
+fn to_drive(idn: Idn, generic: Ratio, zero: i64) -> Result<Conversion, ScalingError> {
+    let ratio = generic.inverse().ok_or(ScalingError::Overflow(idn))?;
+    Ok(Conversion::new(ratio).with_offset(zero))
+}
+
+/// From counts to the generic unit. A zero that is no whole number there is rounded.
+fn from_drive(idn: Idn, generic: Ratio, zero: i64) -> Result<Conversion, ScalingError> {
+    let offset = generic.apply(zero, Rounding::Nearest).map_err(|_| ScalingError::Overflow(idn))?;
+    Ok(Conversion::new(generic).with_offset(-offset))
 }

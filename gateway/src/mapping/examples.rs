@@ -14,7 +14,7 @@ use super::compile_sercos::{Compiler, unit_of};
 use super::format::{CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow};
 use super::load::{TableText, Tables};
 use super::{
-    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Reference,
+    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Rated, Reference,
     SercosAxis,
 };
 
@@ -244,7 +244,11 @@ impl Mapping {
                 facts.width(idn, sercos).ok_or_else(|| wrong(format!("{idn} is not in the dictionary")))?;
             facts.note_data(idn, value.to_le_bytes().get(..width.bytes()).unwrap_or_default());
         }
-        let units = AxisUnits { kind, reference: Reference::Load, rated_torque: example.rated };
+        let units = AxisUnits {
+            kind,
+            reference: Reference::Load,
+            rated: example.rated.map(|value| Rated { kind, value }),
+        };
         let idn: Idn = example.idn.get_ref().parse().map_err(|error| wrong(format!("{error}")))?;
         let axis = SercosAxis {
             units,

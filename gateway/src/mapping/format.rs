@@ -42,6 +42,9 @@ pub struct UnitRow {
     pub generic_per_unit: RatioRow,
     /// What multiplies the ratio: a scaling of the axis.
     pub times: Option<Name>,
+    /// How drives spell the unit, beside the dictionary.
+    #[serde(default)]
+    pub texts: Vec<String>,
     /// Where it comes from.
     pub source: Source,
 }

@@ -22,6 +22,7 @@ mod compile_sercos;
 mod definitions;
 mod device_link;
 mod dictionary;
+mod drive_facts;
 mod examples;
 mod format;
 mod load;
@@ -59,9 +60,10 @@ pub use dictionary::{
     ExceptionAction, FaultRecord, GenericDictionary, IdnFormat, IdnUnit, NetworkObject, PolarityEffect,
     RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word, networks,
 };
+pub use drive_facts::{Difference, DriveFacts};
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};
-pub use scaling::{AxisUnits, DriveFacts, Lsb, Reference, ScalingError, ScalingRule};
+pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos_tables::{FaultRule, SercosTables};
 
 use load::Tables;

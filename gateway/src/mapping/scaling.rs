@@ -1,112 +1,23 @@
 //! What one unit in the last place of a SERCOS value is, from the drive's scaling parameters.
+//!
+//! ```text
+//! LSB = base * factor * 10^exponent / divisor    by the scaling type
+//!       * gear                                   where the data refer to the other shaft
+//!       * feed constant                          where the data are turns and the axis makes a way, or the reverse
+//!       / rated torque                           where the data are newton or newton metre
+//! ```
 
-use std::collections::BTreeMap;
-
-use profile_generic::program::{BitPattern, Width};
+use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
-use profile_sercos::wire::attribute::{Attribute, Format, ItemLength};
 use profile_sercos::wire::idn::Idn;
 
-use super::dictionary::{IdnFormat, SercosDictionary};
+use super::dictionary::SercosDictionary;
+use super::drive_facts::DriveFacts;
 
 /// The largest power of ten in a scaling; S-0-0046 and its like go from -32 to 32, 64 bits hold 10^18.
 pub const MAX_EXPONENT: u32 = 18;
-
-/// What a drive has said about itself.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct DriveFacts {
-    facts: BTreeMap<Idn, Fact>,
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-struct Fact {
-    attribute: Option<Attribute>,
-    data: Option<Vec<u8>>,
-    missing: bool,
-}
-
-impl DriveFacts {
-    /// Nothing known.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// The drive has given element 3 of an IDN.
-    pub fn note_attribute(&mut self, idn: Idn, attribute: Attribute) {
-        self.facts.entry(idn).or_default().attribute = Some(attribute);
-    }
-
-    /// The drive has given element 7 of an IDN, or has taken these bytes for it.
-    pub fn note_data(&mut self, idn: Idn, data: &[u8]) {
-        self.facts.entry(idn).or_default().data = Some(data.to_vec());
-    }
-
-    /// The drive has no such IDN.
-    pub fn note_missing(&mut self, idn: Idn) {
-        self.facts.entry(idn).or_default().missing = true;
-    }
-
-    /// Whether the drive has said that it has no such IDN.
-    pub fn is_missing(&self, idn: Idn) -> bool {
-        self.facts.get(&idn).is_some_and(|fact| fact.missing)
-    }
-
-    /// Element 3, if the drive has given it.
-    pub fn attribute(&self, idn: Idn) -> Option<Attribute> {
-        self.facts.get(&idn)?.attribute
-    }
-
-    /// Element 7 as bytes, if the drive has given it.
-    pub fn data(&self, idn: Idn) -> Option<&[u8]> {
-        self.facts.get(&idn)?.data.as_deref()
-    }
-
-    /// Element 7 as a number, signed or not as the drive or the dictionary says.
-    pub fn number(&self, idn: Idn, dictionary: &SercosDictionary) -> Option<i64> {
-        let data = self.data(idn)?;
-        let signed = self.is_signed(idn, dictionary);
-        let fill = if signed && data.last().is_some_and(|byte| byte & 0x80 != 0) { 0xFF } else { 0 };
-        let mut bytes = [fill; 8];
-        bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(i64::from_le_bytes(bytes))
-    }
-
-    fn is_signed(&self, idn: Idn, dictionary: &SercosDictionary) -> bool {
-        match self.attribute(idn) {
-            Some(attribute) => attribute.format() == Format::Signed,
-            None => dictionary.idn(idn).is_some_and(|row| row.format == Some(IdnFormat::Signed)),
-        }
-    }
-
-    /// How the value of an IDN lies in a telegram; the drive's word counts more than the dictionary's.
-    /// `None` for lists and when nobody knows the length.
-    pub fn width(&self, idn: Idn, dictionary: &SercosDictionary) -> Option<Width> {
-        let row = dictionary.idn(idn);
-        let length = match self.attribute(idn) {
-            Some(attribute) if attribute.is_list() => return None,
-            Some(attribute) => match attribute.item_length() {
-                ItemLength::One => 1,
-                ItemLength::Two => 2,
-                ItemLength::Four => 4,
-                ItemLength::Eight => 8,
-            },
-            None => row.filter(|row| !row.list)?.length?,
-        };
-        Some(match (length, self.is_signed(idn, dictionary)) {
-            (1, false) => Width::U8,
-            (1, true) => Width::I8,
-            (2, false) => Width::U16,
-            (2, true) => Width::I16,
-            (4, false) => Width::U32,
-            (4, true) => Width::I32,
-            (8, false) => Width::U64,
-            (8, true) => Width::I64,
-            _ => return None,
-        })
-    }
-}
 
 /// The shaft that an axis or a value refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -118,6 +29,20 @@ pub enum Reference {
     Motor,
 }
 
+impl Reference {
+    /// Both with their words in the files.
+    pub const NAMED: &'static [(&'static str, Self)] = &[("load", Self::Load), ("motor", Self::Motor)];
+}
+
+/// What a motor can give for ever.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rated {
+    /// Whether it is a torque (rotary) or a force (linear): a turning motor may well move a linear axis.
+    pub kind: UnitKind,
+    /// Micro newton metre or micro newton, above 0.
+    pub value: i64,
+}
+
 /// What must be known of an axis to scale its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AxisUnits {
@@ -125,8 +50,8 @@ pub struct AxisUnits {
     pub kind: UnitKind,
     /// The shaft that the axis units refer to.
     pub reference: Reference,
-    /// Rated torque in micro newton metre, or rated force in micro newton, if known.
-    pub rated_torque: Option<i64>,
+    /// Rated torque or force of the motor, if known.
+    pub rated: Option<Rated>,
 }
 
 /// The unit in the last place of a scaled value.
@@ -136,8 +61,10 @@ pub struct Lsb {
     pub quantity: Quantity,
     /// Generic units in it.
     pub generic: Ratio,
-    /// Counts after which positions wrap, if the drive works modulo.
-    pub modulo: Option<i64>,
+    /// Counts where the generic quantity is zero.
+    pub zero: i64,
+    /// Counts after which positions wrap, and the IDN that says so, if the drive works modulo.
+    pub modulo: Option<(i64, Idn)>,
 }
 
 /// Why a value cannot be scaled.
@@ -150,12 +77,10 @@ pub enum ScalingError {
     #[error("{0} is needed for the scaling and was not read from the drive")]
     NotRead(Idn),
     /// The scaling type is none of those in the tables.
-    #[error("{idn}: expected a scaling type of a {kind} axis, got {value:#06x}")]
+    #[error("{idn}: expected a scaling type that can be converted, got {value:#06x}")]
     Type {
         /// The scaling type parameter.
         idn: Idn,
-        /// The axis.
-        kind: UnitKind,
         /// What the drive holds.
         value: i64,
     },
@@ -169,9 +94,42 @@ pub enum ScalingError {
         /// What the drive holds.
         value: i64,
     },
+    /// The scaling type fixes a factor, and the drive shows another.
+    #[error("{idn}: expected {expected}, which the scaling type {word} = {value:#06x} fixes, got {got}")]
+    Preferential {
+        /// The factor, exponent or resolution.
+        idn: Idn,
+        /// What it should hold.
+        expected: i64,
+        /// What the drive holds.
+        got: i64,
+        /// The scaling type parameter.
+        word: Idn,
+        /// What it holds.
+        value: i64,
+    },
+    /// The unit in the drive's element 4 is none of those in the tables.
+    #[error("{idn}: expected a unit of {expected} in element 4, got `{got}`")]
+    Unit {
+        /// The parameter.
+        idn: Idn,
+        /// What the unit should measure.
+        expected: Quantity,
+        /// The drive's unit.
+        got: String,
+    },
     /// Absolute torque without a rated torque.
-    #[error("{0}: the drive gives torque in absolute units, and the axis has no rated torque")]
-    NoRatedTorque(Idn),
+    #[error(
+        "{word} = {value:#06x}: the drive gives {what} in absolute units, and the axis has no rated {what}"
+    )]
+    NoRatedTorque {
+        /// The scaling type parameter.
+        word: Idn,
+        /// What it holds.
+        value: i64,
+        /// Torque or force.
+        what: &'static str,
+    },
     /// The exact ratio does not fit 64 bits.
     #[error("{0}: the exact ratio does not fit 64 bits")]
     Overflow(Idn),
@@ -193,6 +151,29 @@ pub(super) struct Method {
     pub factor: Term,
     pub exponent: Term,
     pub divisor: Term,
+    pub zero: i64,
+    pub expect: Vec<(Idn, i64)>,
+}
+
+/// What lies between motor and load.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GearRule {
+    /// The scaling type that refers to the load.
+    pub pattern: BitPattern,
+    /// Turns of the motor.
+    pub motor: Idn,
+    /// Turns of the load that belong to them.
+    pub load: Idn,
+    /// The shaft that the generic quantity refers to, where it is not that of the axis.
+    pub generic: Option<Reference>,
+}
+
+/// How positions wrap.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ModuloRule {
+    pub pattern: BitPattern,
+    pub range: Idn,
+    pub divider: Option<Idn>,
 }
 
 /// How the unit of one quantity follows from the drive's scaling parameters.
@@ -200,23 +181,43 @@ pub(super) struct Method {
 pub struct ScalingRule {
     pub(super) scaling: String,
     pub(super) word: Idn,
-    pub(super) load: Option<(BitPattern, [Idn; 2])>,
-    pub(super) modulo: Option<(BitPattern, Idn)>,
+    pub(super) gear: Option<GearRule>,
+    pub(super) feed: Option<Idn>,
+    pub(super) exact: bool,
+    pub(super) modulo: Option<ModuloRule>,
     pub(super) methods: Vec<Method>,
+}
+
+/// Where the scaling finds what it needs to know.
+pub(super) struct ScalingSource<'a> {
+    pub axis: AxisUnits,
+    pub facts: &'a DriveFacts,
+    pub dictionary: &'a SercosDictionary,
+    /// Nanounits of the load in a nanoturn of it, by the feed constant with this IDN.
+    pub feed: &'a dyn Fn(Idn) -> Result<Ratio, ScalingError>,
+}
+
+impl ScalingSource<'_> {
+    fn read(&self, idn: Idn) -> Result<i64, ScalingError> {
+        self.facts.number(idn, self.dictionary).ok_or(ScalingError::NotRead(idn))
+    }
 }
 
 impl ScalingRule {
     /// Every IDN that the rule may look at.
     pub fn idns(&self) -> Vec<Idn> {
         let mut idns = vec![self.word];
-        idns.extend(self.load.iter().flat_map(|(_, gear)| *gear));
-        idns.extend(self.modulo.map(|(_, range)| range));
+        idns.extend(self.gear.iter().flat_map(|gear| [gear.motor, gear.load]));
+        idns.extend(self.feed);
+        idns.extend(self.modulo.map(|modulo| modulo.range));
+        idns.extend(self.modulo.and_then(|modulo| modulo.divider));
         for method in &self.methods {
             for term in [method.factor, method.exponent, method.divisor] {
                 if let Term::Drive(idn) = term {
                     idns.push(idn);
                 }
             }
+            idns.extend(method.expect.iter().map(|(idn, _)| *idn));
         }
         let mut seen = Vec::with_capacity(idns.len());
         idns.retain(|idn| {
@@ -232,65 +233,103 @@ impl ScalingRule {
     ///
     /// # Errors
     /// A parameter was not read or holds what no row knows, or the exact ratio does not fit 64 bits.
-    pub fn lsb(
-        &self,
-        axis: AxisUnits,
-        facts: &DriveFacts,
-        dictionary: &SercosDictionary,
-    ) -> Result<Lsb, ScalingError> {
-        let read = |idn| facts.number(idn, dictionary).ok_or(ScalingError::NotRead(idn));
+    pub(super) fn lsb(&self, source: &ScalingSource<'_>) -> Result<Lsb, ScalingError> {
+        let value = source.read(self.word)?;
+        let unknown = ScalingError::Type { idn: self.word, value };
+        let word = u32::try_from(value).map_err(|_| unknown.clone())?;
+        let method = self.methods.iter().find(|method| method.pattern.matches(word)).ok_or(unknown)?;
+        for (idn, expected) in &method.expect {
+            let (idn, expected) = (*idn, *expected);
+            if let Some(got) = source.facts.number(idn, source.dictionary).filter(|got| *got != expected) {
+                return Err(ScalingError::Preferential { idn, expected, got, word: self.word, value });
+            }
+        }
+        let mut generic = self.then(self.scale(source, method)?, method.base)?;
+        let mut quantity = method.quantity;
+        if let Some(kind) = method.kind {
+            generic = self.at_shaft(source, word, generic)?;
+            if quantity == Quantity::TorqueAbsolute {
+                let what = if kind == UnitKind::Rotary { "torque" } else { "force" };
+                let rated = source.axis.rated.filter(|rated| rated.kind == kind && rated.value > 0);
+                let none = ScalingError::NoRatedTorque { word: self.word, value, what };
+                let rated = rated.and_then(|rated| Ratio::new(1_000_000, rated.value)).ok_or(none)?;
+                generic = self.then(generic, rated)?;
+                quantity = Quantity::Torque;
+            } else if kind != source.axis.kind {
+                generic = self.then(generic, self.feed(source, kind)?)?;
+            }
+        }
+        generic.inverse().ok_or(ScalingError::Overflow(self.word))?;
+        let modulo = match self.modulo.filter(|modulo| modulo.pattern.matches(word)) {
+            Some(modulo) => Some((self.range(source, modulo)?, modulo.range)),
+            None => None,
+        };
+        Ok(Lsb { quantity, generic, zero: method.zero, modulo })
+    }
+
+    fn then(&self, ratio: Ratio, next: Ratio) -> Result<Ratio, ScalingError> {
+        let product = if self.exact { ratio.then(next) } else { ratio.then_nearest(next) };
+        product.ok_or(ScalingError::Overflow(self.word))
+    }
+
+    /// Factor times power of ten over divisor.
+    fn scale(&self, source: &ScalingSource<'_>, method: &Method) -> Result<Ratio, ScalingError> {
         let term = |term| match term {
             Term::Fixed(value) => Ok((self.word, value)),
-            Term::Drive(idn) => read(idn).map(|value| (idn, value)),
+            Term::Drive(idn) => source.read(idn).map(|value| (idn, value)),
         };
-        let overflow = ScalingError::Overflow(self.word);
-        let value = read(self.word)?;
-        let unknown = ScalingError::Type { idn: self.word, kind: axis.kind, value };
-        let word = u32::try_from(value).map_err(|_| unknown.clone())?;
-        let mut fitting =
-            self.methods.iter().filter(|method| method.kind.is_none_or(|kind| kind == axis.kind));
-        let method = fitting.find(|method| method.pattern.matches(word)).ok_or(unknown)?;
-
         let (idn, factor) = term(method.factor)?;
         let factor = above_zero(idn, factor)?;
         let (idn, divisor) = term(method.divisor)?;
         let divisor = above_zero(idn, divisor)?;
         let (idn, exponent) = term(method.exponent)?;
         let power = power_of_ten(idn, exponent)?;
-        let scale = Ratio::new(factor, divisor).and_then(|ratio| ratio.then(power));
-        let mut generic = scale.and_then(|ratio| ratio.then(method.base)).ok_or_else(|| overflow.clone())?;
+        self.then(Ratio::new(factor, divisor).ok_or(ScalingError::Overflow(self.word))?, power)
+    }
 
-        if let Some((pattern, [motor_turns, load_turns])) = self.load {
-            let reference = if pattern.matches(word) { Reference::Load } else { Reference::Motor };
-            if reference != axis.reference {
-                let motor = above_zero(motor_turns, read(motor_turns)?)?;
-                let load = above_zero(load_turns, read(load_turns)?)?;
-                // One turn of the motor is load/motor turns of the load.
-                let gear = match axis.reference {
-                    Reference::Load => Ratio::new(load, motor),
-                    Reference::Motor => Ratio::new(motor, load),
-                };
-                generic = gear.and_then(|gear| generic.then(gear)).ok_or_else(|| overflow.clone())?;
-            }
+    /// The same at the shaft that the generic quantity refers to.
+    fn at_shaft(&self, source: &ScalingSource<'_>, word: u32, unit: Ratio) -> Result<Ratio, ScalingError> {
+        let Some(gear) = self.gear else { return Ok(unit) };
+        let data = if gear.pattern.matches(word) { Reference::Load } else { Reference::Motor };
+        let generic = gear.generic.unwrap_or(source.axis.reference);
+        if data == generic {
+            return Ok(unit);
         }
-        let mut quantity = method.quantity;
-        if quantity == Quantity::TorqueAbsolute {
-            let rated = axis.rated_torque.filter(|rated| *rated > 0);
-            let rated = rated.ok_or(ScalingError::NoRatedTorque(self.word))?;
-            let relative = Ratio::new(1_000_000, rated).and_then(|ratio| generic.then(ratio));
-            generic = relative.ok_or_else(|| overflow.clone())?;
-            quantity = Quantity::Torque;
-        }
-        generic.inverse().ok_or(overflow)?;
-        let modulo = match self.modulo {
-            Some((pattern, range)) if pattern.matches(word) => Some(above_one(range, read(range)?)?),
-            _ => None,
+        let motor = above_zero(gear.motor, source.read(gear.motor)?)?;
+        let load = above_zero(gear.load, source.read(gear.load)?)?;
+        // One turn of the motor is load/motor turns of the load.
+        let ratio = match generic {
+            Reference::Load => Ratio::new(load, motor),
+            Reference::Motor => Ratio::new(motor, load),
         };
-        Ok(Lsb { quantity, generic, modulo })
+        self.then(unit, ratio.ok_or(ScalingError::Overflow(self.word))?)
+    }
+
+    /// From what the data measure to what the axis does.
+    fn feed(&self, source: &ScalingSource<'_>, data: UnitKind) -> Result<Ratio, ScalingError> {
+        let idn = self.feed.ok_or_else(|| ScalingError::Unknown(self.scaling.clone()))?;
+        let feed = (source.feed)(idn)?;
+        match data {
+            UnitKind::Rotary => Ok(feed),
+            UnitKind::Linear => feed.inverse().ok_or(ScalingError::Overflow(idn)),
+        }
+    }
+
+    fn range(&self, source: &ScalingSource<'_>, modulo: ModuloRule) -> Result<i64, ScalingError> {
+        if let Some(idn) = modulo.divider
+            && let Some(value) = source.facts.number(idn, source.dictionary).filter(|value| *value != 1)
+        {
+            return Err(ScalingError::Value {
+                idn,
+                expected: "1, as nobody tells how it changes the range",
+                value,
+            });
+        }
+        above_one(modulo.range, source.read(modulo.range)?)
     }
 }
 
-fn above_zero(idn: Idn, value: i64) -> Result<i64, ScalingError> {
+pub(super) fn above_zero(idn: Idn, value: i64) -> Result<i64, ScalingError> {
     if value > 0 { Ok(value) } else { Err(ScalingError::Value { idn, expected: "a number above 0", value }) }
 }
 

@@ -2,6 +2,7 @@
 
 mod builder;
 
+use arrayvec::ArrayVec;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::OperatingMode;
@@ -12,6 +13,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::svc::Element;
 
 use super::captures::CaptureRule;
 use super::dictionary::{Dictionaries, IdnUnit};
@@ -23,6 +25,31 @@ pub(super) struct SignalRule {
     pub idn: Idn,
     /// Whether an axis cannot work without it.
     pub refuse: bool,
+    /// The bit by which the drive inverts it.
+    pub polarity: Option<Polarity>,
+}
+
+/// A bit of a polarity parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Polarity {
+    pub idn: Idn,
+    pub bit: u32,
+}
+
+/// A fixed unit and how drives spell it.
+#[derive(Debug, Clone)]
+pub(super) struct FixedUnit {
+    pub unit: String,
+    pub texts: Vec<String>,
+    pub quantity: Quantity,
+    pub ratio: Ratio,
+}
+
+impl FixedUnit {
+    /// Whether a drive that says this means the unit.
+    pub fn is(&self, text: &str) -> bool {
+        self.texts.iter().chain([&self.unit]).any(|known| known.eq_ignore_ascii_case(text))
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -62,21 +89,27 @@ pub(super) struct ParameterRule {
     pub from_drive: bool,
     pub reject: bool,
     pub factor: Ratio,
+    /// The drive's element 4 tells the unit.
+    pub unit_by_drive: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum StepKind {
     WriteValue(Idn, i64),
     WriteParameter(Parameter),
     WriteModes,
-    Read { idn: Idn, attribute: bool, data: bool },
+    Read { idn: Idn, elements: Elements },
     ReadScaling,
     ReadTelegram,
+    ReadParameters,
     ReadCaptures,
     Command(Idn),
 }
 
-#[derive(Debug, Clone, Copy)]
+/// Elements of a data block.
+pub(super) type Elements = ArrayVec<Element, 5>;
+
+#[derive(Debug, Clone)]
 pub(super) struct StepRule {
     pub phase: u8,
     pub kind: StepKind,
@@ -92,8 +125,10 @@ pub(super) struct StepRule {
 /// The mapping of the generic model to SERCOS.
 #[derive(Debug, Clone, Default)]
 pub struct SercosTables {
-    pub(super) units: Vec<(String, Quantity, Ratio)>,
+    pub(super) units: Vec<FixedUnit>,
     pub(super) scalings: Vec<ScalingRule>,
+    /// The polarity whose sign is that of the axis.
+    pub(super) direction: Option<Polarity>,
     pub(super) control: Idn,
     pub(super) status_word: Idn,
     pub(super) signals: Vec<SignalRule>,
@@ -116,6 +151,16 @@ impl SercosTables {
         self.signals.iter().find(|rule| rule.signal == signal)
     }
 
+    /// Every polarity parameter, once.
+    pub(super) fn polarity_idns(&self) -> Vec<Idn> {
+        let mut idns: Vec<Idn> =
+            self.signals.iter().filter_map(|rule| rule.polarity).map(|bit| bit.idn).collect();
+        idns.extend(self.direction.map(|bit| bit.idn));
+        idns.sort();
+        idns.dedup();
+        idns
+    }
+
     /// A rule that only converts a value of this IDN, both ways, to the quantity that its scaling gives.
     pub(super) fn plain_rule(&self, idn: Idn, dictionaries: &Dictionaries) -> Option<ParameterRule> {
         let IdnUnit::Scaled(scaling) = &dictionaries.sercos.idn(idn)?.unit else { return None };
@@ -131,6 +176,7 @@ impl SercosTables {
             from_drive: true,
             reject: false,
             factor: Ratio::ONE,
+            unit_by_drive: false,
         })
     }
 

@@ -6,6 +6,7 @@ mod cip_dictionary;
 mod cip_program;
 mod cyclic_axis;
 mod sercos_program;
+mod sercos_scaling;
 mod shipped_tables;
 
 use std::fmt::Write as _;
@@ -66,6 +67,9 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
 /// What a drive tells that has taken every value of the plan for CP2.
 fn obedient(mapping: &Mapping, axis: &SercosAxis) -> DriveFacts {
     let mut facts = DriveFacts::new();
+    for polarity in [43, 55, 85] {
+        facts.note_data(Idn::standard(polarity), &[0, 0]);
+    }
     for step in mapping.commissioning(axis, 2, &DriveFacts::new()).unwrap().steps {
         if let Step::Write { idn, candidates, .. } = step {
             facts.note_data(idn, &candidates[0]);

@@ -182,6 +182,12 @@ impl<A: Application> Slave<A> {
         &mut self.core.store
     }
 
+    /// Sets a number as the one who set the machine up has left it in the slave, past its limits and phases.
+    pub fn preset(&mut self, idn: Idn, value: i64) {
+        self.core.store.set_number_of(idn, value);
+        self.app.written(idn, &mut self.core.store);
+    }
+
     /// The application.
     pub fn application(&self) -> &A {
         &self.app

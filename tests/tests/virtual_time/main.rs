@@ -10,6 +10,7 @@ mod loss;
 mod network;
 mod planes;
 mod programs;
+mod scaling;
 mod scripts;
 mod stalled;
 mod stopping;

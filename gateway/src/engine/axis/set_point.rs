@@ -8,7 +8,7 @@ use profile_generic::image::{AxisCommand, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
-use profile_generic::quantity::{Torque, Velocity};
+use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Transition};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
@@ -154,7 +154,9 @@ impl AxisChannel {
         acts_at: SystemTime,
         telegram: Option<&mut [u8]>,
     ) -> bool {
+        let before = self.command.position;
         self.fine_command(now, system, acts_at);
+        self.watch_step(now, system, before);
         let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
         let mut conversions = ConversionReport::default();
         self.control_word = program.encode(
@@ -171,6 +173,18 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
         }
         true
+    }
+
+    /// A drive that works modulo takes the short way to its next position: a longer one would lead it backward, so it is
+    /// not sent.
+    fn watch_step(&mut self, now: MonotonicTime, system: SystemTime, before: Position) {
+        let led = self.state() == DriveState::Operating && self.command.mode == OperatingMode::Position;
+        let step = self.south.as_ref().and_then(|(program, _)| program.position_step());
+        let far = |step: i64| self.command.position.get().abs_diff(before.get()) > step.unsigned_abs();
+        if led && step.is_some_and(far) {
+            self.command.position = before;
+            self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
+        }
     }
 
     /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it

@@ -1,5 +1,6 @@
 //! What a SERCOS drive has: IDNs, words and operation modes.
 
+use profile_sercos::wire::attribute::Format;
 use profile_sercos::wire::idn::Idn;
 
 use super::{Enumeration, named_code, resolve_codes};
@@ -34,6 +35,18 @@ impl IdnFormat {
         ("text", Self::Text),
         ("idn", Self::Idn),
     ];
+
+    /// The format of element 3 that it stands for.
+    pub fn of_attribute(self) -> Format {
+        match self {
+            Self::Binary => Format::Binary,
+            Self::Unsigned => Format::Unsigned,
+            Self::Signed => Format::Signed,
+            Self::Hexadecimal => Format::Hexadecimal,
+            Self::Text => Format::Text,
+            Self::Idn => Format::Idn,
+        }
+    }
 
     /// The word in the files.
     pub fn name(self) -> &'static str {

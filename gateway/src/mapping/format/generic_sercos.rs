@@ -17,6 +17,8 @@ pub struct GenericSercosFile {
     pub unit: Vec<UnitRow>,
     /// Units that the drive's scaling parameters define.
     pub scaling: Vec<SercosScalingRow>,
+    /// Which way is forward.
+    pub direction: DirectionRow,
     /// The control and the status word.
     pub words: WordsRow,
     /// Signals.
@@ -108,6 +110,26 @@ pub struct FieldValueRow {
     pub is: Spanned<u32>,
 }
 
+/// A bit of a polarity parameter.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolarityRow {
+    /// The parameter.
+    pub idn: Name,
+    /// The bit: 1 is inverted.
+    pub bit: Spanned<u32>,
+}
+
+/// The value whose sign is that of the axis.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionRow {
+    /// Its polarity.
+    pub polarity: PolarityRow,
+    /// Where it comes from.
+    pub source: Source,
+}
+
 /// How the unit of a quantity follows from the drive's scaling parameters.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -118,6 +140,11 @@ pub struct SercosScalingRow {
     pub word: Name,
     /// Where the scaling type says that the values refer to the load, and what lies between motor and load.
     pub load: Option<LoadRow>,
+    /// IDN with the way that the load makes in one turn, where turns and ways are to be converted to each other.
+    pub feed: Option<Name>,
+    /// Whether only the exact ratio will do; else the nearest one that 64 bits hold.
+    #[serde(default)]
+    pub exact: bool,
     /// Bits of the scaling type that say that positions wrap, and the IDN with the range.
     pub modulo: Option<ModuloRow>,
     /// What the scaling types mean; the first that matches wins.
@@ -137,6 +164,8 @@ pub struct LoadRow {
     pub pattern: [u32; 2],
     /// IDNs with the turns of the motor and the turns of the load that belong to them.
     pub gear: [Name; 2],
+    /// The shaft that the generic quantity refers to, `load` or `motor`. Default: that of the axis.
+    pub generic: Option<Name>,
 }
 
 /// Modulo processing.
@@ -147,6 +176,8 @@ pub struct ModuloRow {
     pub pattern: [u32; 2],
     /// IDN with the range, in the unit of the scaling.
     pub range: Name,
+    /// IDN that changes the range in a way that nobody has told: only 1 will do.
+    pub divider: Option<Name>,
 }
 
 /// One scaling type.
@@ -157,7 +188,7 @@ pub struct ScalingMethodRow {
     pub pattern: [u32; 2],
     /// What it is called.
     pub name: String,
-    /// `rotary`, `linear`, or absent when either will do.
+    /// What the data measure, `rotary` or `linear`; absent where they measure neither, so that no gear lies between.
     pub kind: Option<Name>,
     /// Generic quantity of the base unit.
     pub quantity: Name,
@@ -173,6 +204,11 @@ pub struct ScalingMethodRow {
     pub divisor: Option<i64>,
     /// IDN with the divisor.
     pub divisor_idn: Option<Name>,
+    /// Counts at zero of the generic quantity. Default: 0.
+    pub zero: Option<i64>,
+    /// What the drive must hold where it has the IDN: a preferential scaling shows the factors it works with.
+    #[serde(default)]
+    pub expect: Vec<(Name, i64)>,
 }
 
 /// A worked example of a scaling.
@@ -183,7 +219,7 @@ pub struct ScalingExampleRow {
     pub kind: Name,
     /// What the drive holds: IDN and value.
     pub drive: Vec<(String, i64)>,
-    /// Rated torque in micro newton metre, where it matters.
+    /// Rated torque in micro newton metre, or rated force in micro newton, by the kind; where it matters.
     pub rated: Option<i64>,
     /// IDN whose value is converted.
     pub idn: Name,
@@ -205,8 +241,10 @@ pub struct SercosSignalRow {
     pub idn: Name,
     /// `to_drive` or `from_drive`.
     pub direction: Name,
-    /// What happens when the drive has no such IDN: `refuse` or `omit`.
+    /// What happens when the drive has no such IDN, or does not put it into telegrams: `refuse` or `omit`.
     pub missing: Name,
+    /// The bit by which the drive inverts the value.
+    pub polarity: Option<PolarityRow>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -311,6 +349,9 @@ pub struct SercosParameterRow {
     pub missing: Name,
     /// Factor between parameter and IDN, for signs (`[-1, 1]`) and reciprocals of units.
     pub factor: Option<RatioRow>,
+    /// No source tells the unit: the drive's element 4 does, or the parameter is missing.
+    #[serde(default)]
+    pub unit_by_drive: bool,
     /// Where it comes from.
     pub source: Source,
     /// Worked examples.
@@ -324,12 +365,12 @@ pub struct SercosParameterRow {
 pub struct CommissionRow {
     /// Communication phase, 2 to 4.
     pub phase: Spanned<u8>,
-    /// `write`, `read`, `command`, `read_scaling`, `read_telegram`, `read_captures` or `write_modes`.
+    /// `write`, `read`, `command`, `read_scaling`, `read_telegram`, `read_parameters`, `read_captures` or `write_modes`.
     #[serde(rename = "do")]
     pub step: Name,
     /// IDN; none for the steps that know theirs.
     pub idn: Option<Name>,
-    /// Elements to read: `attribute` and `data`.
+    /// Elements to read: `attribute`, `unit`, `minimum`, `maximum`, `data`. Default: all of them.
     pub elements: Option<Vec<Name>>,
     /// Value to write.
     pub value: Option<Spanned<i64>>,

@@ -8,19 +8,23 @@ use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
+use profile_sercos::wire::svc::Element;
 
-use super::{FaultRule, ModeRule, ParameterRule, SercosTables, SignalRule, SlotRule, StepKind, StepRule};
+use super::{
+    Elements, FaultRule, FixedUnit, ModeRule, ParameterRule, Polarity, SercosTables, SignalRule, SlotRule,
+    StepKind, StepRule,
+};
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
 use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::format::{
-    CommissionRow, FieldValueRow, GenericSercosFile, Name, ScalingMethodRow, SercosCaptureRow,
+    CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ScalingMethodRow, SercosCaptureRow,
     SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
 };
 use crate::mapping::load::{Parsed, TableErrors};
 use crate::mapping::resolver::Resolver;
-use crate::mapping::scaling::{Method, ScalingRule, Term};
+use crate::mapping::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
 
 impl SercosTables {
     pub(in crate::mapping) fn resolve(
@@ -41,6 +45,7 @@ impl SercosTables {
         for row in &rows.scaling {
             builder.scaling(row);
         }
+        builder.tables.direction = builder.polarity(&rows.direction.polarity);
         for row in &rows.signal {
             builder.signal(row);
         }
@@ -92,21 +97,43 @@ impl<'a> Builder<'a> {
             let quantity = quantity(&mut self.resolver, &row.quantity);
             let ratio = self.resolver.ratio("generic_per_unit", &row.generic_per_unit);
             if let (Some(quantity), Some(ratio)) = (quantity, ratio) {
-                self.tables.units.push((row.unit.get_ref().clone(), quantity, ratio));
+                let (unit, texts) = (row.unit.get_ref().clone(), row.texts.clone());
+                self.tables.units.push(FixedUnit { unit, texts, quantity, ratio });
             }
         }
     }
 
     fn scaling(&mut self, row: &SercosScalingRow) {
         let word = self.idn("word", &row.word);
-        let load = match &row.load {
+        let gear = match &row.load {
             None => None,
             Some(load) => {
                 let [mask, value] = load.pattern;
                 let [motor, turns] = &load.gear;
                 let gear = (self.idn("gear", motor), self.idn("gear", turns));
                 let (Some(motor), Some(turns)) = gear else { return };
-                Some((BitPattern::new(mask, value), [motor.idn, turns.idn]))
+                let generic = load
+                    .generic
+                    .as_ref()
+                    .and_then(|name| self.resolver.word("generic", name, Reference::NAMED));
+                Some(GearRule {
+                    pattern: BitPattern::new(mask, value),
+                    motor: motor.idn,
+                    load: turns.idn,
+                    generic,
+                })
+            }
+        };
+        let feed = match &row.feed {
+            None => None,
+            Some(name) => {
+                let Some(feed) = self.idn("feed", name) else { return };
+                if !self.measures(feed, Quantity::None) {
+                    let message =
+                        format!("expected an IDN with a fixed unit of [[unit]], {} has none", feed.idn);
+                    self.resolver.error(name.span(), "feed", message);
+                }
+                Some(feed.idn)
             }
         };
         let modulo = match &row.modulo {
@@ -114,13 +141,20 @@ impl<'a> Builder<'a> {
             Some(modulo) => {
                 let [mask, value] = modulo.pattern;
                 let Some(range) = self.idn("range", &modulo.range) else { return };
-                Some((BitPattern::new(mask, value), range.idn))
+                let divider = modulo.divider.as_ref().and_then(|name| self.idn("divider", name));
+                Some(ModuloRule {
+                    pattern: BitPattern::new(mask, value),
+                    range: range.idn,
+                    divider: divider.map(|row| row.idn),
+                })
             }
         };
         let methods: Vec<Method> = row.methods.iter().filter_map(|method| self.method(method)).collect();
         if let Some(word) = word {
             let scaling = row.scaling.get_ref().clone();
-            self.tables.scalings.push(ScalingRule { scaling, word: word.idn, load, modulo, methods });
+            let word = word.idn;
+            let rule = ScalingRule { scaling, word, gear, feed, exact: row.exact, modulo, methods };
+            self.tables.scalings.push(rule);
         }
     }
 
@@ -135,6 +169,10 @@ impl<'a> Builder<'a> {
         let exponent = row.exponent.map(i64::from);
         let exponent = self.term("exponent_idn", exponent, row.exponent_idn.as_ref(), 0)?;
         let divisor = self.term("divisor_idn", row.divisor, row.divisor_idn.as_ref(), 1)?;
+        let mut expect = Vec::with_capacity(row.expect.len());
+        for (name, value) in &row.expect {
+            expect.push((self.idn("expect", name)?.idn, *value));
+        }
         let [mask, value] = row.pattern;
         Some(Method {
             pattern: BitPattern::new(mask, value),
@@ -144,6 +182,8 @@ impl<'a> Builder<'a> {
             factor,
             exponent,
             divisor,
+            zero: row.zero.unwrap_or(0),
+            expect,
         })
     }
 
@@ -157,6 +197,15 @@ impl<'a> Builder<'a> {
                 None
             }
         }
+    }
+
+    fn polarity(&mut self, row: &PolarityRow) -> Option<Polarity> {
+        let idn = self.idn("polarity", &row.idn)?.idn;
+        let bit = *row.bit.get_ref();
+        if bit > 15 {
+            self.resolver.error(row.bit.span(), "bit", format!("expected a bit from 0 to 15, got {bit}"));
+        }
+        Some(Polarity { idn, bit })
     }
 
     fn signal(&mut self, row: &SercosSignalRow) {
@@ -183,7 +232,8 @@ impl<'a> Builder<'a> {
         if self.tables.signal(signal).is_some() {
             self.resolver.error(row.signal.span(), "signal", "the signal is there twice");
         }
-        self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse });
+        let polarity = row.polarity.as_ref().and_then(|row| self.polarity(row));
+        self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity });
     }
 
     /// Whether the unit of an IDN can become the quantity.
@@ -191,7 +241,7 @@ impl<'a> Builder<'a> {
         match &idn.unit {
             IdnUnit::None => quantity == Quantity::None,
             IdnUnit::Fixed { unit, .. } => {
-                self.tables.units.iter().any(|(known, of, _)| known == unit && *of == quantity)
+                self.tables.units.iter().any(|known| known.unit == *unit && known.quantity == quantity)
             }
             IdnUnit::Scaled(scaling) => self.tables.scalings.iter().any(|rule| {
                 let converts =
@@ -445,7 +495,10 @@ impl<'a> Builder<'a> {
         else {
             return;
         };
-        if !self.measures(idn, quantity) {
+        if row.unit_by_drive != (idn.unit == IdnUnit::None && quantity != Quantity::None) {
+            let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for no other";
+            self.resolver.error(row.idn.span(), "unit_by_drive", message);
+        } else if !row.unit_by_drive && !self.measures(idn, quantity) {
             let message = format!("the unit of {} is no {quantity}", idn.idn);
             return self.resolver.error(row.idn.span(), "idn", message);
         }
@@ -457,7 +510,9 @@ impl<'a> Builder<'a> {
             self.resolver.error(row.parameter.span(), "parameter", "the parameter is there twice");
         }
         let idn = idn.idn;
-        let rule = ParameterRule { parameter, quantity, idn, to_drive, from_drive, reject, factor };
+        let unit_by_drive = row.unit_by_drive;
+        let rule =
+            ParameterRule { parameter, quantity, idn, to_drive, from_drive, reject, factor, unit_by_drive };
         self.tables.parameters.push(rule);
     }
 
@@ -473,6 +528,7 @@ impl<'a> Builder<'a> {
             ("command", Verb::Command),
             ("read_scaling", Verb::ReadScaling),
             ("read_telegram", Verb::ReadTelegram),
+            ("read_parameters", Verb::ReadParameters),
             ("read_captures", Verb::ReadCaptures),
             ("write_modes", Verb::WriteModes),
         ];
@@ -526,18 +582,29 @@ impl<'a> Builder<'a> {
                 Some(StepKind::WriteParameter(parameter))
             }
             (Verb::Read, Some(idn), None, None) => {
-                let (mut attribute, mut data) = (false, row.elements.is_none());
-                for name in row.elements.iter().flatten() {
-                    match self.resolver.word("elements", name, &[("attribute", true), ("data", false)])? {
-                        true => attribute = true,
-                        false => data = true,
+                let words = [
+                    ("attribute", Element::Attribute),
+                    ("unit", Element::Unit),
+                    ("minimum", Element::Minimum),
+                    ("maximum", Element::Maximum),
+                    ("data", Element::Data),
+                ];
+                let mut elements = Elements::new();
+                for (name, element) in words {
+                    let wanted = |rows: &Vec<Name>| rows.iter().any(|row| row.get_ref() == name);
+                    if row.elements.as_ref().is_none_or(wanted) {
+                        elements.push(element);
                     }
                 }
-                Some(StepKind::Read { idn: idn.idn, attribute, data })
+                for name in row.elements.iter().flatten() {
+                    self.resolver.word("elements", name, &words)?;
+                }
+                Some(StepKind::Read { idn: idn.idn, elements })
             }
             (Verb::Command, Some(idn), None, None) if idn.command => Some(StepKind::Command(idn.idn)),
             (Verb::ReadScaling, None, None, None) => Some(StepKind::ReadScaling),
             (Verb::ReadTelegram, None, None, None) => Some(StepKind::ReadTelegram),
+            (Verb::ReadParameters, None, None, None) => Some(StepKind::ReadParameters),
             (Verb::ReadCaptures, None, None, None) => Some(StepKind::ReadCaptures),
             (Verb::WriteModes, None, None, None) => Some(StepKind::WriteModes),
             _ => {
@@ -557,6 +624,7 @@ enum Verb {
     Command,
     ReadScaling,
     ReadTelegram,
+    ReadParameters,
     ReadCaptures,
     WriteModes,
 }

@@ -221,7 +221,7 @@ fn a_changed_ratio_makes_an_example_fail() {
             "quantity = \"torque\"\ngeneric_per_unit = [1_000, 1]",
         ),
         (|t| &mut t.cip_generic, "nanounits = 25_400_000_000", "nanounits = 25_000_000_000"),
-        (|t| &mut t.generic_sercos, "divisor = 3_600_000 }", "divisor = 360_000 }"),
+        (|t| &mut t.generic_sercos, "divisor = 3_600_000, expect", "divisor = 360_000, expect"),
         (|t| &mut t.generic_sercos, "factor = [-1, 1]\n", ""),
     ];
     for (table, from, to) in changes {

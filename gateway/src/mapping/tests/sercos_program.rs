@@ -21,10 +21,10 @@ fn commissioning_of_a_rotary_modulo_axis() {
                 Step::Write { idn, candidates, refused } => {
                     writeln!(text, "  write   {idn} {candidates:02X?} {refused:?}").unwrap();
                 }
-                Step::Read { idn, attribute, data, refused } => {
-                    let attribute = if attribute { " attribute" } else { "" };
-                    let data = if data { " data" } else { "" };
-                    writeln!(text, "  read    {idn}{attribute}{data} {refused:?}").unwrap();
+                Step::Read { idn, elements, refused } => {
+                    let elements: String =
+                        elements.iter().map(|element| format!(" {}", *element as u8)).collect();
+                    writeln!(text, "  read    {idn} elements{elements} {refused:?}").unwrap();
                 }
                 Step::Command { idn, refused } => writeln!(text, "  command {idn} {refused:?}").unwrap(),
             }
@@ -189,6 +189,7 @@ fn scalings_that_cannot_be_used_say_why() {
         (76, vec![0xC2, 0x00]),
         (44, vec![0x7F, 0x00]),
         (86, vec![0x02, 0x00]),
+        (86, vec![0x42, 0x00]),
     ] {
         let mut facts = obedient(mapping, &axis);
         facts.note_data(Idn::standard(103), &0_u32.to_le_bytes());
@@ -203,11 +204,12 @@ fn scalings_that_cannot_be_used_say_why() {
     let idle = SercosAxis { modes: [].into_iter().collect(), ..rotary_axis(false) };
     writeln!(text, "{}", mapping.telegram(&idle, &DriveFacts::new()).unwrap_err()).unwrap();
     insta::assert_snapshot!(text, @r"
-    0076 = [00, 00]: S-0-0076: expected a scaling type of a rotary axis, got 0x0000
-    0076 = [41, 00]: S-0-0076: expected a scaling type of a rotary axis, got 0x0041
+    0076 = [00, 00]: S-0-0076: expected a scaling type that can be converted, got 0x0000
+    0076 = [41, 00]: S-0-0123 is needed for the scaling and was not read from the drive
     0076 = [C2, 00]: S-0-0103: expected a number above 1, got 0
-    0044 = [7F, 00]: S-0-0044: expected a scaling type of a rotary axis, got 0x007f
-    0086 = [02, 00]: S-0-0086: the drive gives torque in absolute units, and the axis has no rated torque
+    0044 = [7F, 00]: S-0-0044: expected a scaling type that can be converted, got 0x007f
+    0086 = [02, 00]: S-0-0086 = 0x0002: the drive gives torque in absolute units, and the axis has no rated torque
+    0086 = [42, 00]: S-0-0122 is needed for the scaling and was not read from the drive
     nothing read: S-0-0076 is needed for the scaling and was not read from the drive
     no [[mode]] row for operating mode homing
     expected at least one operating mode, got none

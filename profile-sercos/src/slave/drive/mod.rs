@@ -345,7 +345,11 @@ impl Drive {
         let polarity = sign(store, idn::TORQUE_POLARITY, 2);
         store.set_number_of(idn::TORQUE_FEEDBACK, polarity * self.scales.torque.counts(actual.torque.0));
         store.set_number_of(idn::BUS_VOLTAGE, actual.bus_voltage.0 / 100_000);
-        store.set_number_of(idn::MOTOR_TEMPERATURE, actual.temperature.0 / 100);
+        let motor = scaling::temperature(store, actual.temperature.0);
+        store.set_number_of(idn::MOTOR_TEMPERATURE, motor);
+        // The amplifier warms half as much as the motor; it is always in the unit of element 4.
+        let ambient = self.servo.parameters().ambient_temperature;
+        store.set_number_of(idn::AMPLIFIER_TEMPERATURE, (actual.temperature.0 + ambient.0) / 200);
         store.set_number_of(idn::POSITION_STATUS, i64::from(self.referenced));
         store.set_number_of(idn::STATUS, i64::from(self.class_3(store)));
         let errors = self.diagnosis().errors;

@@ -55,10 +55,6 @@ pub mod idn {
     pub const ACCELERATION_LIMIT_POSITIVE: Idn = Idn::standard(136);
     /// Negative acceleration limit value, a magnitude.
     pub const ACCELERATION_LIMIT_NEGATIVE: Idn = Idn::standard(137);
-    /// Input revolutions of the load gear.
-    pub const GEAR_INPUT: Idn = Idn::standard(121);
-    /// Output revolutions of the load gear.
-    pub const GEAR_OUTPUT: Idn = Idn::standard(122);
     /// Bipolar velocity limit.
     pub const VELOCITY_LIMIT: Idn = Idn::standard(91);
     /// Bipolar torque limit.
@@ -89,6 +85,8 @@ pub mod idn {
     pub const BUS_VOLTAGE: Idn = Idn::standard(380);
     /// Motor temperature.
     pub const MOTOR_TEMPERATURE: Idn = Idn::standard(383);
+    /// Amplifier temperature.
+    pub const AMPLIFIER_TEMPERATURE: Idn = Idn::standard(384);
     /// Active position feedback value.
     pub const ACTIVE_POSITION: Idn = Idn::standard(386);
     /// Position feedback value status.
@@ -108,6 +106,7 @@ mod attribute {
     pub const U16_CP2_CP3: u32 = 0x4011_0001;
     pub const I16_CP2_CP3: u32 = 0x4021_0001;
     pub const U32_CP2_CP3: u32 = 0x4012_0001;
+    pub const FEED: u32 = 0x4422_0001;
     pub const VELOCITY: u32 = 0x0322_0001;
     pub const VELOCITY_UNSIGNED: u32 = 0x0312_0001;
     pub const VELOCITY_READ: u32 = 0x7322_0001;
@@ -169,6 +168,16 @@ fn define_scaling(store: &mut Store, servo: &ServoParameters) {
         value(scaling::TORQUE_EXPONENT, a::I16_CP2_CP3, "Torque/force data scaling exponent", -1)
             .range(-32, 32),
         value(scaling::MODULO, a::MODULO, "Modulo value", 3_600_000).range(2, i64::from(i32::MAX)),
+        value(scaling::GEAR_INPUT, a::U32_CP2_CP3, "Input revolutions of load gear", 1)
+            .unit("Rev")
+            .range(1, i64::from(u32::MAX)),
+        value(scaling::GEAR_OUTPUT, a::U32_CP2_CP3, "Output revolutions of load gear", 1)
+            .unit("Rev")
+            .range(1, i64::from(u32::MAX)),
+        value(scaling::FEED_CONSTANT, a::FEED, "Feed constant", 100_000)
+            .unit("mm/Rev")
+            .range(1, i64::from(i32::MAX)),
+        value(scaling::TEMPERATURE_TYPE, a::BITS_CP2_CP3, "Temperature data scaling type", 0),
         value(idn::VELOCITY_POLARITY, a::BITS_CP2_CP3, "Velocity polarity parameter", 0),
         value(idn::POSITION_POLARITY, a::BITS_CP2_CP3, "Position polarity parameter", 0),
         value(idn::TORQUE_POLARITY, a::BITS_CP2_CP3, "Torque/force polarity parameter", 0),
@@ -205,6 +214,7 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
         value(idn::TORQUE_FEEDBACK, a::TORQUE_READ, "Torque/force feedback value", Feedback).unit(force),
         value(idn::BUS_VOLTAGE, a::VOLTAGE_READ, "DC bus voltage", Feedback).unit("V"),
         value(idn::MOTOR_TEMPERATURE, a::TORQUE_READ, "Motor temperature", Feedback).unit("degC"),
+        value(idn::AMPLIFIER_TEMPERATURE, a::TORQUE_READ, "Amplifier temperature", Feedback).unit("degC"),
         value(idn::POSITION_STATUS, a::BITS, "Position feedback value status", Feedback),
         value(idn::MANUFACTURER_ERRORS, a::BITS, "Manufacturer class 1 diagnostics", Feedback),
     ];
@@ -257,9 +267,6 @@ fn define_settings(store: &mut Store) {
             .range(1, double),
         value(idn::ACCELERATION_LIMIT_NEGATIVE, a::VELOCITY_UNSIGNED, "Negative acceleration limit value", 1)
             .range(1, double),
-        // Motor and load turn alike: there is no gear between them.
-        value(idn::GEAR_INPUT, a::U32_READ, "Input revolutions of load gear", 1),
-        value(idn::GEAR_OUTPUT, a::U32_READ, "Output revolutions of load gear", 1),
         value(idn::MONITORING_WINDOW, a::POSITION_UNSIGNED, "Monitoring window", 0).range(0, double),
         value(idn::ON_DELAY, a::DELAY, "Drive on delay time", 0).unit("ms").range(0, word),
         value(idn::OFF_DELAY, a::DELAY, "Drive off delay time", 0).unit("ms").range(0, word),

@@ -8,8 +8,9 @@
 //! | torque | S-0-0086 | S-0-0093, S-0-0094 | 1 N | 0.01 Nm |
 //!
 //! Torque without scaling is in 0.1 % of S-0-0111, position without scaling in encoder counts. With a
-//! preferential type (bit 3 = 0) the drive sets factor and exponent itself. A rotary axis takes rotational
-//! scaling, a linear axis linear scaling; there is no gear between motor and load.
+//! preferential type (bit 3 = 0) the drive sets factor and exponent itself; those that no source tells (inch, linear
+//! per second) are its own. Data refer to the motor or, with bit 6, to the load behind the gear S-0-0121 : S-0-0122. A
+//! turn of the load makes the way S-0-0123, so that either kind of axis takes either kind of data.
 
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::scaling::UnitKind;
@@ -50,6 +51,14 @@ pub mod idn {
     pub const TORQUE_EXPONENT: Idn = Idn::standard(94);
     /// Modulo value.
     pub const MODULO: Idn = Idn::standard(103);
+    /// Input revolutions of the load gear: turns of the motor.
+    pub const GEAR_INPUT: Idn = Idn::standard(121);
+    /// Output revolutions of the load gear: turns of the load.
+    pub const GEAR_OUTPUT: Idn = Idn::standard(122);
+    /// Feed constant, 0.0001 mm a turn.
+    pub const FEED_CONSTANT: Idn = Idn::standard(123);
+    /// Temperature data scaling type.
+    pub const TEMPERATURE_TYPE: Idn = Idn::standard(208);
 }
 
 /// Bits of a scaling type.
@@ -63,14 +72,21 @@ mod bits {
     pub const INCH: i64 = 1 << 4;
     /// Second instead of minute, for velocity.
     pub const SECOND: i64 = 1 << 5;
+    /// Of the load instead of the motor.
+    pub const LOAD: i64 = 1 << 6;
     pub const MODULO: i64 = 1 << 7;
 }
 
 /// Nanounits in a metre (axis unit millimetre) and in a turn (axis unit revolution).
 const METRE: i64 = 1_000_000_000_000;
 const TURN: i64 = 1_000_000_000;
-/// A turn in nanoradian.
-const TURN_NANORADIAN: i64 = 6_283_185_307;
+/// Turns in radians: a convergent of the continued fraction, off by less than 4e-18.
+const TURNS: i64 = 78_256_779;
+const RADIANS: i64 = 491_701_844;
+/// Pound of force in 1e-13 newton.
+const POUND: i64 = 44_482_216_152_605;
+/// Inch pound of force in 1e-16 newton metre.
+const INCH_POUND: i64 = 1_129_848_290_276_167;
 
 /// One kind of data: counts to generic units and back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,7 +143,7 @@ impl Scales {
             position: position.ok_or(idn::POSITION_TYPE)?,
             velocity: Scale::new(velocity(store, rotary)).ok_or(idn::VELOCITY_TYPE)?,
             acceleration: Scale::new(acceleration(store, rotary)).ok_or(idn::ACCELERATION_TYPE)?,
-            torque: Scale::new(torque(store, rotary, servo)).ok_or(idn::TORQUE_TYPE)?,
+            torque: Scale::new(torque(store, servo)).ok_or(idn::TORQUE_TYPE)?,
             modulo: if modulo { value } else { 1 << 32 },
             from_zero: modulo,
         })
@@ -166,51 +182,79 @@ fn length(kind: i64) -> Option<Ratio> {
     if kind & bits::INCH != 0 { Ratio::new(METRE / 10_000 * 254, 1) } else { Ratio::new(METRE, 1) }
 }
 
+/// Nanounits of the axis in what the scaling type measures: a turn (`turn` nanoturns of it) or a length, of motor or load.
+fn displacement(store: &Store, kind: i64, rotary: bool, turn: Ratio) -> Option<Ratio> {
+    // Nanomillimetres of the load in a nanoturn of it.
+    let feed = Ratio::new(store.number_of(idn::FEED_CONSTANT), 10_000)?;
+    let unit = match (kind & bits::METHOD, rotary) {
+        (bits::ROTATIONAL, true) => turn,
+        (bits::ROTATIONAL, false) => turn.then_nearest(feed)?,
+        (bits::LINEAR, false) => length(kind)?,
+        (bits::LINEAR, true) => length(kind)?.then_nearest(feed.inverse()?)?,
+        _ => return None,
+    };
+    if kind & bits::LOAD != 0 { Some(unit) } else { unit.then_nearest(gear(store)?) }
+}
+
+/// Turns of the load in a turn of the motor.
+fn gear(store: &Store) -> Option<Ratio> {
+    Ratio::new(store.number_of(idn::GEAR_OUTPUT), store.number_of(idn::GEAR_INPUT))
+        .filter(|gear| gear.num() > 0)
+}
+
 fn position(store: &Store, rotary: bool, servo: &ServoParameters) -> Option<Ratio> {
     let kind = store.number_of(idn::POSITION_TYPE);
-    match (kind & bits::METHOD, rotary) {
-        (bits::NONE, _) => Ratio::new(TURN, i64::from(servo.encoder_counts)),
-        (bits::ROTATIONAL, true) => Ratio::new(TURN, store.number_of(idn::POSITION_RESOLUTION)),
-        (bits::LINEAR, false) => {
-            factor(store, idn::POSITION_FACTOR, idn::POSITION_EXPONENT)?.then(length(kind)?)
+    let turn = Ratio::new(TURN, 1)?;
+    match kind & bits::METHOD {
+        bits::NONE => Ratio::new(TURN, i64::from(servo.encoder_counts)),
+        bits::ROTATIONAL => {
+            let counts = Ratio::new(1, store.number_of(idn::POSITION_RESOLUTION))?;
+            displacement(store, kind, rotary, turn)?.then(counts)
         }
-        _ => None,
+        _ => factor(store, idn::POSITION_FACTOR, idn::POSITION_EXPONENT)?
+            .then(displacement(store, kind, rotary, turn)?),
     }
 }
 
 fn velocity(store: &Store, rotary: bool) -> Option<Ratio> {
     let kind = store.number_of(idn::VELOCITY_TYPE);
-    let unit = match (kind & bits::METHOD, rotary) {
-        (bits::ROTATIONAL, true) => Ratio::new(TURN, 1),
-        (bits::LINEAR, false) => length(kind),
-        _ => None,
-    }?;
     let seconds = if kind & bits::SECOND != 0 { 1 } else { 60 };
-    factor(store, idn::VELOCITY_FACTOR, idn::VELOCITY_EXPONENT)?.then(unit)?.then(Ratio::new(1, seconds)?)
+    factor(store, idn::VELOCITY_FACTOR, idn::VELOCITY_EXPONENT)?
+        .then_nearest(displacement(store, kind, rotary, Ratio::new(TURN, 1)?)?)?
+        .then_nearest(Ratio::new(1, seconds)?)
 }
 
 fn acceleration(store: &Store, rotary: bool) -> Option<Ratio> {
     let kind = store.number_of(idn::ACCELERATION_TYPE);
-    let unit = match (kind & bits::METHOD, rotary) {
-        (bits::ROTATIONAL, true) => Ratio::new(TURN, TURN_NANORADIAN)?.then(Ratio::new(TURN, 1)?),
-        (bits::LINEAR, false) => length(kind),
-        _ => None,
-    }?;
-    factor(store, idn::ACCELERATION_FACTOR, idn::ACCELERATION_EXPONENT)?.then(unit)
+    let radian = Ratio::new(TURNS * TURN, RADIANS)?;
+    factor(store, idn::ACCELERATION_FACTOR, idn::ACCELERATION_EXPONENT)?
+        .then_nearest(displacement(store, kind, rotary, radian)?)
 }
 
-fn torque(store: &Store, rotary: bool, servo: &ServoParameters) -> Option<Ratio> {
+fn torque(store: &Store, servo: &ServoParameters) -> Option<Ratio> {
     let kind = store.number_of(idn::TORQUE_TYPE);
-    match (kind & bits::METHOD, rotary) {
-        (bits::NONE, _) => Ratio::new(1_000, 1),
-        (bits::ROTATIONAL, true) | (bits::LINEAR, false) if kind & bits::INCH == 0 => {
-            // Micro newton (metre), as parts per million of what the motor is rated for.
-            let micro = Ratio::new(1_000_000, 1)?;
-            let rated = Ratio::new(1_000_000, servo.rated_torque.0)?;
-            factor(store, idn::TORQUE_FACTOR, idn::TORQUE_EXPONENT)?.then(micro)?.then(rated)
-        }
+    let inch = kind & bits::INCH != 0;
+    // Micro newton (metre); the motor is rated in that of the axis.
+    let rotary = servo.kind == UnitKind::Rotary;
+    let unit = match (kind & bits::METHOD, rotary) {
+        (bits::NONE, _) => return Ratio::new(1_000, 1),
+        (bits::ROTATIONAL, true) if inch => Ratio::new(INCH_POUND, 10_000_000_000),
+        (bits::LINEAR, false) if inch => Ratio::new(POUND, 10_000_000),
+        (bits::ROTATIONAL, true) | (bits::LINEAR, false) => Ratio::new(1_000_000, 1),
         _ => None,
+    }?;
+    // What the load sees is more by as much as it turns slower.
+    let unit = if kind & bits::LOAD != 0 { unit.then_nearest(gear(store)?)? } else { unit };
+    let rated = Ratio::new(1_000_000, servo.rated_torque.0)?;
+    factor(store, idn::TORQUE_FACTOR, idn::TORQUE_EXPONENT)?.then_nearest(unit)?.then_nearest(rated)
+}
+
+/// A temperature in millidegree Celsius as counts of 0.1 degree of the scaling type.
+pub fn temperature(store: &Store, millidegree: i64) -> i64 {
+    if store.number_of(idn::TEMPERATURE_TYPE) & 1 == 0 {
+        return millidegree / 100;
     }
+    millidegree * 9 / 500 + 320
 }
 
 /// What the drive sets by itself when a scaling type is preferential: pairs of IDN and value.
@@ -219,12 +263,21 @@ pub fn preferential(type_idn: Idn, kind: i64) -> &'static [(Idn, i64)] {
         return &[];
     }
     let linear = kind & bits::METHOD == bits::LINEAR;
+    let inch = linear && kind & bits::INCH != 0;
     match (type_idn, linear, kind & bits::SECOND != 0) {
+        (idn::POSITION_TYPE, true, _) if inch => &[(idn::POSITION_FACTOR, 1), (idn::POSITION_EXPONENT, -5)],
         (idn::POSITION_TYPE, true, _) => &[(idn::POSITION_FACTOR, 1), (idn::POSITION_EXPONENT, -7)],
         (idn::POSITION_TYPE, false, _) => &[(idn::POSITION_RESOLUTION, 3_600_000)],
-        (idn::VELOCITY_TYPE, true, _) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
+        (idn::VELOCITY_TYPE, true, false) if inch => {
+            &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -5)]
+        }
+        (idn::VELOCITY_TYPE, true, false) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
+        (idn::VELOCITY_TYPE, true, true) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -7)],
         (idn::VELOCITY_TYPE, false, false) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -4)],
         (idn::VELOCITY_TYPE, false, true) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
+        (idn::ACCELERATION_TYPE, true, _) if inch => {
+            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -4)]
+        }
         (idn::ACCELERATION_TYPE, true, _) => {
             &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -6)]
         }
@@ -291,15 +344,41 @@ mod tests {
         assert_eq!(Scales::read(&store, &servo).unwrap().torque.generic(50), 500_000);
     }
 
+    /// Gear and feed constant: a spindle of 10 mm whose motor turns 5 times for 2 turns of it.
+    #[test]
+    fn motor_and_load_turns_and_ways() {
+        let (mut store, servo) = store(UnitKind::Linear);
+        store.set_number_of(idn::GEAR_INPUT, 5);
+        store.set_number_of(idn::GEAR_OUTPUT, 2);
+        for (kind, counts, way) in [
+            (0x02, 3_600_000, 4_000_000_000),
+            (0x42, 3_600_000, 10_000_000_000),
+            (0x01, 10_000, 400_000_000),
+            (0x41, 10_000, 1_000_000_000),
+            (0x59, 10_000_000, 25_400_000_000),
+        ] {
+            store.set_number_of(idn::POSITION_TYPE, kind);
+            store.set_number_of(idn::POSITION_EXPONENT, -7);
+            assert_eq!(Scales::read(&store, &servo).unwrap().position.generic(counts), way, "{kind:#x}");
+        }
+        store.set_number_of(idn::TORQUE_TYPE, 0x41);
+        store.set_number_of(idn::TORQUE_EXPONENT, 0);
+        // 2.5 N at the load are 1 N of the motor, which is rated for 1 N.
+        assert_eq!(Scales::read(&store, &servo).unwrap().torque.generic(5), 2_000_000);
+        store.set_number_of(idn::TEMPERATURE_TYPE, 1);
+        assert_eq!(temperature(&store, 100_000), 2_120);
+    }
+
     #[test]
     fn impossible_scalings_are_named() {
         let cases = [
-            (idn::POSITION_TYPE, 1, idn::POSITION_TYPE),
+            (idn::POSITION_TYPE, 3, idn::POSITION_TYPE),
+            (idn::GEAR_INPUT, 0, idn::POSITION_TYPE),
             (idn::POSITION_RESOLUTION, 0, idn::POSITION_TYPE),
             (idn::VELOCITY_TYPE, 0, idn::VELOCITY_TYPE),
             (idn::VELOCITY_EXPONENT, 30, idn::VELOCITY_TYPE),
             (idn::ACCELERATION_FACTOR, 0, idn::ACCELERATION_TYPE),
-            (idn::TORQUE_TYPE, 0x12, idn::TORQUE_TYPE),
+            (idn::TORQUE_TYPE, 0x01, idn::TORQUE_TYPE),
             (idn::POSITION_TYPE, 0x82, idn::MODULO),
         ];
         for (idn, value, wanted) in cases {

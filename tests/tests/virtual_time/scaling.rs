@@ -1,0 +1,181 @@
+//! Drives in every scaling that a machine builder may have left them in: the axis goes where it is sent, as fast as it is
+//! sent there, whatever the drive counts in.
+
+use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, millis};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cip::controller::{AxisSet, Step};
+use profile_generic::state::DriveState;
+use profile_sercos::wire::idn::Idn;
+
+/// Parameters of the drive: number and value.
+type Preset = &'static [(u16, i64)];
+
+/// A gear of 5 to 2 and a spindle of 8 mm.
+const GEAR: Preset = &[(121, 5), (122, 2), (123, 80_000)];
+
+/// For the turntable.
+const ROTARY: &[(&str, Preset)] = &[
+    ("motor, preferential", &[(76, 0x02), (44, 0x02), (160, 0x02)]),
+    ("load, preferential, per second", &[(76, 0x42), (44, 0x62), (160, 0x42)]),
+    (
+        "parameters",
+        &[(76, 0x4A), (79, 1 << 20), (44, 0x4A), (45, 3), (46, -3), (160, 0x4A), (161, 7), (162, -4)],
+    ),
+    ("motor, parameters", &[(76, 0x0A), (79, 10_007), (44, 0x2A), (45, 1), (46, -5), (160, 0x0A), (162, -2)]),
+    ("linear data of a turning axis", &[(76, 0x41), (44, 0x41), (160, 0x41)]),
+    ("newton metre at the load", &[(86, 0x42)]),
+    ("inch pounds at the motor", &[(86, 0x1A), (93, 1), (94, -2)]),
+    ("load, modulo", &[(76, 0xC2), (103, 3_600_000)]),
+    ("motor, modulo of some turns", &[(76, 0x8A), (79, 36_000), (103, 100_000)]),
+];
+
+/// For the slide.
+const LINEAR: &[(&str, Preset)] = &[
+    ("load, preferential", &[(76, 0x41), (44, 0x41), (160, 0x41)]),
+    (
+        "motor, metre per second",
+        &[(76, 0x01), (44, 0x29), (45, 1), (46, -7), (160, 0x09), (161, 2), (162, -6)],
+    ),
+    (
+        "inch",
+        &[(76, 0x59), (77, 1), (78, -5), (44, 0x59), (45, 1), (46, -4), (160, 0x59), (161, 1), (162, -3)],
+    ),
+    ("inch, preferential", &[(76, 0x51), (44, 0x51), (160, 0x51)]),
+    ("turns of the spindle", &[(76, 0x42), (44, 0x42), (160, 0x42)]),
+    ("turns of the motor", &[(76, 0x0A), (79, 65_536), (44, 0x22), (160, 0x02)]),
+    ("newton", &[(86, 0x49), (93, 1), (94, -1)]),
+    ("pounds of force", &[(86, 0x19), (93, 1), (94, -1)]),
+];
+
+/// A box that knows what the motors are rated for.
+fn rated() -> String {
+    BOX.replace("address = 1", "address = 1\nrated_torque = \"1 Nm\"")
+        .replace("address = 2", "address = 2\nrated_torque = \"200 N\"")
+}
+
+fn preset(rig: &mut Rig, place: usize, values: Preset) {
+    for (idn, value) in values {
+        rig.line.slaves_mut()[place].preset(Idn::standard(*idn), *value);
+    }
+}
+
+/// Sends both axes somewhere and back, and looks at the servos themselves.
+fn run(rig: &mut Rig, what: &str) {
+    rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+    rig.connect(vec![
+        Step::Enable(AxisSet::first(2)),
+        Step::Together(vec![
+            Step::MoveAbsolute { axis: 1, position: 2.25, limits: TURNTABLE },
+            Step::MoveAbsolute { axis: 2, position: 150.5, limits: SLIDE },
+        ]),
+        Step::Dwell { seconds: 0.4 },
+        Step::Jog { axis: 1, velocity: -2.0, acceleration: 40.0, jerk: 800.0, seconds: 1.0 },
+        Step::Disable(AxisSet::first(2)),
+    ]);
+    rig.run_until(millis(20_000), "the end of the moves", |rig| rig.report().steps_finished == 3);
+    for (place, target, window) in [(0, 9 * NANO / 4, NANO / 500), (1, 301 * NANO / 2, NANO / 25)] {
+        let error = rig.position(place) - target;
+        assert!(error.abs() < window, "{what}: axis {place} is {error} nanounits away\n{}", rig.told());
+        // What the box says of itself is the same, to a count of the coarsest scaling here.
+        let seen = rig.engine.axes()[place].feedback().position.get();
+        assert!((seen - rig.position(place)).abs() < window, "{what}: {seen} seen");
+    }
+    rig.run_until(millis(5_000), "the velocity", |rig| (rig.velocity(0) + 2 * NANO).abs() < NANO / 50);
+    rig.run_for(millis(100));
+    let seen = rig.engine.axes()[0].feedback();
+    assert!((seen.velocity.get() + 2 * NANO).abs() < NANO / 50, "{what}: {}", seen.velocity);
+    assert!(
+        (seen.torque.get() - rig.drive(0).actual().torque.get()).abs() < 20_000,
+        "{what}: {}",
+        seen.torque
+    );
+    let report = rig.run(millis(20_000));
+    assert_eq!(report.failure, None, "{what}: {}\n{}", rig.log(), rig.told());
+}
+
+#[test]
+fn axes_go_where_they_are_sent_in_every_scaling_of_their_drives() {
+    for number in 0..ROTARY.len().max(LINEAR.len()) {
+        let mut rig = Rig::new(Settings { configuration: rated(), ..Settings::default() });
+        let (rotary, linear) = (ROTARY[number % ROTARY.len()], LINEAR[number % LINEAR.len()]);
+        for (place, (_, values)) in [rotary, linear].into_iter().enumerate() {
+            preset(&mut rig, place, GEAR);
+            preset(&mut rig, place, values);
+        }
+        run(&mut rig, &format!("{} / {}", rotary.0, linear.0));
+    }
+}
+
+/// Each polarity bit by itself and all of them: inverted as a whole the axis turns the other way, and where only some of
+/// the bits are set, command and actual value still go the same way.
+#[test]
+fn polarities_lead_no_axis_astray() {
+    for (position, velocity, torque) in [
+        (0b000, 0b000, 0b000),
+        (0b111, 0b111, 0b111),
+        (0b001, 0b000, 0b000),
+        (0b100, 0b000, 0b000),
+        (0b000, 0b001, 0b001),
+        (0b000, 0b100, 0b100),
+        (0b101, 0b000, 0b101),
+        (0b110, 0b011, 0b001),
+    ] {
+        let mut rig = Rig::new(Settings::default());
+        for (idn, bits) in [(55, position), (43, velocity), (85, torque)] {
+            rig.line.slaves_mut()[0].preset(Idn::standard(idn), bits);
+        }
+        rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig.connect(vec![
+            Step::Enable(AxisSet::one(1)),
+            Step::MoveAbsolute { axis: 1, position: 1.5, limits: TURNTABLE },
+            Step::Dwell { seconds: 0.3 },
+            Step::Jog { axis: 1, velocity: 3.0, acceleration: 40.0, jerk: 800.0, seconds: 1.0 },
+            Step::Disable(AxisSet::one(1)),
+        ]);
+        let what = format!("{position:#05b} {velocity:#05b} {torque:#05b}");
+        let way = if position & 0b100 == 0 { 1 } else { -1 };
+        rig.run_until(millis(20_000), "the end of the move", |rig| rig.report().steps_finished == 3);
+        let error = rig.position(0) * way - 3 * NANO / 2;
+        assert!(error.abs() < NANO / 500, "{what}: {error} nanorevolutions away");
+        rig.run_until(millis(5_000), "the velocity", |rig| {
+            (rig.velocity(0) * way - 3 * NANO).abs() < NANO / 50
+        });
+        let seen = rig.engine.axes()[0].feedback();
+        assert!(seen.velocity.get() > 2 * NANO, "{what}: {}", seen.velocity);
+        let torque = rig.drive(0).actual().torque.get() * way;
+        assert!((seen.torque.get() - torque).abs() < 5_000, "{what}: {} for {torque}", seen.torque);
+        let report = rig.run(millis(20_000));
+        assert_eq!(report.failure, None, "{what}: {}\n{}", rig.log(), rig.told());
+    }
+}
+
+/// What cannot be converted, or is only half understood, keeps its axis out, says why, and leaves the other one running.
+#[test]
+fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
+    let cases: [(Preset, &str); 6] = [
+        (&[(76, 0x00)], "S-0-0076: expected a scaling type that can be converted, got 0x0000"),
+        (&[(44, 0x00)], "S-0-0044: expected a scaling type that can be converted, got 0x0000"),
+        (
+            &[(86, 0x02)],
+            "S-0-0086 = 0x0002: the drive gives torque in absolute units, and the axis has no rated torque",
+        ),
+        (
+            &[(79, 1_000_000)],
+            "S-0-0079: expected 3600000, which the scaling type S-0-0076 = 0x0002 fixes, got 1000000",
+        ),
+        (&[(76, 0x09), (78, -19)], "S-0-0078: expected an exponent from -18 to 18, got -19"),
+        (&[(76, 0x82), (103, 0)], "S-0-0103: expected a number above 1, got 0"),
+    ];
+    for (values, why) in cases {
+        let mut rig = Rig::new(Settings::default());
+        preset(&mut rig, 0, values);
+        rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig.run_for(millis(100));
+        let told = rig.told();
+        let line = format!("axis 1: the drive with SERCOS address 1 cannot be used: {why}; it is left out");
+        let refused = told.contains(&line) || told.contains("S-0-0103") && why.contains("S-0-0103");
+        assert!(refused, "expected {line}\n{told}");
+        assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
+        assert_eq!(rig.engine.axes()[1].state(), DriveState::Ready, "{told}");
+    }
+}
