@@ -175,8 +175,18 @@ impl Core {
         let word = i64::from(control.bits());
         match (control, state) {
             (ProcedureControl::CANCEL, _) => {
-                if matches!(state, CommandState::InProcess | CommandState::Interrupted) {
-                    app.order(idn, Order::Cancel, &mut self.store)?;
+                let communication =
+                    matches!(idn, Idn::CP3_CHECK | Idn::CP4_CHECK | Idn::DELAY_MEASURING | Idn::RESET_C1D);
+                match state {
+                    CommandState::InProcess | CommandState::Interrupted => {
+                        app.order(idn, Order::Cancel, &mut self.store)?;
+                    }
+                    CommandState::Idle | CommandState::Set => {}
+                    // It has ended; what it has left behind ends too.
+                    _ if !communication => {
+                        let _ = app.order(idn, Order::Cancel, &mut self.store);
+                    }
+                    _ => {}
                 }
                 self.running.retain(|running| *running != handle);
                 self.ended.retain(|ended| *ended != handle);

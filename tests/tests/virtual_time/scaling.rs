@@ -176,6 +176,6 @@ fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
         let refused = told.contains(&line) || told.contains("S-0-0103") && why.contains("S-0-0103");
         assert!(refused, "expected {line}\n{told}");
         assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
-        assert_eq!(rig.engine.axes()[1].state(), DriveState::Ready, "{told}");
+        assert_ne!(rig.engine.axes()[1].state(), DriveState::NotReady, "{told}");
     }
 }

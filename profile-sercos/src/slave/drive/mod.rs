@@ -16,6 +16,8 @@
 //! When the connection with S-0-0134 no longer delivers the drive stops as if bit 15 had gone to 0.
 
 mod fault;
+pub mod homing;
+pub mod motion;
 pub mod parameters;
 pub mod probe;
 pub mod scaling;
@@ -24,10 +26,14 @@ use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
-use profile_generic::servo::{Servo, ServoActual, ServoCommand, ServoControl, ServoError, ServoParameters};
+use profile_generic::servo::{
+    Servo, ServoActual, ServoCommand, ServoControl, ServoError, ServoParameters, input,
+};
 use profile_generic::state::Report;
 use profile_generic::time::DurationNs;
 
+use self::homing::{Homing, Senses};
+use self::motion::{Motion, Pace};
 use self::parameters::{MODES, idn};
 use self::probe::Probe;
 use self::scaling::Scales;
@@ -43,6 +49,8 @@ use crate::wire::svc_error::SvcError;
 
 /// Data blocks of the operation modes that bits 10..8 of S-0-0134 select.
 const MODE_BLOCKS: [u16; 8] = [32, 33, 34, 35, 284, 285, 286, 287];
+/// Bit of an operation mode: the drive makes up the way to its target by itself.
+const INTERPOLATED: u16 = 1 << 4;
 /// Distance of motor temperature and overload to their limits at which the drive warns.
 const TEMPERATURE_MARGIN_MILLIDEGREE: i64 = 10_000;
 /// Part of the overload model, ppm, at which the drive warns.
@@ -74,6 +82,9 @@ pub struct Drive {
     locked: bool,
     referenced: bool,
     probe: Probe,
+    /// The set-point that the drive makes up by itself.
+    motion: Motion,
+    homing: Homing,
     /// Set-points that count from the next cycle on.
     next: ServoCommand,
 }
@@ -105,6 +116,8 @@ impl Drive {
             follows: false,
             locked: false,
             referenced: false,
+            motion: Motion::default(),
+            homing: Homing::default(),
         })
     }
 
@@ -175,7 +188,8 @@ impl Drive {
             in_position_window: Position(scales.position.generic(number(idn::POSITION_WINDOW)).max(1)),
             standstill_window: Velocity(scales.velocity.generic(number(idn::STANDSTILL_WINDOW)).max(1)),
             position_gain: number(idn::POSITION_GAIN).saturating_mul(1_000_000) / 6,
-            velocity_feed_forward: if lag_less { 1_000_000 } else { 0 },
+            // 0.01 %.
+            velocity_feed_forward: if lag_less { number(idn::VELOCITY_FEED_FORWARD) * 100 } else { 0 },
             ..*self.servo.parameters()
         }
     }
@@ -209,7 +223,7 @@ impl Drive {
         let mode = match code {
             0x0001 => OperatingMode::Torque,
             0x0002 => OperatingMode::Velocity,
-            0x0003 | 0x000B => OperatingMode::Position,
+            0x0003 | 0x000B | 0x0013 | 0x001B => OperatingMode::Position,
             _ => return None,
         };
         if (code, number) != (self.mode, self.mode_number) {
@@ -250,15 +264,23 @@ impl Drive {
     }
 
     /// The command of this cycle in generic units.
-    fn command(&mut self, cycle: &Cycle, mode: OperatingMode, store: &Store) -> ServoCommand {
+    fn command(&mut self, cycle: &Cycle, mode: OperatingMode, store: &mut Store) -> ServoCommand {
         let control = self.servo_control(cycle, store);
         let running = self.actual.report == Report::Operating;
         let torque = running || self.actual.report == Report::Halted;
         self.on_for = if torque { self.on_for + cycle.elapsed } else { DurationNs::ZERO };
         let delayed = self.on_for < tenth_millis(store, idn::ON_DELAY);
-        self.follows = running && !delayed && control == ServoControl::Enable;
-        let actual = self.scales.position.counts(self.actual.position.0);
+        let able = running && !delayed && control == ServoControl::Enable;
+        self.follows = able && !self.homing.leads();
         let mut command = ServoCommand { control, power: self.main_power, mode, ..ServoCommand::default() };
+        if let Some(position) = self.lead(cycle, able, mode, store) {
+            self.position = self.scales.position.counts(position);
+            command.position = Position(position);
+            command.mode = OperatingMode::Position;
+            return command;
+        }
+        let actual = self.scales.position.counts(self.actual.position.0);
+        self.motion = Motion { position: self.actual.position.0, velocity: self.actual.velocity.0 };
         if !self.follows {
             // Command values do not count: the drive stands where it is.
             self.position = actual;
@@ -284,7 +306,129 @@ impl Drive {
         let torque = |value| Torque(self.scales.torque.generic(value));
         command.torque = torque(sign(idn::TORQUE_POLARITY, 0) * number(idn::TORQUE_COMMAND));
         command.torque_offset = torque(sign(idn::TORQUE_POLARITY, 1) * number(idn::TORQUE_ADDITIVE));
+        if mode == OperatingMode::Position {
+            self.motion.position = command.position.0;
+        }
         command
+    }
+
+    /// The set-point of a motion that the drive makes up by itself: homing, or the way to S-0-0258 in an operation mode
+    /// with drive-controlled interpolation.
+    fn lead(&mut self, cycle: &Cycle, able: bool, mode: OperatingMode, store: &mut Store) -> Option<i64> {
+        let (edge, marker) = self.probe.take_homing_edges();
+        let switch = self.actual.digital_inputs & input::HOME_SWITCH != 0;
+        let senses = Senses { switch, edge, marker, able, span: cycle.elapsed.0 };
+        let (scales, inverted) = (self.scales, store.number_of(idn::POSITION_POLARITY) & 1 << 2 != 0);
+        let counts = |position: i64| {
+            let counts = scales.position.counts(position);
+            scales.fold(if inverted { -counts } else { counts })
+        };
+        self.homing.watch(&senses, store, counts);
+        if self.homing.leads() {
+            let shift = self.homing.advance(&mut self.motion, &senses, store, &scales, counts);
+            if let Some(shift) = shift {
+                self.displace(shift);
+            }
+            return able.then_some(self.motion.position);
+        }
+        if !self.follows || mode != OperatingMode::Position || self.mode & INTERPOLATED == 0 {
+            return None;
+        }
+        let number = |idn| store.number_of(idn);
+        let sign = if number(idn::POSITION_POLARITY) & 1 == 0 { 1 } else { -1 };
+        let here = scales.position.counts(self.motion.position);
+        let target = scales.position.generic(scales.unfold(sign * number(idn::TARGET_POSITION), here));
+        // 0.01 %.
+        let velocity = scales.velocity.generic(number(idn::POSITIONING_VELOCITY).abs());
+        let velocity =
+            velocity / 10_000 * number(idn::OVERRIDE) + velocity % 10_000 * number(idn::OVERRIDE) / 10_000;
+        let limit = self.servo.parameters().velocity_limit.0;
+        let acceleration = scales.acceleration.generic(number(idn::POSITIONING_ACCELERATION).abs()).max(1);
+        let deceleration = scales.acceleration.generic(number(idn::POSITIONING_DECELERATION).abs());
+        let deceleration = if deceleration > 0 { deceleration } else { acceleration };
+        if velocity == 0 {
+            self.motion.advance(cycle.elapsed.0, 0, Pace { velocity: 1, acceleration, deceleration });
+        } else {
+            let pace = Pace { velocity: velocity.min(limit), acceleration, deceleration };
+            self.motion.advance_to(cycle.elapsed.0, target, pace);
+        }
+        Some(self.motion.position)
+    }
+
+    /// The place of the axis gets a position that is `shift` nanounits more, and refers to the machine from now on.
+    fn displace(&mut self, shift: i64) {
+        let moved = |position: Position| Position(position.0.saturating_add(shift));
+        self.servo.set_position(moved(self.servo.position()));
+        self.actual.position = moved(self.actual.position);
+        self.next.position = moved(self.next.position);
+        self.motion.position = self.motion.position.saturating_add(shift);
+        self.position = self.scales.position.counts(self.actual.position.0);
+        self.homing.shifted(shift);
+        self.referenced = true;
+    }
+
+    /// The master's order to one of the procedure commands of homing.
+    fn order_homing(&mut self, idn: Idn, order: Order, store: &mut Store) -> Result<Progress, SvcError> {
+        use self::homing::idn as h;
+        let parameter = store.number_of(h::PARAMETER);
+        let standing = self.actual.status.contains(StatusBits::STANDSTILL);
+        match (idn, order) {
+            (h::BY_DRIVE, Order::Start) => {
+                if !self.follows || self.homing.leads() || !homing::is_possible(parameter) {
+                    return Err(SvcError::NOT_EXECUTABLE);
+                }
+                self.probe.take_homing_edges();
+                self.referenced = false;
+                self.homing.start_by_drive(store, self.actual.digital_inputs & input::HOME_SWITCH != 0);
+                Ok(Progress::InProcess)
+            }
+            (h::BY_DRIVE, Order::Cancel) => {
+                self.homing.cancel_by_drive();
+                Ok(Progress::Done)
+            }
+            (h::BY_MASTER, Order::Start) => {
+                if !homing::is_possible(parameter) {
+                    return Err(SvcError::NOT_EXECUTABLE);
+                }
+                self.probe.take_homing_edges();
+                self.referenced = false;
+                self.homing.start_by_master(store);
+                Ok(Progress::InProcess)
+            }
+            (h::BY_MASTER, Order::Cancel) => {
+                self.homing.cancel_by_master();
+                Ok(Progress::Done)
+            }
+            (h::CALCULATE, Order::Start) => {
+                let Some(shift) = self.homing.displacement(store, &self.scales) else {
+                    return Err(SvcError::NOT_EXECUTABLE);
+                };
+                store.set_number_of(h::DISPLACEMENT, self.scales.position.counts(shift));
+                Ok(Progress::Done)
+            }
+            (h::DISPLACE, Order::Start) => {
+                let shift = self.homing.displacement(store, &self.scales).filter(|_| standing);
+                self.displace(shift.ok_or(SvcError::NOT_EXECUTABLE)?);
+                self.homing.set_displaced(true);
+                Ok(Progress::Done)
+            }
+            (h::DISPLACE, Order::Cancel) => {
+                self.homing.set_displaced(false);
+                Ok(Progress::Done)
+            }
+            (h::CANCEL, Order::Start) => {
+                self.referenced = false;
+                Ok(Progress::Done)
+            }
+            (h::SET_ABSOLUTE, Order::Start) if standing && !self.in_operation() => {
+                let sign = if store.number_of(idn::POSITION_POLARITY) & 1 << 2 == 0 { 1 } else { -1 };
+                let position = sign * self.scales.position.generic(store.number_of(h::REFERENCE));
+                self.displace(position.saturating_sub(self.servo.position().0));
+                Ok(Progress::Done)
+            }
+            (h::CALCULATE | h::CANCEL | h::SET_ABSOLUTE, Order::Cancel) => Ok(Progress::Done),
+            _ => Err(SvcError::NOT_EXECUTABLE),
+        }
     }
 
     /// The command for the time up to now: the set-points of a telegram count from the synchronisation after it, so that
@@ -444,6 +588,9 @@ impl Application for Drive {
             let known = code == 0 || MODES.iter().any(|&mode| i64::from(mode) == code);
             return if known { Ok(()) } else { Err(SvcError::INVALID_DATA) };
         }
+        if idn == homing::idn::PARAMETER {
+            return if homing::is_possible(value(2)) { Ok(()) } else { Err(SvcError::INVALID_DATA) };
+        }
         if idn == idn::POSITION_GAIN {
             let gain = value(2).saturating_mul(1_000_000) / 6;
             let parameters = ServoParameters { position_gain: gain, ..*self.servo.parameters() };
@@ -468,13 +615,22 @@ impl Application for Drive {
         self.adopt(store);
     }
 
-    fn order(&mut self, idn: Idn, order: Order, _: &mut Store) -> Result<Progress, SvcError> {
-        if idn == probe::idn::COMMAND { Ok(self.probe.order(order)) } else { Err(SvcError::NOT_EXECUTABLE) }
+    fn order(&mut self, idn: Idn, order: Order, store: &mut Store) -> Result<Progress, SvcError> {
+        if idn == probe::idn::COMMAND {
+            Ok(self.probe.order(order))
+        } else {
+            self.order_homing(idn, order, store)
+        }
     }
 
     fn progress(&mut self, idn: Idn, _: &mut Store) -> Progress {
-        // Probing goes on until it is cancelled.
-        if idn == probe::idn::COMMAND { Progress::InProcess } else { Progress::Failed }
+        match idn {
+            // Probing goes on until it is cancelled.
+            probe::idn::COMMAND => Progress::InProcess,
+            homing::idn::BY_DRIVE => self.homing.progress_by_drive(),
+            homing::idn::BY_MASTER => self.homing.progress_by_master(),
+            _ => Progress::Failed,
+        }
     }
 
     fn check_phase(&self, phase: Phase, store: &Store, invalid: &mut Invalid) {

@@ -61,6 +61,18 @@ pub mod idn {
     pub const TORQUE_LIMIT: Idn = Idn::standard(92);
     /// Kv of the position loop.
     pub const POSITION_GAIN: Idn = Idn::standard(104);
+    /// Feedrate override.
+    pub const OVERRIDE: Idn = Idn::standard(108);
+    /// Target position.
+    pub const TARGET_POSITION: Idn = Idn::standard(258);
+    /// Positioning velocity.
+    pub const POSITIONING_VELOCITY: Idn = Idn::standard(259);
+    /// Positioning acceleration.
+    pub const POSITIONING_ACCELERATION: Idn = Idn::standard(260);
+    /// Positioning deceleration; 0 takes the acceleration.
+    pub const POSITIONING_DECELERATION: Idn = Idn::standard(359);
+    /// Velocity feed forward gain of lag-less position control.
+    pub const VELOCITY_FEED_FORWARD: Idn = Idn::standard(296);
     /// Standstill window.
     pub const STANDSTILL_WINDOW: Idn = Idn::standard(124);
     /// Velocity threshold n_x.
@@ -96,8 +108,9 @@ pub mod idn {
 /// S-0-1302.0.1 of a drive.
 const FSP_DRIVE: i64 = 2;
 
-/// Operation modes: torque, velocity, position with and without following distance.
-pub const MODES: [u16; 4] = [0x0001, 0x0002, 0x0003, 0x000B];
+/// Operation modes: torque, velocity, position with and without following distance, the same with drive-controlled
+/// interpolation.
+pub const MODES: [u16; 6] = [0x0001, 0x0002, 0x0003, 0x000B, 0x0013, 0x001B];
 
 /// Element 3: unsigned, signed or bits; written in CP2 and CP3, at any time, or never.
 mod attribute {
@@ -122,7 +135,6 @@ mod attribute {
     pub const CURRENT_READ: u32 = 0x7312_0001;
     pub const SPEED_READ: u32 = 0x7412_0001;
     pub const U16_READ: u32 = 0x7011_0001;
-    pub const U32_READ: u32 = 0x7012_0001;
     pub const VOLTAGE_READ: u32 = 0x7111_0001;
     pub const MODE_LIST: u32 = 0x7035_0001;
 }
@@ -222,6 +234,20 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
         store.define(definition);
     }
     super::probe::define(store, length);
+    super::homing::define(store, length, speed);
+    let positioning = [
+        value(idn::TARGET_POSITION, a::POSITION, "Target position", Command).unit(length),
+        value(idn::POSITIONING_VELOCITY, a::VELOCITY, "Positioning velocity", Command).unit(speed),
+        value(idn::POSITIONING_ACCELERATION, a::VELOCITY, "Positioning acceleration", Command),
+        value(idn::POSITIONING_DECELERATION, a::VELOCITY, "Positioning deceleration", Command),
+        Definition::value(idn::OVERRIDE, a::GAIN, "Feedrate override", 10_000).unit("%").cyclic(Command),
+        Definition::value(idn::VELOCITY_FEED_FORWARD, a::GAIN, "Velocity feed forward gain", 10_000)
+            .unit("%")
+            .range(0, 10_000),
+    ];
+    for definition in positioning {
+        store.define(definition);
+    }
     let milli = |micro: i64| micro / 1_000;
     let rated = milli(servo.rated_current.0);
     let peak = rated.saturating_mul(servo.torque_limit.0) / 1_000_000;
@@ -306,6 +332,10 @@ fn preset(store: &mut Store, servo: &ServoParameters) {
         (idn::VELOCITY_THRESHOLD, scales.velocity.counts(servo.standstill_window.0)),
         (idn::TORQUE_THRESHOLD, scales.torque.counts(servo.torque_limit.0)),
         (idn::MONITORING_WINDOW, scales.position.counts(servo.position_error_tolerance.0)),
+        (super::homing::idn::VELOCITY, scales.velocity.counts(servo.velocity_limit.0 / 50)),
+        (super::homing::idn::ACCELERATION, scales.acceleration.counts(servo.deceleration_limit.0 / 10)),
+        (idn::POSITIONING_VELOCITY, scales.velocity.counts(servo.velocity_limit.0 / 10)),
+        (idn::POSITIONING_ACCELERATION, scales.acceleration.counts(servo.deceleration_limit.0 / 10)),
         // 0.01 (1000/min) = 1/6 per second.
         (idn::POSITION_GAIN, servo.position_gain.saturating_mul(6) / 1_000_000),
     ] {

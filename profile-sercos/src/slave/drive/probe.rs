@@ -104,13 +104,16 @@ pub(super) struct Probe {
     /// S-0-0179.
     latched: u8,
     markers: u16,
+    /// Where the home switch went active, and where a marker was, since they were taken.
+    homing: (Option<Position>, Option<Position>),
 }
 
 impl Probe {
     /// Lets the servo capture every edge; which of them count is decided here.
     pub fn new(servo: &mut Servo) -> Self {
-        let marker = (CaptureSource::Marker, CaptureEdge::Positive);
-        for (source, edge) in EDGES.into_iter().chain([marker]) {
+        let others = [CaptureSource::Marker, CaptureSource::HomeSwitch];
+        let others = others.map(|source| (source, CaptureEdge::Positive));
+        for (source, edge) in EDGES.into_iter().chain(others) {
             servo.capture(CaptureRequest { auto_rearm: true, ..CaptureRequest::arm(0, source, edge) });
         }
         Self::default()
@@ -141,7 +144,12 @@ impl Probe {
             if result.status != CaptureStatus::Captured {
                 continue;
             }
+            if result.source == CaptureSource::HomeSwitch {
+                self.homing.0 = Some(result.position);
+                continue;
+            }
             if result.source == CaptureSource::Marker {
+                self.homing.1 = Some(result.position);
                 self.markers = self.markers.wrapping_add(1);
                 store.set_number_of(idn::MARKER, counts(result.position));
                 continue;
@@ -156,6 +164,11 @@ impl Probe {
                 store.set_number_of(idn::VALUES[edge], counts(result.position));
             }
         }
+    }
+
+    /// Where the home switch went active, and where the last marker was, since the last call.
+    pub fn take_homing_edges(&mut self) -> (Option<Position>, Option<Position>) {
+        core::mem::take(&mut self.homing)
     }
 
     /// The words for the master.
