@@ -449,10 +449,9 @@ mod tests {
             for power in [Ratio::new(1, 1_000).unwrap(), Ratio::new(100, 1).unwrap()] {
                 let gear = Ratio::new(gear.0, gear.1).unwrap();
                 let near = radian.then_nearest(gear).unwrap().then_nearest(power).unwrap();
-                let exact = 78_256_779e9 / 491_701_844.0 * gear.num as f64 / gear.den as f64
-                    * power.num as f64
-                    / power.den as f64;
-                let got = near.num as f64 / near.den as f64;
+                let parts = [gear.num, power.num, gear.den, power.den].map(|part| Ratio::ONE.to_f64(part));
+                let exact = 78_256_779e9 / 491_701_844.0 * parts[0] * parts[1] / parts[2] / parts[3];
+                let got = Ratio::ONE.to_f64(near.num) / Ratio::ONE.to_f64(near.den);
                 assert!(((got - exact) / exact).abs() < 1e-15, "{near}: {got} for {exact}");
             }
         }

@@ -18,6 +18,10 @@ struct Scales {
     resolution: i64,
 }
 
+fn float(value: i64) -> f64 {
+    profile_generic::ratio::Ratio::ONE.to_f64(value)
+}
+
 fn axis_of(kind: UnitKind) -> SercosAxis {
     let rated = Some(Rated { kind, value: 2_500_000 });
     SercosAxis { units: AxisUnits { kind, rated, ..AxisUnits::default() }, ..rotary_axis(false) }
@@ -53,7 +57,7 @@ fn expected(kind: UnitKind, quantity: usize, scales: Scales) -> Option<f64> {
     let word = scales.word;
     let (method, parameter, inch, second, load) =
         (word & 7, word & 8 != 0, word & 16 != 0, word & 32 != 0, word & 64 != 0);
-    let exact = |value: i64| value as f64;
+    let exact = float;
     let linear = match method {
         0 if quantity == 3 => return Some(1_000.0),
         1 => true,
@@ -125,7 +129,7 @@ fn lsb(axis: &SercosAxis, facts: &DriveFacts, quantity: usize) -> Result<Lsb, Se
 }
 
 fn ratio_of(lsb: Lsb) -> f64 {
-    lsb.generic.num() as f64 / lsb.generic.den() as f64
+    float(lsb.generic.num()) / float(lsb.generic.den())
 }
 
 /// Every scaling word with every bit, for either kind of axis: each converts as the arithmetic says, or is refused with
@@ -386,14 +390,14 @@ proptest! {
             .within(width.range().0, width.range().1);
         let counts = there.convert(value);
         let back = unit.generic.convert(counts.value, profile_generic::ratio::Rounding::Nearest);
-        let fits = value as f64 / size;
-        let (low, high) = (width.range().0 as f64, width.range().1 as f64);
+        let fits = float(value) / size;
+        let (low, high) = (float(width.range().0), float(width.range().1));
         if counts.saturated {
             prop_assert!(fits < low - 0.49 || fits > high + 0.49, "{} fits", fits);
             prop_assert!(counts.value == width.range().0 || counts.value == width.range().1);
         } else if !back.saturated {
-            let lost = (back.value as f64 - value as f64).abs();
-            prop_assert!(lost <= size / 2.0 + 0.5 + value.unsigned_abs() as f64 * 1e-15, "{} of {}", lost, size);
+            let lost = (float(back.value) - float(value)).abs();
+            prop_assert!(lost <= size / 2.0 + 0.5 + float(value).abs() * 1e-15, "{} of {}", lost, size);
         }
     }
 
@@ -413,7 +417,7 @@ proptest! {
         let mut position = 0_i64;
         for step in std::iter::once(0.0).chain(steps) {
             #[expect(clippy::cast_possible_truncation, reason = "below half of 2^31")]
-            let step = (step * range as f64) as i64;
+            let step = (step * float(range)) as i64;
             position += step;
             command.set(Signal::PositionCommand, position * 2_500 / 9);
             let mut telegram = [0; 12];

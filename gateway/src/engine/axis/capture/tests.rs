@@ -27,10 +27,14 @@ fn program(words: &[u16], places: &[u16], listed: bool) -> SercosProgram {
         ..SercosAxis::default()
     };
     let mut facts = DriveFacts::new();
+    for polarity in [43, 55, 85] {
+        facts.note_data(Idn::standard(polarity), &[0, 0]);
+    }
     for (block, value) in [(76, 0x42_u16), (44, 0x42), (160, 0x42), (86, 0)] {
         facts.note_data(Idn::standard(block), &value.to_le_bytes());
     }
-    let mut list = Vec::new();
+    // The torque, beside what is to be captured.
+    let mut list = Idn::standard(84).0.to_le_bytes().to_vec();
     for (blocks, attribute) in [(words, WORD), (places, PLACE)] {
         for block in blocks {
             facts.note_attribute(Idn::standard(*block), attribute);
