@@ -93,6 +93,9 @@ pub struct MasterConfig {
     pub mst_jitter_ns: u32,
     /// Deviation of one slave's forwarding in nanoseconds; the inter frame gap follows from it.
     pub slave_jitter_ns: u32,
+    /// Delay of one pass through a slave in nanoseconds; the ring delay follows from it. 900 by default, more than
+    /// any known slave needs.
+    pub slave_delay_ns: u32,
     /// Slaves for which storage is set aside, 1..=511. Above 255 the network uses four telegrams in CP1 and CP2.
     pub slaves_max: u16,
     /// Expected slaves. Others found on the network take part without connections.
@@ -133,6 +136,7 @@ impl MasterConfig {
             setup_cycle_ns: 1_000_000,
             mst_jitter_ns: 45_000,
             slave_jitter_ns: 80,
+            slave_delay_ns: 900,
             slaves_max: 64,
             slaves: Vec::new(),
             stable_cycles: 100,

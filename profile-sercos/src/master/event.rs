@@ -125,6 +125,15 @@ pub enum Event {
         /// The slave.
         slave: SlaveId,
     },
+    /// The slave does not have this connection: S-0-1051, or its fixed configuration.
+    NoConnection {
+        /// The slave.
+        slave: SlaveId,
+        /// The configured connection.
+        instance: u8,
+        /// Connections which the slave has, numbered from 0.
+        available: u16,
+    },
     /// S-0-0127 or S-0-0128 failed; `invalid_parameters` lists what the slave finds wrong.
     CheckFailed {
         /// The slave.
@@ -198,6 +207,9 @@ impl fmt::Display for Event {
             Event::StepFailed { slave, idn, failure } => write!(f, "{slave}: {idn}: {failure}"),
             Event::ClassMismatch { slave } => {
                 write!(f, "{slave}: exactly one of SCP_FixCFG and SCP_VarCFG is needed")
+            }
+            Event::NoConnection { slave, instance, available } => {
+                write!(f, "{slave} has {available} connections, connection {instance} is not one of them")
             }
             Event::CheckFailed { slave, phase } => {
                 write!(f, "{slave}: the check to leave {phase} failed, parameters are invalid")

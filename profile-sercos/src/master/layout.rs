@@ -31,12 +31,15 @@ const MST_END: u64 = 28;
 const SPARE: usize = 2;
 /// Shortest unified communication channel in nanoseconds: one frame of the largest size.
 const UC_MIN_NS: u64 = 125_000;
-/// Bytes kept free between the unified communication channel and the next cycle.
-const UC_GUARD: u64 = 60;
-/// Delay of one pass through a slave in nanoseconds, where it has not been measured.
-const PASS_NS: u64 = 900;
+/// Bytes kept free at the end of the cycle: the header of the next MST, and what a hardware master takes before it.
+const CYCLE_GUARD: u64 = 60;
+/// Time which the components on the way take besides the slaves in nanoseconds. No public figure: what is left of the
+/// recorded ring delay of two slaves when the passes and half the gap are taken off.
+const COMPONENTS_NS: u64 = 1_800;
 /// Bytes of Ethernet's smallest permitted inter frame gap, and one for its rounding.
 const GAP_MIN: u64 = 12 + 1;
+/// The gap grows by this share of the slaves' jitter (ns) times the thousandfold root of the passes.
+const GAP_FACTOR: (u64, u64) = (27, 640_000);
 /// Largest inter frame gap which a slave without S-0-1036 stands.
 const GAP_MAX_FIXED: u64 = 37;
 
@@ -60,6 +63,10 @@ pub struct SlaveNeed {
     pub feedback_ns: u32,
     /// Minimum of S-0-1006, earliest start of AT0, ns.
     pub at_start_min_ns: u32,
+    /// S-0-1037, jitter of its forwarding, ns; 0 where it does not tell.
+    pub jitter_ns: u32,
+    /// S-0-1047, time until command values are active in it (t11), ns.
+    pub consumer_ns: u32,
 }
 
 /// Where a connection is.
@@ -103,6 +110,8 @@ pub struct Times {
     pub command_valid_ns: u32,
     /// S-0-1015, ring delay.
     pub ring_delay_ns: u32,
+    /// The last AT is back at the master.
+    pub at_back_ns: u32,
     /// S-0-1023, synchronization jitter.
     pub sync_jitter_ns: u32,
     /// S-0-1036, inter frame gap in bytes.
@@ -120,8 +129,10 @@ pub struct Timing {
     pub cycle_ns: u32,
     /// Deviation of the master's cycle start, ns.
     pub mst_jitter_ns: u32,
-    /// Deviation of one slave's forwarding, ns.
+    /// Deviation of one slave's forwarding, ns; slaves that tell a larger one count with theirs.
     pub slave_jitter_ns: u32,
+    /// Delay of one pass through a slave, ns.
+    pub slave_delay_ns: u32,
     /// Whether every slave has S-0-1036.
     pub gap_adjustable: bool,
     /// Hot-plug field in every telegram.
@@ -144,19 +155,32 @@ pub enum LayoutError {
         max: usize,
     },
     /// Four telegrams are not enough.
-    #[error("{kind}s: {needed} bytes are needed, four telegrams have {available}")]
+    #[error(
+        "{kind}s: {needed} bytes are needed, four telegrams have {available}; slave {slave} is the first without room"
+    )]
     Telegrams {
         /// MDT or AT.
         kind: Kind,
+        /// Position in the list of the first slave that lacks room.
+        slave: usize,
         /// Bytes needed.
         needed: usize,
         /// Bytes there.
         available: usize,
     },
-    /// The telegrams are longer than the cycle.
-    #[error("MDTs and ATs take {needed_ns} ns with jitter, the cycle has {cycle_ns} ns")]
+    /// The telegrams, with their jitter and until they are back, are longer than the cycle.
+    #[error(
+        "MDTs of {mdt_ns} ns and ATs of {at_ns} ns with a ring delay of {ring_ns} ns take {needed_ns} ns with jitter, \
+         the cycle has {cycle_ns} ns"
+    )]
     Cycle {
-        /// Time needed in nanoseconds.
+        /// Time of the MDTs with gaps in nanoseconds.
+        mdt_ns: u64,
+        /// Time of the ATs with gaps in nanoseconds.
+        at_ns: u64,
+        /// Time of a telegram through all slaves and back in nanoseconds.
+        ring_ns: u64,
+        /// Time needed in nanoseconds, late starts of slow slaves and jitter included.
         needed_ns: u64,
         /// Cycle time in nanoseconds.
         cycle_ns: u32,
@@ -186,19 +210,25 @@ struct Filler {
     /// Bytes asked for, beyond the end as well.
     needed: usize,
     len: [u16; TELEGRAMS_MAX],
+    /// The first slave for which there was no room.
+    without: Option<usize>,
 }
 
 impl Filler {
     fn new(kind: Kind, first: usize, start: usize) -> Filler {
-        Filler { kind, start, telegram: 0, at: first, needed: first, len: [0; TELEGRAMS_MAX] }
+        Filler { kind, start, telegram: 0, at: first, needed: first, len: [0; TELEGRAMS_MAX], without: None }
     }
 
-    /// The next `len` bytes. Beyond the last telegram it goes on counting, so that the error can say how much.
-    fn take(&mut self, len: usize) -> Offset {
+    /// The next `len` bytes, for a slave. Beyond the last telegram it goes on counting, so that the error can say how
+    /// much.
+    fn take(&mut self, slave: usize, len: usize) -> Offset {
         if self.at + len > DATA_LEN_MAX {
             self.telegram += 1;
             self.at = self.start;
             self.needed += self.start;
+        }
+        if self.telegram >= TELEGRAMS_MAX {
+            self.without.get_or_insert(slave);
         }
         let offset = self.at;
         self.at += len;
@@ -213,9 +243,9 @@ impl Filler {
     }
 
     fn finish(mut self) -> Result<[u16; TELEGRAMS_MAX], LayoutError> {
-        if self.telegram >= TELEGRAMS_MAX {
+        if let Some(slave) = self.without {
             let available = TELEGRAMS_MAX * DATA_LEN_MAX;
-            return Err(LayoutError::Telegrams { kind: self.kind, needed: self.needed, available });
+            return Err(LayoutError::Telegrams { kind: self.kind, slave, needed: self.needed, available });
         }
         if self.len[0] == 0 {
             self.len[0] = u16::try_from(DATA_LEN_MIN).unwrap_or(u16::MAX);
@@ -242,16 +272,18 @@ impl CyclicLayout {
         let mut mdt = Filler::new(Kind::Mdt, HOT_PLUG_LEN + EXTENDED_LEN + spare, start);
         let mut at = Filler::new(Kind::At, HOT_PLUG_LEN, start);
         self.slaves.clear();
-        for need in needs.clone() {
+        for (slave, need) in needs.clone().enumerate() {
             self.slaves.push(need.map(|_| {
-                let (svc_mdt, svc_at) = (mdt.take(SVC_LEN), at.take(SVC_LEN));
+                let (svc_mdt, svc_at) = (mdt.take(slave, SVC_LEN), at.take(slave, SVC_LEN));
                 let (control, status) = (svc_mdt, svc_at);
                 SlavePlaces { svc_mdt, svc_at, control, status, connections: ArrayVec::new() }
             }));
         }
-        for places in self.slaves.iter_mut().flatten() {
-            places.control = mdt.take(DEVICE_WORD_LEN);
-            places.status = at.take(DEVICE_WORD_LEN);
+        for (slave, places) in self.slaves.iter_mut().enumerate() {
+            if let Some(places) = places {
+                places.control = mdt.take(slave, DEVICE_WORD_LEN);
+                places.status = at.take(slave, DEVICE_WORD_LEN);
+            }
         }
         let mut number = 0;
         for (slave, (places, need)) in self.slaves.iter_mut().zip(needs.clone()).enumerate() {
@@ -262,7 +294,7 @@ impl CyclicLayout {
                     return Err(LayoutError::Connection { slave, instance, length, max: CONNECTION_LEN_MAX });
                 }
                 let filler = if connection.slave_produces { &mut at } else { &mut mdt };
-                let (kind, at) = (filler.kind, filler.take(usize::from(length)));
+                let (kind, at) = (filler.kind, filler.take(slave, usize::from(length)));
                 places.connections.push(ConnectionPlace { instance, kind, at, len: length, number });
                 number += 1;
             }
@@ -278,9 +310,11 @@ impl CyclicLayout {
         I: Iterator<Item = Option<&'a SlaveNeed>> + Clone,
     {
         let active = || needs.clone().flatten();
+        let most = |get: fn(&SlaveNeed) -> u32| active().map(|need| u64::from(get(need))).max().unwrap_or(0);
         let slaves = u64::try_from(active().count()).unwrap_or(u64::MAX).min(511);
         let cycle = u64::from(timing.cycle_ns);
-        let gap = inter_frame_gap(timing, slaves);
+        let slave_jitter = most(|need| need.jitter_ns).max(u64::from(timing.slave_jitter_ns));
+        let gap = inter_frame_gap(slave_jitter, slaves, timing.gap_adjustable);
         let on_wire = |lengths: &[u16; TELEGRAMS_MAX]| -> u64 {
             lengths
                 .iter()
@@ -290,22 +324,26 @@ impl CyclicLayout {
         };
         let (mdt, at) = (on_wire(&self.mdt_len), on_wire(&self.at_len));
         let jitter = (u64::from(timing.mst_jitter_ns) + gap * BYTE_NS) / 2;
-        let at_start_min = active().map(|need| u64::from(need.at_start_min_ns)).max().unwrap_or(0);
-        let feedback = active().map(|need| u64::from(need.feedback_ns)).max().unwrap_or(0);
-        let at_start = (mdt + jitter).max(at_start_min);
+        let at_start = (mdt + jitter).max(most(|need| need.at_start_min_ns));
         let at_end = at_start + jitter + at;
-        if at_end + jitter > cycle {
-            return Err(LayoutError::Cycle { needed_ns: at_end + jitter, cycle_ns: timing.cycle_ns });
+        // Out through every slave and back, as the gaps let it shift, and what else is on the way.
+        let path = 2 * slaves * u64::from(timing.slave_delay_ns) + gap * BYTE_NS / 2 + COMPONENTS_NS;
+        // The ATs have to be back before the master begins the next cycle, which evaluates them.
+        let needed = (at_end + jitter + CYCLE_GUARD * BYTE_NS).max(at_end + path);
+        if needed > cycle {
+            let (mdt_ns, at_ns, ring_ns, cycle_ns) = (mdt, at, path, timing.cycle_ns);
+            return Err(LayoutError::Cycle { mdt_ns, at_ns, ring_ns, needed_ns: needed, cycle_ns });
         }
-        // From the line's first slave to its last and back, and one frame overhead each way.
-        let path = 2 * slaves * PASS_NS + OVERHEAD * BYTE_NS;
-        let uc_end = cycle.saturating_sub(jitter + UC_GUARD * BYTE_NS);
+        let uc_end = cycle.saturating_sub(jitter + CYCLE_GUARD * BYTE_NS);
         let uc = (uc_end >= at_end + UC_MIN_NS).then(|| (narrow(at_end), narrow(uc_end)));
+        let before_at = path + most(|need| need.feedback_ns);
+        let command_valid = mdt - MST_END * BYTE_NS + path + most(|need| need.consumer_ns);
         Ok(Times {
             at_start_ns: narrow(at_start),
-            sync_ns: narrow((at_start + cycle - (path + feedback) % cycle) % cycle),
-            command_valid_ns: narrow((mdt - MST_END * BYTE_NS + path) % cycle),
+            sync_ns: narrow((at_start + cycle - before_at % cycle) % cycle),
+            command_valid_ns: narrow(command_valid % cycle),
             ring_delay_ns: narrow(path + OVERHEAD * BYTE_NS),
+            at_back_ns: narrow(at_end + path),
             sync_jitter_ns: narrow(jitter),
             gap: u16::try_from(gap).unwrap_or(u16::MAX),
             uc_ns: uc,
@@ -344,11 +382,14 @@ impl CyclicLayout {
     }
 }
 
-/// Bytes between two frames, so that frames which the slaves delay differently do not meet.
-fn inter_frame_gap(timing: &Timing, slaves: u64) -> u64 {
-    let root = if slaves == 0 { 0 } else { (slaves - 1).isqrt() + 1 };
-    let gap = GAP_MIN + 27 * u64::from(timing.slave_jitter_ns) * root / 640;
-    if timing.gap_adjustable { gap } else { gap.min(GAP_MAX_FIXED) }
+/// Bytes between two frames, so that frames which the slaves delay differently do not meet: every slave is passed
+/// twice, and what the passes deviate adds up like noise.
+fn inter_frame_gap(slave_jitter_ns: u64, slaves: u64, adjustable: bool) -> u64 {
+    // Thousandfold root of 2 N, rounded.
+    let root = ((8_000_000 * slaves).isqrt() + 1) / 2;
+    let (numerator, denominator) = GAP_FACTOR;
+    let gap = GAP_MIN + numerator * slave_jitter_ns * root / denominator;
+    if adjustable { gap } else { gap.min(GAP_MAX_FIXED) }
 }
 
 /// Times are below the cycle time or a few microseconds: they fit 32 bits.
@@ -358,13 +399,18 @@ fn narrow(ns: u64) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::wire::layout::Region;
 
     fn timing(cycle_ns: u32) -> Timing {
         Timing {
             cycle_ns,
             mst_jitter_ns: 45_000,
             slave_jitter_ns: 80,
+            slave_delay_ns: 900,
             gap_adjustable: true,
             hot_plug_in_all: true,
         }
@@ -403,10 +449,11 @@ mod tests {
         assert_eq!(
             layout.times,
             Times {
-                at_start_ns: 31_020,              // frame 3881
-                sync_ns: 24_860,                  // frame 3929
-                command_valid_ns: 11_680,         // frame 3977
-                ring_delay_ns: 8_720,             // frame 4025
+                at_start_ns: 31_020,      // frame 3881
+                sync_ns: 24_860,          // frame 3929
+                command_valid_ns: 11_680, // frame 3977
+                ring_delay_ns: 8_720,     // frame 4025
+                at_back_ns: 62_200 + 6_160,
                 sync_jitter_ns: 23_260,           // frame 4073
                 gap: 19,                          // frame 4345
                 uc_ns: Some((62_200, 9_971_940)), // frames 4409, 4425
@@ -445,23 +492,37 @@ mod tests {
         let needs = vec![need(250, 8); 40];
         assert_eq!(
             layout(&timing(10_000_000), &needs),
-            Err(LayoutError::Telegrams { kind: Kind::Mdt, needed: 10_398, available: 5976 })
+            Err(LayoutError::Telegrams { kind: Kind::Mdt, slave: 19, needed: 10_398, available: 5976 })
         );
         assert_eq!(
             layout(&timing(10_000_000), &[need(258, 8)]),
             Err(LayoutError::Connection { slave: 0, instance: 0, length: 258, max: 256 })
         );
-        // (46 + 32 + 19) * 80 + (48 + 32 + 19) * 80 + 3 * 23260.
+        // (46 + 32 + 19) * 80, (48 + 32 + 19) * 80; with 3 * 23260 and the guard of 4800.
         assert_eq!(
             layout(&timing(62_500), &[need(8, 12), need(8, 12)]),
-            Err(LayoutError::Cycle { needed_ns: 85_460, cycle_ns: 62_500 })
+            Err(LayoutError::Cycle {
+                mdt_ns: 7_760,
+                at_ns: 7_920,
+                ring_ns: 6_160,
+                needed_ns: 90_260,
+                cycle_ns: 62_500
+            })
+        );
+        // 200 slaves: MDTs and ATs of two telegrams each fit into 500 us, their way through the slaves does not.
+        let error = layout(&Timing { mst_jitter_ns: 0, ..timing(500_000) }, &vec![need(0, 0); 200]);
+        assert_eq!(
+            error.unwrap_err().to_string(),
+            "MDTs of 147680 ns and ATs of 147200 ns with a ring delay of 365000 ns take 666280 ns with jitter, the \
+             cycle has 500000 ns"
         );
     }
 
     #[test]
     fn performance_anchors() {
         // Public performance table: 12 bytes for each of 70 drives in 250 us, with a hardware master.
-        let exact = Timing { mst_jitter_ns: 0, slave_jitter_ns: 0, ..timing(250_000) };
+        // Such a master takes ATs that come back in the next cycle; the ring delay does not count.
+        let exact = Timing { mst_jitter_ns: 0, slave_jitter_ns: 0, slave_delay_ns: 0, ..timing(250_000) };
         let table = layout(&exact, &vec![need(12, 12); 70]).unwrap();
         assert_eq!(table.times.load_permille, 931);
         assert_eq!(table.times.uc_ns, None);
@@ -482,5 +543,93 @@ mod tests {
         slower.feedback_ns = 200_000;
         let layout = self::layout(&timing(1_000_000), &[slower]).unwrap();
         assert!(layout.times.sync_ns > 800_000, "feedback of the cycle before: {}", layout.times.sync_ns);
+    }
+
+    #[test]
+    fn gaps_and_ring_delays_of_any_number_of_slaves() {
+        // Gaps by the public formula, with its thousandfold roots of 2 N: 1414, 2000, 4000, 5657, 11314, 22539, 31969.
+        for (slaves, gap, capped) in
+            [(1, 17, 17), (2, 19, 19), (8, 26, 26), (16, 32, 32), (64, 51, 37), (254, 89, 37), (511, 120, 37)]
+        {
+            assert_eq!(inter_frame_gap(80, slaves, true), gap, "{slaves}");
+            assert_eq!(inter_frame_gap(80, slaves, false), capped, "{slaves}");
+        }
+        assert_eq!((inter_frame_gap(80, 0, true), inter_frame_gap(0, 511, true)), (13, 13));
+        let one = layout(&timing(10_000_000), &[need(8, 12)]).unwrap();
+        let many = layout(&timing(10_000_000), &vec![need(0, 0); 511]).unwrap();
+        // 1800 a slave, half a gap, the components, one frame overhead.
+        assert_eq!(one.times.ring_delay_ns, 1_800 + 680 + 1_800 + 2_560);
+        assert_eq!(many.times.ring_delay_ns, 511 * 1_800 + 4_800 + 1_800 + 2_560);
+    }
+
+    #[test]
+    fn slaves_that_tell_their_jitter_and_t11_are_believed() {
+        let mut slow = need(8, 12);
+        slow.jitter_ns = 200;
+        slow.consumer_ns = 5_000;
+        let layout = layout(&timing(1_000_000), &[slow, need(8, 12)]).unwrap();
+        // 13 + 27 * 200 * 2000 / 640000, and five microseconds more until the command values are active.
+        assert_eq!(layout.times.gap, 29);
+        let path = 3_600 + 29 * 40 + 1_800;
+        assert_eq!(layout.times.command_valid_ns, (46 + 32 + 29) * 80 - 2_240 + path + 5_000);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(96))]
+
+        /// Whatever the slaves need: a layout without overlaps that holds its own times, or a refusal whose numbers
+        /// show why.
+        #[test]
+        fn every_layout_holds(
+            needs in vec((0u16..40, 0u16..40), 1..=511),
+            cycles in 1u32..40,
+            hot_plug_in_all: bool,
+        ) {
+            let needs: Vec<_> = needs.iter().map(|&(mdt, at)| need(2 * mdt, 2 * at)).collect();
+            let timing = Timing { hot_plug_in_all, ..timing(cycles * 250_000) };
+            match layout(&timing, &needs) {
+                Ok(layout) => {
+                    let wire = layout.to_wire(|index| u16::try_from(index + 1).unwrap());
+                    for (kind, lengths) in [(Kind::Mdt, layout.mdt_len), (Kind::At, layout.at_len)] {
+                        for (number, len) in (0u8..).zip(lengths) {
+                            let len = usize::from(len);
+                            prop_assert!(len == 0 || (DATA_LEN_MIN..=DATA_LEN_MAX).contains(&len));
+                            if len == 0 {
+                                continue;
+                            }
+                            let regions = wire.regions(kind, number, len).unwrap();
+                            let first = regions.iter().find(|(_, region)| {
+                                !matches!(region, Region::HotPlug | Region::Extended | Region::Gap)
+                            });
+                            let start = match (number, kind) {
+                                (0, Kind::Mdt) if hot_plug_in_all => 14,
+                                (0, Kind::Mdt) => 12,
+                                (0, Kind::At) => 8,
+                                _ if hot_plug_in_all => 8,
+                                _ => 0,
+                            };
+                            prop_assert_eq!(first.map(|(range, _)| range.start), Some(start));
+                        }
+                    }
+                    let times = layout.times;
+                    let cycle = timing.cycle_ns;
+                    prop_assert!(times.at_start_ns < cycle && times.at_back_ns <= cycle);
+                    prop_assert!(times.sync_ns < cycle && times.command_valid_ns < cycle);
+                    prop_assert!(times.load_permille < 1000);
+                    if let Some((t6, t7)) = times.uc_ns {
+                        prop_assert!(t6 > times.at_start_ns && t7 <= cycle && t7 - t6 >= 125_000);
+                    }
+                }
+                Err(LayoutError::Telegrams { needed, available, slave, .. }) => {
+                    prop_assert!(slave < needs.len() && available == 5976);
+                    // What does not fit behind the end of a telegram is lost at most four times.
+                    prop_assert!(needed + 4 * 80 > available, "{needed}");
+                }
+                Err(LayoutError::Cycle { needed_ns, cycle_ns, mdt_ns, at_ns, .. }) => {
+                    prop_assert!(needed_ns > u64::from(cycle_ns) && mdt_ns + at_ns < needed_ns);
+                }
+                Err(error) => return Err(TestCaseError::fail(error.to_string())),
+            }
+        }
     }
 }

@@ -173,7 +173,6 @@ impl Step {
         !matches!(
             self,
             Step::ScpClasses
-                | Step::Setup
                 | Step::ConfigurationList
                 | Step::Length
                 | Step::CycleTime
@@ -207,9 +206,12 @@ impl Step {
     }
 
     fn applies_to(self, station: &Station, instance: u8) -> bool {
-        let variable = station.facts.version(ScpClass::VAR_CFG).is_some();
+        let facts = &station.facts;
+        let variable = facts.version(ScpClass::VAR_CFG).is_some();
         match (self, station.connection(instance)) {
-            (Step::Setup, None) => variable && u16::from(instance) < station.facts.connections,
+            // A connection that is not wanted is switched off. Slaves with a fixed configuration may lack the setup.
+            (Step::Setup, None) => facts.has_setup() && u16::from(instance) < facts.connections,
+            (Step::Setup, Some(_)) => facts.has_setup(),
             (_, None) => false,
             (Step::ConfigurationList, Some(connection)) => {
                 variable && connection.configuration == ConfigurationType::IdnList

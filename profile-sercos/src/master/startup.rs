@@ -12,7 +12,7 @@ use super::svc::request::{SvcData, SvcFailure, SvcOutcome};
 use crate::wire::connection::CONNECTION_CONTROL_LEN;
 use crate::wire::header::Kind;
 use crate::wire::idn::Idn;
-use crate::wire::scp::ScpEntry;
+use crate::wire::scp::{ScpClass, ScpEntry};
 
 impl Master {
     fn steps(&self) -> &'static [Step] {
@@ -44,9 +44,18 @@ impl Master {
             station.need = super::layout::SlaveNeed::default();
             station.ends.clear();
             station.report.truncate(station.read_rows);
-            if station.is_active() && !station.connections.is_empty() && !station.facts.is_consistent() {
+            if !station.is_active() || station.connections.is_empty() {
+                continue;
+            }
+            let (slave, available) = (SlaveId::from_index(index), station.facts.connections);
+            let beyond = station.connections.iter().map(|connection| connection.instance);
+            let beyond = beyond.max().filter(|&instance| available > 0 && u16::from(instance) >= available);
+            if !station.facts.is_consistent() {
                 station.work = Work::Failed;
-                self.emit(Event::ClassMismatch { slave: SlaveId::from_index(index) });
+                self.emit(Event::ClassMismatch { slave });
+            } else if let Some(instance) = beyond {
+                station.work = Work::Failed;
+                self.emit(Event::NoConnection { slave, instance, available });
             }
         }
     }
@@ -155,6 +164,7 @@ impl Master {
             cycle_ns: self.config.cycle_ns,
             mst_jitter_ns: self.config.mst_jitter_ns,
             slave_jitter_ns: self.config.slave_jitter_ns,
+            slave_delay_ns: self.config.slave_delay_ns,
             gap_adjustable: stations.iter().filter(|station| station.is_active()).all(|s| s.facts.gap),
             hot_plug_in_all: self.config.hot_plug_in_all,
         };
@@ -224,6 +234,9 @@ fn learn(station: &mut Station, step: Step, instance: u8, outcome: &SvcOutcome) 
         Step::ScpClasses => {
             station.facts.classes =
                 outcome.data.words().map(ScpEntry::from_word).take(super::station::CLASSES_MAX).collect();
+            if station.facts.version(ScpClass::VAR_CFG).is_none() {
+                station.facts.connections = super::station::CONNECTIONS_FIXED;
+            }
         }
         Step::GapPresence => station.facts.gap = true,
         Step::ConnectionImage => {
@@ -246,6 +259,8 @@ fn learn(station: &mut Station, step: Step, instance: u8, outcome: &SvcOutcome) 
             });
         }
         Step::FeedbackTime => station.need.feedback_ns = number.unwrap_or(0),
+        Step::SlaveJitter => station.need.jitter_ns = number.unwrap_or(0),
+        Step::ConsumerTime => station.need.consumer_ns = number.unwrap_or(0),
         Step::AtStartMinimum => station.need.at_start_min_ns = number.unwrap_or(0),
         Step::CheckInvalid => {
             let room = station.invalid.capacity();

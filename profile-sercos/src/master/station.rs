@@ -13,6 +13,9 @@ use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 use crate::wire::svc::AtSvc;
 
+/// Connections of a slave with fixed configuration.
+pub const CONNECTIONS_FIXED: u16 = 2;
+
 /// SCP classes kept per slave; the written list of active classes then fits into a request.
 pub const CLASSES_MAX: usize = 32;
 
@@ -36,7 +39,7 @@ pub struct Facts {
     pub classes: ArrayVec<ScpEntry, CLASSES_MAX>,
     /// Whether it has S-0-1036, inter frame gap.
     pub gap: bool,
-    /// Connections which it has by S-0-1051.
+    /// Connections which it has: by S-0-1051, or [`CONNECTIONS_FIXED`] without SCP_VarCFG; 0 when it does not tell.
     pub connections: u16,
 }
 
@@ -50,6 +53,13 @@ impl Facts {
     /// Exactly one way to configure connections.
     pub(super) fn is_consistent(&self) -> bool {
         self.version(ScpClass::FIX_CFG).is_some() != self.version(ScpClass::VAR_CFG).is_some()
+    }
+
+    /// S-0-1050.x.1 belongs to the classes that configure, synchronize or watch connections.
+    pub(super) fn has_setup(&self) -> bool {
+        [ScpClass::VAR_CFG, ScpClass::SYNC, ScpClass::WATCHDOG, ScpClass::WATCHDOG_CONNECTION]
+            .into_iter()
+            .any(|class| self.version(class).is_some())
     }
 
     /// The list for S-0-1000.0.1: the lowest version of each class.

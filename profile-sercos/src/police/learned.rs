@@ -1,6 +1,6 @@
 //! What went over a service channel: the operation data that a slave was told, or has told.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::wire::idn::Idn;
 use crate::wire::procedure::ProcedureControl;
@@ -64,11 +64,11 @@ impl Learned {
         self.values.get(&idn)?.get(LIST_HEAD_LEN..)
     }
 
-    /// The numbers of the connections that were set up.
-    pub fn connections(&self) -> impl Iterator<Item = u8> + '_ {
-        let setups = self.values.iter().filter(|(idn, _)| {
-            idn.block() == Idn::CONNECTION_BLOCK && !idn.is_product() && idn.element() == 1
+    /// The numbers of the connections that were set up (element 1) or given a place (element 3).
+    pub fn connections(&self) -> BTreeSet<u8> {
+        let told = self.values.keys().filter(|idn| {
+            idn.block() == Idn::CONNECTION_BLOCK && !idn.is_product() && matches!(idn.element(), 1 | 3)
         });
-        setups.map(|(idn, _)| idn.instance())
+        told.map(|idn| idn.instance()).collect()
     }
 }

@@ -219,7 +219,11 @@ fn places(position: u16, slave: &Learned, taken: &mut Vec<Taken>, broken: &mut V
     let mut connections = Vec::new();
     for index in slave.connections() {
         let x = |element| Idn::connection(index, element);
-        let setup = ConnectionSetup::from_bits_retain(slave.half(x(1)).unwrap_or(0));
+        // Slaves with a fixed configuration may not be told a setup; they produce in ATs and consume in MDTs.
+        let mdt = |word| Offset::from_assignment(word).0 == Kind::Mdt;
+        let fixed = slave.half(x(3)).map(|word| ConnectionSetup::synchronous(!mdt(word)));
+        let told = slave.half(x(1)).map(ConnectionSetup::from_bits_retain);
+        let setup = told.or(fixed).unwrap_or_default();
         if !setup.contains(ConnectionSetup::ACTIVE) {
             continue;
         }

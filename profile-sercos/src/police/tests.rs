@@ -6,10 +6,12 @@ use super::light::{COMMAND, FEEDBACK, Mirror};
 use super::*;
 use crate::master::config::{ConnectionConfig, Connections, MasterConfig, SlaveConfig};
 use crate::master::connection::ConsumerState;
-use crate::master::event::{Refusal, SlaveId};
+use crate::master::event::{Event, Refusal, SlaveId};
 use crate::master::phase::State;
+use crate::slave::communication::FixedConnection;
 use crate::slave::{self, Line, Slave};
 use crate::wire::idn::Idn;
+use crate::wire::scp::{ScpClass, ScpEntry};
 
 type Bus = VirtualBus<Line<Mirror>>;
 
@@ -401,4 +403,89 @@ fn addresses_are_unique_from_cp3_on() {
     bus.excused = Box::new(|_| true);
     bus.state(State::Await3);
     assert_eq!(bus.police.breaches()[0].rule, Rule::Address { slave: 3, address: 1 });
+}
+
+const fn class(class: ScpClass, version: u8) -> ScpEntry {
+    ScpEntry { class, version }
+}
+
+/// A fixed configuration: connection 0 is consumed, connection 1 produced.
+const FIXED: &[FixedConnection] = &[
+    FixedConnection { produces: false, idns: &[COMMAND] },
+    FixedConnection { produces: true, idns: &[FEEDBACK] },
+];
+
+#[test]
+fn classes_of_both_kinds_and_versions_come_up_in_one_line() {
+    use ScpClass as C;
+    const ONE: &[ScpEntry] = &[class(C::FIX_CFG, 1), class(C::SYNC, 1)];
+    const BARE: &[ScpEntry] = &[class(C::FIX_CFG, 1)];
+    const TWO: &[ScpEntry] = &[class(C::VAR_CFG, 2), class(C::SYNC, 2), class(C::NRT, 1)];
+    const BOTH: &[ScpEntry] =
+        &[class(C::VAR_CFG, 1), class(C::VAR_CFG, 2), class(C::SYNC, 1), class(C::SYNC, 2)];
+    let mut bus = bus(5, 5, 2_000_000, true);
+    let kinds = [(ONE, FIXED), (BARE, FIXED), (TWO, &[][..]), (BOTH, &[]), (ONE, FIXED)];
+    let slaves = (1u16..).zip(kinds).map(|(address, (classes, fixed))| {
+        let config = slave::Config { address, classes, fixed, ..slave::Config::default() };
+        Slave::new(&config, Mirror::default())
+    });
+    bus.line = Line::new(slaves.collect());
+    // The third slave's V2 classes tell jitter and t11.
+    bus.line.slaves_mut()[2].store_mut().set_number_of(Idn::SLAVE_JITTER, 640);
+    bus.line.slaves_mut()[2].store_mut().set_number_of(Idn::CONSUMER_TIME, 4_000);
+    bus.up_to(Phase::CP4);
+    bus.cycles(2);
+    for slave in (0..5).map(SlaveId) {
+        bus.master.producer(slave, 0).unwrap().copy_from_slice(&9i32.to_le_bytes());
+        assert!(bus.master.commit(slave, 0));
+    }
+    bus.cycles(3);
+    for slave in (0..5).map(SlaveId) {
+        let consumer = bus.master.consumer(slave, 1).unwrap();
+        assert_eq!((consumer.state, consumer.data), (ConsumerState::Consuming, &9i32.to_le_bytes()[..]));
+    }
+    // 13 + 27 * 640 * 3162 / 640000 for five slaves.
+    assert_eq!(bus.master.layout().times.gap, 98);
+    let told = |bus: &Bus, slave: usize, idn| bus.line.slaves()[slave].store().number_of(idn);
+    let soft = 1 << 4;
+    let control: Vec<i64> = (0..5).map(|slave| told(&bus, slave, Idn::COMMUNICATION_CONTROL)).collect();
+    assert_eq!(control, [0, 0, soft, 0, 0], "S-0-1032 belongs to version 2");
+    let starts: Vec<bool> = (0..5).map(|slave| told(&bus, slave, Idn::AT_START) > 0).collect();
+    assert_eq!(starts, [true, false, true, true, true], "t1 belongs to SCP_Sync");
+    let active = |slave: usize| {
+        let store = bus.line.slaves()[slave].store();
+        let data = store.get(store.find(Idn::SCP_ACTIVE).unwrap()).data();
+        data.chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect::<Vec<_>>()
+    };
+    assert_eq!(active(2), [0x0202, 0x0302, 0x0A01]);
+    assert_eq!(active(3), [0x0201, 0x0301], "the lowest version of each class");
+    let rows = |slave| {
+        let row = |row: &crate::master::report::ReportRow| row.to_string();
+        bus.master.report(SlaveId(slave)).iter().map(row).collect::<Vec<_>>()
+    };
+    assert!(rows(2).contains(&"CP2 read S-0-1037: 640 (0x280)".to_owned()), "{:?}", rows(2));
+    assert!(!rows(3).iter().any(|row| row.contains("S-0-1037") || row.contains("S-0-1047")));
+    assert!(
+        !rows(1).iter().any(|row| row.contains("S-0-1051") || row.contains(".6:") || row.contains(".1.2"))
+    );
+    assert!(rows(0).contains(&"CP2 write S-0-1050.1.1: 49152 (0xc000)".to_owned()), "{:?}", rows(0));
+}
+
+#[test]
+fn a_connection_that_the_slave_does_not_have_is_refused() {
+    let mut bus = bus(2, 2, 1_000_000, true);
+    let config = slave::Config { address: 2, connections: 1, ..slave::Config::default() };
+    bus.line.slaves_mut()[1] = Slave::new(&config, Mirror::default());
+    bus.line.cut_behind(usize::MAX);
+    bus.auto_proceed = false;
+    bus.master.set_target_phase(Phase::CP4);
+    bus.state(State::Await2);
+    bus.master.proceed().unwrap();
+    let refused = Event::NoConnection { slave: SlaveId(1), instance: 1, available: 1 };
+    bus.run_until("refused", |bus| bus.saw(&refused));
+    bus.state(State::Await2);
+    bus.master.exclude(SlaveId(1)).unwrap();
+    bus.master.proceed().unwrap();
+    bus.auto_proceed = true;
+    bus.state(State::Cp4);
 }

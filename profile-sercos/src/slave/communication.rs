@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::parameter::{Definition, IDN_LIST_READ_ONLY, Store};
+use crate::wire::connection::ConnectionSetup;
 use crate::wire::header::{DATA_LEN_MAX, DATA_LEN_MIN};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
@@ -15,8 +16,8 @@ pub const VALUES_MAX: usize = 32;
 /// Longest cycle, ns.
 pub const CYCLE_NS_MAX: u32 = 65_000_000;
 
-/// Communication classes of this slave: S-0-1000.
-pub const CLASSES: [ScpEntry; 3] = [
+/// Communication classes of a slave, S-0-1000, where its configuration does not say otherwise.
+pub const CLASSES: &[ScpEntry] = &[
     ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
     ScpEntry { class: ScpClass::SYNC, version: 1 },
     ScpEntry { class: ScpClass::NRT, version: 1 },
@@ -126,17 +127,21 @@ mod attribute {
     pub const COMMAND_CP3: u32 = 0x5009_0001;
 }
 
+/// A connection that is as it is: SCP_FixCFG.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FixedConnection {
+    /// The slave produces.
+    pub produces: bool,
+    /// Its values; they are defined by the application.
+    pub idns: &'static [Idn],
+}
+
 /// Fills a store with the parameters of the communication profile.
-pub fn define(
-    store: &mut Store,
-    address: u16,
-    mac: [u8; 6],
-    connections: u8,
-    identity: &Identity,
-    serial: u32,
-) {
+pub fn define(store: &mut Store, config: &super::Config) {
     use attribute as a;
-    let classes: ArrayVec<u8, 8> = CLASSES.iter().flat_map(|entry| entry.to_word().to_le_bytes()).collect();
+    let super::Config { mac, serial, identity, .. } = config;
+    let address = config.address.min(511);
+    let classes: Vec<u8> = config.classes.iter().flat_map(|entry| entry.to_word().to_le_bytes()).collect();
     let s = Idn::standard;
     let number = Definition::value;
     let cycle_max = i64::from(CYCLE_NS_MAX);
@@ -170,7 +175,7 @@ pub fn define(
         time(s(1016), a::TIME, "Slave delay", 600),
         Definition::list(Idn::UC_TIMES, a::TIME_LIST_CP2, "Unified channel times (t6, t7)", &[0; 8], 8)
             .unit("us"),
-        Definition::list(s(1019), a::BYTE_LIST, "MAC address", &mac, 6),
+        Definition::list(s(1019), a::BYTE_LIST, "MAC address", mac, 6),
         time(Idn::SYNC_JITTER, a::TIME_CP2, "Synchronization jitter", 0),
         Definition::command(Idn::DELAY_MEASURING, a::COMMAND_CP2, "Ring delay measurement"),
         Definition::text(s(1026), "Communication hardware version", "Axisbridge sans-IO", 40),
@@ -198,6 +203,13 @@ pub fn define(
     for definition in definitions {
         store.define(definition);
     }
+    if !config.fixed.is_empty() {
+        for (index, fixed) in (0u8..).zip(config.fixed.iter().take(CONNECTIONS_MAX)) {
+            define_connection(store, index, Some(fixed));
+        }
+        return;
+    }
+    let connections = config.connections.clamp(1, 8);
     let image = vec![0; 2 * usize::from(connections)];
     store.define(Definition::list(
         Idn::CONNECTION_IMAGE,
@@ -207,22 +219,28 @@ pub fn define(
         16,
     ));
     for index in 0..connections {
-        define_connection(store, index);
+        define_connection(store, index, None);
     }
 }
 
-fn define_connection(store: &mut Store, index: u8) {
+fn define_connection(store: &mut Store, index: u8, fixed: Option<&FixedConnection>) {
     use attribute as a;
     let x = |element| Idn::connection(index, element);
     let number = Definition::value;
     let longest = 2 + 8 * i64::try_from(VALUES_MAX).unwrap_or(i64::MAX);
+    let setup = fixed.map_or(ConnectionSetup::empty(), |fixed| ConnectionSetup::synchronous(fixed.produces));
+    let idns = fixed.map(|fixed| fixed.idns).unwrap_or_default();
+    let list: Vec<u8> = idns.iter().flat_map(|idn| idn.0.to_le_bytes()).collect();
+    let list_attribute = if fixed.is_some() { IDN_LIST_READ_ONLY } else { a::IDN_LIST_CP2 };
+    if fixed.is_none() {
+        store.define(number(x(connection::NUMBER), a::U16_CP2, "Connection number", 0));
+    }
     let definitions = [
-        number(x(connection::SETUP), a::BITS_CP2, "Connection setup", 0),
-        number(x(connection::NUMBER), a::U16_CP2, "Connection number", 0),
+        number(x(connection::SETUP), a::BITS_CP2, "Connection setup", i64::from(setup.bits())),
         number(x(connection::ASSIGNMENT), a::HEX_CP2, "Telegram assignment", 0),
         number(x(connection::LENGTH_MAX), a::U16, "Longest connection", longest).unit("bytes"),
         number(x(connection::LENGTH), a::U16, "Length of connection", 2).unit("bytes"),
-        Definition::list(x(connection::LIST), a::IDN_LIST_CP2, "Configuration list", &[], 4 * VALUES_MAX),
+        Definition::list(x(connection::LIST), list_attribute, "Configuration list", &list, 4 * VALUES_MAX),
         number(x(connection::CONTROL), a::BITS, "Connection control", 0),
         number(x(connection::CYCLE), a::U32_CP2, "Producer cycle time", 0).unit("ns"),
         number(x(connection::LOSSES_MAX), a::U16_CP2, "Permitted data losses", 0),
@@ -233,9 +251,13 @@ fn define_connection(store: &mut Store, index: u8) {
     }
 }
 
-/// Fills the lists that name other parameters: S-0-0017, S-0-0187, S-0-0188. Call when all are defined.
+/// Fills what follows from other parameters: S-0-0017, S-0-0187, S-0-0188 and the lengths of connections. Call when all
+/// are defined.
 pub fn define_lists(store: &mut Store) {
     use super::parameter::Cyclic;
+    for index in 0..u8::try_from(CONNECTIONS_MAX).unwrap_or(u8::MAX) {
+        set_length(store, index);
+    }
     let list = |filter: &dyn Fn(Cyclic) -> bool, own: &[Idn]| -> Vec<u8> {
         let mut idns: Vec<Idn> = store.iter().filter(|p| filter(p.cyclic())).map(|p| p.idn()).collect();
         idns.extend(own);
@@ -266,7 +288,10 @@ pub fn check(store: &Store, idn: Idn, data: &[u8]) -> Result<(), SvcError> {
     let doubles = || data.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let good = match idn {
         Idn::CYCLE_TIME => doubles().all(is_cycle_time),
-        Idn::SCP_ACTIVE => words().all(|word| CLASSES.contains(&ScpEntry::from_word(word))),
+        Idn::SCP_ACTIVE => {
+            let own = store.find(Idn::SCP_CLASSES).map_or(&[][..], |handle| store.get(handle).data());
+            words().all(|word| own.chunks_exact(2).any(|own| own == word.to_le_bytes()))
+        }
         Idn::MDT_LENGTHS | Idn::AT_LENGTHS => {
             data.len() == 8
                 && words().all(|len| len == 0 || (DATA_LEN_MIN..=DATA_LEN_MAX).contains(&usize::from(len)))
@@ -289,6 +314,16 @@ pub fn value_len(store: &Store, idn: Idn) -> Option<usize> {
     (fixed && parameter.cyclic() != Cyclic::No).then_some(parameter.capacity())
 }
 
+/// S-0-1050.x.5 follows from the list.
+fn set_length(store: &mut Store, index: u8) {
+    let list = Idn::connection(index, connection::LIST);
+    if store.find(list).is_some() {
+        let sum: usize = store.idns(list).filter_map(|value| value_len(store, value)).sum();
+        let len = i64::try_from(2 + sum).unwrap_or(i64::MAX);
+        store.set_number_of(Idn::connection(index, connection::LENGTH), len);
+    }
+}
+
 /// What follows from a new communication parameter: lengths and images.
 pub fn written(store: &mut Store, idn: Idn) {
     if idn.block() != Idn::CONNECTION_BLOCK || idn.is_product() {
@@ -298,13 +333,8 @@ pub fn written(store: &mut Store, idn: Idn) {
         }
         return;
     }
-    let x = |element| Idn::connection(idn.instance(), element);
     match idn.element() {
-        connection::LIST => {
-            let sum: usize = store.idns(idn).filter_map(|value| value_len(store, value)).sum();
-            let len = i64::try_from(2 + sum).unwrap_or(i64::MAX);
-            store.set_number_of(x(connection::LENGTH), len);
-        }
+        connection::LIST => set_length(store, idn.instance()),
         connection::SETUP => {
             let mut image = ArrayVec::<u8, { 2 * CONNECTIONS_MAX }>::new();
             for index in 0..u8::try_from(CONNECTIONS_MAX).unwrap_or(u8::MAX) {
@@ -325,7 +355,13 @@ mod tests {
 
     fn store() -> Store {
         let mut store = Store::new();
-        define(&mut store, 5, [2; 6], 2, &Identity::default(), 77);
+        let config = crate::slave::Config {
+            address: 5,
+            connections: 2,
+            serial: 77,
+            ..crate::slave::Config::default()
+        };
+        define(&mut store, &config);
         store.define(Definition::value(Idn::standard(36), 0x0322_0001, "command", 0).cyclic(Cyclic::Command));
         store
             .define(Definition::value(Idn::standard(135), 0x7001_0001, "status", 0).cyclic(Cyclic::Feedback));

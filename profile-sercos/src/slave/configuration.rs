@@ -251,14 +251,14 @@ fn resolve_link(
 
 #[cfg(test)]
 mod tests {
-    use super::super::communication::{self, Identity};
+    use super::super::communication;
     use super::super::parameter::Definition;
     use super::*;
 
     /// Slave 1 of recording sercos3_startup_line2 as configured in frames 2641 to 4473.
     fn configured() -> Store {
         let mut store = Store::new();
-        communication::define(&mut store, 1, [2; 6], 4, &Identity::default(), 1);
+        communication::define(&mut store, &crate::slave::Config::default());
         for (idn, attribute, cyclic) in [
             (134, 0x7001_0001, Cyclic::Command),
             (36, 0x0322_0001, Cyclic::Command),

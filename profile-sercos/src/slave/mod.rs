@@ -27,7 +27,7 @@ pub use self::application::{Application, Cycle, Diagnosis};
 pub use self::core::Core;
 pub use self::line::Line;
 
-use self::communication::{Identity, idn};
+use self::communication::{FixedConnection, Identity, idn};
 use self::core::Access;
 use self::parameter::Store;
 use self::phase::{Event, Fault, State};
@@ -38,6 +38,7 @@ use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::{DeviceStatus, InactivePort};
 use crate::wire::header::{Channel, HEADER_LEN, Header, Kind, Phase};
 use crate::wire::idn::Idn;
+use crate::wire::scp::ScpEntry;
 use crate::wire::svc::MdtSvc;
 
 /// Silence after which a slave leaves CP0 to CP2, and CP3 or CP4 while a switch down is announced. No public
@@ -98,6 +99,10 @@ pub struct Config {
     pub serial: u32,
     /// What the slave says about itself.
     pub identity: Identity,
+    /// Communication classes and versions, S-0-1000.
+    pub classes: &'static [ScpEntry],
+    /// Connections that cannot be configured, of a slave with SCP_FixCFG; empty for SCP_VarCFG.
+    pub fixed: &'static [FixedConnection],
 }
 
 impl Default for Config {
@@ -108,6 +113,8 @@ impl Default for Config {
             connections: 4,
             serial: 1,
             identity: Identity::default(),
+            classes: communication::CLASSES,
+            fixed: &[],
         }
     }
 }
@@ -147,9 +154,7 @@ impl<A: Application> Slave<A> {
     /// A slave in NRT with both ports unconnected.
     pub fn new(config: &Config, mut app: A) -> Self {
         let mut store = Store::new();
-        let connections = config.connections.clamp(1, 8);
-        let address = config.address.min(511);
-        communication::define(&mut store, address, config.mac, connections, &config.identity, config.serial);
+        communication::define(&mut store, config);
         app.define(&mut store);
         communication::define_lists(&mut store);
         let svc = Server::new(&store);
