@@ -176,6 +176,9 @@ impl Master {
         if self.state.serves() {
             for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
                 let answer = station.svc;
+                if let Some(status) = station.status {
+                    station.channel.command_change(status.contains(DeviceStatus::COMMAND_CHANGE));
+                }
                 station.channel.receive(now, answer);
             }
         }

@@ -46,6 +46,7 @@ use self::report::ReportRow;
 use self::scan::Scan;
 use self::station::{End, Facts, Presence, Station};
 use self::svc::request::SvcRequest;
+use crate::wire::data_status::DataStatus;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
@@ -330,6 +331,14 @@ impl Master {
             Ok((place, serial)) => Ok(Ticket { slave, place, serial }),
             Err(request) => Err((SubmitError::Full, request)),
         }
+    }
+
+    /// How far a request is: the data status which the slave gave last, that of a procedure command as long as it is
+    /// in process. `None` while it waits, and once it has ended.
+    #[must_use]
+    pub fn svc_progress(&self, ticket: Ticket) -> Option<DataStatus> {
+        let station = self.stations[..self.found].get(ticket.slave.index())?;
+        station.channel.progress(ticket.place, ticket.serial)
     }
 
     /// Between CP2 and CP3 requests wait.

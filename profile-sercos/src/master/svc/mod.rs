@@ -4,14 +4,18 @@
 //! A step without that handshake for some cycles, or a slave that is busy for too long, ends the request.
 //! Requests wait in a fixed number of places; a place is taken until its outcome has been fetched, so no
 //! outcome is ever lost.
+//!
+//! A procedure command in process does not hold the channel: other requests are served meanwhile. It is asked about
+//! when nothing else waits, when S-DEV says that a command has changed, and every few steps in any case.
 
 pub mod request;
 mod transfer;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use self::request::{Priority, SvcFailure, SvcOutcome, SvcReply, SvcRequest};
+use self::request::{SvcFailure, SvcOutcome, SvcReply, SvcRequest};
 use self::transfer::{Flow, Transfer};
+use crate::wire::data_status::DataStatus;
 use crate::wire::svc::{AtSvc, Element, MdtSvc, SvcControl, SvcStatus};
 use crate::wire::svc_error::SvcError;
 
@@ -20,6 +24,9 @@ pub const REQUESTS_MAX: usize = 16;
 
 /// Place of the master's own requests.
 const OWN: usize = REQUESTS_MAX;
+
+/// Steps for other requests after which a procedure command in process is asked about.
+const ASK_EVERY: u16 = 64;
 
 /// Times which a slave has for its answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +54,8 @@ enum Place {
     Free,
     Waiting,
     Active,
+    /// A procedure command in process, off the wire, and when it was asked about in the order of all.
+    Parked(Transfer, u64),
     Finished(Result<SvcReply, SvcFailure>),
 }
 
@@ -85,6 +94,13 @@ pub(crate) struct ServiceChannel {
     busy_since: Option<MonotonicTime>,
     /// The slave was through with everything in the last cycle.
     free: bool,
+    /// S-DEV bit 5 as it was last, and the commands to ask about since it moved.
+    change: bool,
+    changed: usize,
+    /// Commands in process that were asked about so far.
+    turn: u64,
+    /// Steps since a command in process was asked about.
+    unasked: u16,
     slots: [Slot; REQUESTS_MAX + 1],
     serial: u64,
 }
@@ -99,6 +115,10 @@ impl ServiceChannel {
             missing_cycles: 0,
             busy_since: None,
             free: false,
+            change: false,
+            changed: 0,
+            turn: 0,
+            unasked: 0,
             slots: core::array::from_fn(|_| Slot::empty()),
             serial: 0,
         }
@@ -125,14 +145,25 @@ impl ServiceChannel {
         self.open = open;
     }
 
-    /// Whether a request is on the wire.
+    /// Whether a request is on the wire, or a procedure command in process.
     pub fn is_running(&self) -> bool {
-        self.active.is_some()
+        self.active.is_some() || self.slots.iter().any(|slot| matches!(slot.place, Place::Parked(..)))
     }
 
     /// Whether nothing is on the wire and nothing waits.
     pub fn is_idle(&self) -> bool {
-        self.active.is_none() && !self.slots.iter().any(|slot| matches!(slot.place, Place::Waiting))
+        !self.is_running() && !self.slots.iter().any(|slot| matches!(slot.place, Place::Waiting))
+    }
+
+    /// The data status which the slave gave last for a request under way: how far a procedure command is. `None` when
+    /// it waits or has ended.
+    pub fn progress(&self, place: usize, serial: u64) -> Option<DataStatus> {
+        let slot = self.slots.get(place).filter(|slot| slot.serial == serial)?;
+        match (&slot.place, &self.active) {
+            (Place::Parked(transfer, _), _) => Some(transfer.status()),
+            (Place::Active, Some((index, transfer, _))) if *index == place => Some(transfer.status()),
+            _ => None,
+        }
     }
 
     /// Takes a request of the application; gives it back when all places are taken.
@@ -189,7 +220,7 @@ impl ServiceChannel {
         self.active = None;
         self.free = false;
         for slot in &mut self.slots {
-            if matches!(slot.place, Place::Waiting | Place::Active) {
+            if matches!(slot.place, Place::Waiting | Place::Active | Place::Parked(..)) {
                 slot.place = Place::Finished(Err(failure));
             }
         }
@@ -200,6 +231,14 @@ impl ServiceChannel {
         if self.free && self.active.is_none() && self.start() {
             self.put_step();
         }
+    }
+
+    /// Takes S-DEV bit 5: it moves when a procedure command has ended or failed.
+    pub fn command_change(&mut self, change: bool) {
+        if change != self.change {
+            self.changed = self.slots.iter().filter(|slot| matches!(slot.place, Place::Parked(..))).count();
+        }
+        self.change = change;
     }
 
     /// Takes what the AT of this cycle said, `None` when it did not come, and prepares the next MDT.
@@ -251,22 +290,44 @@ impl ServiceChannel {
         }
     }
 
-    /// Makes the most urgent waiting request the active one.
+    /// Makes the most urgent request the active one.
     fn start(&mut self) -> bool {
-        let rank = |index: usize, slot: &Slot| (index == OWN, slot.request.priority == Priority::Urgent);
-        let next = (0..self.slots.len())
-            .filter(|&index| self.open && matches!(self.slots[index].place, Place::Waiting))
-            .max_by_key(|&index| {
-                let slot = &self.slots[index];
-                (rank(index, slot), core::cmp::Reverse(slot.serial))
-            });
-        let Some(index) = next else {
+        let Some(index) = self.next() else {
             return false;
         };
         let slot = &mut self.slots[index];
-        slot.place = Place::Active;
-        self.active = Some((index, Transfer::new(&mut slot.request), false));
+        let transfer = match core::mem::replace(&mut slot.place, Place::Active) {
+            Place::Parked(transfer, _) => {
+                self.unasked = 0;
+                self.changed = self.changed.saturating_sub(1);
+                transfer
+            }
+            _ => Transfer::new(&mut slot.request),
+        };
+        self.active = Some((index, transfer, false));
         true
+    }
+
+    /// The request to go on with: the most urgent one that waits, or a command in process where its time has come.
+    fn next(&self) -> Option<usize> {
+        let serial = |index: usize| core::cmp::Reverse(self.slots[index].serial);
+        let rank = |index: usize| (index == OWN, self.slots[index].request.priority, serial(index));
+        let all = 0..self.slots.len();
+        let waiting = all.clone().filter(|&index| self.may_start(index)).max_by_key(|&index| rank(index));
+        let asked = |index: usize| match self.slots[index].place {
+            Place::Parked(_, turn) => Some((turn, index)),
+            _ => None,
+        };
+        let parked = all.filter_map(asked).min();
+        let due = waiting.is_none() || self.changed > 0 || self.unasked >= ASK_EVERY;
+        parked.filter(|_| due).map(|(_, index)| index).or(waiting)
+    }
+
+    /// Whether the request waits and may go on the wire. One command at a time acts on a data block.
+    fn may_start(&self, index: usize) -> bool {
+        let slot = &self.slots[index];
+        let taken = |other: &Slot| matches!(&other.place, Place::Parked(transfer, _) if transfer.idn() == slot.request.idn);
+        self.open && matches!(slot.place, Place::Waiting) && !self.slots.iter().any(taken)
     }
 
     /// The channel is through with the last step: take its answer and put the next step on the wire.
@@ -280,6 +341,15 @@ impl ServiceChannel {
                 Flow::Next => {
                     self.put_step();
                     return;
+                }
+                // Others first, if there are any.
+                Flow::InProcess => {
+                    let index = *index;
+                    self.turn += 1;
+                    if let Some((_, transfer, _)) = self.active.take() {
+                        self.slots[index].place = Place::Parked(transfer, self.turn);
+                    }
+                    self.start();
                 }
                 Flow::Finished(result) => {
                     self.slots[*index].place = Place::Finished(result);
@@ -299,6 +369,7 @@ impl ServiceChannel {
             let control = SvcControl::new(!self.sent.control.mhs(), step.element, step.write, step.last);
             self.sent = MdtSvc { control, info: step.info };
             self.free = false;
+            self.unasked = self.unasked.saturating_add(1);
         }
     }
 

@@ -59,6 +59,8 @@ enum Stage {
 pub(super) enum Flow {
     /// [`Transfer::step`] tells the next step.
     Next,
+    /// The procedure command is still in process: the next step asks again, at any time.
+    InProcess,
     /// This came out.
     Finished(Result<SvcReply, SvcFailure>),
 }
@@ -97,6 +99,16 @@ impl Transfer {
             deadline: MonotonicTime::MAX,
             failure: None,
         }
+    }
+
+    /// The data block.
+    pub fn idn(&self) -> Idn {
+        self.idn
+    }
+
+    /// The data status which the slave gave last.
+    pub fn status(&self) -> DataStatus {
+        self.reply.status
     }
 
     /// The step for the wire.
@@ -277,7 +289,7 @@ impl Transfer {
             CommandState::Done => None,
             CommandState::Failed | CommandState::Interrupted => Some(SvcFailure::CommandFailed(status)),
             _ if now >= self.deadline => Some(SvcFailure::CommandTimeout(status)),
-            _ => return Flow::Next,
+            _ => return Flow::InProcess,
         };
         if self.operation == SvcOperation::Command { self.go(Stage::Cancel) } else { self.finish() }
     }
@@ -318,7 +330,7 @@ mod tests {
             steps.push(format!("{:04x} {:08x}", word.0, step.info));
             let now = MonotonicTime(u64::try_from(index).unwrap() * 300_000_000);
             match transfer.advance(now, TIMEOUT, answer.map_err(SvcError), &mut request.data) {
-                Flow::Next => {}
+                Flow::Next | Flow::InProcess => {}
                 Flow::Finished(result) => {
                     assert_eq!(index + 1, answers.len(), "answers left over");
                     return (steps, Some(result), request.data);

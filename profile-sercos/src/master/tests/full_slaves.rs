@@ -5,9 +5,9 @@ use crate::master::config::Connections;
 use crate::police::light::{COMMAND, FEEDBACK, MODE, Mirror};
 use crate::slave::{self, Slave};
 
-type FullRig = VirtualBus<slave::Line<Mirror>>;
+pub(super) type FullRig = VirtualBus<slave::Line<Mirror>>;
 
-fn full_rig(count: u16) -> FullRig {
+pub(super) fn full_rig(count: u16) -> FullRig {
     let connections: Connections = [
         ConnectionConfig::new(0, false, &[COMMAND]).unwrap(),
         ConnectionConfig::new(1, true, &[FEEDBACK]).unwrap(),

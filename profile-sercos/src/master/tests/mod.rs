@@ -62,3 +62,4 @@ mod faults;
 mod full_slaves;
 mod phase_up;
 mod recording;
+mod service;
