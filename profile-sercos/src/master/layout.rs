@@ -386,7 +386,7 @@ impl CyclicLayout {
 /// twice, and what the passes deviate adds up like noise.
 fn inter_frame_gap(slave_jitter_ns: u64, slaves: u64, adjustable: bool) -> u64 {
     // Thousandfold root of 2 N, rounded.
-    let root = ((8_000_000 * slaves).isqrt() + 1) / 2;
+    let root = (8_000_000 * slaves).isqrt().div_ceil(2);
     let (numerator, denominator) = GAP_FACTOR;
     let gap = GAP_MIN + numerator * slave_jitter_ns * root / denominator;
     if adjustable { gap } else { gap.min(GAP_MAX_FIXED) }
