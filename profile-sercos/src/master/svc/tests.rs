@@ -415,9 +415,12 @@ fn shown(channel: &mut ServiceChannel) -> String {
     format!("{:04x} {:08x} {}{}", sent.control.0, sent.info, places.join(" "), failure.unwrap_or_default())
 }
 
+/// What happens to a channel.
+type Act<'a> = &'a dyn Fn(&mut ServiceChannel, &mut Commands);
+
 #[test]
 fn whole_state_table() {
-    let events: &[(&str, &dyn Fn(&mut ServiceChannel, &mut Commands))] = &[
+    let events: &[(&str, Act)] = &[
         ("answer", &|channel, peer| {
             let answer = peer.answer(channel.outgoing());
             channel.receive(MonotonicTime(CYCLE), Some(answer));
