@@ -17,6 +17,8 @@ const SKEW_FAULT_NS: u64 = 60_000_000_000;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct NodeHealth {
     fault: NodeFault,
+    /// The fault that only another connection ends, also where another one came first and is the one that shows.
+    lasting: NodeFault,
     alarm: NodeAlarm,
     alarm_since: MonotonicTime,
     skew_since: Option<MonotonicTime>,
@@ -38,6 +40,10 @@ impl NodeHealth {
 
     /// Latches a fault. The first one stands: it is the cause.
     pub fn raise(&mut self, fault: NodeFault) {
+        let lasts = matches!(fault, NodeFault::CONNECTION_UPDATE | NodeFault::CONNECTION_LOSS);
+        if lasts && self.lasting == NodeFault::NONE {
+            self.lasting = fault;
+        }
         if !self.is_faulted() {
             self.fault = fault;
         }
@@ -58,8 +64,8 @@ impl NodeHealth {
 
     /// Node Fault Reset. Update and loss faults end only with another connection.
     pub fn reset(&mut self) {
-        if !matches!(self.fault, NodeFault::CONNECTION_UPDATE | NodeFault::CONNECTION_LOSS) {
-            self.fault = NodeFault::NONE;
+        if self.fault != self.lasting {
+            self.fault = self.lasting;
             self.skew_since = None;
             self.unsynchronized_since = None;
         }
@@ -122,6 +128,12 @@ mod tests {
         node.raise(NodeFault::DATA_FORMAT);
         node.raise(NodeFault::CONNECTION_UPDATE);
         assert_eq!(node.fault(), NodeFault::DATA_FORMAT);
+        node.reset();
+        assert_eq!(node.fault(), NodeFault::CONNECTION_UPDATE, "it shows when the first one is reset");
+        node.reset();
+        assert_eq!(node.fault(), NodeFault::CONNECTION_UPDATE);
+        node.clear();
+        node.raise(NodeFault::DATA_FORMAT);
         node.reset();
         assert!(!node.is_faulted());
         for fault in [NodeFault::CONNECTION_UPDATE, NodeFault::CONNECTION_LOSS] {

@@ -70,6 +70,11 @@ fn enable_is_refused_where_the_table_has_no_way() {
     rig.cycles(2);
     assert_eq!(rig.state(0), AxisState::StartInhibited);
     assert_eq!(ask(&mut rig, AxisControl::ENABLE, 2), conflict);
+    assert_eq!(
+        rig.device.axis_faults(0),
+        Some(0),
+        "a start that is refused is no exception (clause 5-2.6.4)"
+    );
     rig.drives[0].image.start_inhibits = 0;
     rig.cycles(2);
     assert_eq!(rig.state(0), AxisState::Stopped, "a refused Enable does not wait for its chance");

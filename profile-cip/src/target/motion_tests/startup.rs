@@ -96,6 +96,37 @@ fn a_whole_start_up() {
 }
 
 #[test]
+fn class_and_axes_may_be_configured_in_the_same_update() {
+    // Clause 7-1.2: one instance at a time, several at once, and the first axes together with the class.
+    let mut rig = Rig::new();
+    rig.open();
+    let list = |id: u16, value: &[u8]| {
+        let mut body = [0; 64];
+        let mut list = ListWriter::new(&mut body).expect("room");
+        let size = u8::try_from(value.len()).expect("short");
+        list.value(&AttributeSelector::scalar(id, size), value).expect("room");
+        let len = list.finish();
+        body[..len].to_vec()
+    };
+    let set = MotionService::SET_AXIS_ATTRIBUTES_LIST;
+    rig.services = vec![
+        Some((1, set, list(21, &[9]))),
+        Some((1, set, list(461, &1.5_f32.to_le_bytes()))),
+        Some((1, set, list(610, &[2]))),
+    ];
+    rig.cycle();
+    assert_eq!(rig.header().instance_count, 3);
+    for (instance, id) in [(0, 21_u16), (1, 461), (2, 610)] {
+        let [low, high] = id.to_le_bytes();
+        assert_eq!(rig.response(instance), Some((1, 0, vec![1, 0, 0, 0, low, high, 0, 0])), "{instance}");
+    }
+    assert_eq!(rig.device.high_limit(), 9);
+    assert_eq!(rig.device.attribute(0, 461), Ok(&1.5_f32.to_le_bytes()[..]));
+    assert_eq!(rig.device.attribute(1, 610), Ok(&[2][..]));
+    assert_ne!(rig.device.attribute(0, 610), Ok(&[2][..]), "of its own instance alone");
+}
+
+#[test]
 fn the_connection_belongs_to_one_owner_and_needs_good_parameters() {
     let mut rig = Rig::new();
     rig.open();

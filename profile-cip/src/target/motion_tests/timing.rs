@@ -292,6 +292,57 @@ fn skewed_clocks_keep_the_device_asynchronous_and_fault_after_a_minute() {
 }
 
 #[test]
+fn clocks_that_agree_again_within_the_minute_lead_to_synchronous_operation() {
+    let mut rig = Rig::running();
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::TIME_STAMP;
+    let period = i64::try_from(PERIOD).expect("fits");
+    // The stamp and a period are compared with the time: between now and two periods ago there is no skew.
+    for (age, synchronous) in [(2 * period + 1, false), (-1, false), (2 * period, true)] {
+        send_aged(&mut rig, age);
+        rig.run_device();
+        rig.now += PERIOD;
+        rig.cycles(if synchronous { 3 } else { 0 });
+        assert_eq!(rig.device.is_synchronous(), synchronous, "{age}");
+    }
+    assert_eq!(rig.device.node_fault(), NodeFault::NONE);
+    assert!(rig.header().node_status.contains(NodeStatus::SYNC_MODE));
+}
+
+#[test]
+fn the_devices_time_offset_is_told_when_it_changes_and_its_time_diagnostics_when_asked_for() {
+    use crate::wire::motion::TimeDiagnostics;
+    let mut rig = synchronous();
+    assert_eq!(rig.header().time_offset, None, "told before, and acknowledged");
+    rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: true, offset: -77 });
+    rig.cycle();
+    assert_eq!(rig.header().time_offset, Some(-77));
+    rig.cycles(2);
+    assert_eq!(rig.header().time_offset, None, "only until it has arrived");
+    // The offset is told with a time stamp alone (Table 6-2.11).
+    rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: true, offset: 5 });
+    rig.control -= NodeControl::SYNC_CONTROL;
+    rig.time = TimeDataSet::TIME_DIAGNOSTICS;
+    rig.cycle();
+    assert_eq!((rig.header().time_stamp, rig.header().time_offset), (None, None));
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    let received_at = EPOCH + rig.now;
+    rig.now += 1_000;
+    assert!(rig.run_device());
+    let expected = TimeDiagnostics { received_at, transmitted_at: received_at + 1_000 };
+    assert_eq!(rig.header().time_diagnostics, Some(expected));
+    // A device without synchronized time answers zeros and has no offset to tell.
+    rig.device.config.supports_sync = false;
+    rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::TIME_DIAGNOSTICS;
+    rig.now += PERIOD;
+    rig.cycle();
+    let header = rig.header();
+    assert_eq!((header.time_stamp, header.time_offset), (Some(0), None));
+    assert_eq!(header.time_diagnostics, Some(TimeDiagnostics { received_at: 0, transmitted_at: 0 }));
+}
+
+#[test]
 fn sync_control_needs_a_synchronized_clock_and_its_loss_is_reported() {
     let mut rig = Rig::running();
     rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: false, offset: 0 });
