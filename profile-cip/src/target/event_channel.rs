@@ -221,6 +221,18 @@ impl EventChannel {
         true
     }
 
+    /// The device's System Time Offset has changed by so much, ns: events that wait to be told are stamped in the system
+    /// time of before, and are told in that of now (clause 5-2.6.7.3). So are those that the attributes tell.
+    pub fn shift(&mut self, offset: i64) {
+        let notified = self.pending.iter_mut().map(|event| &mut event.time_stamp);
+        let Captured { registration, home, watch } = &mut self.captured;
+        let captured = registration.iter_mut().map(|(_, time)| time).chain([&mut home.1]).chain(watch);
+        // 0 is no time: an event that cannot be found, or that never was.
+        for time in notified.chain(captured).filter(|time| **time != 0) {
+            *time = time.saturating_add_signed(offset);
+        }
+    }
+
     /// Whether a position passes the window check of a registration edge, if there is one.
     fn is_within(&self, bit: EventChecking, position: i32) -> bool {
         let windowed = bit.windows();

@@ -409,8 +409,12 @@ impl MotionDevice {
         self.node.raise(fault);
     }
 
-    /// Tells the state of the device's clock.
+    /// Tells the state of the device's clock. A new offset moves the time stamps of events that were not told yet.
     pub fn set_sync(&mut self, sync: SyncState) {
+        let step = sync.offset.saturating_sub(self.sync.offset);
+        if step != 0 {
+            self.slots.iter_mut().for_each(|slot| slot.axis.events.shift(step));
+        }
         self.sync = sync;
     }
 

@@ -134,6 +134,24 @@ fn extended_cycle_of_table_6_2_30() {
 }
 
 #[test]
+fn a_step_of_the_system_time_moves_the_stamps_of_what_was_not_told_yet() {
+    let mut channel = channel(ALL);
+    handle(&mut channel, &extended(EventChecking::EVENTS, parameters()));
+    assert!(channel.notify(EventType::MARKER_POSITIVE, 0, 5, 1_000));
+    assert!(channel.notify(EventType::REGISTRATION_1_POSITIVE, 3, 5, 1_000), "it cannot be found");
+    channel.shift(250);
+    assert!(channel.notify(EventType::WATCH_1_FORWARD, 0, 5, 2_000), "stamped behind the step");
+    let stamps = |channel: &EventChannel| -> Vec<u64> {
+        channel.block().expect("open").notifications.iter().map(|n| n.time_stamp).collect()
+    };
+    assert_eq!(stamps(&channel), [1_250, 0, 2_000]);
+    let times: Vec<_> = channel.attributes().filter(|(id, _)| [66, 71, 72].contains(id)).collect();
+    assert_eq!(times, [(71, 1_250), (66, 0), (72, 2_000)]);
+    channel.shift(-5_000);
+    assert_eq!(stamps(&channel), [0, 0, 0], "never below zero");
+}
+
+#[test]
 fn what_the_drive_can_no_longer_check_is_not_pretended() {
     let bits = EventChecking::MARKER_POSITIVE | EventChecking::REG_1_POSITIVE;
     let mut channel = channel(ALL);

@@ -274,7 +274,12 @@ fn events_travel_with_the_axis() {
     assert!(rig.device.notify_event(0, EventType::HOME_POSITIVE, 0, 77, 5));
     rig.cycle();
     let block = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.events).expect("a block");
-    assert_eq!((block.checking, block.notifications[0].position), (home, 77));
+    let told = &block.notifications[0];
+    assert_eq!((block.checking, told.position, told.time_stamp), (home, 77, 5));
+    rig.device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: true, offset: 60 });
+    rig.cycle();
+    let block = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.events).expect("a block");
+    assert_eq!(block.notifications[0].time_stamp, 65, "in the system time of now");
     rig.events = None;
     rig.cycle();
     let block = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.events);
