@@ -8,6 +8,7 @@ mod hookup;
 mod indicators;
 mod loss;
 mod network;
+mod owner;
 mod planes;
 mod programs;
 mod scaling;
