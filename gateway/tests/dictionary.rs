@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Output, Stdio};
 
-use axisbridge::mapping::{CipAttribute, Dictionaries, Enumeration, Mapping, PolarityEffect};
+use axisbridge::mapping::{CipAttribute, Dictionaries, Enumeration, Mapping, PolarityEffect, Word};
 use serde_json::Value;
 
 fn command(arguments: &[&str]) -> Command {
@@ -108,8 +108,10 @@ fn every_part_of_every_profile_says_the_same_in_csv_and_json() {
         ("cip", "services", 15),
         ("cip", "networks", 20),
         ("cip", "faults", faults(&dictionaries())),
-        ("sercos", "instance", dictionaries().sercos.idns().len()),
-        ("sercos", "enums", sercos_codes(&dictionaries())),
+        ("sercos", "idns", 395),
+        ("sercos", "communication", 91),
+        ("sercos", "bits", sercos_bits(&dictionaries())),
+        ("sercos", "codes", sercos_codes(&dictionaries())),
         ("generic", "instance", 18 + dictionaries().generic.parameters().len()),
     ];
     for (profile, part, count) in parts {
@@ -150,9 +152,43 @@ fn faults(dictionaries: &Dictionaries) -> usize {
     cip.fault_records().iter().map(|record| rows_of(set(&record.conditions))).sum()
 }
 
+fn sercos_bits(dictionaries: &Dictionaries) -> usize {
+    let words = dictionaries.sercos.words().iter();
+    let fields = |word: &Word| word.fields.iter().map(|field| 1 + field.values.len()).sum::<usize>();
+    words.map(|word| fields(word) + word.patterns.len()).sum()
+}
+
 fn sercos_codes(dictionaries: &Dictionaries) -> usize {
-    let codes: usize = dictionaries.sercos.enumerations().iter().map(|set| set.codes.len()).sum();
-    codes + dictionaries.sercos.words().iter().map(|word| word.fields.len()).sum::<usize>()
+    dictionaries.sercos.code_sets().iter().map(|set| set.codes.len() + set.groups.len()).sum()
+}
+
+/// Without a part there are the IDNs of both lists, by number.
+#[test]
+fn sercos_prints_every_idn_by_number() {
+    let (columns, all) = records(&["sercos"]);
+    assert_eq!(columns[..5], ["idn", "name", "length", "list", "format"]);
+    let [profile, communication] =
+        ["idns", "communication"].map(|part| records(&["sercos", "--part", part]).1);
+    assert_eq!((all.len(), profile.len(), communication.len()), (486, 395, 91));
+    let mut parts: Vec<&Record> = profile.iter().chain(&communication).collect();
+    // `S-0-1050.x.10` comes behind `S-0-1050.x.8`.
+    let key = |record: &&Record| {
+        let number = record.get("idn").replace('x', "0");
+        number.split(['-', '.']).skip(1).map(|part| part.parse::<u16>().unwrap()).collect::<Vec<_>>()
+    };
+    parts.sort_by_key(key);
+    for (record, part) in all.iter().zip(parts) {
+        assert_eq!(record.values, part.values);
+    }
+}
+
+/// The whole SERCOS dictionary as it is printed: what changes in it shows here.
+#[test]
+fn sercos_reads_as_its_files_say() {
+    for part in ["idns", "communication", "bits", "codes"] {
+        let text = String::from_utf8(printed(&["sercos", "--part", part])).unwrap();
+        insta::assert_snapshot!(format!("sercos_{part}"), text);
+    }
 }
 
 #[test]
@@ -175,7 +211,11 @@ fn rows_read_as_the_standards_print_them() {
         row(&["cip", "--part", "faults"], "name", "Motor Overspeed UL"),
         row(&["cip", "--part", "faults"], "set", "Start Inhibits - Mfg"),
         row(&["sercos"], "idn", "S-0-0047"),
-        row(&["sercos", "--part", "enums"], "name", "Drive on"),
+        row(&["sercos"], "idn", "S-0-0100"),
+        row(&["sercos"], "idn", "S-0-0448"),
+        row(&["sercos"], "idn", "S-0-1050.x.6"),
+        row(&["sercos", "--part", "bits"], "name", "Drive on"),
+        row(&["sercos", "--part", "codes"], "code", "0x7007"),
         row(&["generic"], "name", "torque_limit_positive"),
         row(&["generic"], "name", "position_command"),
     ];
@@ -187,7 +227,11 @@ fn a_part_that_a_profile_lacks_is_a_usage_error() {
     for (arguments, message) in [
         (
             ["sercos", "--part", "class"],
-            "error: the sercos dictionary has no part `class`; expected one of: instance, enums\n",
+            "error: the sercos dictionary has no part `class`; expected one of: idns, communication, bits, codes\n",
+        ),
+        (
+            ["cip", "--part", "idns"],
+            "error: the cip dictionary has no part `idns`; expected one of: instance, class, enums, services, networks, faults\n",
         ),
         (
             ["generic", "--part", "services"],

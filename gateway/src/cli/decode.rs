@@ -64,7 +64,7 @@ impl DictionaryNames<'_> {
 
 impl Names for DictionaryNames<'_> {
     fn name(&self, idn: Idn) -> Option<&str> {
-        self.row(idn).map(|row| row.name.as_str())
+        self.row(idn).map(|row| row.name.as_str()).filter(|name| !name.is_empty())
     }
 
     fn length(&self, idn: Idn) -> Option<usize> {

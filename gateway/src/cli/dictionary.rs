@@ -1,14 +1,15 @@
 //! `axisbridge dictionary`: prints what a profile has, as the tables say it.
 
 mod cip;
+mod generic;
+mod sercos;
 mod sheet;
-mod south;
 
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
 use super::{CliError, DictionaryArguments, DictionaryFormat, DictionaryPart, DictionaryProfile};
-use crate::mapping::{Dictionaries, Mapping};
+use crate::mapping::{Dictionaries, IdnPart, Mapping};
 use sheet::Sheet;
 
 /// Exit status of a wrong command line, as clap has it.
@@ -53,23 +54,33 @@ fn sheet(
     profile: DictionaryProfile,
     part: Option<DictionaryPart>,
 ) -> Result<Sheet, String> {
-    use DictionaryPart::{Class, Enums, Faults, Instance, Networks, Services};
-    let part = part.unwrap_or(Instance);
+    use DictionaryPart::{
+        Bits, Class, Codes, Communication, Enums, Faults, Idns, Instance, Networks, Services,
+    };
     Ok(match (profile, part) {
-        (DictionaryProfile::Cip, Instance) => cip::instance(&dictionaries.cip),
-        (DictionaryProfile::Cip, Class) => cip::class(&dictionaries.cip),
-        (DictionaryProfile::Cip, Enums) => cip::enums(&dictionaries.cip),
-        (DictionaryProfile::Cip, Services) => cip::services(&dictionaries.cip),
-        (DictionaryProfile::Cip, Networks) => cip::networks(&dictionaries.cip),
-        (DictionaryProfile::Cip, Faults) => cip::faults(&dictionaries.cip),
-        (DictionaryProfile::Sercos, Instance) => south::idns(&dictionaries.sercos),
-        (DictionaryProfile::Sercos, Enums) => south::codes(&dictionaries.sercos),
-        (DictionaryProfile::Generic, Instance) => south::generic(&dictionaries.generic),
-        (DictionaryProfile::Sercos, _) => return Err(no_part("sercos", part, "instance, enums")),
-        (DictionaryProfile::Generic, _) => return Err(no_part("generic", part, "instance")),
+        (DictionaryProfile::Cip, None | Some(Instance)) => cip::instance(&dictionaries.cip),
+        (DictionaryProfile::Cip, Some(Class)) => cip::class(&dictionaries.cip),
+        (DictionaryProfile::Cip, Some(Enums)) => cip::enums(&dictionaries.cip),
+        (DictionaryProfile::Cip, Some(Services)) => cip::services(&dictionaries.cip),
+        (DictionaryProfile::Cip, Some(Networks)) => cip::networks(&dictionaries.cip),
+        (DictionaryProfile::Cip, Some(Faults)) => cip::faults(&dictionaries.cip),
+        (DictionaryProfile::Sercos, None) => sercos::idns(&dictionaries.sercos, None),
+        (DictionaryProfile::Sercos, Some(Idns)) => sercos::idns(&dictionaries.sercos, Some(IdnPart::Profile)),
+        (DictionaryProfile::Sercos, Some(Communication)) => {
+            sercos::idns(&dictionaries.sercos, Some(IdnPart::Communication))
+        }
+        (DictionaryProfile::Sercos, Some(Bits)) => sercos::bits(&dictionaries.sercos),
+        (DictionaryProfile::Sercos, Some(Codes)) => sercos::codes(&dictionaries.sercos),
+        (DictionaryProfile::Generic, None | Some(Instance)) => generic::instance(&dictionaries.generic),
+        (_, Some(part)) => return Err(no_part(profile, part)),
     })
 }
 
-fn no_part(profile: &str, part: DictionaryPart, parts: &str) -> String {
-    format!("the {profile} dictionary has no part `{}`; expected one of: {parts}", part.name())
+fn no_part(profile: DictionaryProfile, part: DictionaryPart) -> String {
+    let (name, parts) = match profile {
+        DictionaryProfile::Cip => ("cip", "instance, class, enums, services, networks, faults"),
+        DictionaryProfile::Sercos => ("sercos", "idns, communication, bits, codes"),
+        DictionaryProfile::Generic => ("generic", "instance"),
+    };
+    format!("the {name} dictionary has no part `{}`; expected one of: {parts}", part.name())
 }

@@ -119,7 +119,8 @@ struct DictionaryArguments {
     /// How to print it.
     #[arg(long, value_enum, default_value_t = DictionaryFormat::Csv)]
     format: DictionaryFormat,
-    /// What of it; `instance` when it is not given. sercos has instance and enums, generic has instance.
+    /// What of it. cip has instance (when it is not given), class, enums, services, networks, faults; sercos has idns and
+    /// communication (both when it is not given), bits, codes; generic has instance.
     #[arg(long, value_enum)]
     part: Option<DictionaryPart>,
     /// A folder of mapping tables; a file that is not there is taken from the binary.
@@ -150,7 +151,7 @@ enum DictionaryFormat {
 /// What `dictionary` prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum DictionaryPart {
-    /// What an axis or a drive has: attributes, IDNs, parameters and signals.
+    /// cip: attributes of an axis; generic: parameters and signals.
     Instance,
     /// Attributes of instance 0.
     Class,
@@ -162,6 +163,14 @@ enum DictionaryPart {
     Networks,
     /// Conditions of faults, alarms and inhibits, and what they do.
     Faults,
+    /// IDNs of the drive profile.
+    Idns,
+    /// IDNs of communication and generic device profile.
+    Communication,
+    /// Words and their bits.
+    Bits,
+    /// Codes of SERCOS.
+    Codes,
 }
 
 impl DictionaryPart {
@@ -174,6 +183,10 @@ impl DictionaryPart {
             Self::Services => "services",
             Self::Networks => "networks",
             Self::Faults => "faults",
+            Self::Idns => "idns",
+            Self::Communication => "communication",
+            Self::Bits => "bits",
+            Self::Codes => "codes",
         }
     }
 }

@@ -5,12 +5,13 @@
 
 use arrayvec::ArrayVec;
 use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSet, CaptureSource};
+use profile_generic::image::Signal;
 use profile_generic::program::{BitPattern, Conversion, Width};
 use profile_generic::quantity::Quantity;
 use profile_sercos::wire::idn::Idn;
 
 use super::compile_sercos::{Compiler, SercosAxis, Telegram};
-use super::dictionary::SercosDictionary;
+use super::dictionary::{SercosDictionary, SercosIdn};
 use super::drive_facts::DriveFacts;
 use super::sercos_tables::SercosTables;
 
@@ -369,7 +370,10 @@ impl Compiler<'_> {
 
     fn stored(&self, idn: Idn, telegram: &Telegram) -> Option<Stored> {
         let place = self.place(idn, &telegram.feedback)?;
-        let lsb = self.unit(idn, Quantity::Position).ok()?;
+        // What nobody has described is in the unit of the position feedback, with which it is compared.
+        let known = self.dictionary.idn(idn).is_some_and(SercosIdn::is_known);
+        let like = if known { idn } else { self.tables.signal(Signal::PositionActual)?.idn };
+        let lsb = self.unit(like, Quantity::Position).ok()?;
         let whole = 1_i64.checked_shl(place.width.bits()).filter(|_| place.width.bits() < 63)?;
         Some(Stored {
             place,

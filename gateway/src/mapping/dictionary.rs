@@ -7,19 +7,27 @@ mod cip_faults;
 mod cip_networks;
 mod cip_services;
 mod sercos;
+mod sercos_bits;
+mod sercos_codes;
+mod sercos_idns;
+mod sercos_terms;
 
 pub use cip::{CipDictionary, DataElement};
 pub use cip_attributes::{Access, CipAttribute, CipType, DEVICE_FUNCTIONS, PolarityEffect};
 pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use cip_networks::{CipNetwork, ConnectionDataFormat, ETHERNET_IP, NetworkObject, networks};
 pub use cip_services::CipService;
-pub use sercos::{IdnFormat, IdnUnit, SercosDictionary, SercosIdn, Word};
+pub use sercos::SercosDictionary;
+pub use sercos_bits::{Field, FieldValue, Layout, Pattern, Word};
+pub use sercos_codes::{CodeGroup, CodeSet, GroupKind, NamedCode};
+pub use sercos_idns::{IdnFormat, IdnPart, IdnUnit, SercosIdn};
+pub use sercos_terms::{Confidence, Document, ScaledQuantity, SercosTerms, Trust};
 
 use profile_generic::image::Signal;
 use profile_generic::parameter::{Parameter, ParameterRow};
 use profile_generic::quantity::Quantity;
 
-use super::format::{CodeRow, EnumerationRow, GenericFile, Name};
+use super::format::{GenericFile, Name};
 use super::load::{Parsed, TableErrors, Tables};
 use super::resolver::Resolver;
 
@@ -207,42 +215,17 @@ impl Enumeration {
     }
 }
 
-fn named_code(
-    set: Option<&Enumeration>,
+/// The code of the name that `key` has, of the names and codes of a set.
+fn named_code<'c>(
+    codes: impl Iterator<Item = (&'c str, u32)> + Clone,
     set_name: &str,
     key: &str,
     name: &Name,
     resolver: &mut Resolver<'_>,
 ) -> Option<u32> {
-    let codes = set.map_or(&[][..], |set| &set.codes);
-    let find = |text: &str| codes.iter().find(|known| known.name == text).map(|known| known.code);
-    let known = codes.iter().map(|known| known.name.as_str());
+    let find = |text: &str| codes.clone().find(|(known, _)| *known == text).map(|(_, code)| code);
+    let known = codes.clone().map(|(known, _)| known);
     resolver.name(key, name, &format!("a name of {set_name}"), find, known)
-}
-
-fn resolve_codes(row: &EnumerationRow, resolver: &mut Resolver<'_>) -> Enumeration {
-    let code = |row: &CodeRow| Code {
-        code: *row.code.get_ref(),
-        name: row.name.get_ref().clone(),
-        need: None,
-        rule: String::new(),
-        note: String::new(),
-        limits: Vec::new(),
-    };
-    let set = Enumeration {
-        name: row.name.get_ref().clone(),
-        kind: SetKind::Codes,
-        attributes: Vec::new(),
-        class_attributes: Vec::new(),
-        element: String::new(),
-        source: row.source.get_ref().clone(),
-        note: String::new(),
-        field: None,
-        codes: row.codes.iter().map(code).collect(),
-        ranges: Vec::new(),
-    };
-    set.unique(row.codes.iter().map(|code| &code.name), resolver);
-    set
 }
 
 /// All dictionaries.
@@ -261,7 +244,7 @@ impl Dictionaries {
         Self {
             generic: GenericDictionary::resolve(&tables.generic, errors),
             cip: CipDictionary::resolve(tables, errors),
-            sercos: SercosDictionary::resolve(&tables.sercos, errors),
+            sercos: SercosDictionary::resolve(tables, errors),
         }
     }
 }

@@ -10,6 +10,7 @@ mod cip_generic;
 mod cip_networks;
 mod dictionary;
 mod generic_sercos;
+mod sercos_dictionary;
 
 pub use cip_dictionary::*;
 pub use cip_faults::*;
@@ -17,6 +18,7 @@ pub use cip_generic::*;
 pub use cip_networks::*;
 pub use dictionary::*;
 pub use generic_sercos::*;
+pub use sercos_dictionary::*;
 
 use serde::Deserialize;
 use toml::Spanned;

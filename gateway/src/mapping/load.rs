@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::format::{
     CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipNetworkFile, CipServiceFile,
-    GenericFile, GenericSercosFile, SercosFile,
+    GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
 
 /// The file format this build understands.
@@ -20,14 +20,21 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 9] = [
+const FILES: [(&str, &str); 13] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
     ("dictionary/cip-faults.toml", include_str!("../../../mappings/dictionary/cip-faults.toml")),
     ("dictionary/cip-services.toml", include_str!("../../../mappings/dictionary/cip-services.toml")),
     ("dictionary/cip-networks.toml", include_str!("../../../mappings/dictionary/cip-networks.toml")),
-    ("dictionary/sercos.toml", include_str!("../../../mappings/dictionary/sercos.toml")),
+    ("dictionary/sercos-terms.toml", include_str!("../../../mappings/dictionary/sercos-terms.toml")),
+    ("dictionary/sercos-idns.toml", include_str!("../../../mappings/dictionary/sercos-idns.toml")),
+    (
+        "dictionary/sercos-communication.toml",
+        include_str!("../../../mappings/dictionary/sercos-communication.toml"),
+    ),
+    ("dictionary/sercos-bits.toml", include_str!("../../../mappings/dictionary/sercos-bits.toml")),
+    ("dictionary/sercos-codes.toml", include_str!("../../../mappings/dictionary/sercos-codes.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
 ];
@@ -56,8 +63,16 @@ pub struct TableTexts {
     pub cip_services: TableText,
     /// CIP Motion dictionary: networks.
     pub cip_networks: TableText,
-    /// SERCOS dictionary.
-    pub sercos: TableText,
+    /// SERCOS dictionary: sources, units, function groups.
+    pub sercos_terms: TableText,
+    /// SERCOS dictionary: the drive profile.
+    pub sercos_idns: TableText,
+    /// SERCOS dictionary: IDNs of the communication.
+    pub sercos_communication: TableText,
+    /// SERCOS dictionary: bits.
+    pub sercos_bits: TableText,
+    /// SERCOS dictionary: codes.
+    pub sercos_codes: TableText,
     /// CIP Motion to generic.
     pub cip_generic: TableText,
     /// Generic to SERCOS.
@@ -88,8 +103,16 @@ pub struct Tables {
     pub cip_services: Parsed<CipServiceFile>,
     /// CIP Motion dictionary: networks.
     pub cip_networks: Parsed<CipNetworkFile>,
-    /// SERCOS dictionary.
-    pub sercos: Parsed<SercosFile>,
+    /// SERCOS dictionary: sources, units, function groups.
+    pub sercos_terms: Parsed<SercosTermFile>,
+    /// SERCOS dictionary: the drive profile.
+    pub sercos_idns: Parsed<SercosIdnFile>,
+    /// SERCOS dictionary: IDNs of the communication.
+    pub sercos_communication: Parsed<SercosIdnFile>,
+    /// SERCOS dictionary: bits.
+    pub sercos_bits: Parsed<SercosBitFile>,
+    /// SERCOS dictionary: codes.
+    pub sercos_codes: Parsed<SercosCodeFile>,
     /// CIP Motion to generic.
     pub cip_generic: Parsed<CipGenericFile>,
     /// Generic to SERCOS.
@@ -234,7 +257,11 @@ impl TableTexts {
             cip_faults,
             cip_services,
             cip_networks,
-            sercos,
+            sercos_terms,
+            sercos_idns,
+            sercos_communication,
+            sercos_bits,
+            sercos_codes,
             cip_generic,
             generic_sercos,
         ] = texts;
@@ -245,7 +272,11 @@ impl TableTexts {
             cip_faults,
             cip_services,
             cip_networks,
-            sercos,
+            sercos_terms,
+            sercos_idns,
+            sercos_communication,
+            sercos_bits,
+            sercos_codes,
             cip_generic,
             generic_sercos,
         }
@@ -259,7 +290,11 @@ impl TableTexts {
             cip_faults,
             cip_services,
             cip_networks,
-            sercos,
+            sercos_terms,
+            sercos_idns,
+            sercos_communication,
+            sercos_bits,
+            sercos_codes,
             cip_generic,
             generic_sercos,
         } = self;
@@ -270,7 +305,11 @@ impl TableTexts {
             cip_faults,
             cip_services,
             cip_networks,
-            sercos,
+            sercos_terms,
+            sercos_idns,
+            sercos_communication,
+            sercos_bits,
+            sercos_codes,
             cip_generic,
             generic_sercos,
         ]
@@ -288,7 +327,11 @@ impl TableTexts {
         let cip_faults = self.cip_faults.parse(&mut errors);
         let cip_services = self.cip_services.parse(&mut errors);
         let cip_networks = self.cip_networks.parse(&mut errors);
-        let sercos = self.sercos.parse(&mut errors);
+        let sercos_terms = self.sercos_terms.parse(&mut errors);
+        let sercos_idns = self.sercos_idns.parse(&mut errors);
+        let sercos_communication = self.sercos_communication.parse(&mut errors);
+        let sercos_bits = self.sercos_bits.parse(&mut errors);
+        let sercos_codes = self.sercos_codes.parse(&mut errors);
         let cip_generic = self.cip_generic.parse(&mut errors);
         let generic_sercos = self.generic_sercos.parse(&mut errors);
         let tables = || {
@@ -299,7 +342,11 @@ impl TableTexts {
                 cip_faults: cip_faults?,
                 cip_services: cip_services?,
                 cip_networks: cip_networks?,
-                sercos: sercos?,
+                sercos_terms: sercos_terms?,
+                sercos_idns: sercos_idns?,
+                sercos_communication: sercos_communication?,
+                sercos_bits: sercos_bits?,
+                sercos_codes: sercos_codes?,
                 cip_generic: cip_generic?,
                 generic_sercos: generic_sercos?,
             })

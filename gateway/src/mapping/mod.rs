@@ -55,10 +55,12 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeRange,
-    ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries, ETHERNET_IP, Enumeration,
-    ExceptionAction, FaultRecord, GenericDictionary, IdnFormat, IdnUnit, NetworkObject, PolarityEffect,
-    RangeKind, SercosDictionary, SercosIdn, SetKind, StatusCode, Word, networks,
+    Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup,
+    CodeRange, CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries,
+    Document, ETHERNET_IP, Enumeration, ExceptionAction, FaultRecord, Field, FieldValue, GenericDictionary,
+    GroupKind, IdnFormat, IdnPart, IdnUnit, Layout, NamedCode, NetworkObject, Pattern, PolarityEffect,
+    RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode, Trust, Word,
+    networks,
 };
 pub use drive_facts::{Difference, DriveFacts};
 pub use examples::ExampleFailure;

@@ -193,7 +193,7 @@ impl CipDictionary {
         name: &Name,
         resolver: &mut Resolver<'_>,
     ) -> Option<u32> {
-        named_code(self.enumeration(set), set, key, name, resolver)
+        named_code(names(self.enumeration(set)), set, key, name, resolver)
     }
 
     /// The bit that `key` names in a mapping, from the set of bits `set`.
@@ -204,6 +204,11 @@ impl CipDictionary {
         name: &Name,
         resolver: &mut Resolver<'_>,
     ) -> Option<u32> {
-        named_code(self.bits(set), set, key, name, resolver)
+        named_code(names(self.bits(set)), set, key, name, resolver)
     }
+}
+
+/// The names and codes of a set.
+fn names(set: Option<&Enumeration>) -> impl Iterator<Item = (&str, u32)> + Clone {
+    set.into_iter().flat_map(|set| &set.codes).map(|code| (code.name.as_str(), code.code))
 }

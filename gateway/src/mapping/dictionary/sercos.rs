@@ -1,186 +1,65 @@
-//! What a SERCOS drive has: IDNs, words and operation modes.
+//! What a SERCOS slave and drive have: IDNs, words and codes.
 
-use profile_sercos::wire::attribute::Format;
 use profile_sercos::wire::idn::Idn;
 
-use super::{Enumeration, named_code, resolve_codes};
-use crate::mapping::format::{IdnRow, Name, SercosFile};
-use crate::mapping::load::{Parsed, TableErrors};
+use super::named_code;
+use super::sercos_bits::{Layout, Word, resolve_words};
+use super::sercos_codes::{CodeSet, resolve_codes};
+use super::sercos_idns::{IdnPart, SercosIdn, parse_idn, resolve_idns};
+use super::sercos_terms::SercosTerms;
+use crate::mapping::format::{Name, SercosTermFile};
+use crate::mapping::load::{Parsed, TableErrors, Tables};
 use crate::mapping::resolver::Resolver;
 
-/// How the value of an IDN is displayed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum IdnFormat {
-    /// Bits.
-    Binary,
-    /// Unsigned.
-    Unsigned,
-    /// Signed.
-    Signed,
-    /// Hexadecimal.
-    Hexadecimal,
-    /// Text.
-    Text,
-    /// IDNs.
-    Idn,
-}
-
-impl IdnFormat {
-    /// Every format with its word in the files.
-    pub const NAMED: &'static [(&'static str, Self)] = &[
-        ("binary", Self::Binary),
-        ("unsigned", Self::Unsigned),
-        ("signed", Self::Signed),
-        ("hexadecimal", Self::Hexadecimal),
-        ("text", Self::Text),
-        ("idn", Self::Idn),
-    ];
-
-    /// The format of element 3 that it stands for.
-    pub fn of_attribute(self) -> Format {
-        match self {
-            Self::Binary => Format::Binary,
-            Self::Unsigned => Format::Unsigned,
-            Self::Signed => Format::Signed,
-            Self::Hexadecimal => Format::Hexadecimal,
-            Self::Text => Format::Text,
-            Self::Idn => Format::Idn,
-        }
-    }
-
-    /// The word in the files.
-    pub fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
-    }
-}
-
-/// What one unit in the last place of an IDN is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum IdnUnit {
-    /// No unit.
-    None,
-    /// 10^-decimals of a fixed unit.
-    Fixed {
-        /// The unit.
-        unit: String,
-        /// Digits behind the decimal point.
-        decimals: u8,
-    },
-    /// What the drive's scaling parameters for this quantity say.
-    Scaled(String),
-}
-
-/// One IDN.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SercosIdn {
-    /// The number.
-    pub idn: Idn,
-    /// Its name.
-    pub name: String,
-    /// Bytes of the value or of a list item; `None` when only the drive knows.
-    pub length: Option<u8>,
-    /// Whether it is a list.
-    pub list: bool,
-    /// Display format.
-    pub format: Option<IdnFormat>,
-    /// Whether it is a procedure command.
-    pub command: bool,
-    /// Unit.
-    pub unit: IdnUnit,
-    /// Communication phases in which it can be written; `None` when not known.
-    pub write: Option<Vec<u8>>,
-    /// Keys of the documents it was read in.
-    pub source: String,
-    /// How far to trust it: `high`, `medium`, `low` or `none`.
-    pub confidence: String,
-    /// Anything worth knowing; mostly empty.
-    pub note: String,
-}
-
-/// A word with named fields.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Word {
-    /// Name of the word.
-    pub name: String,
-    /// IDN that holds it.
-    pub idn: Idn,
-    /// Fields: name, first bit, last bit.
-    pub fields: Vec<(String, u32, u32)>,
-    /// Where it comes from.
-    pub source: String,
-}
-
-impl Word {
-    /// First and last bit of the field with this name.
-    pub fn field(&self, name: &str) -> Option<(u32, u32)> {
-        self.fields.iter().find(|(known, _, _)| known == name).map(|(_, low, high)| (*low, *high))
-    }
-
-    /// The names of all fields.
-    pub fn field_names(&self) -> impl Iterator<Item = &str> + Clone {
-        self.fields.iter().map(|(name, _, _)| name.as_str())
-    }
-}
-
-/// What a SERCOS drive has.
+/// What a SERCOS slave and drive have.
 #[derive(Debug, Clone, Default)]
 pub struct SercosDictionary {
+    pub(super) terms: SercosTerms,
     idns: Vec<SercosIdn>,
-    words: Vec<Word>,
-    enumerations: Vec<Enumeration>,
+    pub(super) words: Vec<Word>,
+    pub(super) code_sets: Vec<CodeSet>,
 }
 
 impl SercosDictionary {
-    pub(super) fn resolve(file: &Parsed<SercosFile>, errors: &mut TableErrors) -> Self {
-        let mut resolver = Resolver::new(&file.text, errors);
-        let rows = &file.rows;
-        resolver.head(&rows.format, "profile", &rows.profile, "sercos");
-        let mut idns: Vec<SercosIdn> = Vec::with_capacity(rows.idn.len());
-        for row in &rows.idn {
-            if let Some(idn) = resolve_idn(row, &mut resolver) {
-                if idns.iter().any(|known| known.idn == idn.idn) {
-                    resolver.error(row.idn.span(), "idn", format!("{} is there twice", idn.idn));
-                }
-                idns.push(idn);
-            }
-        }
-        idns.sort_by_key(|row| row.idn);
-        let mut dictionary = Self {
-            idns,
-            words: Vec::new(),
-            enumerations: rows.enumeration.iter().map(|row| resolve_codes(row, &mut resolver)).collect(),
-        };
-        for row in &rows.word {
-            let Some(idn) = dictionary.idn_or_error("idn", &row.idn, &mut resolver).map(|row| row.idn) else {
-                continue;
-            };
-            let mut fields: Vec<(String, u32, u32)> = Vec::with_capacity(row.fields.len());
-            for field in &row.fields {
-                let [low, high] = *field.bits.get_ref();
-                if low > high || high > 31 {
-                    let message = format!("expected first and last bit up to 31, got [{low}, {high}]");
-                    resolver.error(field.bits.span(), "bits", message);
-                    continue;
-                }
-                if fields.iter().any(|(_, other_low, other_high)| low <= *other_high && *other_low <= high) {
-                    resolver.error(field.bits.span(), "bits", "the field overlaps another one");
-                }
-                fields.push((field.name.get_ref().clone(), low, high));
-            }
-            let (name, source) = (row.name.get_ref().clone(), row.source.get_ref().clone());
-            dictionary.words.push(Word { name, idn, fields, source });
-        }
+    pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
+        let terms = SercosTerms::resolve(&tables.sercos_terms, errors);
+        let mut idns = Vec::new();
+        resolve_idns(&tables.sercos_idns, IdnPart::Profile, &terms, &mut idns, errors);
+        resolve_idns(&tables.sercos_communication, IdnPart::Communication, &terms, &mut idns, errors);
+        // By number, with the elements of a structure behind the plain number.
+        idns.sort_by_key(|row| (row.idn.0 & 0xFFFF, row.idn.instance(), row.idn.element()));
+        let mut dictionary = Self { terms, idns, ..Self::default() };
+        dictionary.check_scalings(&tables.sercos_terms, errors);
+        resolve_codes(&tables.sercos_codes, &mut dictionary, errors);
+        resolve_words(&tables.sercos_bits, &mut dictionary, errors);
         dictionary
     }
 
-    /// All IDNs, by number.
+    /// The scalings name IDNs that there are.
+    fn check_scalings(&self, file: &Parsed<SercosTermFile>, errors: &mut TableErrors) {
+        let mut resolver = Resolver::new(&file.text, errors);
+        for row in &self.terms.scalings {
+            let _ = self.idn_or_error("type", &row.scaling_type, &mut resolver);
+            for name in &row.parameters {
+                let _ = self.idn_or_error("parameters", name, &mut resolver);
+            }
+        }
+    }
+
+    /// Documents, units, scalings and function groups that the rows refer to.
+    pub fn terms(&self) -> &SercosTerms {
+        &self.terms
+    }
+
+    /// All IDNs, by data block, then by structure instance and element.
     pub fn idns(&self) -> &[SercosIdn] {
         &self.idns
     }
 
     /// The row of an IDN.
     pub fn idn(&self, idn: Idn) -> Option<&SercosIdn> {
-        let at = self.idns.binary_search_by_key(&idn, |row| row.idn).ok()?;
+        let key = |idn: Idn| (idn.0 & 0xFFFF, idn.instance(), idn.element());
+        let at = self.idns.binary_search_by_key(&key(idn), |row| key(row.idn)).ok()?;
         self.idns.get(at)
     }
 
@@ -189,9 +68,9 @@ impl SercosDictionary {
         self.words.iter().find(|word| word.name == name)
     }
 
-    /// The word that this IDN holds.
+    /// The word that this IDN holds in SERCOS III.
     pub fn word_of(&self, idn: Idn) -> Option<&Word> {
-        self.words.iter().find(|word| word.idn == idn)
+        self.words.iter().find(|word| word.layout != Layout::Sercos12 && word.idns.contains(&idn))
     }
 
     /// All words.
@@ -199,14 +78,25 @@ impl SercosDictionary {
         &self.words
     }
 
-    /// All sets of named codes.
-    pub fn enumerations(&self) -> &[Enumeration] {
-        &self.enumerations
+    /// All sets of codes.
+    pub fn code_sets(&self) -> &[CodeSet] {
+        &self.code_sets
     }
 
-    /// The set of named codes with this name.
-    pub fn enumeration(&self, name: &str) -> Option<&Enumeration> {
-        self.enumerations.iter().find(|set| set.name == name)
+    /// The set of codes with this name.
+    pub fn codes(&self, name: &str) -> Option<&CodeSet> {
+        self.code_sets.iter().find(|set| set.name == name)
+    }
+
+    /// The set of codes that `key` names.
+    pub(super) fn codes_or_error(
+        &self,
+        key: &str,
+        name: &Name,
+        resolver: &mut Resolver<'_>,
+    ) -> Option<&CodeSet> {
+        let known = self.code_sets.iter().map(|set| set.name.as_str());
+        resolver.name(key, name, "a set of codes", |text| self.codes(text), known)
     }
 
     /// The IDN that `key` names in a mapping.
@@ -216,15 +106,19 @@ impl SercosDictionary {
         name: &Name,
         resolver: &mut Resolver<'_>,
     ) -> Option<&SercosIdn> {
-        let idn = parse_idn(key, name, resolver)?;
+        let (idn, _) = parse_idn(key, name, resolver)?;
         let row = self.idn(idn);
         if row.is_none() {
-            resolver.error(name.span(), key, format!("expected an IDN of the dictionary, got {idn}"));
+            resolver.error(
+                name.span(),
+                key,
+                format!("expected an IDN of the dictionary, got {}", name.get_ref()),
+            );
         }
         row
     }
 
-    /// The code that `key` names in a mapping, from the enumeration `set`.
+    /// The code that `key` names in a mapping, from the set `set`.
     pub(in crate::mapping) fn code_or_error(
         &self,
         set: &str,
@@ -232,54 +126,7 @@ impl SercosDictionary {
         name: &Name,
         resolver: &mut Resolver<'_>,
     ) -> Option<u32> {
-        named_code(self.enumeration(set), set, key, name, resolver)
+        let codes = self.codes(set).into_iter().flat_map(|set| &set.codes);
+        named_code(codes.map(|code| (code.name.as_str(), code.code)), set, key, name, resolver)
     }
-}
-
-fn parse_idn(key: &str, name: &Name, resolver: &mut Resolver<'_>) -> Option<Idn> {
-    match name.get_ref().parse() {
-        Ok(idn) => Some(idn),
-        Err(error) => {
-            resolver.error(name.span(), key, format!("expected an IDN, got `{}`: {error}", name.get_ref()));
-            None
-        }
-    }
-}
-
-fn resolve_idn(row: &IdnRow, resolver: &mut Resolver<'_>) -> Option<SercosIdn> {
-    const CONFIDENCES: [(&str, ()); 4] = [("high", ()), ("medium", ()), ("low", ()), ("none", ())];
-    let idn = parse_idn("idn", &row.idn, resolver)?;
-    let format = match &row.format {
-        Some(name) => Some(resolver.word("format", name, IdnFormat::NAMED)?),
-        None => None,
-    };
-    resolver.word("confidence", &row.confidence, &CONFIDENCES)?;
-    if let Some(length) = &row.length
-        && ![1, 2, 4, 8].contains(length.get_ref())
-    {
-        resolver.error(length.span(), "length", format!("expected 1, 2, 4 or 8, got {}", length.get_ref()));
-        return None;
-    }
-    let unit = match (&row.scaling, &row.unit) {
-        (Some(scaling), None) => IdnUnit::Scaled(scaling.get_ref().clone()),
-        (None, Some(unit)) => IdnUnit::Fixed { unit: unit.get_ref().clone(), decimals: row.decimals },
-        (None, None) => IdnUnit::None,
-        (Some(_), Some(unit)) => {
-            resolver.error(unit.span(), "unit", "expected `scaling` or `unit`, got both");
-            return None;
-        }
-    };
-    Some(SercosIdn {
-        idn,
-        name: row.name.get_ref().clone(),
-        length: row.length.as_ref().map(|length| *length.get_ref()),
-        list: row.list,
-        format,
-        command: row.command,
-        unit,
-        write: row.write.clone(),
-        source: row.source.get_ref().clone(),
-        confidence: row.confidence.get_ref().clone(),
-        note: row.note.clone().unwrap_or_default(),
-    })
 }

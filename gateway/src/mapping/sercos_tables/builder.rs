@@ -8,6 +8,7 @@ use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
+use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
 use super::{
@@ -79,10 +80,18 @@ impl<'a> Builder<'a> {
         self.dictionaries.sercos.idn_or_error(key, name, &mut self.resolver)
     }
 
-    fn word(&mut self, key: &str, name: &Name) -> Option<&'a Word> {
+    /// The word with this name and the one IDN that holds it.
+    fn word(&mut self, key: &str, name: &Name) -> Option<(Idn, &'a Word)> {
         let sercos = &self.dictionaries.sercos;
         let known = sercos.words().iter().map(|word| word.name.as_str());
-        self.resolver.name(key, name, "a word of the dictionary", |text| sercos.word(text), known)
+        let find = |text: &str| sercos.word(text);
+        let word = self.resolver.name(key, name, "a word of the dictionary", find, known)?;
+        if let [idn] = word.idns.as_slice() {
+            return Some((*idn, word));
+        }
+        let message = format!("expected a word of one IDN, `{}` has {}", word.name, word.idns.len());
+        self.resolver.error(name.span(), key, message);
+        None
     }
 
     fn pattern(&mut self, word: &Word, rows: &[FieldValueRow]) -> Option<BitPattern> {
@@ -349,9 +358,9 @@ impl<'a> Builder<'a> {
         for row in &rows.status {
             let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
             let bit = self.resolver.name("status", &row.status, "a status bit", StatusBits::parse, known);
-            let Some(word) = self.word("word", &row.word) else { continue };
-            if word.idn != self.tables.status_word {
-                let message = format!("expected the status word of the telegram, got {}", word.idn);
+            let Some((idn, word)) = self.word("word", &row.word) else { continue };
+            if idn != self.tables.status_word {
+                let message = format!("expected the status word of the telegram, got {idn}");
                 self.resolver.error(row.word.span(), "word", message);
             }
             if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
@@ -371,7 +380,7 @@ impl<'a> Builder<'a> {
                 self.resolver.name("reaction", name, "a reaction", Reaction::parse, known)
             }
         };
-        let Some(word) = self.word("word", &row.word) else { return };
+        let Some((idn, word)) = self.word("word", &row.word) else { return };
         let pattern = self.pattern(word, &row.pattern);
         if let (Some(cause), Some(reaction), Some(pattern)) = (cause, reaction, pattern) {
             let severe =
@@ -381,7 +390,7 @@ impl<'a> Builder<'a> {
                     "the drive only warns: expected a cause whose exception has default = \"Alarm\"";
                 self.resolver.error(row.cause.span(), "cause", message);
             }
-            self.tables.faults.push(FaultRule { word: word.idn, pattern, cause, reaction });
+            self.tables.faults.push(FaultRule { word: idn, pattern, cause, reaction });
         }
     }
 
@@ -424,6 +433,7 @@ impl<'a> Builder<'a> {
         }
         let [value, counter, enable, command] = found;
         if let (Some(value), Some(name)) = (value, &row.value)
+            && value.is_known()
             && !self.measures(value, Quantity::Position)
         {
             let message = format!("the unit of {} is no {}", value.idn, Quantity::Position);
@@ -435,8 +445,8 @@ impl<'a> Builder<'a> {
         }
         let word = match (&row.word, by) {
             (Some(name), 0 | 2) => {
-                let word = self.word("word", name)?;
-                Some((word.idn, self.pattern(word, &row.pattern)?))
+                let (idn, word) = self.word("word", name)?;
+                Some((idn, self.pattern(word, &row.pattern)?))
             }
             (None, 1 | 3) => None,
             _ => {

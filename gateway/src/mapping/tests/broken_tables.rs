@@ -25,7 +25,7 @@ type Case = (&'static str, Table, &'static str, &'static str);
 const CASES: &[Case] = &[
     ("no TOML", |t| &mut t.cip_generic, "[scaling]", "[scaling"),
     ("unknown key", |t| &mut t.cip_generic, "wraps = true", "wrap = true"),
-    ("wrong type", |t| &mut t.sercos, "length = 2,", "length = \"two\","),
+    ("wrong type", |t| &mut t.sercos_idns, "length = 2,", "length = \"two\","),
     ("warning that stops", |t| &mut t.generic_sercos, "cause = \"cooling_warning\"", "cause = \"cooling\""),
     ("no such action", |t| &mut t.cip_generic, "least = \"Ignore\"", "least = \"Ignored\""),
     (
@@ -186,7 +186,149 @@ const CASES: &[Case] = &[
         "quantity = \"torque\", access = \"command\"",
         "quantity = \"time\", access = \"command\"",
     ),
-    ("format", |t| &mut t.sercos, "format = 1", "format = 2"),
+    ("format", |t| &mut t.sercos_idns, "format = 1", "format = 2"),
+    ("profile", |t| &mut t.sercos_bits, "profile = \"sercos\"", "profile = \"sercose\""),
+    ("IDN twice", |t| &mut t.sercos_idns, "idn = \"S-0-0012\"", "idn = \"S-0-0011\""),
+    ("IDN in both files", |t| &mut t.sercos_communication, "idn = \"S-0-0014\"", "idn = \"S-0-0013\""),
+    ("element twice", |t| &mut t.sercos_communication, "idn = \"S-0-1050.x.2\"", "idn = \"S-0-1050.0.1\""),
+    ("no such number", |t| &mut t.sercos_communication, "idn = \"S-0-1050.x.2\"", "idn = \"S-0-1050.y.2\""),
+    ("IDN without a clause", |t| &mut t.sercos_idns, "clause = \"12.1\", ", ""),
+    ("unknown unit", |t| &mut t.sercos_idns, "unit = \"us\"", "unit = \"µs\""),
+    ("unknown scaling", |t| &mut t.sercos_idns, "scaling = \"velocity\"", "scaling = \"velocities\""),
+    (
+        "unit and scaling",
+        |t| &mut t.sercos_idns,
+        "scaling = \"velocity\"",
+        "scaling = \"velocity\", unit = \"us\"",
+    ),
+    ("unknown display format", |t| &mut t.sercos_idns, "format = \"signed\"", "format = \"sined\""),
+    ("odd length", |t| &mut t.sercos_idns, "length = 2,", "length = 3,"),
+    ("unknown group", |t| &mut t.sercos_idns, "group = \"FG Motor\"", "group = \"FG Moto\""),
+    ("phases out of order", |t| &mut t.sercos_idns, "write = [2, 3]", "write = [3, 2]"),
+    ("phase without a service channel", |t| &mut t.sercos_idns, "write = [2, 3]", "write = [1, 2]"),
+    ("cyclic in nothing", |t| &mut t.sercos_idns, "cyclic = { at = \"M\" }", "cyclic = { }"),
+    ("cyclic by nobody", |t| &mut t.sercos_idns, "cyclic = { at = \"M\" }", "cyclic = { at = \"Q\" }"),
+    (
+        "element 3 of another length",
+        |t| &mut t.sercos_idns,
+        "attribute = 0x70110001",
+        "attribute = 0x70120001",
+    ),
+    ("element 3 of another point", |t| &mut t.sercos_idns, "decimals = 3,", "decimals = 4,"),
+    (
+        "length of which nothing is known",
+        |t| &mut t.sercos_idns,
+        "source = \"list\", confidence = \"unknown\"",
+        "length = 2, source = \"list\", confidence = \"unknown\"",
+    ),
+    (
+        "high by one family",
+        |t| &mut t.sercos_idns,
+        "source = \"R3 R4\", confidence = \"medium\"",
+        "source = \"R3 R4\", confidence = \"high\"",
+    ),
+    ("unknown confidence", |t| &mut t.sercos_idns, "confidence = \"high\"", "confidence = \"hihg\""),
+    ("unknown document", |t| &mut t.sercos_idns, "source = \"R1 M E\"", "source = \"R1 N E\""),
+    ("no document", |t| &mut t.sercos_idns, "source = \"R1 M E\"", "source = \"\""),
+    ("document twice", |t| &mut t.sercos_terms, "key = \"R2\"", "key = \"R1\""),
+    ("unit twice", |t| &mut t.sercos_terms, "unit = \"kW\"", "unit = \"V\""),
+    ("scaling by an unknown IDN", |t| &mut t.sercos_terms, "type = \"S-0-0208\"", "type = \"S-0-4008\""),
+    (
+        "bits that overlap",
+        |t| &mut t.sercos_bits,
+        "{ bits = [14, 14], name = \"Enable drive\"",
+        "{ bits = [14, 15], name = \"Enable drive\"",
+    ),
+    (
+        "pieces that overlap",
+        |t| &mut t.sercos_bits,
+        "parts = [[11, 11], [9, 9]",
+        "parts = [[11, 11], [9, 11]",
+    ),
+    ("bits above the width", |t| &mut t.sercos_bits, "bits = [30, 31]", "bits = [30, 32]"),
+    ("bits upside down", |t| &mut t.sercos_bits, "bits = [30, 31]", "bits = [31, 30]"),
+    ("no bits", |t| &mut t.sercos_bits, "bits = [30, 31], ", ""),
+    ("bits and pieces", |t| &mut t.sercos_bits, "bits = [30, 31]", "bits = [30, 31], parts = [[30, 31]]"),
+    (
+        "bits without a name",
+        |t| &mut t.sercos_bits,
+        "bits = [30, 31], name = \"Interpretation\"",
+        "bits = [30, 31]",
+    ),
+    (
+        "reserved bits with a name",
+        |t| &mut t.sercos_bits,
+        "reserved = true",
+        "reserved = true, name = \"Free\"",
+    ),
+    ("field twice", |t| &mut t.sercos_bits, "name = \"Feedback error\"", "name = \"Control voltage error\""),
+    (
+        "width of another IDN",
+        |t| &mut t.sercos_bits,
+        "idns = [\"S-0-0011\"]\nlayout = \"all\"\nwidth = 16",
+        "idns = [\"S-0-0011\"]\nlayout = \"all\"\nwidth = 32",
+    ),
+    ("odd width", |t| &mut t.sercos_bits, "width = 32", "width = 24"),
+    ("unknown layout", |t| &mut t.sercos_bits, "layout = \"III\"", "layout = \"IV\""),
+    ("word twice", |t| &mut t.sercos_bits, "name = \"Class 2 diagnostic\"", "name = \"Class 1 diagnostic\""),
+    ("two words of an IDN", |t| &mut t.sercos_bits, "idns = [\"S-0-0012\"]", "idns = [\"S-0-0011\"]"),
+    ("word of an unknown IDN", |t| &mut t.sercos_bits, "idns = [\"S-0-0179\"]", "idns = [\"S-0-2179\"]"),
+    ("word of nothing", |t| &mut t.sercos_bits, "element = \"attribute (element 3) of every IDN\"\n", ""),
+    (
+        "value above the field",
+        |t| &mut t.sercos_bits,
+        "{ value = 3, name = \"enabled\"",
+        "{ value = 4, name = \"enabled\"",
+    ),
+    (
+        "value twice",
+        |t| &mut t.sercos_bits,
+        "{ value = 1, name = \"drive on\"",
+        "{ value = 0, name = \"drive on\"",
+    ),
+    (
+        "pattern above its bits",
+        |t| &mut t.sercos_bits,
+        "bits = [13, 15], value = 7",
+        "bits = [13, 15], value = 8",
+    ),
+    ("unknown set of codes", |t| &mut t.sercos_bits, "codes = \"SCP class\"", "codes = \"SCP classes\""),
+    (
+        "source without confidence",
+        |t| &mut t.sercos_bits,
+        "source = \"M\", confidence = \"medium\"",
+        "source = \"M\"",
+    ),
+    (
+        "mapping of a word of many",
+        |t| &mut t.generic_sercos,
+        "word = \"Home switch\"",
+        "word = \"Probe inputs\"",
+    ),
+    ("SERCOS code twice", |t| &mut t.sercos_codes, "code = 0x000C", "code = 0x000B"),
+    (
+        "name of a code twice",
+        |t| &mut t.sercos_codes,
+        "name = \"Velocity control\"",
+        "name = \"Torque control\"",
+    ),
+    ("set of codes twice", |t| &mut t.sercos_codes, "name = \"SCP class\"", "name = \"FSP type\""),
+    ("code above the IDN", |t| &mut t.sercos_codes, "code = 0xC01B", "code = 0x1C01B"),
+    ("codes of bits above the IDN", |t| &mut t.sercos_codes, "field = [8, 15]", "field = [8, 16]"),
+    (
+        "codes over a code",
+        |t| &mut t.sercos_codes,
+        "from = 0x8001, to = 0x800C",
+        "from = 0x8001, to = 0x8803",
+    ),
+    (
+        "codes upside down",
+        |t| &mut t.sercos_codes,
+        "from = 0x8001, to = 0x800C",
+        "from = 0x8001, to = 0x8000",
+    ),
+    ("codes of an unknown kind", |t| &mut t.sercos_codes, "kind = \"vendor\"", "kind = \"maker\""),
+    ("codes that nothing has", |t| &mut t.sercos_codes, "idns = [\"S-0-1302.x.1\"]\n", ""),
 ];
 
 #[test]
@@ -209,6 +351,41 @@ fn errors_carry_their_place_as_numbers() {
     let [error] = errors.0.as_slice() else { panic!("{errors}") };
     assert_eq!((error.line, error.column, error.key.as_str()), (line, 10, "signal"));
     assert_eq!(error.file, "mappings/cip-generic.toml");
+}
+
+/// Line, column and key of what is wrong with the SERCOS dictionary, counted here in the text.
+#[test]
+fn errors_of_the_sercos_dictionary_carry_their_exact_place() {
+    let cases: &[(Table, &str, &str, &str, &str)] = &[
+        (
+            |t| &mut t.sercos_idns,
+            "idn = \"S-0-0058\"",
+            "idn = \"S-0-0031\"",
+            "\"S-0-0031\", name = \"Rev",
+            "idn",
+        ),
+        (|t| &mut t.sercos_idns, "unit = \"us\"", "unit = \"uS\"", "\"uS\"", "unit"),
+        (|t| &mut t.sercos_idns, "format = \"hexadecimal\"", "format = \"hex\"", "\"hex\"", "format"),
+        (|t| &mut t.sercos_bits, "bits = [24, 29]", "bits = [24, 30]", "[24, 30]", "bits"),
+        (
+            |t| &mut t.sercos_codes,
+            "code = 0x7007",
+            "code = 0x7006",
+            "0x7006, name = \"operation data is ab",
+            "code",
+        ),
+    ];
+    for (table, from, to, wrong, key) in cases {
+        let mut texts = TableTexts::embedded();
+        replace(table(&mut texts), from, to);
+        let (path, text) = (table(&mut texts).path.clone(), table(&mut texts).text.clone());
+        let (line, content) = (1..).zip(text.lines()).find(|(_, content)| content.contains(wrong)).unwrap();
+        let column = content.find(wrong).unwrap() + 1;
+        let errors = Mapping::from_texts(texts).unwrap_err();
+        let [error] = errors.0.as_slice() else { panic!("{errors}") };
+        assert_eq!((error.file.as_str(), error.line, error.column), (path.as_str(), line, column), "{error}");
+        assert_eq!(error.key, *key, "{error}");
+    }
 }
 
 /// The examples are worth their place: a row that is changed is found out.
@@ -241,8 +418,8 @@ fn a_folder_replaces_files_and_may_hold_no_others() {
     let folder = std::env::temp_dir().join(format!("axisbridge-mapping-{}", std::process::id()));
     std::fs::create_dir_all(folder.join("dictionary")).unwrap();
     let mut texts = TableTexts::embedded();
-    replace(&mut texts.sercos, "name = \"Position command value\"", "name = \"Position set-point\"");
-    std::fs::write(folder.join("dictionary/sercos.toml"), &texts.sercos.text).unwrap();
+    replace(&mut texts.sercos_idns, "name = \"Position command value\"", "name = \"Position set-point\"");
+    std::fs::write(folder.join("dictionary/sercos-idns.toml"), &texts.sercos_idns.text).unwrap();
     let mapping = Mapping::from_folder(&folder).unwrap();
     let name = mapping.dictionaries.sercos.idn(Idn::standard(47)).map(|row| row.name.clone());
     assert_eq!(name.as_deref(), Some("Position set-point"));

@@ -1,0 +1,34 @@
+//! The generic dictionary as a table.
+
+use super::sheet::{Cell, Sheet};
+use crate::mapping::GenericDictionary;
+
+/// Parameters, by number, and the signals of the process image, which have none.
+pub fn instance(dictionary: &GenericDictionary) -> Sheet {
+    const COLUMNS: &[&str] = &["id", "name", "kind", "quantity", "unit", "data_type", "access", "note"];
+    let parameters = dictionary.parameters().iter().map(|row| {
+        vec![
+            row.parameter.0.into(),
+            row.parameter.name().into(),
+            "parameter".into(),
+            row.quantity.name().into(),
+            row.quantity.unit().into(),
+            row.kind.name().into(),
+            row.access.name().into(),
+            row.description.into(),
+        ]
+    });
+    let signals = dictionary.signals().iter().map(|signal| {
+        vec![
+            Cell::None,
+            signal.name().into(),
+            "signal".into(),
+            signal.quantity().name().into(),
+            signal.quantity().unit().into(),
+            "integer".into(),
+            if signal.is_command() { "command" } else { "feedback" }.into(),
+            "".into(),
+        ]
+    });
+    Sheet::new(COLUMNS, parameters.chain(signals).collect())
+}
