@@ -68,6 +68,18 @@ impl ConnectionConfig {
 /// The connections of one slave.
 pub type Connections = ArrayVec<ConnectionConfig, CONNECTIONS_MAX>;
 
+/// What the master does in CP2 about slaves without a SERCOS address of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum AddressPolicy {
+    /// Reports them and does not enter CP3 with them.
+    #[default]
+    Refuse,
+    /// Gives them free addresses by S-0-1040, the lowest first, in the order of the network. Addresses of the
+    /// configuration are not given away, and no slave keeps one that it shares: which of them was meant is for a person
+    /// to say. They take part without connections.
+    Assign,
+}
+
 /// One slave that is expected on the network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SlaveConfig {
@@ -100,6 +112,8 @@ pub struct MasterConfig {
     pub slaves_max: u16,
     /// Expected slaves. Others found on the network take part without connections.
     pub slaves: Vec<SlaveConfig>,
+    /// Slaves that have no address or share one.
+    pub addresses: AddressPolicy,
     /// Consecutive cycles for which topology, and then the address list, must stay the same in CP0.
     pub stable_cycles: u16,
     /// Cycles after which CP0 reports that topology or list do not become stable.
@@ -139,6 +153,7 @@ impl MasterConfig {
             slave_delay_ns: 900,
             slaves_max: 64,
             slaves: Vec::new(),
+            addresses: AddressPolicy::Refuse,
             stable_cycles: 100,
             scan_timeout_cycles: 1000,
             pause: DurationNs::from_millis(120),

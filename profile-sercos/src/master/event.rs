@@ -105,6 +105,15 @@ pub enum Event {
         /// The slave.
         slave: SlaveId,
     },
+    /// The slave was given another SERCOS address by S-0-1040. It takes part without connections.
+    AddressAssigned {
+        /// The slave.
+        slave: SlaveId,
+        /// The address before, 0 for none.
+        old: u16,
+        /// The new address.
+        new: u16,
+    },
     /// The application may work and then call `proceed`.
     AwaitingApplication {
         /// CP2 or CP3.
@@ -203,6 +212,9 @@ impl fmt::Display for Event {
                 write!(f, "{first} and {second} both have address {address}")
             }
             Event::AddressConflict { slave } => write!(f, "{slave} has no address of its own: CP3 refused"),
+            Event::AddressAssigned { slave, old, new } => {
+                write!(f, "{slave} with address {old} was given address {new}")
+            }
             Event::AwaitingApplication { phase } => write!(f, "{phase}: the application may work"),
             Event::StepFailed { slave, idn, failure } => write!(f, "{slave}: {idn}: {failure}"),
             Event::ClassMismatch { slave } => {

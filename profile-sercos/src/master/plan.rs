@@ -23,6 +23,7 @@ const SOFT_MASTER_NS: u32 = 1_000;
 /// One kind of request of the phase-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Step {
+    Address,
     FspType,
     ScpClasses,
     ActivateClasses,
@@ -65,8 +66,14 @@ pub(super) enum Step {
 }
 
 /// What the slaves are.
-pub(super) const READ: &[Step] =
-    &[Step::FspType, Step::ScpClasses, Step::ActivateClasses, Step::GapPresence, Step::ConnectionImage];
+pub(super) const READ: &[Step] = &[
+    Step::Address,
+    Step::FspType,
+    Step::ScpClasses,
+    Step::ActivateClasses,
+    Step::GapPresence,
+    Step::ConnectionImage,
+];
 
 /// Connections and what they need.
 pub(super) const CONNECT: &[Step] = &[
@@ -172,7 +179,8 @@ impl Step {
     pub fn optional(self) -> bool {
         !matches!(
             self,
-            Step::ScpClasses
+            Step::Address
+                | Step::ScpClasses
                 | Step::ConfigurationList
                 | Step::Length
                 | Step::CycleTime
@@ -200,6 +208,7 @@ impl Step {
             Step::CommunicationControl => sync >= 2 || facts.version(ScpClass::SOFTWARE_CONTROL).is_some(),
             Step::Gap => facts.gap,
             Step::UcTimes | Step::MtuRequested | Step::MtuEffective => facts.version(ScpClass::NRT).is_some(),
+            Step::Address => station.assign.is_some(),
             Step::CheckInvalid => station.check_failed,
             _ => true,
         }
@@ -223,6 +232,7 @@ impl Step {
 
     fn idn(self, instance: u8, check: (Idn, Idn)) -> Idn {
         match self {
+            Step::Address => Idn::ADDRESS,
             Step::FspType => Idn::FSP_TYPE,
             Step::ScpClasses => Idn::SCP_CLASSES,
             Step::ActivateClasses => Idn::SCP_ACTIVE,
@@ -277,6 +287,7 @@ impl Step {
             word(idn, values.config.cycle_ns.saturating_mul(cycles))
         };
         match self {
+            Step::Address => half(idn, station.assign.unwrap_or(0)),
             Step::FspType => SvcRequest::read(idn),
             Step::ScpClasses => {
                 SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))

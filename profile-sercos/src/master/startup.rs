@@ -1,6 +1,7 @@
 //! The work of the phase-up: each list of steps for all slaves at the same time.
 
 use super::Master;
+use super::config::AddressPolicy;
 use super::connection::{ConsumerEnd, ProducerEnd};
 use super::event::{Event, SlaveId};
 use super::layout::{ConnectionNeed, Timing};
@@ -13,6 +14,9 @@ use crate::wire::connection::CONNECTION_CONTROL_LEN;
 use crate::wire::header::Kind;
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
+
+/// Largest SERCOS address.
+const ADDRESS_MAX: u16 = 511;
 
 impl Master {
     fn steps(&self) -> &'static [Step] {
@@ -29,6 +33,9 @@ impl Master {
     /// Starts the list of steps of the present state at every slave.
     pub(super) fn begin_work(&mut self) {
         let state = self.state;
+        if state == State::Read2 && self.config.addresses == AddressPolicy::Assign {
+            self.choose_addresses();
+        }
         for index in 0..self.found {
             let station = &mut self.stations[index];
             // A request that was cut off by a switch of the phase gives the list buffer back.
@@ -57,6 +64,43 @@ impl Master {
                 station.work = Work::Failed;
                 self.emit(Event::NoConnection { slave, instance, available });
             }
+        }
+    }
+
+    /// Chooses an address for each slave that has none of its own.
+    fn choose_addresses(&mut self) {
+        let configured = |address: u16| self.config.slaves.iter().any(|slave| slave.address == address);
+        for index in 0..self.found {
+            let (before, others) = self.stations[..self.found].split_at_mut(index);
+            let Some((station, after)) = others.split_first_mut() else { continue };
+            let address = station.address;
+            let first = !before.iter().any(|other| other.address == address);
+            let shared = !first || after.iter().any(|other| other.address == address);
+            let keeps = address != 0 && (!shared || (first && !configured(address)));
+            if keeps || !station.is_active() {
+                continue;
+            }
+            let others = || before.iter().chain(after.iter());
+            let taken = |address: u16| {
+                configured(address)
+                    || others().any(|other| other.address == address || other.assign == Some(address))
+            };
+            station.assign = (1..=ADDRESS_MAX).find(|&address| !taken(address));
+        }
+    }
+
+    /// The slave has taken its new address.
+    fn take_address(&mut self, index: usize) {
+        let slave = SlaveId::from_index(index);
+        let station = &mut self.stations[index];
+        let Some(new) = station.assign.take() else { return };
+        let old = core::mem::replace(&mut station.address, new);
+        let missing = core::mem::replace(&mut station.configured, false);
+        station.connections.clear();
+        self.emit(Event::AddressAssigned { slave, old, new });
+        // Said with the last of those that shared it.
+        if missing && !self.stations[..self.found].iter().any(|other| other.address == old) {
+            self.emit(Event::Missing { address: old });
         }
     }
 
@@ -152,6 +196,9 @@ impl Master {
             station.list = buffer;
         }
         station.work = if failure.is_some() { Work::Failed } else { Work::Free };
+        if failure.is_none() && step == Step::Address {
+            self.take_address(index);
+        }
         if let Some(failure) = failure {
             self.emit(Event::StepFailed { slave: SlaveId::from_index(index), idn, failure });
         }

@@ -97,6 +97,8 @@ pub(super) struct Station {
     pub address: u16,
     pub presence: Presence,
     pub configured: bool,
+    /// The SERCOS address that it is to be given in CP2.
+    pub assign: Option<u16>,
     pub connections: Connections,
     pub facts: Facts,
     pub need: SlaveNeed,
@@ -127,6 +129,7 @@ impl Station {
             address: 0,
             presence: Presence::Active,
             configured: false,
+            assign: None,
             connections: Connections::new(),
             facts: Facts::default(),
             need: SlaveNeed::default(),
@@ -151,6 +154,7 @@ impl Station {
         self.address = address;
         self.presence = Presence::Active;
         self.configured = config.is_some();
+        self.assign = None;
         self.connections.clear();
         if let Some(connections) = config {
             self.connections.extend(connections.iter().cloned());

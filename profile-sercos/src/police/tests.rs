@@ -4,11 +4,12 @@ use super::bus::VirtualBus;
 use super::learned::Learned;
 use super::light::{COMMAND, FEEDBACK, Mirror};
 use super::*;
-use crate::master::config::{ConnectionConfig, Connections, MasterConfig, SlaveConfig};
+use crate::master::config::{AddressPolicy, ConnectionConfig, Connections, MasterConfig, SlaveConfig};
 use crate::master::connection::ConsumerState;
 use crate::master::event::{Event, Refusal, SlaveId};
 use crate::master::phase::State;
 use crate::slave::communication::FixedConnection;
+use crate::slave::parameter::Definition;
 use crate::slave::{self, Line, Slave};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
@@ -488,4 +489,82 @@ fn a_connection_that_the_slave_does_not_have_is_refused() {
     bus.master.proceed().unwrap();
     bus.auto_proceed = true;
     bus.state(State::Cp4);
+}
+
+/// A bus of slaves with these addresses; those of the first list are configured.
+fn addressed(configured: &[u16], found: &[u16], addresses: AddressPolicy) -> Bus {
+    let count = u16::try_from(found.len()).unwrap();
+    let model = bus(count, 1, 1_000_000, true);
+    let connections = model.master.config().slaves[0].connections.clone();
+    let slaves = configured.iter().map(|&address| SlaveConfig { address, connections: connections.clone() });
+    let config = MasterConfig { slaves: slaves.collect(), addresses, ..model.master.config().clone() };
+    let slave = |&address| {
+        let config = slave::Config { address, ..slave::Config::default() };
+        Slave::new(&config, Mirror::default())
+    };
+    VirtualBus::new(config, Line::new(found.iter().map(slave).collect())).unwrap()
+}
+
+fn addresses(bus: &Bus) -> Vec<u16> {
+    bus.master.slaves().map(|slave| slave.address).collect()
+}
+
+#[test]
+fn slaves_without_an_address_of_their_own_are_given_one() {
+    let mut bus = addressed(&[5, 9], &[0, 5, 5, 9, 7, 7], AddressPolicy::Assign);
+    bus.up_to(Phase::CP4);
+    // Nobody keeps the configured address 5 which two slaves share; the first one keeps 7.
+    assert_eq!(addresses(&bus), [1, 2, 3, 9, 7, 4]);
+    let assigned = |slave, old, new| Event::AddressAssigned { slave: SlaveId(slave), old, new };
+    for event in [assigned(0, 0, 1), assigned(1, 5, 2), assigned(2, 5, 3), assigned(5, 7, 4)] {
+        assert!(bus.saw(&event), "{event}");
+    }
+    assert_eq!(bus.log.iter().filter(|event| **event == Event::Missing { address: 5 }).count(), 1);
+    assert_eq!(bus.master.slave_by_address(5), None);
+    let configured: Vec<bool> = bus.master.slaves().map(|slave| slave.configured).collect();
+    assert_eq!(configured, [false, false, false, true, false, false]);
+    assert!(bus.master.consumer(SlaveId(1), 1).is_none() && bus.master.consumer(SlaveId(3), 1).is_some());
+    let report: Vec<_> = bus.master.report(SlaveId(1)).iter().map(ToString::to_string).collect();
+    assert_eq!(report[0], "CP2 write S-0-1040: 2 (0x2)");
+    // The slaves keep what they were given.
+    bus.master.set_target_phase(Phase::CP0);
+    bus.state(State::Cp0);
+    bus.log.clear();
+    bus.up_to(Phase::CP4);
+    assert_eq!(addresses(&bus), [1, 2, 3, 9, 7, 4]);
+    let again = bus.log.iter().any(|event| {
+        matches!(
+            event,
+            Event::DoubleAddress { .. } | Event::AddressAssigned { .. } | Event::AddressConflict { .. }
+        )
+    });
+    assert!(!again, "{:?}", bus.log);
+}
+
+#[test]
+fn without_the_policy_they_are_refused() {
+    let mut bus = addressed(&[5], &[5, 0, 5], AddressPolicy::Refuse);
+    bus.master.set_target_phase(Phase::CP4);
+    bus.run_until("refused", |bus| bus.saw(&Event::AddressConflict { slave: SlaveId(0) }));
+    assert!(bus.saw(&Event::DoubleAddress { address: 5, first: SlaveId(0), second: SlaveId(2) }));
+    bus.cycles(50);
+    assert_eq!((bus.master.state(), addresses(&bus)), (State::Await2, vec![5, 0, 5]));
+}
+
+#[test]
+fn a_slave_that_does_not_take_its_address_is_named_and_the_others_go_on() {
+    let mut bus = addressed(&[5], &[5, 0, 0], AddressPolicy::Assign);
+    // S-0-1040 of the second slave cannot be written.
+    bus.line.slaves_mut()[1].store_mut().define(Definition::value(Idn::ADDRESS, 0x7011_0001, "address", 0));
+    bus.master.set_target_phase(Phase::CP4);
+    bus.run_until("refused", |bus| bus.saw(&Event::AddressConflict { slave: SlaveId(1) }));
+    let failed = bus.log.iter().find_map(|event| match event {
+        Event::StepFailed { slave: SlaveId(1), idn, failure } => Some(format!("{idn}: {failure}")),
+        _ => None,
+    });
+    assert_eq!(failed.as_deref(), Some("S-0-1040: operation data: operation data cannot be changed"));
+    bus.master.exclude(SlaveId(1)).unwrap();
+    bus.master.proceed().unwrap();
+    bus.state(State::Cp4);
+    assert_eq!(addresses(&bus), [5, 0, 2]);
 }
