@@ -259,6 +259,12 @@ impl Master {
             let valid = self.is_valid(&self.stations[index]);
             let allowed = self.config.slave_valid_misses;
             let station = &mut self.stations[index];
+            let conditions = station.status.map(|status| status.intersection(DeviceStatus::CONDITIONS));
+            if let Some(status) = conditions.filter(|&status| valid && status != station.told) {
+                station.told = status;
+                let event = Event::DeviceStatus { slave: SlaveId::from_index(index), status };
+                super::push(&mut self.events, &mut self.statistics, event);
+            }
             match station.presence {
                 Presence::Active if valid => station.misses = 0,
                 Presence::Active => {

@@ -5,6 +5,7 @@ use core::fmt;
 use super::connection::ConsumerState;
 use super::layout::LayoutError;
 use super::svc::request::{SvcFailure, SvcOutcome};
+use crate::wire::device_status::DeviceStatus;
 use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
 
@@ -161,6 +162,13 @@ pub enum Event {
         /// The first slave that kept on inserting data; `None` in CP0.
         slave: Option<SlaveId>,
     },
+    /// What a slave says about errors and warnings in S-DEV has changed: bits 15, 9, 7, 6 and 4.
+    DeviceStatus {
+        /// The slave.
+        slave: SlaveId,
+        /// Those bits, the others 0.
+        status: DeviceStatus,
+    },
     /// A slave is not valid any more. It takes no part until the next scan.
     SlaveLost {
         /// The slave.
@@ -231,6 +239,17 @@ impl fmt::Display for Event {
                 write!(f, "{from} to {to}: {slave} did not stop inserting data in time")
             }
             Event::SwitchFailed { from, to, slave: None } => write!(f, "{from} to {to}: not in time"),
+            Event::DeviceStatus { slave, status } => match status.condition_names().next() {
+                None => write!(f, "{slave}: no error or warning any more"),
+                Some(_) => {
+                    write!(f, "{slave}:")?;
+                    let mut comma = "";
+                    status.condition_names().try_for_each(|name| {
+                        let comma = core::mem::replace(&mut comma, ",");
+                        write!(f, "{comma} {name}")
+                    })
+                }
+            },
             Event::SlaveLost { slave, address, phase } => {
                 write!(f, "{slave} with address {address} was lost in {phase}")
             }

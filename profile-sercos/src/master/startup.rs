@@ -1,7 +1,7 @@
 //! The work of the phase-up: each list of steps for all slaves at the same time.
 
 use super::Master;
-use super::config::AddressPolicy;
+use super::config::{AddressPolicy, CONNECTION_LEN_MAX};
 use super::connection::{ConsumerEnd, ProducerEnd};
 use super::event::{Event, SlaveId};
 use super::layout::{ConnectionNeed, Timing};
@@ -190,7 +190,9 @@ impl Master {
             RowOutcome::Failed(_) if step == Step::CheckInvalid => None,
             RowOutcome::Failed(failure) => Some(failure),
             RowOutcome::Absent => None,
-            RowOutcome::Value { .. } | RowOutcome::Done => learn(station, step, instance, &outcome).err(),
+            RowOutcome::Value { .. } | RowOutcome::Done => {
+                learn(station, step, instance, &outcome, self.config.cycle_ns).err()
+            }
         };
         if let SvcData::Buffer(buffer) = outcome.data {
             station.list = buffer;
@@ -274,8 +276,23 @@ impl Master {
 }
 
 /// Takes what a step brought about the slave.
-fn learn(station: &mut Station, step: Step, instance: u8, outcome: &SvcOutcome) -> Result<(), SvcFailure> {
+fn learn(
+    station: &mut Station,
+    step: Step,
+    instance: u8,
+    outcome: &SvcOutcome,
+    cycle_ns: u32,
+) -> Result<(), SvcFailure> {
     let number = outcome.data.unsigned().and_then(|value| u32::try_from(value).ok());
+    // What would refuse the layout of all others is refused here, where it has a name.
+    let max = match step {
+        Step::Length => u32::try_from(CONNECTION_LEN_MAX).unwrap_or(u32::MAX),
+        Step::FeedbackTime | Step::SlaveJitter | Step::ConsumerTime | Step::AtStartMinimum => cycle_ns,
+        _ => u32::MAX,
+    };
+    if let Some(value) = number.filter(|&value| value > max) {
+        return Err(SvcFailure::Impossible { value, max });
+    }
     match step {
         Step::FspType => station.facts.fsp_type = number,
         Step::ScpClasses => {

@@ -108,6 +108,8 @@ pub(super) struct Station {
     pub status: Option<DeviceStatus>,
     /// S-SVC of the last cycle; `None` when its AT did not come.
     pub svc: Option<AtSvc>,
+    /// Errors and warnings of S-DEV that the application knows of.
+    pub told: DeviceStatus,
     pub misses: u8,
     pub returned: bool,
     pub work: Work,
@@ -137,6 +139,7 @@ impl Station {
             channel: ServiceChannel::new(config.svc),
             status: None,
             svc: None,
+            told: DeviceStatus::empty(),
             misses: 0,
             returned: false,
             work: Work::Done,
@@ -165,6 +168,7 @@ impl Station {
         self.channel.rest(false);
         self.status = None;
         self.svc = None;
+        self.told = DeviceStatus::empty();
         self.misses = 0;
         self.returned = false;
         self.work = Work::Done;

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::wire::data_status::{CommandState, DataStatus};
 use crate::wire::idn::Idn;
 use crate::wire::procedure::ProcedureControl;
 use crate::wire::svc::{Element, LIST_HEAD_LEN, MdtSvc};
@@ -12,7 +13,7 @@ pub(super) struct Learned {
     open: Option<Idn>,
     parts: Vec<u8>,
     values: BTreeMap<Idn, Vec<u8>>,
-    /// S-0-0127 was executed: the slave takes part in CP3.
+    /// S-0-0127 was executed and done: the slave takes part in CP3.
     pub checked: bool,
 }
 
@@ -28,13 +29,18 @@ impl Learned {
             Element::Idn if write => {
                 self.open = Some(Idn(step.info));
                 self.parts.clear();
+                if Idn(step.info) == Idn::CP3_CHECK {
+                    let [low, high, ..] = answer.to_le_bytes();
+                    let status = DataStatus::from_bits_retain(u16::from_le_bytes([low, high]));
+                    self.checked |= status.command_state() == CommandState::Done;
+                }
             }
             Element::Data => {
                 let Some(idn) = self.open else { return };
                 self.parts.extend(if write { step.info } else { answer }.to_le_bytes());
                 if write && idn == Idn::CP3_CHECK && step.info == u32::from(ProcedureControl::EXECUTE.bits())
                 {
-                    self.checked = true;
+                    self.checked = false;
                 }
                 if control.last() {
                     self.values.insert(idn, std::mem::take(&mut self.parts));

@@ -76,6 +76,30 @@ impl DeviceStatus {
     const TOPOLOGY: DeviceStatus = DeviceStatus::TOPOLOGY_1.union(DeviceStatus::TOPOLOGY_0);
     const INACTIVE_PORT: DeviceStatus = DeviceStatus::INACTIVE_PORT_1.union(DeviceStatus::INACTIVE_PORT_0);
 
+    /// The bits that tell of errors, warnings and the parameterization level.
+    pub const CONDITIONS: DeviceStatus = DeviceStatus::COMMUNICATION_WARNING
+        .union(DeviceStatus::CONNECTION_ERROR)
+        .union(DeviceStatus::DEVICE_ERROR)
+        .union(DeviceStatus::DEVICE_WARNING)
+        .union(DeviceStatus::PARAMETERIZATION);
+
+    const NAMES: [(DeviceStatus, &str); 8] = [
+        (Self::COMMUNICATION_WARNING, "communication warning"),
+        (Self::TOPOLOGY_CHANGE, "topology change"),
+        (Self::CONNECTION_ERROR, "connection error"),
+        (Self::SLAVE_VALID, "slave valid"),
+        (Self::DEVICE_ERROR, "device error"),
+        (Self::DEVICE_WARNING, "device warning"),
+        (Self::COMMAND_CHANGE, "command change"),
+        (Self::PARAMETERIZATION, "parameterization level"),
+    ];
+
+    /// Names of the bits of [`DeviceStatus::CONDITIONS`] that are set.
+    pub fn condition_names(self) -> impl Iterator<Item = &'static str> {
+        let set = self.intersection(Self::CONDITIONS);
+        Self::NAMES.into_iter().filter(move |&(bit, _)| set.contains(bit)).map(|(_, name)| name)
+    }
+
     /// The current topology.
     pub const fn topology(self) -> Topology {
         Topology::from_word(self.bits())
@@ -107,19 +131,9 @@ impl DeviceStatus {
 impl fmt::Display for DeviceStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:#06x}", self.bits())?;
-        let names = [
-            (Self::COMMUNICATION_WARNING, "communication warning"),
-            (Self::TOPOLOGY_CHANGE, "topology change"),
-            (Self::CONNECTION_ERROR, "connection error"),
-            (Self::SLAVE_VALID, "slave valid"),
-            (Self::DEVICE_ERROR, "device error"),
-            (Self::DEVICE_WARNING, "device warning"),
-            (Self::COMMAND_CHANGE, "command change"),
-            (Self::PARAMETERIZATION, "parameterization level"),
-        ];
         super::display_bits(
             f,
-            names.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name),
+            Self::NAMES.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name),
         )?;
         write!(f, ", {}", self.topology())?;
         if self.topology() != Topology::FastForward {

@@ -244,6 +244,14 @@ pub enum SvcFailure {
         /// Bytes given.
         given: usize,
     },
+    /// The slave asks for something that no network can give it.
+    #[error("the slave asks for {value}, at most {max} is possible")]
+    Impossible {
+        /// What it asks for, in the unit of the parameter.
+        value: u32,
+        /// The largest possible value.
+        max: u32,
+    },
     /// The procedure command failed or was interrupted.
     #[error("procedure command {}", .0.command_state())]
     CommandFailed(DataStatus),

@@ -8,12 +8,11 @@ use crate::slave::{self, Slave};
 pub(super) type FullRig = VirtualBus<slave::Line<Mirror>>;
 
 pub(super) fn full_rig(count: u16) -> FullRig {
-    let connections: Connections = [
-        ConnectionConfig::new(0, false, &[COMMAND]).unwrap(),
-        ConnectionConfig::new(1, true, &[FEEDBACK]).unwrap(),
-    ]
-    .into_iter()
-    .collect();
+    // The slaves bear it when a test does not send values for a while.
+    let command =
+        ConnectionConfig { allowed_losses: 60_000, ..ConnectionConfig::new(0, false, &[COMMAND]).unwrap() };
+    let connections: Connections =
+        [command, ConnectionConfig::new(1, true, &[FEEDBACK]).unwrap()].into_iter().collect();
     let slaves = (1..=count).map(|address| SlaveConfig { address, connections: connections.clone() });
     let config = MasterConfig { slaves: slaves.collect(), ..config(&[]) };
     let slave = |address| {

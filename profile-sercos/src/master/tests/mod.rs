@@ -57,6 +57,7 @@ impl Rig {
     }
 }
 
+mod bad_input;
 mod disturbance;
 mod faults;
 mod full_slaves;

@@ -251,7 +251,6 @@ impl Peer {
             (Element::Data, true) if COMMANDS.contains(&idn) => {
                 let mut status = u16::try_from(info & 3).unwrap();
                 if status == 3 {
-                    self.checked |= idn == Idn::CP3_CHECK;
                     if let Some((check, invalid)) = &self.faults.invalid
                         && *check == idn
                     {
@@ -264,6 +263,7 @@ impl Peer {
                         status = 7;
                     }
                 }
+                self.checked |= idn == Idn::CP3_CHECK && matches!(status, 3 | 7);
                 self.commands.insert(idn, status);
                 Ok(0)
             }
