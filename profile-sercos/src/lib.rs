@@ -3,7 +3,8 @@
 //! * [`wire`]: what stands in the Ethernet frame and in the service channel, as values.
 //! * [`master`]: the master role, from the first CP0 telegram to cyclic operation.
 //! * [`police`]: judges everything on the wire by the rules; carries the tests.
-//! * [`slave`]: the slave role, with a simulated drive behind it.
+//! * [`slave`]: the slave role, with a simulated drive behind it, and networks of slaves.
+//! * [`port`]: the two Ethernet ports of both.
 //!
 //! Everything here is sans-IO: frames and the time go in as arguments, frames and events come out. Nothing
 //! opens a socket, reads a clock or logs.
@@ -16,5 +17,6 @@
 
 pub mod master;
 pub mod police;
+pub mod port;
 pub mod slave;
 pub mod wire;

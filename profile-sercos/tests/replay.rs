@@ -18,7 +18,7 @@ use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::phase::State;
-use profile_sercos::slave::{Config, Line, Slave};
+use profile_sercos::slave::{Config, Network, Slave};
 use profile_sercos::wire::cp12;
 use profile_sercos::wire::device_status::DeviceStatus;
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
@@ -27,12 +27,12 @@ use profile_sercos::wire::svc::{AtSvc, SVC_LEN};
 
 const CYCLE: DurationNs = DurationNs::from_millis(10);
 
-fn line() -> Line<Drive> {
+fn line() -> Network<Drive> {
     let slave = |address: u16| {
         let config = Config { address, connections: 2, serial: u32::from(address), ..Config::default() };
         Slave::new(&config, Drive::new(ServoParameters::default()).unwrap())
     };
-    Line::new(vec![slave(1), slave(2)])
+    Network::line(vec![slave(1), slave(2)])
 }
 
 /// Offsets of the parts of slave 1 and 2 in a recorded AT0 of CP3 and CP4: service channel, S-DEV, connection.
@@ -100,7 +100,7 @@ fn a_foreign_master_takes_the_line_to_cp4() {
             }
             last_mdt.insert(header.telegram.number(), recorded.clone());
             let mut frame = recorded.clone();
-            assert!(line.handle_frame(now, &mut frame));
+            assert!(line.round_trip(now, &mut frame));
             assert_eq!(&frame, recorded, "an MDT comes back unchanged");
             let state = line.slaves()[0].state();
             assert_eq!(line.slaves()[1].state(), state);
@@ -117,7 +117,7 @@ fn a_foreign_master_takes_the_line_to_cp4() {
             continue;
         }
         let mut frame = sent;
-        assert!(line.handle_frame(now, &mut frame));
+        assert!(line.round_trip(now, &mut frame));
         compared += 1;
         if &frame == recorded {
             equal += 1;

@@ -37,7 +37,7 @@ fn a_line_is_scanned() {
 #[test]
 fn a_broken_line_turns_round_at_the_break() {
     let mut bench = bench(3);
-    bench.line.cut_behind(2);
+    bench.line.cut(2);
     bench.cycle();
     let at = bench.scan();
     assert_eq!((at.counter.count(), at.slaves().count()), (4, 2));
@@ -191,10 +191,10 @@ fn a_second_copy_of_a_telegram_changes_nothing() {
     let (mut again, mut first, mut second) = (mdt.clone(), at.clone(), at);
     let now = bench.now + CYCLE;
     let mut mdt = mdt;
-    bench.line.handle_frame(now, &mut mdt);
-    bench.line.handle_frame(now, &mut first);
-    bench.line.handle_frame(now, &mut again);
-    bench.line.handle_frame(now, &mut second);
+    bench.line.round_trip(now, &mut mdt);
+    bench.line.round_trip(now, &mut first);
+    bench.line.round_trip(now, &mut again);
+    bench.line.round_trip(now, &mut second);
     assert_eq!(first, second);
     assert_ne!(first[HEADER_LEN..], [0; 60][..first.len().min(60) - HEADER_LEN]);
 }
@@ -205,7 +205,7 @@ fn broken_headers_are_passed_on_and_counted() {
     let (mut mdt, _) = bench.telegrams();
     mdt[16] ^= 1;
     let sent = mdt.clone();
-    assert!(bench.line.handle_frame(bench.now + CYCLE, &mut mdt));
+    assert!(bench.line.round_trip(bench.now + CYCLE, &mut mdt));
     assert_eq!(mdt, sent);
     assert_eq!(bench.read_list(0, Idn::standard(1035)), Ok(vec![1, 0, 0, 0]));
     bench.write_list(0, Idn::standard(1035), &[0; 4]).unwrap();
@@ -242,7 +242,7 @@ proptest::proptest! {
             header.emit(&mut frame).unwrap();
             let sent = frame.clone();
             bench.now = bench.now + CYCLE;
-            bench.line.handle_frame(bench.now, &mut frame);
+            bench.line.round_trip(bench.now, &mut frame);
             proptest::prop_assert!(header.telegram.kind() == Kind::At || frame == sent);
         }
     }

@@ -8,6 +8,7 @@ use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::state::DriveState;
 use profile_sercos::master::event::Event;
+use profile_sercos::master::topology::Topology;
 
 use super::axis::Loss;
 use super::commissioning::StepFailure;
@@ -137,6 +138,8 @@ impl Notice {
                 Event::Phase(_)
                 | Event::Stopped
                 | Event::Scanned { .. }
+                | Event::Topology(Topology::LineOne | Topology::LineTwo | Topology::Ring)
+                | Event::RingClosed
                 | Event::AwaitingApplication { .. }
                 | Event::Connection { .. }
                 | Event::Svc { .. },

@@ -9,7 +9,7 @@ use profile_generic::servo::ServoParameters;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::{Config as SlaveConfig, Line, Slave};
+use profile_sercos::slave::{Config as SlaveConfig, Network, Slave};
 
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
@@ -19,7 +19,7 @@ use crate::sys::clock;
 use crate::sys::packet_socket::PacketSocket;
 
 /// Drives joined to a line.
-pub type DriveLine = Line<Drive>;
+pub type DriveLine = Network<Drive>;
 
 /// Frames on their way back: a cycle has eight, those of two cycles fit.
 const FRAMES_MAX: usize = 16;
@@ -76,7 +76,7 @@ pub fn line(drives: impl IntoIterator<Item = (u16, UnitKind)>) -> DriveLine {
         let config = SlaveConfig { address, mac, serial: u32::from(address), ..SlaveConfig::default() };
         Slave::new(&config, drive)
     });
-    Line::new(slaves.collect())
+    Network::line(slaves.collect())
 }
 
 /// A line inside this process: what is sent comes back at once, changed as the slaves change it. The frames are the
@@ -138,7 +138,7 @@ impl SouthPort for InProcessLine {
         let (back, length) = &mut self.returned[(self.first + self.count) % FRAMES_MAX];
         back[..frame.len()].copy_from_slice(frame);
         *length = frame.len();
-        if self.line.handle_frame(now, &mut back[..frame.len()]) {
+        if self.line.round_trip(now, &mut back[..frame.len()]) {
             self.count += 1;
         }
         true
@@ -160,7 +160,7 @@ pub fn run(line: &mut DriveLine, socket: &PacketSocket, stop: &AtomicBool) -> st
             // A link that went down gives nothing until it is back.
             let Ok(Some(received)) = socket.recv(&mut buffer) else { break };
             let Some(frame) = buffer.get_mut(..received.len) else { continue };
-            if line.handle_frame(clock::monotonic_now(), frame) {
+            if line.round_trip(clock::monotonic_now(), frame) {
                 // A frame that cannot be sent is one that was lost on the way.
                 let _ = socket.send(frame);
             }

@@ -7,7 +7,7 @@ use super::event::SlaveId;
 use super::layout::CyclicLayout;
 use super::scan;
 use super::station::{End, Station};
-use crate::wire::cp0::{self, CommunicationVersion, MdtRepr};
+use crate::wire::cp0::{self, AtRepr, CommunicationVersion, MdtRepr, SequenceCounter};
 use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
 use crate::wire::error::put_u16;
@@ -79,13 +79,16 @@ impl Master {
             version |= CommunicationVersion::FOUR_TELEGRAMS;
         }
         let mdt = MdtRepr { version, ..MdtRepr::default() };
-        self.frames.add(Kind::Mdt, 0, cp0::MDT_LEN, |data| {
+        let emit = |data: &mut [u8]| {
             // The length is the one of the telegram.
             let _ = mdt.emit(data);
-        });
-        self.frames.add(Kind::At, 0, cp0::AT_LEN, |data| {
-            let _ = scan::empty().emit(data);
-        });
+        };
+        self.frames.add(Kind::Mdt, 0, cp0::MDT_LEN, emit, |_| {});
+        let empty = |data: &mut [u8]| {
+            let _ = AtRepr::empty(SequenceCounter::START_PRIMARY).emit(data);
+        };
+        let counter = scan::secondary_counter(self.scan.start_two());
+        self.frames.add(Kind::At, 0, cp0::AT_LEN, empty, |data| put_u16(data, 0, counter.0));
     }
 
     fn build_telegrams(
@@ -95,26 +98,27 @@ impl Master {
         extended: Option<Extended>,
     ) {
         let (stations, layout, phase) = (&self.stations[..self.found], &self.layout, self.layout_phase);
+        let ring = self.redundancy.is_closed();
         let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
         for (number, len) in used(mdt) {
-            self.frames.add(Kind::Mdt, number, len, |data| {
+            let fill = |data: &mut [u8]| {
                 if let (0, Some(extended)) = (number, extended) {
                     let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
                     let _ = field.map(|field| extended.emit(field));
                 }
-                for (index, station) in stations.iter().enumerate().filter(|(_, station)| station.is_active())
-                {
+                for (index, station) in stations.iter().enumerate() {
                     if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
-                        fill_station(data, number, slot, station);
+                        fill_station(data, number, slot, station, ring);
                     }
-                    if phase == Phase::CP4 {
+                    if phase == Phase::CP4 && station.is_active() {
                         fill_connections(data, number, layout, index, station);
                     }
                 }
-            });
+            };
+            self.frames.add(Kind::Mdt, number, len, fill, |_| {});
         }
         for (number, len) in used(at) {
-            self.frames.add(Kind::At, number, len, |_| {});
+            self.frames.add(Kind::At, number, len, |_| {}, |_| {});
         }
     }
 
@@ -136,9 +140,11 @@ impl Master {
     }
 }
 
-/// Writes a slave's service channel and C-DEV into the MDT that has them.
-fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station) {
+/// Writes a slave's service channel and C-DEV into the MDT that has them. One that takes no part is told nothing but
+/// that its topology is to stay as it is.
+fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station, ring: bool) {
     if slot.svc.0 == number
+        && station.is_active()
         && let Some(bytes) = data.get_mut(slot.svc.1..slot.svc.1 + SVC_LEN)
     {
         let _ = station.channel.outgoing().emit(bytes);
@@ -146,7 +152,10 @@ fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station) {
     if slot.device.0 == number
         && let Some(bytes) = data.get_mut(slot.device.1..slot.device.1 + DEVICE_WORD_LEN)
     {
-        put_u16(bytes, 0, DeviceControl::MASTER_VALID.bits());
+        let mut control = station.command;
+        control.set(DeviceControl::MASTER_VALID, station.is_active());
+        control.set(DeviceControl::RING_CLOSED, ring && station.is_active());
+        put_u16(bytes, 0, control.bits());
     }
 }
 

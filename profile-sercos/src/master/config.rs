@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 use profile_generic::time::DurationNs;
 
 use super::svc::SvcLimits;
+use crate::port::Port;
 use crate::wire::connection::{ConfigurationType, ConnectionSetup, ConnectionTiming};
 use crate::wire::cp0;
 use crate::wire::header::MacAddress;
@@ -89,11 +90,35 @@ pub struct SlaveConfig {
     pub connections: Connections,
 }
 
+/// Which of its two ports the master has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Ports {
+    /// Port 1 only: a line with P telegrams.
+    #[default]
+    One,
+    /// Port 2 only: a line with S telegrams.
+    Two,
+    /// Both: a ring, or a line on either or on both.
+    Both,
+}
+
+impl Ports {
+    /// Whether there is this port.
+    #[must_use]
+    pub const fn contains(self, port: Port) -> bool {
+        matches!((self, port), (Ports::Both, _) | (Ports::One, Port::One) | (Ports::Two, Port::Two))
+    }
+}
+
 /// Configuration of the master.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MasterConfig {
     /// Source address of all telegrams. Frames with another source are refused.
     pub mac: MacAddress,
+    /// The Ethernet ports there are.
+    pub ports: Ports,
+    /// Cycles for which both ends of an open ring must see each other's telegrams before it is closed again.
+    pub close_cycles: u16,
     /// Cycle time of CP3 and CP4 (tScyc) in nanoseconds: 31250, 62500, 125000 or a multiple of 250000 up to
     /// 65 ms.
     pub cycle_ns: u32,
@@ -140,12 +165,14 @@ pub struct MasterConfig {
 }
 
 impl MasterConfig {
-    /// A configuration with the usual times: 1 ms in CP0 to CP2, 120 ms pauses, 200 ms waits, 100 stable
+    /// A configuration for a line on port 1 with the usual times: 1 ms in CP0 to CP2, 120 ms pauses, 200 ms waits, 100 stable
     /// cycles, 45 us jitter of a soft master, room for 64 slaves.
     #[must_use]
     pub fn new(mac: MacAddress, cycle_ns: u32) -> MasterConfig {
         MasterConfig {
             mac,
+            ports: Ports::One,
+            close_cycles: 100,
             cycle_ns,
             setup_cycle_ns: 1_000_000,
             mst_jitter_ns: 45_000,

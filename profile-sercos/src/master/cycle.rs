@@ -6,9 +6,10 @@ use super::Master;
 use super::build::slot;
 use super::event::{Event, SlaveId};
 use super::phase::{PhaseEvent, State};
-use super::scan::{self, ScanResult};
+use super::scan::{self, ScanResult, Survey};
 use super::station::{End, Presence, Station};
 use super::svc::request::SvcFailure;
+use super::topology::Route;
 use crate::wire::cp0::AtRepr;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::error::u16_at;
@@ -31,12 +32,10 @@ impl Master {
         }
         if self.state.phase().is_some() || self.state == State::Down {
             if !self.evaluated {
-                self.statistics.at_missing += 1;
+                self.statistics.at_missing += u64::from(!self.is_complete());
                 self.evaluate(now);
             }
-            if !self.frames.all_back(Kind::Mdt) {
-                self.statistics.mdt_missing += 1;
-            }
+            self.end_cycle();
         }
         for _ in 0..STATES_PER_CYCLE {
             let moved = self.decide(now).is_some_and(|event| self.advance(now, event));
@@ -168,9 +167,7 @@ impl Master {
             self.supervise();
         }
         self.condition = match self.state {
-            State::Leave1 | State::Leave2 | State::Leave3 | State::Down => {
-                (0..self.found).all(|index| !self.stations[index].is_active() || self.has_left(index))
-            }
+            State::Leave1 | State::Leave2 | State::Leave3 | State::Down => self.all_have_left(),
             _ => (0..self.found).all(|index| !self.stations[index].is_active() || self.meets(index)),
         };
         if self.state.serves() {
@@ -188,9 +185,10 @@ impl Master {
     }
 
     fn evaluate_scan(&mut self) {
-        let at = self.frames.at(0).and_then(|data| AtRepr::parse(data).ok());
+        let ats = Route::ALL.map(|route| self.frames.at(route, 0).and_then(|data| AtRepr::parse(data).ok()));
+        let survey = Survey::of(&ats, self.scan.start_two());
         match self.state {
-            State::Scan => match self.scan.update(at.as_ref()) {
+            State::Scan => match self.scan.update(survey) {
                 ScanResult::Going => {}
                 ScanResult::Nobody => self.emit(Event::NoSlaves),
                 ScanResult::Unstable => self.emit(Event::ScanUnstable),
@@ -200,32 +198,82 @@ impl Master {
                 }
                 ScanResult::Stable(slaves) => self.scan_ready = Some(slaves),
             },
-            State::Cp0 => self.condition = self.scan.has_changed(at.as_ref()),
-            State::Leave0 | State::Down => self.condition = at.as_ref().is_some_and(scan::is_untouched),
+            State::Cp0 => self.condition = self.scan.has_changed(survey.as_ref()),
+            State::Leave0 | State::Down => {
+                let mut back = ats.iter().flatten();
+                self.condition = ats.iter().any(Option::is_some) && back.all(scan::is_untouched);
+            }
             _ => {}
         }
     }
 
+    /// Whether the ATs that have come back have the data of every slave.
+    pub(super) fn is_complete(&mut self) -> bool {
+        let back = |route: &Route| self.frames.all_back(Kind::At, *route);
+        let scanned = self.scan.survey().map_or(&[][..], |survey| survey.topology.routes());
+        let routes = match self.layout_phase {
+            Phase::CP0 if self.redundancy.is_fixed() => self.redundancy.topology().routes(),
+            Phase::CP0 => scanned,
+            _ => self.redundancy.topology().routes(),
+        };
+        if !routes.is_empty() && routes.iter().all(back) {
+            return true;
+        }
+        // In a ring one of the two copies is enough.
+        let whole =
+            self.layout_phase > Phase::CP0 && !self.redundancy.is_fixed() && Route::ALL.iter().any(back);
+        whole
+            && (0..self.found).all(|index| {
+                self.read_station(index);
+                !self.stations[index].is_active() || self.is_valid(&self.stations[index])
+            })
+    }
+
+    /// Takes a slave's part of the ATs. Of the copies that a ring gives, a valid one counts, then one into which the
+    /// slave has put anything at all.
     fn read_station(&mut self, index: usize) {
         let slot = slot(self.layout_phase, &self.layout, index, Kind::At);
-        let part = |(telegram, offset): (u8, usize), len: usize| {
-            self.frames.at(telegram).and_then(|data| data.get(offset..offset + len))
-        };
-        let svc = slot.and_then(|slot| part(slot.svc, SVC_LEN)).and_then(|bytes| AtSvc::parse(bytes).ok());
-        let status = slot
-            .and_then(|slot| part(slot.device, DEVICE_WORD_LEN))
-            .map(|bytes| DeviceStatus::from_bits_retain(u16_at(bytes, 0)));
+        let mut best = (0, None, None);
+        let mut valid_routes = 0;
+        for &route in self.redundancy.possible_routes() {
+            let part = |(telegram, offset): (u8, usize), len: usize| {
+                self.frames.at(route, telegram).and_then(|data| data.get(offset..offset + len))
+            };
+            let svc =
+                slot.and_then(|slot| part(slot.svc, SVC_LEN)).and_then(|bytes| AtSvc::parse(bytes).ok());
+            let status = slot
+                .and_then(|slot| part(slot.device, DEVICE_WORD_LEN))
+                .map(|bytes| DeviceStatus::from_bits_retain(u16_at(bytes, 0)));
+            let inserted = status.is_some_and(|status| !status.is_empty())
+                || svc.is_some_and(|svc| svc.status.contains(SvcStatus::VALID));
+            let rank = match status {
+                Some(status) if self.shows_valid(status) => 3,
+                _ if inserted => 2,
+                Some(_) => 1,
+                None => 0,
+            };
+            if rank == 3 {
+                valid_routes |= 1 << route.index();
+            }
+            if rank > best.0 {
+                best = (rank, status, svc);
+            }
+        }
         let station = &mut self.stations[index];
-        station.svc = svc;
-        station.status = status;
+        (station.status, station.svc) = (best.1, best.2);
+        station.valid_routes = valid_routes;
     }
 
     /// A slave is there: S-DEV is not empty in CP2, SlaveValid in the other phases.
-    fn is_valid(&self, station: &Station) -> bool {
-        station.status.is_some_and(|status| match self.layout_phase {
+    pub(super) fn is_valid(&self, station: &Station) -> bool {
+        station.status.is_some_and(|status| self.shows_valid(status))
+    }
+
+    fn shows_valid(&self, status: DeviceStatus) -> bool {
+        match self.layout_phase {
             Phase::CP2 => !status.is_empty(),
             _ => status.contains(DeviceStatus::SLAVE_VALID),
-        })
+        }
     }
 
     /// A slave meets the condition of the present state.
@@ -252,6 +300,13 @@ impl Master {
             Phase::CP2 => station.status.is_some_and(|status| status.is_empty()),
             _ => station.status.is_some_and(|status| !status.contains(DeviceStatus::SLAVE_VALID)),
         }
+    }
+
+    /// With two ports twice in a row: in the first cycle the copy into which a slave still writes may be lost.
+    fn all_have_left(&mut self) -> bool {
+        let left = (0..self.found).all(|index| !self.stations[index].is_active() || self.has_left(index));
+        let before = core::mem::replace(&mut self.left_before, left);
+        left && (before || self.redundancy.is_fixed())
     }
 
     fn supervise(&mut self) {
@@ -310,9 +365,14 @@ impl Master {
                 let End::Consumer(consumer) = end else { continue };
                 let instance = connection.instance;
                 let place = places.connections.iter().find(|place| place.instance == instance);
+                let routes = station.valid_routes;
                 let bytes = place.filter(|_| valid).and_then(|place| {
-                    let data = self.frames.at(place.at.telegram)?;
-                    data.get(place.at.range(usize::from(place.len)))
+                    Route::ALL.into_iter().filter(|route| routes & 1 << route.index() != 0).find_map(
+                        |route| {
+                            let data = self.frames.at(route, place.at.telegram)?;
+                            data.get(place.at.range(usize::from(place.len)))
+                        },
+                    )
                 });
                 if let Some(state) = consumer.update(bytes) {
                     let event = Event::Connection { slave: SlaveId::from_index(index), instance, state };
@@ -334,7 +394,10 @@ impl Master {
                 self.evaluated = true;
                 self.next_cycle = now + self.config.pause;
             }
-            State::Settle => self.start_phase(Phase::CP0),
+            State::Settle => {
+                self.redundancy.start();
+                self.start_phase(Phase::CP0);
+            }
             State::Scan => {
                 self.scan.start();
                 self.scan_ready = None;
@@ -353,7 +416,10 @@ impl Master {
                 self.start_phase(Phase::CP3);
                 self.rest_channels(None);
             }
-            State::Start4 => self.layout_phase = Phase::CP4,
+            State::Start4 => {
+                self.layout_phase = Phase::CP4;
+                self.reset_topology_commands();
+            }
             State::Cp4 => {
                 self.open_channels(true);
                 self.emit(Event::Phase(Phase::CP4));
@@ -380,6 +446,7 @@ impl Master {
 
     fn start_phase(&mut self, phase: Phase) {
         self.layout_phase = phase;
+        self.reset_topology_commands();
         for station in &mut self.stations[..self.found] {
             station.misses = 0;
         }
@@ -409,6 +476,7 @@ impl Master {
         }
         let slaves = SlaveId::from_index(self.found).0;
         self.emit(Event::Scanned { slaves });
+        self.take_topology();
         for index in 0..self.found {
             let (slave, address) = (SlaveId::from_index(index), self.stations[index].address);
             if !self.stations[index].configured {

@@ -5,18 +5,11 @@ use core::fmt;
 use super::connection::ConsumerState;
 use super::layout::LayoutError;
 use super::svc::request::{SvcFailure, SvcOutcome};
+use super::topology::Topology;
+pub use crate::port::Port;
 use crate::wire::device_status::DeviceStatus;
-use crate::wire::header::Phase;
+use crate::wire::header::{Kind, Phase};
 use crate::wire::idn::Idn;
-
-/// One of the master's two Ethernet ports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Port {
-    /// Sends the primary (P) telegrams. In a line they come back here.
-    One,
-    /// Sends the secondary (S) telegrams of a ring.
-    Two,
-}
 
 /// A slave by its position on the network, counted from 0 in the order of the line. It stays the same until the
 /// next scan.
@@ -42,6 +35,29 @@ impl SlaveId {
 impl fmt::Display for SlaveId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "slave at position {}", self.topology_address())
+    }
+}
+
+/// One end of a cable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum End {
+    /// A port of the master.
+    Master(Port),
+    /// A slave.
+    Slave {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+    },
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            End::Master(port) => write!(f, "the master's {port}"),
+            End::Slave { address, .. } => write!(f, "the slave with address {address}"),
+        }
     }
 }
 
@@ -169,6 +185,25 @@ pub enum Event {
         /// Those bits, the others 0.
         status: DeviceStatus,
     },
+    /// The topology is another one; with two ports also after each scan.
+    Topology(Topology),
+    /// A slave at the end of a cable has no link any more and turns the telegrams round: the cable is cut, or what
+    /// it leads to is off.
+    CableOpen {
+        /// The end nearer to port 1.
+        low: End,
+        /// The end nearer to port 2.
+        high: End,
+    },
+    /// The ring was open and is closed again.
+    RingClosed,
+    /// A slave did not do what closes the ring. It is open as before, and tried again after a while.
+    RingNotClosed {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+    },
     /// A slave is not valid any more. It takes no part until the next scan.
     SlaveLost {
         /// The slave.
@@ -213,6 +248,12 @@ impl fmt::Display for Event {
             Event::ScanUnstable => f.write_str("topology or address list do not become stable"),
             Event::TooManySlaves { found, max } => write!(f, "{found} slaves found, room for {max}"),
             Event::Missing { address } => write!(f, "the slave with address {address} was not found"),
+            Event::Topology(topology) => write!(f, "topology: {topology}"),
+            Event::CableOpen { low, high } => write!(f, "no connection between {low} and {high}"),
+            Event::RingClosed => f.write_str("the ring is closed again"),
+            Event::RingNotClosed { slave, address } => {
+                write!(f, "the ring cannot be closed: {slave} (address {address}) does not do as commanded")
+            }
             Event::Unknown { slave, address } => {
                 write!(f, "{slave} with address {address} is not configured")
             }
@@ -325,13 +366,14 @@ pub struct Statistics {
     pub skipped: u64,
     /// Frames accepted.
     pub accepted: u64,
-    /// Cycles in which at least one AT did not come back.
+    /// Cycles whose ATs, taken together from all ports, did not have the data of every slave.
     pub at_missing: u64,
-    /// Cycles in which at least one MDT did not come back.
+    /// Cycles in which at least one MDT did not come back on a port where the topology gives it back.
     pub mdt_missing: u64,
     /// Events dropped because nobody took them.
     pub events_lost: u64,
     refused: [u64; Refusal::ALL.len()],
+    lost: [[u64; 2]; 2],
 }
 
 impl Statistics {
@@ -339,6 +381,16 @@ impl Statistics {
     #[must_use]
     pub const fn refused(&self, reason: Refusal) -> u64 {
         self.refused[reason as usize]
+    }
+
+    /// Telegrams of this kind that did not come back on this port, where the topology gives them back.
+    #[must_use]
+    pub const fn lost(&self, port: Port, kind: Kind) -> u64 {
+        self.lost[port.index()][kind as usize]
+    }
+
+    pub(crate) fn count_lost(&mut self, port: Port, kind: Kind, count: usize) {
+        self.lost[port.index()][kind as usize] += u64::try_from(count).unwrap_or(u64::MAX);
     }
 
     pub(crate) fn count_refusal(&mut self, reason: Refusal) {

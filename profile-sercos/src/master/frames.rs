@@ -1,46 +1,60 @@
 //! The frames of one cycle: built, sent one after the other, and taken back.
 
+use super::config::Ports;
 use super::event::{Port, Refusal};
+use super::topology::Route;
 use crate::wire::header::{
     Channel, DATA_LEN_MAX, FRAME_LEN_MAX, HEADER_LEN, Header, Kind, MacAddress, PhaseField, TELEGRAMS_MAX,
     TelegramType,
 };
 
-/// MDTs and ATs of one cycle.
-const FRAMES_MAX: usize = 2 * TELEGRAMS_MAX;
+/// MDTs and ATs of one cycle, on both ports.
+const FRAMES_MAX: usize = 2 * 2 * TELEGRAMS_MAX;
+
+/// The port from which a channel is sent.
+const fn port_of(channel: Channel) -> Port {
+    match channel {
+        Channel::Primary => Port::One,
+        Channel::Secondary => Port::Two,
+    }
+}
 
 #[derive(Debug)]
 struct Sent {
     telegram: TelegramType,
     bytes: [u8; FRAME_LEN_MAX],
     len: usize,
-    back: bool,
+    /// The ports at which it has come back.
+    back: [bool; 2],
 }
 
 #[derive(Debug)]
 pub(super) struct Frames {
     mac: MacAddress,
+    ports: Ports,
     phase: PhaseField,
     /// Whether the frames of a cycle are out.
     out: bool,
     sent: Vec<Sent>,
     used: usize,
     next: usize,
-    /// Data fields of the ATs that have come back.
+    /// Data fields of the ATs that have come back, four for each route.
     received: Vec<[u8; DATA_LEN_MAX]>,
 }
 
 impl Frames {
-    pub fn new(mac: MacAddress) -> Frames {
-        let empty = || Sent { telegram: TelegramType(0), bytes: [0; FRAME_LEN_MAX], len: 0, back: false };
+    pub fn new(mac: MacAddress, ports: Ports) -> Frames {
+        let empty =
+            || Sent { telegram: TelegramType(0), bytes: [0; FRAME_LEN_MAX], len: 0, back: [false; 2] };
         Frames {
             mac,
+            ports,
             phase: PhaseField(0),
             out: false,
             sent: (0..FRAMES_MAX).map(|_| empty()).collect(),
             used: 0,
             next: 0,
-            received: vec![[0; DATA_LEN_MAX]; TELEGRAMS_MAX],
+            received: vec![[0; DATA_LEN_MAX]; TELEGRAMS_MAX * Route::ALL.len()],
         }
     }
 
@@ -59,40 +73,69 @@ impl Frames {
         self.next = 0;
     }
 
-    /// Adds a telegram with `len` bytes of data, at most 1494; `fill` gets them zeroed.
-    pub fn add(&mut self, kind: Kind, number: u8, len: usize, fill: impl FnOnce(&mut [u8])) {
-        let Some(frame) = self.sent.get_mut(self.used) else {
-            return;
-        };
-        self.used += 1;
+    /// Adds a telegram with `len` bytes of data, at most 1494, on each port that there is. `fill` gets them zeroed;
+    /// `secondary` makes the data of the S telegram out of that of the P telegram.
+    pub fn add(
+        &mut self,
+        kind: Kind,
+        number: u8,
+        len: usize,
+        fill: impl FnOnce(&mut [u8]),
+        secondary: impl FnOnce(&mut [u8]),
+    ) {
         let len = len.min(DATA_LEN_MAX);
-        frame.telegram = TelegramType::new(Channel::Primary, kind, number);
-        frame.len = HEADER_LEN + len;
-        frame.back = false;
-        let header = Header { source: self.mac, telegram: frame.telegram, phase: self.phase };
-        let (head, data) = frame.bytes.split_at_mut(HEADER_LEN);
-        // The head has exactly the header's length.
-        let _ = header.emit(head);
-        data[..len].fill(0);
-        fill(&mut data[..len]);
+        let count = if self.ports == Ports::Both { 2 } else { 1 };
+        let Some(frames) = self.sent.get_mut(self.used..self.used + count) else { return };
+        self.used += count;
+        let channels = match self.ports {
+            Ports::One | Ports::Both => [Channel::Primary, Channel::Secondary],
+            Ports::Two => [Channel::Secondary, Channel::Primary],
+        };
+        for (frame, channel) in frames.iter_mut().zip(channels) {
+            frame.telegram = TelegramType::new(channel, kind, number);
+            frame.len = HEADER_LEN + len;
+            frame.back = [false; 2];
+            let header = Header { source: self.mac, telegram: frame.telegram, phase: self.phase };
+            // The frame is longer than the header.
+            let _ = header.emit(&mut frame.bytes);
+        }
+        let Some((first, rest)) = frames.split_first_mut() else { return };
+        let data = &mut first.bytes[HEADER_LEN..HEADER_LEN + len];
+        data.fill(0);
+        fill(data);
+        match rest.first_mut() {
+            Some(copy) => {
+                let bytes = &mut copy.bytes[HEADER_LEN..HEADER_LEN + len];
+                bytes.copy_from_slice(data);
+                secondary(bytes);
+            }
+            None if self.ports == Ports::Two => secondary(data),
+            None => {}
+        }
     }
 
-    /// The next frame to send.
-    pub fn next_transmit(&mut self) -> Option<&[u8]> {
+    /// The next frame to send, and the port to send it on.
+    pub fn next_transmit(&mut self) -> Option<(Port, &[u8])> {
         if self.next >= self.used {
             return None;
         }
         self.next += 1;
-        self.sent.get(self.next - 1).map(|frame| &frame.bytes[..frame.len])
+        let frame = self.sent.get(self.next - 1)?;
+        Some((port_of(frame.telegram.channel()), &frame.bytes[..frame.len]))
     }
 
     pub fn has_transmit(&self) -> bool {
         self.next < self.used
     }
 
-    /// Takes a frame that came back. Each frame comes back once, on the port it was sent from, as the line gives
-    /// it back; everything about it but the slaves' data is as it was sent.
-    pub fn receive(&mut self, port: Port, frame: &[u8]) -> Result<(), Refusal> {
+    /// Takes a frame that came back on `port`. It comes back once on a port at which the topology `admits` it;
+    /// everything about it but the slaves' data is as it was sent.
+    pub fn receive(
+        &mut self,
+        port: Port,
+        frame: &[u8],
+        admits: impl FnOnce(Route) -> bool,
+    ) -> Result<Kind, Refusal> {
         let header = Header::parse_unchecked(frame).map_err(|_| Refusal::NotSercos)?;
         if Header::parse(frame).is_err() {
             return Err(Refusal::Crc);
@@ -103,7 +146,8 @@ impl Frames {
         if !self.out {
             return Err(Refusal::Silence);
         }
-        if port != Port::One || header.telegram.channel() != Channel::Primary {
+        let route = Route { channel: header.telegram.channel(), port };
+        if !self.ports.contains(port) || !self.ports.contains(port_of(route.channel)) || !admits(route) {
             return Err(Refusal::Port);
         }
         let sent = &mut self.sent[..self.used];
@@ -119,29 +163,46 @@ impl Frames {
         if frame.len() != sent.len {
             return Err(Refusal::Length);
         }
-        if sent.back {
+        if core::mem::replace(&mut sent.back[port.index()], true) {
             return Err(Refusal::Duplicate);
         }
-        sent.back = true;
         if header.telegram.kind() == Kind::At {
-            let number = usize::from(header.telegram.number());
-            if let Some(received) = self.received.get_mut(number) {
+            let place = route.index() * TELEGRAMS_MAX + usize::from(header.telegram.number());
+            if let Some(received) = self.received.get_mut(place) {
                 received[..frame.len() - HEADER_LEN].copy_from_slice(&frame[HEADER_LEN..]);
             }
         }
-        Ok(())
+        Ok(header.telegram.kind())
     }
 
-    /// Whether every frame of this kind has come back.
-    pub fn all_back(&self, kind: Kind) -> bool {
-        self.sent[..self.used].iter().all(|sent| sent.back || sent.telegram.kind() != kind)
+    fn of(&self, kind: Kind, channel: Channel) -> impl Iterator<Item = &Sent> {
+        let wanted = move |sent: &&Sent| sent.telegram.kind() == kind && sent.telegram.channel() == channel;
+        self.sent[..self.used].iter().filter(wanted)
+    }
+
+    /// Frames of this kind that have not come back on this route.
+    pub fn missing(&self, kind: Kind, route: Route) -> usize {
+        self.of(kind, route.channel).filter(|sent| !sent.back[route.port.index()]).count()
+    }
+
+    /// Whether every frame of this kind has come back on this route.
+    pub fn all_back(&self, kind: Kind, route: Route) -> bool {
+        self.missing(kind, route) == 0
+    }
+
+    /// Whether an AT has come back on this route.
+    pub fn came(&self, route: Route) -> bool {
+        self.of(Kind::At, route.channel).any(|sent| sent.back[route.port.index()])
     }
 
     /// The data field of an AT that came back in this cycle.
-    pub fn at(&self, number: u8) -> Option<&[u8]> {
-        let telegram = TelegramType::new(Channel::Primary, Kind::At, number);
-        let sent = self.sent[..self.used].iter().find(|sent| sent.telegram == telegram && sent.back)?;
-        self.received.get(usize::from(number)).map(|received| &received[..sent.len - HEADER_LEN])
+    pub fn at(&self, route: Route, number: u8) -> Option<&[u8]> {
+        let telegram = TelegramType::new(route.channel, Kind::At, number);
+        let sent = self.sent[..self.used]
+            .iter()
+            .find(|sent| sent.telegram == telegram && sent.back[route.port.index()])?;
+        let place = route.index() * TELEGRAMS_MAX + usize::from(number);
+        self.received.get(place).map(|received| &received[..sent.len - HEADER_LEN])
     }
 }
 
@@ -154,13 +215,14 @@ mod tests {
     const MAC: MacAddress = [2, 0, 0, 0, 0, 1];
 
     fn cycle() -> (Frames, Vec<Vec<u8>>) {
-        let mut frames = Frames::new(MAC);
+        let mut frames = Frames::new(MAC, Ports::One);
         frames.begin(PhaseField::new(false, 3, Phase::CP2));
-        frames.add(Kind::Mdt, 0, 46, |data| data[0] = 7);
-        frames.add(Kind::At, 0, 48, |_| {});
-        frames.add(Kind::At, 1, 40, |_| {});
+        frames.add(Kind::Mdt, 0, 46, |data| data[0] = 7, |_| {});
+        frames.add(Kind::At, 0, 48, |_| {}, |_| {});
+        frames.add(Kind::At, 1, 40, |_| {}, |_| {});
         let mut out = Vec::new();
-        while let Some(frame) = frames.next_transmit() {
+        while let Some((port, frame)) = frames.next_transmit() {
+            assert_eq!(port, Port::One);
             out.push(frame.to_vec());
         }
         (frames, out)
@@ -173,13 +235,15 @@ mod tests {
         assert_eq!(out[0][20], 7);
         let mut at = out[1].clone();
         at[20 + 47] = 9;
-        assert!(!frames.all_back(Kind::At));
-        assert_eq!(frames.receive(Port::One, &at), Ok(()));
-        assert_eq!(frames.at(0).map(|data| (data.len(), data[47])), Some((48, 9)));
-        assert_eq!(frames.at(1), None);
-        assert_eq!(frames.receive(Port::One, &at), Err(Refusal::Duplicate));
-        assert_eq!(frames.receive(Port::One, &out[2]), Ok(()));
-        assert!(frames.all_back(Kind::At) && !frames.all_back(Kind::Mdt));
+        assert!(!frames.all_back(Kind::At, Route::PRIMARY_ONE));
+        assert_eq!(frames.receive(Port::One, &at, |_| true), Ok(Kind::At));
+        assert_eq!(frames.at(Route::PRIMARY_ONE, 0).map(|data| (data.len(), data[47])), Some((48, 9)));
+        assert_eq!(frames.at(Route::PRIMARY_ONE, 1), None);
+        assert_eq!(frames.receive(Port::One, &at, |_| true), Err(Refusal::Duplicate));
+        assert_eq!(frames.receive(Port::One, &out[2], |_| true), Ok(Kind::At));
+        assert!(
+            frames.all_back(Kind::At, Route::PRIMARY_ONE) && !frames.all_back(Kind::Mdt, Route::PRIMARY_ONE)
+        );
     }
 
     #[test]
@@ -209,12 +273,60 @@ mod tests {
             (Port::One, with(&|f| f.truncate(67), true), Refusal::Length),
         ];
         for (port, frame, reason) in cases {
-            assert_eq!(frames.receive(port, &frame), Err(reason));
-            assert_eq!(frames.at(0), None, "{reason}");
+            assert_eq!(frames.receive(port, &frame, |_| true), Err(reason));
+            assert_eq!(frames.at(Route::PRIMARY_ONE, 0), None, "{reason}");
         }
         frames.silence();
-        assert_eq!(frames.receive(Port::One, &out[1]), Err(Refusal::Silence));
+        assert_eq!(frames.receive(Port::One, &out[1], |_| true), Err(Refusal::Silence));
         assert!(!frames.has_transmit());
+    }
+
+    #[test]
+    fn both_ports_have_the_same_telegrams() {
+        let mut frames = Frames::new(MAC, Ports::Both);
+        frames.begin(PhaseField::new(false, 3, Phase::CP4));
+        frames.add(Kind::Mdt, 0, 46, |data| data[..2].fill(7), |data| data[0] = 8);
+        frames.add(Kind::At, 0, 48, |_| {}, |_| {});
+        let mut out = Vec::new();
+        while let Some((port, frame)) = frames.next_transmit() {
+            out.push((port, frame.to_vec()));
+        }
+        let types: Vec<_> =
+            out.iter().map(|(port, frame)| (*port, frame[14], frame[20], frame[21])).collect();
+        let wanted = [
+            (Port::One, 0x20, 7, 7),
+            (Port::Two, 0xA0, 8, 7),
+            (Port::One, 0x60, 0, 0),
+            (Port::Two, 0xE0, 0, 0),
+        ];
+        assert_eq!(types, wanted);
+        // The P telegram comes back on both ports where only the other way is interrupted.
+        let mut first = out[2].1.clone();
+        first[20] = 1;
+        assert_eq!(frames.receive(Port::One, &first, |_| true), Ok(Kind::At));
+        first[20] = 2;
+        assert_eq!(frames.receive(Port::Two, &first, |_| true), Ok(Kind::At));
+        assert_eq!(frames.receive(Port::Two, &first, |_| true), Err(Refusal::Duplicate));
+        assert_eq!(frames.receive(Port::Two, &out[3].1, |route| route.port == Port::One), Err(Refusal::Port));
+        let came = Route::ALL.map(|route| frames.at(route, 0).map(|data| data[0]));
+        assert_eq!(came, [Some(1), None, Some(2), None]);
+        assert_eq!(frames.missing(Kind::At, Route::SECONDARY_TWO), 1);
+        assert!(
+            frames.all_back(Kind::At, Route::PRIMARY_TWO) && !frames.all_back(Kind::Mdt, Route::PRIMARY_TWO)
+        );
+    }
+
+    #[test]
+    fn a_line_on_port_2_has_s_telegrams_only() {
+        let mut frames = Frames::new(MAC, Ports::Two);
+        frames.begin(PhaseField::new(false, 0, Phase::CP0));
+        frames.add(Kind::At, 0, 40, |data| data[0] = 1, |data| data[1] = 0x80);
+        let (port, frame) = frames.next_transmit().unwrap();
+        assert_eq!((port, frame[14], frame[20], frame[21]), (Port::Two, 0xE0, 1, 0x80));
+        let frame = frame.to_vec();
+        assert!(frames.next_transmit().is_none());
+        assert_eq!(frames.receive(Port::One, &frame, |_| true), Err(Refusal::Port));
+        assert_eq!(frames.receive(Port::Two, &frame, |_| true), Ok(Kind::At));
     }
 
     proptest! {
@@ -222,7 +334,7 @@ mod tests {
         #[test]
         fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..120)) {
             let (mut frames, _) = cycle();
-            prop_assert!(frames.receive(Port::One, &bytes).is_err());
+            prop_assert!(frames.receive(Port::One, &bytes, |_| true).is_err());
         }
     }
 }

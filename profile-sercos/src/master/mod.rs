@@ -1,6 +1,6 @@
 //! The master role.
 //!
-//! [`Master`] takes a line of slaves from no telegrams at all (NRT) through CP0 to CP4 and keeps the cycle going.
+//! [`Master`] takes a network of slaves, a line on either port or a ring on both, from no telegrams at all (NRT) through CP0 to CP4 and keeps the cycle going.
 //! It is driven by time and frames:
 //!
 //! ```text
@@ -26,11 +26,13 @@ mod frames;
 pub mod layout;
 pub mod phase;
 mod plan;
+mod redundancy;
 pub mod report;
 mod scan;
 mod startup;
 pub mod station;
 pub mod svc;
+pub mod topology;
 
 use std::collections::VecDeque;
 
@@ -42,13 +44,15 @@ use self::event::{Event, Output, Port, Refusal, SlaveId, Statistics, Ticket};
 use self::frames::Frames;
 use self::layout::CyclicLayout;
 use self::phase::{PhaseEvent, State};
+use self::redundancy::Redundancy;
 use self::report::ReportRow;
 use self::scan::Scan;
 use self::station::{End, Facts, Presence, Station};
 use self::svc::request::SvcRequest;
+use self::topology::Topology;
 use crate::wire::data_status::DataStatus;
 use crate::wire::device_status::DeviceStatus;
-use crate::wire::header::Phase;
+use crate::wire::header::{Kind, Phase};
 use crate::wire::idn::Idn;
 
 /// Events kept until they are taken; later ones are dropped and counted.
@@ -99,7 +103,7 @@ pub struct SlaveInfo<'a> {
     pub facts: &'a Facts,
 }
 
-/// The master of a line.
+/// The master of a network.
 #[derive(Debug)]
 pub struct Master {
     config: MasterConfig,
@@ -112,6 +116,7 @@ pub struct Master {
     /// The frames that are out have been evaluated.
     evaluated: bool,
     scan: Scan,
+    redundancy: Redundancy,
     /// Slaves in a stable scan that has not been taken over yet.
     scan_ready: Option<u16>,
     stations: Vec<Station>,
@@ -124,6 +129,8 @@ pub struct Master {
     cycles: u32,
     /// The slaves meet the condition of the present state.
     condition: bool,
+    /// No slave inserted data in the cycle before.
+    left_before: bool,
     proceed: bool,
     next_cycle: MonotonicTime,
     system_time: Option<SystemTime>,
@@ -144,9 +151,10 @@ impl Master {
             target: None,
             layout_phase: Phase::CP0,
             cycle_count: 0,
-            frames: Frames::new(config.mac),
+            frames: Frames::new(config.mac, config.ports),
             evaluated: true,
             scan: Scan::new(config.stable_cycles, config.scan_timeout_cycles),
+            redundancy: Redundancy::new(config.ports, slaves),
             scan_ready: None,
             stations: (0..slaves).map(|_| Station::new(&config)).collect(),
             found: 0,
@@ -154,6 +162,7 @@ impl Master {
             since: MonotonicTime::ZERO,
             cycles: 0,
             condition: false,
+            left_before: false,
             proceed: false,
             next_cycle: MonotonicTime::ZERO,
             system_time: None,
@@ -220,15 +229,16 @@ impl Master {
                 self.cycle(now);
             }
         }
-        self.frames.next_transmit().map(|frame| Output::Transmit { port: Port::One, frame })
+        self.frames.next_transmit().map(|(port, frame)| Output::Transmit { port, frame })
     }
 
     /// Takes a frame from the network. A refused one changes nothing; it is counted by its reason.
     pub fn handle_frame(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> Result<(), Refusal> {
-        match self.frames.receive(port, frame) {
-            Ok(()) => {
+        let redundancy = &self.redundancy;
+        match self.frames.receive(port, frame, |route| redundancy.admits(route)) {
+            Ok(kind) => {
                 self.statistics.accepted += 1;
-                if !self.evaluated && self.frames.all_back(crate::wire::header::Kind::At) {
+                if kind == Kind::At && !self.evaluated && self.is_complete() {
                     self.evaluate(now);
                 }
                 Ok(())
@@ -421,6 +431,12 @@ impl Master {
         &self.layout
     }
 
+    /// What the network is: found by the scan, and watched from then on. A master with one port knows only lines.
+    #[must_use]
+    pub fn topology(&self) -> Topology {
+        self.redundancy.topology()
+    }
+
     /// Counters.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
@@ -452,6 +468,7 @@ impl Master {
         self.since = now;
         self.cycles = 0;
         self.condition = false;
+        self.left_before = false;
         self.proceed = false;
         self.enter(now, last);
         true

@@ -8,6 +8,7 @@ use super::layout::SlaveNeed;
 use super::plan::{Cursor, Step};
 use super::report::{REPORT_MAX, ReportRow};
 use super::svc::ServiceChannel;
+use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
@@ -106,6 +107,10 @@ pub(super) struct Station {
     pub channel: ServiceChannel,
     /// S-DEV of the last cycle; `None` when its AT did not come.
     pub status: Option<DeviceStatus>,
+    /// Routes on which the last cycle brought valid data, one bit each by [`super::topology::Route::index`].
+    pub valid_routes: u8,
+    /// Commanded topology and handshake bit of C-DEV.
+    pub command: DeviceControl,
     /// S-SVC of the last cycle; `None` when its AT did not come.
     pub svc: Option<AtSvc>,
     /// Errors and warnings of S-DEV that the application knows of.
@@ -138,6 +143,8 @@ impl Station {
             ends: ArrayVec::new(),
             channel: ServiceChannel::new(config.svc),
             status: None,
+            valid_routes: 0,
+            command: DeviceControl::empty(),
             svc: None,
             told: DeviceStatus::empty(),
             misses: 0,
@@ -167,6 +174,8 @@ impl Station {
         self.ends.clear();
         self.channel.rest(false);
         self.status = None;
+        self.valid_routes = 0;
+        self.command = DeviceControl::empty();
         self.svc = None;
         self.told = DeviceStatus::empty();
         self.misses = 0;
@@ -180,6 +189,21 @@ impl Station {
 
     pub fn is_active(&self) -> bool {
         self.presence == Presence::Active
+    }
+
+    /// Commands a topology: the bits change and the handshake bit toggles.
+    pub fn command_topology(&mut self, topology: Topology) {
+        self.command = self.command.with_topology(topology);
+        self.command.toggle(DeviceControl::TOPOLOGY_CHANGE);
+    }
+
+    /// Whether S-DEV shows what was commanded.
+    pub fn follows_command(&self) -> bool {
+        self.status.is_some_and(|status| {
+            status.contains(DeviceStatus::TOPOLOGY_CHANGE)
+                == self.command.contains(DeviceControl::TOPOLOGY_CHANGE)
+                && status.topology() == self.command.topology()
+        })
     }
 
     pub fn connection(&self, instance: u8) -> Option<&ConnectionConfig> {

@@ -13,8 +13,8 @@ use crate::master::config::{ConfigError, MasterConfig};
 use crate::master::event::{Event, Output, Port, SlaveId, Ticket};
 use crate::master::phase::State;
 use crate::master::svc::request::{SvcOutcome, SvcRequest};
-use crate::slave::{self, Application, Forward, Line};
-use crate::wire::header::{FRAME_LEN_MAX, Phase};
+use crate::slave::{Application, Network};
+use crate::wire::header::Phase;
 
 /// Smallest gap between two frames: 12 bytes at 100 Mbit/s.
 const GAP: DurationNs = DurationNs(960);
@@ -22,49 +22,43 @@ const GAP: DurationNs = DurationNs(960);
 /// Is told about a passage: topology address, outward, frame before and behind the station, where it may be changed.
 pub type Watch<'a> = dyn FnMut(u16, bool, &[u8], &mut [u8]) + 'a;
 
+/// Is told what comes to a port of the master.
+pub type Arrived<'a> = dyn FnMut(Port, &mut [u8]) + 'a;
+
 /// What a station does besides: topology address, outward, the frame as it leaves the station.
 pub type Misdeed = Box<dyn FnMut(u16, bool, &mut [u8])>;
 
-/// What is behind the master's first port.
+/// What is behind the master's ports.
 pub trait Stations {
     /// Looks after the time-outs of all stations.
     fn handle_time(&mut self, now: MonotonicTime);
 
-    /// Sends a frame through the stations, which change it, and tells `watch` about each of them. Returns whether
-    /// it comes back.
-    fn pass(&mut self, now: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool;
+    /// Sends a frame from a port of the master through the stations, which change it, and tells `watch` about each of
+    /// them. `arrived` gets what comes to a port of the master.
+    fn pass(
+        &mut self,
+        now: MonotonicTime,
+        port: Port,
+        frame: &mut [u8],
+        watch: &mut Watch<'_>,
+        arrived: &mut Arrived<'_>,
+    );
 }
 
-impl<A: Application> Stations for Line<A> {
+impl<A: Application> Stations for Network<A> {
     fn handle_time(&mut self, now: MonotonicTime) {
-        Line::handle_time(self, now);
+        Network::handle_time(self, now);
     }
 
-    fn pass(&mut self, now: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool {
-        let mut copy = [0; FRAME_LEN_MAX];
-        let Some(before) = copy.get_mut(..frame.len()) else { return false };
-        before.copy_from_slice(frame);
-        let mut station = |slave: &mut slave::Slave<A>, address, port, frame: &mut [u8]| {
-            let forward = slave.handle_frame(now, port, frame);
-            watch(address, port == slave::Port::One, before, frame);
-            if before != frame {
-                before.copy_from_slice(frame);
-            }
-            forward
-        };
-        let slaves = self.slaves_mut();
-        let mut turned = None;
-        for (index, (address, slave)) in (1u16..).zip(slaves.iter_mut()).enumerate() {
-            if station(slave, address, slave::Port::One, frame) != Forward::Through {
-                turned = Some((index, address));
-                break;
-            }
-        }
-        let Some((last, address)) = turned else { return false };
-        for (slave, back) in slaves[..last].iter_mut().rev().zip(1..) {
-            station(slave, address - back, slave::Port::Two, frame);
-        }
-        true
+    fn pass(
+        &mut self,
+        now: MonotonicTime,
+        port: Port,
+        frame: &mut [u8],
+        watch: &mut Watch<'_>,
+        arrived: &mut Arrived<'_>,
+    ) {
+        self.send_watched(now, port, frame, Some(watch), arrived);
     }
 }
 
@@ -138,14 +132,15 @@ impl<S: Stations> VirtualBus<S> {
         self.now = self.now.max(at);
         self.line.handle_time(self.now);
         let mut out = Vec::new();
-        while let Some(Output::Transmit { frame, .. }) = self.master.poll(self.now) {
-            out.push(frame.to_vec());
+        while let Some(Output::Transmit { port, frame }) = self.master.poll(self.now) {
+            out.push((port, frame.to_vec()));
         }
-        if let Some(first) = out.first() {
+        if let Some((_, first)) = out.first() {
             self.cycles.push((self.now, first[15]));
         }
-        let mut start = self.now;
-        for mut frame in out {
+        let mut starts = [self.now; 2];
+        for (port, mut frame) in out {
+            let start = starts[port.index()];
             if !(self.outward)(&mut frame) {
                 continue;
             }
@@ -156,12 +151,16 @@ impl<S: Stations> VirtualBus<S> {
                 misdeed(slave, outward, after);
                 police.passed(start, slave, outward, before, after);
             };
-            let back = self.line.pass(self.now, &mut frame, &mut watch);
-            start = start + wire_time(frame.len()) + GAP;
-            if back && (self.cable)(&mut frame) {
-                // What the master refuses it counts by itself.
-                let _ = self.master.handle_frame(self.now, Port::One, &frame);
-            }
+            let (now, master, cable) = (self.now, &mut self.master, &mut self.cable);
+            let mut arrived = |port, frame: &mut [u8]| {
+                let mut frame = frame.to_vec();
+                if cable(&mut frame) {
+                    // What the master refuses it counts by itself.
+                    let _ = master.handle_frame(now, port, &frame);
+                }
+            };
+            self.line.pass(now, port, &mut frame, &mut watch, &mut arrived);
+            starts[port.index()] = start + wire_time(frame.len()) + GAP;
         }
         for breach in &self.police.breaches()[self.judged..] {
             assert!((self.excused)(breach), "{breach}");

@@ -88,6 +88,10 @@ pub struct Police {
     switching_since: Option<MonotonicTime>,
     stations: Vec<Station>,
     plan: Option<Plan>,
+    /// The channel whose MST began the cycle.
+    leading: Channel,
+    /// ATs of this cycle into which each slave has written, one bit each.
+    answered: Vec<u16>,
 }
 
 impl Police {
@@ -105,6 +109,8 @@ impl Police {
             switching_since: None,
             stations: Vec::new(),
             plan: None,
+            leading: Channel::Primary,
+            answered: Vec::new(),
         }
     }
 
@@ -130,10 +136,11 @@ impl Police {
             return;
         };
         let telegram = header.telegram;
-        if telegram.channel() == Channel::Primary {
-            if telegram.is_mst() {
-                self.mst(at, header.phase);
-            }
+        if telegram.is_mst() && self.leads(telegram.channel(), header.phase) {
+            self.mst(at, header.phase);
+        }
+        let leads = telegram.channel() == self.leading;
+        if leads {
             self.order(at, telegram);
         }
         let mst = self.cycle.as_ref().map(|cycle| cycle.phase);
@@ -145,9 +152,30 @@ impl Police {
         let end = at + wire_time(frame.len());
         self.window(at, end, telegram);
         self.quiet_since = self.quiet_since.max(end);
-        if telegram.kind() == Kind::Mdt && telegram.channel() == Channel::Primary {
+        if telegram.kind() == Kind::Mdt && leads {
             self.mdt(at, telegram.number(), data);
         }
+    }
+
+    /// Whether the MST begins a cycle. With two ports there are two of each telegram; one of the channels leads.
+    fn leads(&mut self, channel: Channel, field: PhaseField) -> bool {
+        let copy = channel != self.leading && self.cycle.as_ref().is_some_and(|cycle| cycle.phase == field);
+        if !copy {
+            self.leading = channel;
+            self.answered.clear();
+        }
+        !copy
+    }
+
+    /// Whether this is the first of the copies of an AT into which the slave writes in this cycle.
+    fn first_answer(&mut self, index: usize, number: u8) -> bool {
+        if self.answered.len() <= index {
+            self.answered.resize(index + 1, 0);
+        }
+        let (place, bit) = (&mut self.answered[index], 1u16 << (number & 0xF));
+        let first = *place & bit == 0;
+        *place |= bit;
+        first
     }
 
     /// A new cycle: its phase, its counter, and its distance from the one before.
@@ -307,6 +335,8 @@ impl Police {
 
     fn order(&mut self, at: MonotonicTime, telegram: TelegramType) {
         let phase = self.phase;
+        // Both channels have the same telegrams.
+        let telegram = TelegramType(telegram.0 & 0x7F);
         if !self.expected().any(|(expected, _)| expected == telegram) {
             self.breach(at, Offender::Master, Rule::Unexpected { telegram, phase });
             return;
@@ -406,13 +436,13 @@ impl Police {
         if let Some(offset) = first_change(before, after, &own) {
             self.breach(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
         }
-        if telegram.kind() == Kind::At && telegram.channel() == Channel::Primary {
-            self.answered(at, index, telegram.number(), after);
+        if telegram.kind() == Kind::At && self.first_answer(index, telegram.number()) {
+            self.answers(at, index, telegram.number(), after);
         }
     }
 
     /// What a slave has put into an AT.
-    fn answered(&mut self, at: MonotonicTime, index: usize, number: u8, data: &[u8]) {
+    fn answers(&mut self, at: MonotonicTime, index: usize, number: u8, data: &[u8]) {
         let operating = self.operating();
         let places = self.plan.as_mut().and_then(|plan| plan.slaves.get_mut(index)?.as_mut());
         let Some(station) = self.stations.get_mut(index) else { return };
@@ -483,7 +513,8 @@ impl Police {
         let own = if writes { field } else { 0..0 };
         if let Some(offset) = first_change(before, after, &[0..CONNECTION_CONTROL_LEN, own]) {
             self.breach(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
-        } else if writes {
+        } else if writes && usize::from(slave) == topology {
+            // In a ring the S telegram counts from the other end; the P telegram gives the number.
             let word = u16_at(after, 2 * topology);
             while self.stations.len() < topology {
                 self.stations.push(Station::default());

@@ -10,11 +10,11 @@ use crate::master::event::{Event, Refusal, SlaveId};
 use crate::master::phase::State;
 use crate::slave::communication::FixedConnection;
 use crate::slave::parameter::Definition;
-use crate::slave::{self, Line, Slave};
+use crate::slave::{self, Network, Slave};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 
-type Bus = VirtualBus<Line<Mirror>>;
+type Bus = VirtualBus<Network<Mirror>>;
 
 /// So many slaves; the first `connected` of them have a connection of four bytes each way.
 fn bus(count: u16, connected: u16, cycle_ns: u32, hot_plug_in_all: bool) -> Bus {
@@ -41,7 +41,7 @@ fn bus(count: u16, connected: u16, cycle_ns: u32, hot_plug_in_all: bool) -> Bus 
         let config = slave::Config { address, connections: 2, ..slave::Config::default() };
         Slave::new(&config, Mirror::default())
     };
-    VirtualBus::new(config, Line::new((1..=count).map(slave).collect())).unwrap()
+    VirtualBus::new(config, Network::line((1..=count).map(slave).collect())).unwrap()
 }
 
 /// Brings a bus to CP4 and sends a value to and from each connected slave.
@@ -430,7 +430,7 @@ fn classes_of_both_kinds_and_versions_come_up_in_one_line() {
         let config = slave::Config { address, classes, fixed, ..slave::Config::default() };
         Slave::new(&config, Mirror::default())
     });
-    bus.line = Line::new(slaves.collect());
+    bus.line = Network::line(slaves.collect());
     // The third slave's V2 classes tell jitter and t11.
     bus.line.slaves_mut()[2].store_mut().set_number_of(Idn::SLAVE_JITTER, 640);
     bus.line.slaves_mut()[2].store_mut().set_number_of(Idn::CONSUMER_TIME, 4_000);
@@ -477,7 +477,7 @@ fn a_connection_that_the_slave_does_not_have_is_refused() {
     let mut bus = bus(2, 2, 1_000_000, true);
     let config = slave::Config { address: 2, connections: 1, ..slave::Config::default() };
     bus.line.slaves_mut()[1] = Slave::new(&config, Mirror::default());
-    bus.line.cut_behind(usize::MAX);
+    bus.line.mend(1);
     bus.auto_proceed = false;
     bus.master.set_target_phase(Phase::CP4);
     bus.state(State::Await2);

@@ -1,7 +1,7 @@
 //! The slave role: phases, service channel server, parameters, cyclic data, and a simulated drive behind it.
 //!
 //! A [`Slave`] sits between two ports. Every frame that comes in goes through [`Slave::handle_frame`], which
-//! takes what is for this slave, puts in what is from it, and says where the frame goes on. [`Line`] joins
+//! takes what is for this slave, puts in what is from it, and says where the frame goes on. [`Network`] joins
 //! slaves. The function-specific profile behind the communication is an [`Application`]; [`drive::Drive`] is
 //! one.
 //!
@@ -15,28 +15,31 @@ mod core;
 mod cyclic;
 mod diagnosis;
 pub mod drive;
-mod line;
+mod network;
 pub mod parameter;
 pub mod phase;
 mod scan;
 pub mod service_channel;
+pub mod topology;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use self::application::{Application, Cycle, Diagnosis};
 pub use self::core::Core;
-pub use self::line::Line;
+pub use self::network::Network;
+pub use crate::port::Port;
 
 use self::communication::{FixedConnection, Identity, idn};
 use self::core::Access;
 use self::parameter::Store;
 use self::phase::{Event, Fault, State};
 use self::service_channel::Server;
+use self::topology::Ports;
 use crate::wire::cp0::CommunicationVersion;
 use crate::wire::cp12;
-use crate::wire::device_control::{DeviceControl, Topology};
-use crate::wire::device_status::{DeviceStatus, InactivePort};
-use crate::wire::header::{Channel, HEADER_LEN, Header, Kind, Phase};
+use crate::wire::device_control::DeviceControl;
+use crate::wire::device_status::DeviceStatus;
+use crate::wire::header::{HEADER_LEN, Header, Kind, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::scp::ScpEntry;
 use crate::wire::svc::MdtSvc;
@@ -48,33 +51,6 @@ pub const MST_TIMEOUT: DurationNs = DurationNs::from_millis(500);
 /// How often the application is called without communication.
 pub const NRT_PERIOD: DurationNs = DurationNs::from_millis(10);
 
-/// One of the two ports of a slave.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Port {
-    /// Port 1; nearer to the master's first port in a line.
-    One,
-    /// Port 2.
-    Two,
-}
-
-impl Port {
-    /// The other port.
-    #[must_use]
-    pub const fn other(self) -> Port {
-        match self {
-            Port::One => Port::Two,
-            Port::Two => Port::One,
-        }
-    }
-
-    const fn index(self) -> usize {
-        match self {
-            Port::One => 0,
-            Port::Two => 1,
-        }
-    }
-}
-
 /// Where a frame goes after a slave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Forward {
@@ -84,6 +60,8 @@ pub enum Forward {
     Back,
     /// Both: back, and a copy out of the port where the line ends.
     BackAndThrough,
+    /// It ends here.
+    Nowhere,
 }
 
 /// What a slave is built with.
@@ -136,13 +114,11 @@ pub struct Slave<A> {
     core: Core,
     svc: Server,
     app: A,
-    links: [bool; 2],
-    /// Port on which telegrams of the P and the S channel come in first; the other one sees the way back.
-    entry: [Option<Port>; 2],
-    topology: Topology,
-    topology_toggle: bool,
+    ports: Ports,
     version: CommunicationVersion,
     topology_address: u16,
+    /// Cycles of CP0 since a P telegram gave the topology address.
+    address_age: u8,
     round: Round,
     last_cycle: MonotonicTime,
     /// Losses in a row before the last MST came.
@@ -162,12 +138,10 @@ impl<A: Application> Slave<A> {
             core: Core::new(store),
             svc,
             app,
-            links: [false; 2],
-            entry: [None; 2],
-            topology: Topology::StoreAndForward,
-            topology_toggle: false,
+            ports: Ports::new(),
             version: CommunicationVersion::empty(),
             topology_address: 0,
+            address_age: u8::MAX,
             round: Round::default(),
             last_cycle: MonotonicTime::ZERO,
             losses: 0,
@@ -223,9 +197,23 @@ impl<A: Application> Slave<A> {
         self.svc.open_idn(&self.core.store)
     }
 
-    /// Plugs or pulls a cable.
+    /// Tells whether a port has a link. A slave that loses one turns telegrams round at once.
     pub fn set_link(&mut self, port: Port, up: bool) {
-        self.links[port.index()] = up;
+        self.ports.set_link(port, up);
+    }
+
+    /// Its ports, and how it passes telegrams on.
+    pub fn ports(&self) -> &Ports {
+        &self.ports
+    }
+
+    /// Starts anew in NRT, as after power-up. Parameters stay as they are.
+    pub fn restart(&mut self) {
+        self.core.state = State::Nrt;
+        self.core.fault = None;
+        self.core.connection_failed = false;
+        self.enter_nrt();
+        self.show_diagnosis();
     }
 
     /// When [`handle_time`](Self::handle_time) has something to do unless a frame comes before.
@@ -251,49 +239,37 @@ impl<A: Application> Slave<A> {
     /// Takes a frame that came in on `port` and changes it as it passes.
     pub fn handle_frame(&mut self, now: MonotonicTime, port: Port, frame: &mut [u8]) -> Forward {
         self.handle_time(now);
-        if let Some(header) = self.accept(port, frame) {
-            let channel = channel_index(header.telegram.channel());
-            let entry = match self.entry[channel] {
-                Some(entry) => entry,
-                None if self.core.state == State::Nrt && header.phase.phase() != Phase::CP0 => {
-                    return self.forward(port, None);
-                }
-                None => *self.entry[channel].insert(port),
-            };
+        if Header::parse_unchecked(frame).is_err() {
+            // Another EtherType is no error: it belongs to the unified communication channel.
+            return self.ports.pass(port);
+        }
+        let Ok(header) = Header::parse(frame) else {
+            self.count_port_error(port);
+            return self.ports.forward(port, None, self.forwards_at_end());
+        };
+        let channel = header.telegram.channel();
+        if self.ports.is_inactive(port) {
+            self.ports.hear(now, channel);
+            return Forward::Nowhere;
+        }
+        let scan = header.phase.phase() == Phase::CP0 && !header.phase.switching();
+        if scan && header.telegram.is_mst() && self.core.state != State::In(Phase::CP0) {
+            self.ports.start(port, channel);
+        }
+        if let Some(entry) = self.ports.entry(channel) {
             let data = &mut frame[HEADER_LEN..];
             match header.telegram.kind() {
                 Kind::Mdt if entry == port => self.handle_mdt(now, &header, data),
                 Kind::Mdt => {}
                 Kind::At => self.handle_at(now, &header, entry == port, data),
             }
-            return self.forward(port, Some(header.telegram.channel()));
         }
-        self.forward(port, None)
+        self.ports.forward(port, Some(channel), self.forwards_at_end())
     }
 
-    /// The header of a SERCOS frame, or `None` for a frame that is only passed on.
-    fn accept(&mut self, port: Port, frame: &[u8]) -> Option<Header> {
-        // Another EtherType is no error: it belongs to the unified communication channel.
-        Header::parse_unchecked(frame).ok()?;
-        match Header::parse(frame) {
-            Ok(header) => Some(header),
-            Err(_) => {
-                self.count_port_error(port);
-                None
-            }
-        }
-    }
-
-    fn forward(&self, port: Port, channel: Option<Channel>) -> Forward {
-        if !self.links[port.other().index()] {
-            return Forward::Back;
-        }
-        match (self.topology, channel) {
-            (Topology::LoopbackForwardPrimary, Some(Channel::Primary))
-            | (Topology::LoopbackForwardSecondary, Some(Channel::Secondary)) => Forward::BackAndThrough,
-            (Topology::LoopbackForwardPrimary | Topology::LoopbackForwardSecondary, Some(_)) => Forward::Back,
-            _ => Forward::Through,
-        }
+    /// The end of a line sends telegrams on, so that the other end of a broken ring sees them.
+    fn forwards_at_end(&self) -> bool {
+        !self.version.contains(CommunicationVersion::NO_FORWARD_AT_END)
     }
 
     /// Permitted silence of the master.
@@ -386,6 +362,7 @@ impl<A: Application> Slave<A> {
         }
         self.core.last_mst = now;
         self.round = Round { phase: header.phase.0, mdts: 0, acted: false };
+        self.address_age = self.address_age.saturating_add(1);
         self.advance(Event::Mst(header.phase));
     }
 
@@ -422,22 +399,22 @@ impl<A: Application> Slave<A> {
         self.svc.reset();
         self.core.clear_commands();
         self.core.configuration = None;
-        self.entry = [None; 2];
-        self.topology = Topology::StoreAndForward;
+        self.ports.stop();
         self.round = Round::default();
     }
 
     fn enter(&mut self, phase: Phase) {
-        self.topology_toggle = false;
+        self.ports.reset_toggle();
         match phase {
             Phase::CP0 => {
                 self.svc.reset();
                 self.core.clear_commands();
                 self.core.configuration = None;
                 self.core.device_control = DeviceControl::empty();
-                self.topology = Topology::FastForward;
                 self.topology_address = 0;
+                self.address_age = u8::MAX;
             }
+            Phase::CP1 => self.ports.hold(),
             Phase::CP2 => self.core.conditions.cp3_checked = false,
             Phase::CP3 => self.core.conditions.cp4_checked = false,
             Phase::CP4 => self.start_connections(),
@@ -459,13 +436,7 @@ impl<A: Application> Slave<A> {
     /// C-DEV of this cycle.
     fn handle_device_control(&mut self, word: u16) {
         let control = DeviceControl::from_bits_retain(word);
-        let toggle = control.contains(DeviceControl::TOPOLOGY_CHANGE);
-        if toggle != self.topology_toggle {
-            self.topology_toggle = toggle;
-            if control.topology() != Topology::StoreAndForward {
-                self.topology = control.topology();
-            }
-        }
+        self.ports.command(control);
         self.core.device_control = control;
         self.core.store.set_number_of(Idn::DEVICE_CONTROL, i64::from(word));
         if control.contains(DeviceControl::MASTER_VALID) {
@@ -475,18 +446,9 @@ impl<A: Application> Slave<A> {
 
     /// S-DEV of this cycle.
     fn device_status(&mut self) -> DeviceStatus {
-        let end = self.links.iter().any(|&up| !up);
-        let topology = match self.topology {
-            Topology::FastForward if end => Topology::LoopbackForwardPrimary,
-            topology => topology,
-        };
         let diagnosis = self.app.diagnosis();
-        let mut status = DeviceStatus::empty().with_topology(topology);
-        if topology != Topology::FastForward && !end {
-            status = status.with_inactive_port(InactivePort::Link);
-        }
+        let mut status = self.ports.status(self.core.last_mst, self.cycle_time());
         status.set(DeviceStatus::SLAVE_VALID, !self.core.state.is_switching());
-        status.set(DeviceStatus::TOPOLOGY_CHANGE, self.topology_toggle);
         status.set(DeviceStatus::COMMAND_CHANGE, self.core.command_changed());
         status.set(DeviceStatus::CONNECTION_ERROR, self.core.connection_failed);
         status.set(DeviceStatus::DEVICE_ERROR, diagnosis.errors != 0 || self.communication_error());
@@ -522,12 +484,5 @@ impl<A: Application> Slave<A> {
         if let Ok(slot) = MdtSvc::parse(slot) {
             self.svc.handle(slot, &mut Access { core: &mut self.core, app: &mut self.app });
         }
-    }
-}
-
-const fn channel_index(channel: Channel) -> usize {
-    match channel {
-        Channel::Primary => 0,
-        Channel::Secondary => 1,
     }
 }

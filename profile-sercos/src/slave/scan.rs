@@ -4,13 +4,15 @@ use super::{Application, Slave};
 use crate::wire::cp0::{AT_LEN, CommunicationVersion, MdtRepr, SLAVES_MAX, SequenceCounter, TopologyField};
 use crate::wire::idn::Idn;
 
-/// What of the communication version this slave can do. It needs no pause beyond the reconfiguration, and the
-/// last slave of a line never sends on its free port.
+/// What of the communication version this slave can do. It needs no pause beyond the reconfiguration.
 const SUPPORTED: CommunicationVersion = CommunicationVersion::ADDRESS_ALLOCATION
     .union(CommunicationVersion::FOUR_TELEGRAMS)
     .union(CommunicationVersion::TIMES)
     .union(CommunicationVersion::FAST_PHASE_SWITCH)
     .union(CommunicationVersion::NO_FORWARD_AT_END);
+
+/// Cycles of CP0 in a row without P telegram after which the S telegram gives the topology address.
+const PRIMARY_MISSES: u8 = 2;
 
 impl<A: Application> Slave<A> {
     pub(super) fn scan_mdt(&mut self, number: u8, data: &[u8]) {
@@ -28,8 +30,12 @@ impl<A: Application> Slave<A> {
         let counter = SequenceCounter(u16::from_le_bytes([data[0], data[1]]));
         if outward {
             let topology = counter.count() & 0x1FF;
-            // In a ring the S telegram counts from the other end; the P telegram gives the address.
-            if !counter.secondary() || self.entry[0].is_none() {
+            // In a ring the S telegram counts from the other end; the P telegram gives the address, also when it
+            // is missing for a cycle or two.
+            if !counter.secondary() {
+                self.address_age = 0;
+            }
+            if !counter.secondary() || self.address_age > PRIMARY_MISSES {
                 self.topology_address = topology;
             }
             let at = 2 * usize::from(topology);

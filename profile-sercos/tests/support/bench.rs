@@ -3,7 +3,7 @@
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::{Config, Line, Slave};
+use profile_sercos::slave::{Config, Network, Slave};
 use profile_sercos::wire::connection::ConnectionControl;
 use profile_sercos::wire::cp0::{AT_LEN, AtRepr, MDT_LEN, MdtRepr, SequenceCounter};
 use profile_sercos::wire::cp12;
@@ -51,7 +51,7 @@ pub struct Feedback {
 
 /// The master and its line.
 pub struct Bench {
-    pub line: Line<Drive>,
+    pub line: Network<Drive>,
     pub now: MonotonicTime,
     pub phase: Phase,
     pub switching: Option<Phase>,
@@ -74,7 +74,7 @@ impl Bench {
         let slaves: Vec<_> = (1..=count).map(slave).collect();
         let n = slaves.len();
         Bench {
-            line: Line::new(slaves),
+            line: Network::line(slaves),
             now: MonotonicTime(1_000_000_000),
             phase: Phase::CP0,
             switching: None,
@@ -128,10 +128,10 @@ impl Bench {
     pub fn scan(&mut self) -> AtRepr {
         let mut mdt = self.frame(Kind::Mdt, 0, MDT_LEN);
         MdtRepr::default().emit(&mut mdt[HEADER_LEN..]).unwrap();
-        assert!(self.line.handle_frame(self.now, &mut mdt));
+        assert!(self.line.round_trip(self.now, &mut mdt));
         let mut at = self.frame(Kind::At, 0, AT_LEN);
         AtRepr::empty(SequenceCounter::START_PRIMARY).emit(&mut at[HEADER_LEN..]).unwrap();
-        assert!(self.line.handle_frame(self.now, &mut at));
+        assert!(self.line.round_trip(self.now, &mut at));
         AtRepr::parse(&at[HEADER_LEN..]).unwrap()
     }
 
@@ -145,11 +145,11 @@ impl Bench {
                     mdt[HEADER_LEN + place.device + 1] = 1;
                 }
             }
-            self.line.handle_frame(self.now, &mut mdt);
+            self.line.round_trip(self.now, &mut mdt);
         }
         for number in 0..2 {
             let mut at = self.frame(Kind::At, number, cp12::LEN);
-            self.line.handle_frame(self.now, &mut at);
+            self.line.round_trip(self.now, &mut at);
             for (index, feedback) in self.feedback.iter_mut().enumerate() {
                 let place = cp12::place(u16::try_from(index + 1).unwrap()).unwrap();
                 if place.telegram == number {
@@ -198,8 +198,8 @@ impl Bench {
 
     fn cyclic(&mut self) {
         let (mut mdt, mut at) = self.telegrams();
-        self.line.handle_frame(self.now, &mut mdt);
-        self.line.handle_frame(self.now, &mut at);
+        self.line.round_trip(self.now, &mut mdt);
+        self.line.round_trip(self.now, &mut at);
         self.collect(&at[HEADER_LEN..]);
     }
 

@@ -102,7 +102,7 @@ impl Bus {
         let emitting = start.elapsed();
 
         for frame in &mut self.frames {
-            let back = self.line.handle_frame(self.now, &mut frame.bytes[..frame.len]);
+            let back = self.line.round_trip(self.now, &mut frame.bytes[..frame.len]);
             assert!(back, "the line is whole");
         }
 

@@ -1,7 +1,7 @@
 //! The whole chain in virtual time: controller, network, box and drives on one clock that only the rig moves.
 //!
 //! ```text
-//! Controller --stream--> Adapter --queue--> Engine --frames--> Line<Drive>
+//! Controller --stream--> Adapter --queue--> Engine --frames--> Network<Drive>
 //!            --datagrams (Knobs)-->         (NorthQueue, SouthQueue)
 //! ```
 //!
@@ -522,7 +522,7 @@ impl Rig {
     fn after_cycle(&mut self) {
         self.line.handle_time(self.now);
         while let Some(mut frame) = self.south.outbound.pop_front() {
-            let back = self.cable && self.line.handle_frame(self.now, frame.as_mut_slice());
+            let back = self.cable && self.line.round_trip(self.now, frame.as_mut_slice());
             let kept = self.tamper_frame.as_mut().is_none_or(|tamper| tamper(&mut frame));
             if back && kept {
                 self.south.inbound.push_back(frame);

@@ -374,7 +374,7 @@ fn a_lost_drive_is_major_faulted_when_the_time_for_its_stop_is_over_and_a_reset_
     let mut rig = Rig::ready(Settings::default());
     rig.connect(vec![Step::Enable(slide_only), Step::Dwell { seconds: 60.0 }]);
     rig.run_until(millis(5_000), "the enable", |rig| rig.report().steps_finished == 1);
-    rig.line.cut_behind(1);
+    rig.line.cut(1);
     let device = |rig: &Rig| rig.engine.devices()[0].device().axis_state(1).expect("an axis").to_string();
     rig.run_until(millis(200), "the fault", |rig| device(rig) == "Aborting");
     let since = rig.now();

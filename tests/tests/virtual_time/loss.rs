@@ -140,7 +140,7 @@ fn a_broken_stream_does_not_disturb_the_motion() {
 #[test]
 fn a_slave_that_vanishes_faults_its_axis_and_only_its_axis() {
     let mut rig = in_motion(Settings::default());
-    rig.line.cut_behind(1);
+    rig.line.cut(1);
     let found = rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[1].fault().is_some());
     // Five losses in a row are allowed, in cycles of 2 ms.
     assert!(found <= millis(14), "{found}");
@@ -234,9 +234,9 @@ fn a_box_that_ends_leaves_drives_without_torque_and_a_silent_bus() {
 #[test]
 fn a_single_lost_drive_is_taken_back_once_nobody_uses_the_others() {
     let mut rig = in_motion(Settings::default());
-    rig.line.cut_behind(1);
+    rig.line.cut(1);
     rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[1].fault().is_some());
-    rig.line.cut_behind(usize::MAX);
+    rig.line.mend(1);
     // The controller stops and disables the axis that it still has, and closes the connection.
     rig.run_until(millis(30_000), "the end of the connection", |rig| rig.status().connections == 0);
     assert_eq!(rig.status().phase, 4, "the bus stays up for the axis that is in use");

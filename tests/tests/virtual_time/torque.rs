@@ -103,7 +103,7 @@ fn happen(rig: &mut Rig, what: Happening) {
         Happening::Power { drive, on } => rig.drive_mut(drive).set_main_power(on),
         Happening::Cut(behind) => {
             rig.cable = behind != Some(0);
-            rig.line.cut_behind(behind.filter(|count| *count > 0).unwrap_or(usize::MAX));
+            if behind == Some(1) { rig.line.cut(1) } else { rig.line.mend(1) }
         }
         Happening::Restart => rig.restart_box(),
         Happening::Network { bad } => {

@@ -3,23 +3,28 @@
 use super::*;
 use crate::master::config::Connections;
 use crate::police::light::{COMMAND, FEEDBACK, MODE, Mirror};
-use crate::slave::{self, Slave};
+use crate::slave::{self, Network, Slave};
 
-pub(super) type FullRig = VirtualBus<slave::Line<Mirror>>;
+pub(super) type FullRig = VirtualBus<Network<Mirror>>;
 
-pub(super) fn full_rig(count: u16) -> FullRig {
+/// A velocity command and a velocity feedback.
+pub(super) fn configured(address: u16) -> SlaveConfig {
     // The slaves bear it when a test does not send values for a while.
     let command =
         ConnectionConfig { allowed_losses: 60_000, ..ConnectionConfig::new(0, false, &[COMMAND]).unwrap() };
     let connections: Connections =
         [command, ConnectionConfig::new(1, true, &[FEEDBACK]).unwrap()].into_iter().collect();
-    let slaves = (1..=count).map(|address| SlaveConfig { address, connections: connections.clone() });
-    let config = MasterConfig { slaves: slaves.collect(), ..config(&[]) };
-    let slave = |address| {
-        let config = slave::Config { address, ..slave::Config::default() };
-        Slave::new(&config, Mirror::default())
-    };
-    VirtualBus::new(config, slave::Line::new((1..=count).map(slave).collect())).unwrap()
+    SlaveConfig { address, connections }
+}
+
+pub(super) fn mirror(address: u16) -> Slave<Mirror> {
+    let config = slave::Config { address, ..slave::Config::default() };
+    Slave::new(&config, Mirror::default())
+}
+
+pub(super) fn full_rig(count: u16) -> FullRig {
+    let config = MasterConfig { slaves: (1..=count).map(configured).collect(), ..config(&[]) };
+    VirtualBus::new(config, Network::line((1..=count).map(mirror).collect())).unwrap()
 }
 
 #[test]
@@ -59,7 +64,7 @@ fn a_cable_cut_in_cp4_leaves_the_slaves_before_it_running() {
     let mut rig = full_rig(3);
     rig.master.set_target_phase(Phase::CP4);
     rig.state(State::Cp4);
-    rig.line.cut_behind(1);
+    rig.line.cut(1);
     for _ in 0..30 {
         rig.step();
     }

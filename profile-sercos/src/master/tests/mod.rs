@@ -63,4 +63,5 @@ mod faults;
 mod full_slaves;
 mod phase_up;
 mod recording;
+mod ring;
 mod service;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use profile_generic::time::MonotonicTime;
 
-use crate::police::bus::{Stations, Watch};
+use crate::police::bus::{Arrived, Stations, Watch};
+use crate::port::Port;
 use crate::wire::cp12;
 use crate::wire::header::{HEADER_LEN, Header, Kind, Phase};
 use crate::wire::idn::Idn;
@@ -397,7 +398,21 @@ impl Line {
 impl Stations for Line {
     fn handle_time(&mut self, _: MonotonicTime) {}
 
-    fn pass(&mut self, _: MonotonicTime, frame: &mut [u8], watch: &mut Watch<'_>) -> bool {
+    fn pass(
+        &mut self,
+        _: MonotonicTime,
+        port: Port,
+        frame: &mut [u8],
+        watch: &mut Watch<'_>,
+        arrived: &mut Arrived<'_>,
+    ) {
+        self.change(frame, watch);
+        arrived(port, frame);
+    }
+}
+
+impl Line {
+    fn change(&mut self, frame: &mut [u8], watch: &mut Watch<'_>) {
         let header = Header::parse(frame).expect("the master sends good headers");
         for peer in self.peers.iter_mut().filter(|peer| !peer.faults.gone) {
             if header.telegram.is_mst() {
@@ -408,18 +423,15 @@ impl Stations for Line {
             if header.telegram.kind() == Kind::At {
                 self.scan(&header, frame, watch);
             }
-            return true;
+            return;
         }
         for (topology, peer) in (1u16..).zip(&mut self.peers).filter(|(_, peer)| !peer.faults.gone) {
             let before = frame.to_vec();
             peer.telegram(&header, &mut frame[HEADER_LEN..], topology);
             watch(topology, true, &before, frame);
         }
-        true
     }
-}
 
-impl Line {
     fn scan(&mut self, header: &Header, frame: &mut [u8], watch: &mut Watch<'_>) {
         let peers = self.peers.iter().filter(|peer| !peer.faults.gone);
         let count = peers.clone().count();

@@ -1,0 +1,340 @@
+//! The ring in operation: where it is open, and how it is closed again.
+//!
+//! The slaves themselves turn telegrams round where a link is lost, within the cycle. The master sees from S-DEV
+//! which ones do, and so which cable is open; it takes each slave's data from the telegram that has it. It closes
+//! the ring when both ends of the gap see each other's telegrams and nothing but a cable lies between them. With a
+//! lost slave in between it stays open: that one would pass the telegrams on as a switch does, and it can be
+//! brought in only at the end of a line.
+
+use arrayvec::ArrayVec;
+
+use super::Master;
+use super::config::Ports;
+use super::event::{End, Event, Port, SlaveId};
+use super::topology::{Closing, ClosingEvent, Route, Seen, Topology, Watch};
+use crate::wire::device_control::{DeviceControl, Topology as Loop};
+use crate::wire::device_status::InactivePort;
+use crate::wire::header::{Kind, Phase};
+
+/// Cycles in which a slave has to follow a topology command.
+const COMMAND_CYCLES: u16 = 12;
+/// Cycles before a refused closing is tried again.
+const REFUSED_CYCLES: u16 = 1000;
+/// Slaves that are commanded at the same time: both ends of a gap.
+const ENDS_MAX: usize = 2;
+
+/// What the master knows of the way telegrams take.
+#[derive(Debug)]
+pub(super) struct Redundancy {
+    ports: Ports,
+    watch: Watch,
+    /// Slaves from port 1 to port 2, by their index.
+    order: Vec<u16>,
+    /// Cables from port 1 to port 2 that are open; one more than there are slaves.
+    open: Vec<bool>,
+    closing: Closing,
+    /// Cycles in the present state of the closing.
+    cycles: u16,
+    /// Cycles in a row in which a slave was not seen while the ring is being closed.
+    blind: u8,
+    /// The ends that are commanded.
+    ends: ArrayVec<usize, ENDS_MAX>,
+}
+
+impl Redundancy {
+    /// Storage for `slaves` slaves.
+    pub fn new(ports: Ports, slaves: usize) -> Redundancy {
+        let topology = match ports {
+            Ports::One => Topology::LineOne,
+            Ports::Two => Topology::LineTwo,
+            Ports::Both => Topology::Absent,
+        };
+        Redundancy {
+            ports,
+            watch: Watch::new(topology),
+            order: Vec::with_capacity(slaves),
+            open: Vec::with_capacity(slaves + 1),
+            closing: Closing::Idle,
+            cycles: 0,
+            blind: 0,
+            ends: ArrayVec::new(),
+        }
+    }
+
+    /// CP0 begins: with two ports anything may come back.
+    pub fn start(&mut self) {
+        if !self.is_fixed() {
+            self.watch = Watch::new(Topology::Absent);
+        }
+    }
+
+    /// With one port there is nothing but a line.
+    pub fn is_fixed(&self) -> bool {
+        self.ports != Ports::Both
+    }
+
+    pub fn topology(&self) -> Topology {
+        self.watch.topology
+    }
+
+    /// Routes on which telegrams can come in at all.
+    pub fn possible_routes(&self) -> &'static [Route] {
+        match self.ports {
+            Ports::One | Ports::Two => self.watch.topology.routes(),
+            Ports::Both => &Route::ALL,
+        }
+    }
+
+    pub fn admits(&self, route: Route) -> bool {
+        self.watch.topology.admits(route, self.closing != Closing::Idle)
+    }
+
+    /// The cables make a ring: C-DEV bit 11.
+    pub fn is_closed(&self) -> bool {
+        self.watch.topology.is_ring() || self.closing != Closing::Idle
+    }
+
+    fn position(&self, index: usize) -> Option<usize> {
+        self.order.iter().position(|&other| usize::from(other) == index)
+    }
+
+    fn move_on(&mut self, event: ClosingEvent) -> bool {
+        let next = self.closing.next(event);
+        let moved = next != self.closing;
+        if moved {
+            self.closing = next;
+            self.cycles = 0;
+            self.blind = 0;
+        }
+        moved
+    }
+}
+
+impl Master {
+    /// Takes the topology over from the scan.
+    pub(super) fn take_topology(&mut self) {
+        let Some(survey) = self.scan.survey() else { return };
+        let (topology, from_one) = (survey.topology, usize::from(survey.from_one));
+        let redundancy = &mut self.redundancy;
+        redundancy.order.clear();
+        let numbered = (0..from_one).chain((from_one..self.found).rev());
+        redundancy.order.extend(numbered.map(|index| SlaveId::from_index(index).0));
+        redundancy.open.clear();
+        redundancy.open.resize(self.found + 1, false);
+        let gap = match topology {
+            Topology::LineOne => Some(self.found),
+            Topology::LineTwo => Some(0),
+            Topology::BrokenRing => Some(from_one),
+            _ => None,
+        };
+        if let Some(open) = gap.and_then(|gap| redundancy.open.get_mut(gap)) {
+            *open = true;
+        }
+        redundancy.closing = Closing::Idle;
+        if redundancy.is_fixed() {
+            return;
+        }
+        redundancy.watch = Watch::new(topology);
+        self.emit(Event::Topology(topology));
+        if let Some(gap) = gap.filter(|_| topology == Topology::BrokenRing) {
+            let (low, high) = self.cable(gap);
+            self.emit(Event::CableOpen { low, high });
+        }
+    }
+
+    /// The handshake bits start anew with each phase.
+    pub(super) fn reset_topology_commands(&mut self) {
+        self.redundancy.closing = Closing::Idle;
+        for station in &mut self.stations[..self.found] {
+            station.command = DeviceControl::empty();
+        }
+    }
+
+    /// The ends of a cable by its position.
+    fn cable(&self, cable: usize) -> (End, End) {
+        let slave = |position: usize| {
+            let index = usize::from(*self.redundancy.order.get(position)?);
+            let address = self.stations.get(index)?.address;
+            Some(End::Slave { slave: SlaveId::from_index(index), address })
+        };
+        let low = cable.checked_sub(1).and_then(slave).unwrap_or(End::Master(Port::One));
+        (low, slave(cable).unwrap_or(End::Master(Port::Two)))
+    }
+
+    /// The cycle is over: what did not come back is lost, and the ways of the telegrams are looked at.
+    pub(super) fn end_cycle(&mut self) {
+        let routes = match self.scan.survey() {
+            Some(survey) if self.layout_phase == Phase::CP0 && !self.redundancy.is_fixed() => {
+                survey.topology.routes()
+            }
+            _ => self.redundancy.topology().routes(),
+        };
+        let mut mdt_missing = false;
+        for &route in routes {
+            for kind in [Kind::Mdt, Kind::At] {
+                let missing = self.frames.missing(kind, route);
+                self.statistics.count_lost(route.port, kind, missing);
+                mdt_missing |= kind == Kind::Mdt && missing > 0;
+            }
+        }
+        self.statistics.mdt_missing += u64::from(mdt_missing);
+        if self.layout_phase == Phase::CP0 {
+            return;
+        }
+        if !self.redundancy.is_fixed() {
+            let frames = &self.frames;
+            let seen = Seen::of(|route| frames.came(route));
+            if let Some(topology) = self.redundancy.watch.update(seen) {
+                self.emit(Event::Topology(topology));
+            }
+        }
+        self.find_open_cables();
+        if !self.redundancy.is_fixed() && self.state.announces().is_none() {
+            self.close_ring();
+        }
+    }
+
+    /// A slave that has turned the telegrams round has no link on its other side.
+    fn find_open_cables(&mut self) {
+        for position in 0..self.redundancy.order.len() {
+            let index = usize::from(self.redundancy.order[position]);
+            let Some(status) = self.stations[index].status.filter(|_| self.is_valid(&self.stations[index]))
+            else {
+                continue;
+            };
+            let cable = match status.topology() {
+                Loop::LoopbackForwardPrimary => position + 1,
+                Loop::LoopbackForwardSecondary => position,
+                Loop::FastForward | Loop::StoreAndForward => continue,
+            };
+            let newly =
+                self.redundancy.open.get_mut(cable).is_some_and(|open| !core::mem::replace(open, true));
+            if newly {
+                let (low, high) = self.cable(cable);
+                self.emit(Event::CableOpen { low, high });
+            }
+        }
+    }
+
+    /// The slaves that turn telegrams round, if closing the ring is a matter of commanding them.
+    fn closable_ends(&self) -> Option<ArrayVec<usize, ENDS_MAX>> {
+        let mut ends = ArrayVec::new();
+        let (mut low, mut high) = (None, None);
+        for (position, &index) in self.redundancy.order.iter().enumerate() {
+            let station = &self.stations[usize::from(index)];
+            let Some(status) = station.status.filter(|_| self.is_valid(station)) else { continue };
+            let (end, wanted) = match status.topology() {
+                Loop::LoopbackForwardPrimary => (&mut low, InactivePort::SecondaryTelegram),
+                Loop::LoopbackForwardSecondary => (&mut high, InactivePort::PrimaryTelegram),
+                Loop::FastForward | Loop::StoreAndForward => continue,
+            };
+            let sees = status.inactive_port() == wanted && station.is_active();
+            if !sees || end.replace(position).is_some() || ends.try_push(usize::from(index)).is_err() {
+                return None;
+            }
+        }
+        let last = self.redundancy.order.len().checked_sub(1);
+        let joined = match (self.redundancy.topology(), low, high) {
+            (Topology::BrokenRing, Some(low), Some(high)) => low + 1 == high,
+            (Topology::LineOne, Some(low), None) => Some(low) == last,
+            (Topology::LineTwo, None, Some(high)) => high == 0,
+            (Topology::DefectRing { .. }, Some(_), None) | (Topology::DefectRing { .. }, None, Some(_)) => {
+                true
+            }
+            _ => false,
+        };
+        joined.then_some(ends)
+    }
+
+    /// One cycle of closing the ring.
+    fn close_ring(&mut self) {
+        self.redundancy.cycles = self.redundancy.cycles.saturating_add(1);
+        let cycles = self.redundancy.cycles;
+        let event = match self.redundancy.closing {
+            Closing::Idle | Closing::Settling | Closing::Refused => match self.closable_ends() {
+                None => ClosingEvent::Open,
+                Some(ends) => {
+                    self.redundancy.ends = ends;
+                    let wait = match self.redundancy.closing {
+                        Closing::Settling => self.config.close_cycles,
+                        Closing::Refused => REFUSED_CYCLES,
+                        _ => u16::MAX,
+                    };
+                    if cycles >= wait { ClosingEvent::Elapsed } else { ClosingEvent::Closable }
+                }
+            },
+            Closing::Commanded => {
+                let done = self.follow() && self.redundancy.topology() == Topology::Ring;
+                if done { ClosingEvent::Done } else { self.judge_command() }
+            }
+            Closing::Restoring => {
+                let late = cycles >= COMMAND_CYCLES;
+                if self.follow() {
+                    ClosingEvent::Done
+                } else if late {
+                    ClosingEvent::Failed
+                } else {
+                    return;
+                }
+            }
+        };
+        let before = self.redundancy.closing;
+        let culprit = self.redundancy.ends.iter().copied().find(|&end| !self.stations[end].follows_command());
+        if !self.redundancy.move_on(event) {
+            return;
+        }
+        match (before, self.redundancy.closing) {
+            (Closing::Settling, Closing::Commanded) => {
+                for end in self.redundancy.ends.clone() {
+                    self.stations[end].command_topology(Loop::FastForward);
+                }
+            }
+            (Closing::Commanded, Closing::Idle) => {
+                self.redundancy.open.fill(false);
+                self.emit(Event::RingClosed);
+            }
+            (Closing::Commanded, Closing::Restoring) => {
+                let last = self.redundancy.ends.last().copied();
+                if let Some(index) = culprit.or(last) {
+                    let (slave, address) = (SlaveId::from_index(index), self.stations[index].address);
+                    self.emit(Event::RingNotClosed { slave, address });
+                }
+                self.restore_loopback();
+            }
+            _ => {}
+        }
+    }
+
+    fn follow(&self) -> bool {
+        self.redundancy.ends.iter().all(|&end| self.stations[end].follows_command())
+    }
+
+    /// While one end has followed and the other has not, the slaves of a line are not seen. That must not last until
+    /// they count as lost.
+    fn judge_command(&mut self) -> ClosingEvent {
+        let unseen = (0..self.found).any(|index| {
+            let station = &self.stations[index];
+            station.is_active() && !self.is_valid(station)
+        });
+        let redundancy = &mut self.redundancy;
+        redundancy.blind = if unseen { redundancy.blind + 1 } else { 0 };
+        let limit = self.config.slave_valid_misses.max(1);
+        if redundancy.blind >= limit || redundancy.cycles >= COMMAND_CYCLES {
+            ClosingEvent::Failed
+        } else {
+            ClosingEvent::Closable
+        }
+    }
+
+    /// Commands the ends back to what they were before.
+    fn restore_loopback(&mut self) {
+        for end in self.redundancy.ends.clone() {
+            let position = self.redundancy.position(end);
+            let cable_above = position
+                .is_some_and(|position| self.redundancy.open.get(position + 1).copied().unwrap_or(false));
+            let topology =
+                if cable_above { Loop::LoopbackForwardPrimary } else { Loop::LoopbackForwardSecondary };
+            self.stations[end].command_topology(topology);
+        }
+    }
+}
