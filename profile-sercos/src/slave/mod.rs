@@ -212,7 +212,7 @@ impl<A: Application> Slave<A> {
         self.core.state = State::Nrt;
         self.core.fault = None;
         self.core.connection_failed = false;
-        self.enter_nrt();
+        self.enter_nrt(false);
         self.show_diagnosis();
     }
 
@@ -227,6 +227,10 @@ impl<A: Application> Slave<A> {
     /// Looks after time-outs, and after the application where there are no cycles.
     pub fn handle_time(&mut self, now: MonotonicTime) {
         let idle = now.since(self.last_cycle);
+        let silent = now.since(self.core.last_mst) > MST_TIMEOUT;
+        if self.core.state == State::Nrt && self.ports.is_end() && silent {
+            self.ports.stop(false);
+        }
         if self.core.state == State::Nrt && idle >= NRT_PERIOD {
             self.act(now, idle, false);
         } else if self.core.state != State::Nrt && now.since(self.core.last_mst) > self.silence_max() {
@@ -389,17 +393,17 @@ impl<A: Application> Slave<A> {
         }
         match (before, transition.next) {
             (before, after) if before == after => {}
-            (_, State::Nrt) => self.enter_nrt(),
+            (_, State::Nrt) => self.enter_nrt(event != Event::MstTimeout),
             (_, State::In(phase)) if before.phase() != Some(phase) => self.enter(phase),
             _ => {}
         }
     }
 
-    fn enter_nrt(&mut self) {
+    fn enter_nrt(&mut self, heard: bool) {
         self.svc.reset();
         self.core.clear_commands();
         self.core.configuration = None;
-        self.ports.stop();
+        self.ports.stop(heard);
         self.round = Round::default();
     }
 

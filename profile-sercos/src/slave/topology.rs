@@ -144,9 +144,19 @@ impl Ports {
         self.follows = false;
     }
 
-    /// NRT: frames are passed on as by a switch.
-    pub(super) fn stop(&mut self) {
-        *self = Ports { links: self.links, ..Ports::new() };
+    /// NRT: frames are passed on as by a switch. A slave that ends a line and leaves while the telegrams go on,
+    /// `heard`, turns them round as before: the slaves in front of it would be cut off.
+    pub(super) fn stop(&mut self, heard: bool) {
+        self.follows = false;
+        self.toggle = false;
+        if !heard || self.inactive().is_none() {
+            *self = Ports { links: self.links, ..Ports::new() };
+        }
+    }
+
+    /// Whether telegrams are turned round here.
+    pub(super) fn is_end(&self) -> bool {
+        self.inactive().is_some()
     }
 
     /// The handshake bit starts anew with each phase.
@@ -229,7 +239,7 @@ mod tests {
     fn whole_table() {
         use Topology::*;
         type Act = fn(&mut Ports);
-        let events: [(&str, Act); 9] = [
+        let events: [(&str, Act); 10] = [
             ("P side lost", |p| p.set_link(Port::One, false)),
             ("S side lost", |p| p.set_link(Port::Two, false)),
             ("P side back", |p| p.set_link(Port::One, true)),
@@ -238,7 +248,8 @@ mod tests {
             ("command loopback P", |p| p.command(command(LoopbackForwardPrimary))),
             ("command loopback S", |p| p.command(command(LoopbackForwardSecondary))),
             ("CP0 by P on port 1", |p| p.start(Port::One, Channel::Primary)),
-            ("NRT", Ports::stop),
+            ("NRT, telegrams stop", |p| p.stop(false)),
+            ("NRT, telegrams go on", |p| p.stop(true)),
         ];
         let mut table = String::new();
         for topology in [StoreAndForward, FastForward, LoopbackForwardPrimary, LoopbackForwardSecondary] {
@@ -248,7 +259,7 @@ mod tests {
                 for (name, event) in &events {
                     let mut ports = ports(links, topology);
                     if topology == StoreAndForward {
-                        ports.stop();
+                        ports.stop(false);
                     }
                     event(&mut ports);
                     writeln!(table, "    {name:<22} {}", ports.topology()).unwrap();
