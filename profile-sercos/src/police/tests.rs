@@ -502,7 +502,7 @@ fn addressed(configured: &[u16], found: &[u16], addresses: AddressPolicy) -> Bus
         let config = slave::Config { address, ..slave::Config::default() };
         Slave::new(&config, Mirror::default())
     };
-    VirtualBus::new(config, Line::new(found.iter().map(slave).collect())).unwrap()
+    VirtualBus::new(config, Network::line(found.iter().map(slave).collect())).unwrap()
 }
 
 fn addresses(bus: &Bus) -> Vec<u16> {

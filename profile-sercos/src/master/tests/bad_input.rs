@@ -246,7 +246,7 @@ fn reports(idn: Idn, value: i64, said: &str) {
     let mut rig = full_rig(3);
     let config = slave::Config { address: 2, classes: FIXED, fixed: CONNECTIONS, ..slave::Config::default() };
     rig.line.slaves_mut()[1] = Slave::new(&config, Mirror::default());
-    rig.line.cut_behind(usize::MAX);
+    rig.line.mend(1);
     rig.line.slaves_mut()[1].store_mut().set_number_of(idn, value);
     rig.auto_proceed = false;
     rig.master.set_target_phase(Phase::CP4);
