@@ -379,7 +379,7 @@ fn lost_telegrams_of_one_way_cost_nothing() {
             count += u32::from(at == port);
             at != port || !count.is_multiple_of(4)
         });
-        let before = rig.master.statistics().clone();
+        let before = *rig.master.statistics();
         rig.cycles(40);
         rig.tamper = Box::new(|_, _| true);
         rig.cycles(1);
