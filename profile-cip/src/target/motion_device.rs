@@ -404,9 +404,12 @@ impl MotionDevice {
     }
 
     /// Raises a fault of the communications node that only the owner of the device can see. Every axis stops, and it
-    /// stays until the controller resets it.
+    /// stays until the controller resets it. Under a fault that is there already it is a consequence of that one, as a command
+    /// that is withheld for a node fault is, and changes nothing.
     pub fn raise_node_fault(&mut self, fault: NodeFault) {
-        self.node.raise(fault);
+        if !self.node.is_faulted() {
+            self.node.raise(fault);
+        }
     }
 
     /// Tells the state of the device's clock. A new offset moves the time stamps of events that were not told yet.

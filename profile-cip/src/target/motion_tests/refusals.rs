@@ -116,6 +116,8 @@ fn a_malformed_update_changes_nothing_else() {
 fn node_fault_4_ends_with_a_node_fault_reset_and_the_axes_stay_faulted() {
     let (_, _, mut rig) = after(|_| vec![9, 9, 9]);
     rig.cycles(3);
+    // Whoever runs the axes sees that they lost their command. That is a consequence, not a fault of its own.
+    rig.device.raise_node_fault(NodeFault::CONNECTION_UPDATE);
     assert_eq!(rig.state(0), AxisState::MajorFaulted);
     rig.control |= NodeControl::FAULT_RESET;
     rig.cycles(2);
