@@ -276,11 +276,18 @@ fn check_attribute(row: &IdnRow, format: Option<IdnFormat>, resolver: &mut Resol
         && row.list == attribute.is_list()
         && row.command == attribute.is_command()
         && format.map(IdnFormat::of_attribute) == Some(attribute.format())
-        && decimals == attribute.decimals();
+        && decimals == attribute.decimals()
+        && row.write.as_ref().is_none_or(|write| can_write(attribute, write.get_ref()));
     if !same {
         let message = format!("expected what the row says, got {:#010X}: {attribute}", attribute.0);
         resolver.error(word.span(), "attribute", message.replace("0X", "0x"));
     }
+}
+
+/// Whether the phases are among those of the attribute, and are none only when the attribute has none.
+fn can_write(attribute: Attribute, phases: &[u8]) -> bool {
+    let open = (2..=4).filter(|phase| !attribute.write_protected(*phase)).count();
+    phases.iter().all(|phase| !attribute.write_protected(*phase)) && (open == 0 || !phases.is_empty())
 }
 
 fn cyclic(row: &IdnRow, terms: &SercosTerms, resolver: &mut Resolver<'_>) -> [String; 2] {

@@ -214,6 +214,18 @@ const CASES: &[Case] = &[
         "attribute = 0x70110001",
         "attribute = 0x70120001",
     ),
+    (
+        "written where element 3 forbids it",
+        |t| &mut t.sercos_idns,
+        "attribute = 0x40010001",
+        "attribute = 0x60010001",
+    ),
+    (
+        "read only where element 3 lets write",
+        |t| &mut t.sercos_idns,
+        "attribute = 0x70110001",
+        "attribute = 0x60110001",
+    ),
     ("element 3 of another point", |t| &mut t.sercos_idns, "decimals = 3,", "decimals = 4,"),
     (
         "length of which nothing is known",

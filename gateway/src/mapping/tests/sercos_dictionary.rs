@@ -114,22 +114,21 @@ fn says_what_the_sources_say_of_each_idn() {
     assert_eq!(unknown, 179);
 }
 
-/// The phases in which everybody writes who writes at all; `None` when nobody says anything.
+/// The phases in which everybody writes who writes at all: none when nobody writes, `None` when nobody says anything
+/// or those who write have no phase in common.
 fn written(by_source: &str) -> Option<Vec<u8>> {
-    let mut phases: Option<Vec<u8>> = None;
-    for said in by_source.split("; ").filter(|said| !said.is_empty()) {
-        let (_, said) = said.split_once(':').unwrap();
-        let these: Vec<u8> =
-            said.split('+').filter_map(|phase| phase.strip_prefix("CP")?.parse().ok()).collect();
-        phases = Some(match phases {
-            Some(known) if these.is_empty() => known,
-            Some(known) if !known.is_empty() => {
-                known.into_iter().filter(|phase| these.contains(phase)).collect()
-            }
-            _ => these,
-        });
+    let said: Vec<Vec<u8>> = by_source
+        .split("; ")
+        .filter_map(|said| said.split_once(':'))
+        .map(|(_, said)| said.split('+').filter_map(|phase| phase.strip_prefix("CP")?.parse().ok()).collect())
+        .collect();
+    let writers = said.iter().filter(|phases| !phases.is_empty());
+    let common: Vec<u8> =
+        (2..=4).filter(|phase| writers.clone().all(|phases| phases.contains(phase))).collect();
+    match writers.count() {
+        0 => (!said.is_empty()).then(Vec::new),
+        _ => Some(common).filter(|phases| !phases.is_empty()),
     }
-    phases
 }
 
 /// `AT/MDT (R3,M)` as the keys for the AT and for the MDT.
@@ -150,6 +149,7 @@ fn the_test_reads_what_sources_say_as_meant() {
     assert_eq!(written("R1:read-only"), Some(vec![]));
     assert_eq!(written("R1:CP2+CP3; M:read-only; E:CP2"), Some(vec![2]));
     assert_eq!(written("M:read-only; R1:CP4"), Some(vec![4]));
+    assert_eq!(written("R3:CP2+CP3; K1:CP4"), None);
     assert_eq!(cyclic("AT/MDT (R3,M)"), ("R3 M".to_owned(), "R3 M".to_owned()));
     assert_eq!(cyclic("MDT (B)"), (String::new(), "B".to_owned()));
 }
