@@ -58,6 +58,15 @@ impl Core {
         }
     }
 
+    /// The phase whose write protections count. A slave that joins in CP4 goes through those of CP2 and CP3.
+    pub(super) fn access_phase(&self) -> Phase {
+        match self.state {
+            State::Joining(_) if self.conditions.cp3_checked => Phase::CP3,
+            State::Joining(_) => Phase::CP2,
+            state => state.phase().unwrap_or(Phase::CP0),
+        }
+    }
+
     /// Forgets commands: a phase start.
     pub(super) fn clear_commands(&mut self) {
         for handle in self.running.drain(..).chain(self.ended.drain(..)) {
@@ -201,7 +210,7 @@ impl Core {
             }
             (ProcedureControl::INTERRUPT, _) => {}
             (ProcedureControl::EXECUTE, CommandState::Idle | CommandState::Set) => {
-                let phase = self.state.phase().unwrap_or(Phase::CP0);
+                let phase = self.access_phase();
                 let full = self.running.len() + self.ended.len() >= COMMANDS_MAX;
                 if full || parameter.attribute().write_protected(phase.0) {
                     return Err(SvcError::NOT_EXECUTABLE);
@@ -237,7 +246,7 @@ impl<A: Application> Host for Access<'_, A> {
     }
 
     fn phase(&self) -> Phase {
-        self.core.state.phase().unwrap_or(Phase::CP0)
+        self.core.access_phase()
     }
 
     fn refresh(&mut self, handle: Handle) {
@@ -260,7 +269,7 @@ impl<A: Application> Host for Access<'_, A> {
         self.app.check(idn, data, &core.store)?;
         core.store.set_data(handle, data);
         communication::written(&mut core.store, idn);
-        if core.state.phase() == Some(Phase::CP2) && idn.block() >= COMMUNICATION_BLOCKS {
+        if core.access_phase() == Phase::CP2 && idn.block() >= COMMUNICATION_BLOCKS {
             // What has been checked is no longer what is configured.
             core.conditions.cp3_checked = false;
         }

@@ -5,7 +5,7 @@
 //! are not known and are here the error's bit in S-0-0014, or 1 for a lost connection.
 
 use super::communication::idn;
-use super::phase::State;
+use super::phase::{Stage, State};
 use super::{Application, Diagnosis, Slave};
 use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
@@ -65,6 +65,8 @@ impl<A: Application> Slave<A> {
             State::In(Phase::CP4) if own.number != 0 => (own.number, own.text),
             State::In(Phase::CP4) => (0xC30A_0040, "CP4"),
             State::Nrt => (0xC30A_0008, "NRT"),
+            State::Joining(Stage::Scan) => (0xC30A_0031, "HP1"),
+            State::Joining(Stage::Setup) => (0xC30A_0032, "HP2"),
             State::In(phase) | State::Switching(phase, _) => {
                 let texts = ["CP0", "CP1", "CP2", "CP3", "CP4"];
                 let text = texts[usize::from(phase.0.min(4))];

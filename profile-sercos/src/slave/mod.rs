@@ -15,6 +15,7 @@ mod core;
 mod cyclic;
 mod diagnosis;
 pub mod drive;
+mod hot_plug;
 mod network;
 pub mod parameter;
 pub mod phase;
@@ -31,6 +32,7 @@ pub use crate::port::Port;
 
 use self::communication::{FixedConnection, Identity, idn};
 use self::core::Access;
+use self::hot_plug::Joining;
 use self::parameter::Store;
 use self::phase::{Event, Fault, State};
 use self::service_channel::Server;
@@ -115,6 +117,7 @@ pub struct Slave<A> {
     svc: Server,
     app: A,
     ports: Ports,
+    joining: Joining,
     version: CommunicationVersion,
     topology_address: u16,
     /// Cycles of CP0 since a P telegram gave the topology address.
@@ -139,6 +142,7 @@ impl<A: Application> Slave<A> {
             svc,
             app,
             ports: Ports::new(),
+            joining: Joining::new(config.classes),
             version: CommunicationVersion::empty(),
             topology_address: 0,
             address_age: u8::MAX,
@@ -267,6 +271,10 @@ impl<A: Application> Slave<A> {
                 Kind::Mdt => {}
                 Kind::At => self.handle_at(now, &header, entry == port, data),
             }
+        } else if header.telegram.is_mst() && header.phase.phase() == Phase::CP4 && !header.phase.switching()
+        {
+            self.listen(port, channel, header.phase, &frame[HEADER_LEN..]);
+            self.core.last_mst = now;
         }
         self.ports.forward(port, Some(channel), self.forwards_at_end())
     }
@@ -322,6 +330,7 @@ impl<A: Application> Slave<A> {
             Some(Phase::CP0) => self.scan_mdt(number, data),
             Some(Phase::CP1 | Phase::CP2) => self.slots_mdt(number, data),
             Some(Phase::CP3 | Phase::CP4) => self.cyclic_mdt(number, data),
+            _ if matches!(self.core.state, State::Joining(_)) => self.joining_mdt(number, data),
             _ => {}
         }
     }
@@ -343,6 +352,7 @@ impl<A: Application> Slave<A> {
         }
         match self.core.state {
             State::Nrt => {}
+            State::Joining(_) if outward => self.joining_at(number, data),
             State::In(Phase::CP0) => self.scan_at(number, outward, data),
             State::In(Phase::CP1 | Phase::CP2) if outward => self.slots_at(number, data),
             State::In(Phase::CP3 | Phase::CP4) | State::Switching(Phase::CP3, _) => {
@@ -368,12 +378,16 @@ impl<A: Application> Slave<A> {
         self.round = Round { phase: header.phase.0, mdts: 0, acted: false };
         self.address_age = self.address_age.saturating_add(1);
         self.advance(Event::Mst(header.phase));
+        self.finish_joining();
     }
 
     fn cycle_time(&self) -> DurationNs {
         match &self.core.configuration {
             Some(configuration) if self.core.state.phase() >= Some(Phase::CP3) => {
                 DurationNs(i64::from(configuration.cycle_ns))
+            }
+            _ if matches!(self.core.state, State::Joining(_)) => {
+                DurationNs(self.core.store.number_of(Idn::CYCLE_TIME))
             }
             // Shortest cycle of CP0 to CP2.
             _ => DurationNs::from_millis(1),
@@ -404,6 +418,7 @@ impl<A: Application> Slave<A> {
         self.core.clear_commands();
         self.core.configuration = None;
         self.ports.stop(heard);
+        self.joining.forget();
         self.round = Round::default();
     }
 

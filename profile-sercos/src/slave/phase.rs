@@ -25,6 +25,17 @@ pub enum State {
     In(Phase),
     /// In the first phase, with a switch to the second announced.
     Switching(Phase, Phase),
+    /// On the way into a network in CP4: hot plug.
+    Joining(Stage),
+}
+
+/// How far a slave is on its way into a network in CP4. HP0, in which it listens, is NRT.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// HP1: it is scanned and told where its service channel is.
+    Scan,
+    /// HP2: it is set up over the service channel.
+    Setup,
 }
 
 /// Why a slave has left SERCOS communication; the bits of S-0-0014.
@@ -62,6 +73,8 @@ pub enum Event {
     Mst(PhaseField),
     /// No MST for longer than permitted.
     MstTimeout,
+    /// Hot plug is through: set up and checked.
+    Joined,
 }
 
 /// What the transition rules need to know.
@@ -86,7 +99,7 @@ impl State {
     /// The phase whose telegram layout is in force.
     pub const fn phase(self) -> Option<Phase> {
         match self {
-            State::Nrt => None,
+            State::Nrt | State::Joining(_) => None,
             State::In(phase) | State::Switching(phase, _) => Some(phase),
         }
     }
@@ -108,6 +121,19 @@ impl State {
             ) => return fail(Fault::MstLoss),
             // Before CP3, or after a switch down to CP0 was announced, the master may stop without harm.
             (Event::MstTimeout, _) => return to(State::Nrt),
+            (Event::Joined, State::Joining(Stage::Setup))
+                if conditions.cp3_checked && conditions.cp4_checked =>
+            {
+                return to(State::In(Phase::CP4));
+            }
+            (Event::Joined, _) => return to(self),
+            (Event::Mst(field), State::Joining(_)) => {
+                let goes_on = field.phase() == Phase::CP4 || field.phase() == Phase::CP0 && field.switching();
+                if goes_on && !(field.phase() == Phase::CP4 && field.switching()) {
+                    return to(self);
+                }
+                field
+            }
             (Event::Mst(field), _) => field,
         };
         let (wanted, announced) = (field.phase(), field.switching());
@@ -147,6 +173,8 @@ impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             State::Nrt => f.write_str("NRT"),
+            State::Joining(Stage::Scan) => f.write_str("HP1"),
+            State::Joining(Stage::Setup) => f.write_str("HP2"),
             State::In(phase) => write!(f, "{phase}"),
             State::Switching(from, to) => write!(f, "{from}->{to}"),
         }
@@ -164,17 +192,19 @@ mod tests {
         states.extend(phases.map(State::In));
         states.extend(phases.into_iter().filter_map(|phase| Some(State::Switching(phase, phase.next()?))));
         states.extend(phases[1..].iter().map(|&phase| State::Switching(phase, Phase::CP0)));
+        states.extend([Stage::Scan, Stage::Setup].map(State::Joining));
         let mut events = Vec::new();
         for switching in [false, true] {
             events.extend((0..=5).map(|phase| Event::Mst(PhaseField::new(switching, 0, Phase(phase)))));
         }
-        events.push(Event::MstTimeout);
+        events.extend([Event::MstTimeout, Event::Joined]);
         let mut table = String::from("           |");
         for event in &events {
             table += &match event {
                 Event::Mst(field) if field.switching() => format!(" >{:<9}|", field.phase().to_string()),
                 Event::Mst(field) => format!(" {:<10}|", field.phase().to_string()),
-                Event::MstTimeout => " timeout   ".to_owned(),
+                Event::MstTimeout => " timeout    |".to_owned(),
+                Event::Joined => " joined".to_owned(),
             };
         }
         for checked in [true, false] {

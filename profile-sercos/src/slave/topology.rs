@@ -139,6 +139,16 @@ impl Ports {
         self.follow();
     }
 
+    /// Hot plug: the slave becomes the end of the line whose telegrams of `channel` come in on `port`.
+    pub(super) fn join(&mut self, port: Port, channel: Channel) {
+        self.start(port, channel);
+        self.follows = false;
+        self.topology = match channel {
+            Channel::Primary => Topology::LoopbackForwardPrimary,
+            Channel::Secondary => Topology::LoopbackForwardSecondary,
+        };
+    }
+
     /// CP0 is over: the topology is the one of the scan until a link is lost or C-DEV commands another one.
     pub(super) fn hold(&mut self) {
         self.follows = false;

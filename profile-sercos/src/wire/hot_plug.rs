@@ -89,6 +89,14 @@ impl HotPlug {
     pub const SWITCH_TO_SVC: u16 = 1 << 8;
     /// Status bit: the code in bits 7..0 is an error.
     pub const ERROR: u16 = 1 << 8;
+    /// Status code: the slave of this index has been scanned.
+    pub const SCANNED: u16 = 1;
+    /// Error code: the service channel cannot be used yet.
+    pub const ERROR_SWITCH: u16 = 2;
+    /// Error code: the slave has no SERCOS address.
+    pub const ERROR_NO_ADDRESS: u16 = 4;
+    /// Error code: the scan failed.
+    pub const ERROR_SCAN: u16 = 5;
 
     /// Reads the field from the start of `bytes`.
     pub fn parse(bytes: &[u8]) -> Result<HotPlug, Error> {
