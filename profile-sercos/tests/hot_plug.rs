@@ -144,7 +144,7 @@ impl Wire {
         self.step(Element::Data, true, true, 0);
     }
 
-    fn to_setup(&mut self) {
+    fn set_up(&mut self) {
         self.parameters(0);
         self.say(0, ENABLED, 0);
         self.say(ADDRESS, ENABLED | 0x80, 14);
@@ -265,7 +265,7 @@ fn hot_plug_that_is_given_up_leads_back_to_nrt() {
             let mut wire = Wire::new(ADDRESS, WITH_HOT_PLUG);
             match stage {
                 Stage::Scan => wire.parameters(0),
-                Stage::Setup => wire.to_setup(),
+                Stage::Setup => wire.set_up(),
             }
             assert_eq!(wire.state(), State::Joining(stage));
             if silence {
@@ -285,7 +285,7 @@ fn hot_plug_that_is_given_up_leads_back_to_nrt() {
 #[test]
 fn a_slave_that_joins_can_be_scanned_anew() {
     let mut wire = Wire::new(ADDRESS, WITH_HOT_PLUG);
-    wire.to_setup();
+    wire.set_up();
     let mut bench = Bench::new(1, ServoParameters::default());
     bench.line = wire.network;
     bench.now = wire.now;
