@@ -18,7 +18,7 @@ use profile_sercos::master::connection::ConsumerState;
 use profile_sercos::master::event::{Event, Output, Port, SlaveId};
 use profile_sercos::master::phase::State;
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::{Config, Line, Slave};
+use profile_sercos::slave::{Config, Network, Slave};
 use profile_sercos::wire::header::{FRAME_LEN_MAX, Phase};
 use profile_sercos::wire::idn::Idn;
 
@@ -31,7 +31,7 @@ const FRAMES: usize = 8;
 struct Bus {
     now: MonotonicTime,
     master: Master,
-    line: Line<Drive>,
+    line: Network<Drive>,
     frames: Vec<([u8; FRAME_LEN_MAX], usize)>,
     slaves: u16,
     counted: bool,
@@ -61,7 +61,7 @@ impl Bus {
             let config = Config { address, ..Config::default() };
             Slave::new(&config, Drive::new(ServoParameters::default()).expect("sound parameters"))
         };
-        let line = Line::new((1..=slaves).map(slave).collect());
+        let line = Network::line((1..=slaves).map(slave).collect());
         let mut bus = Bus {
             now: MonotonicTime(1),
             master,
@@ -100,7 +100,7 @@ impl Bus {
         }
         let sent = start.elapsed();
         for (bytes, len) in &mut self.frames {
-            assert!(self.line.handle_frame(self.now, &mut bytes[..*len]), "a closed line");
+            assert!(self.line.round_trip(self.now, &mut bytes[..*len]), "a closed line");
         }
         let start = Instant::now();
         if self.counted {

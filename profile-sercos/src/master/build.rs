@@ -1,5 +1,7 @@
 //! The telegrams of the next cycle.
 
+use core::ops::Range;
+
 use profile_generic::time::SystemTime;
 
 use super::Master;
@@ -101,22 +103,23 @@ impl Master {
         let ring = self.redundancy.is_closed();
         let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
         for (number, len) in used(mdt) {
-            let fill = |data: &mut [u8]| {
-                if let (0, Some(extended)) = (number, extended) {
-                    let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
-                    let _ = field.map(|field| extended.emit(field));
-                }
-                for (index, station) in stations.iter().enumerate() {
-                    if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
-                        fill_station(data, number, slot, station, ring);
-                    }
-                    if phase == Phase::CP4 && station.is_active() {
-                        fill_connections(data, number, layout, index, station);
-                    }
-                }
-            };
-            self.frames.add(Kind::Mdt, number, len, fill, |_| {});
+            self.frames.add(Kind::Mdt, number, len, |_| {}, |_| {});
         }
+        // Each slave is visited once, whatever the number of telegrams.
+        let mut mdts = self.frames.mdts();
+        if let (Some(extended), Some(data)) = (extended, &mut mdts[0]) {
+            let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
+            let _ = field.map(|field| extended.emit(field));
+        }
+        for (index, station) in stations.iter().enumerate() {
+            if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
+                fill_station(&mut mdts, slot, station, ring);
+            }
+            if phase == Phase::CP4 && station.is_active() {
+                fill_connections(&mut mdts, layout, index, station);
+            }
+        }
+        self.frames.copy_mdts();
         for (number, len) in used(at) {
             self.frames.add(Kind::At, number, len, |_| {}, |_| {});
         }
@@ -142,16 +145,13 @@ impl Master {
 
 /// Writes a slave's service channel and C-DEV into the MDT that has them. One that takes no part is told nothing but
 /// that its topology is to stay as it is.
-fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station, ring: bool) {
-    if slot.svc.0 == number
-        && station.is_active()
-        && let Some(bytes) = data.get_mut(slot.svc.1..slot.svc.1 + SVC_LEN)
+fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool) {
+    if station.is_active()
+        && let Some(bytes) = part(mdts, slot.svc.0, slot.svc.1..slot.svc.1 + SVC_LEN)
     {
         let _ = station.channel.outgoing().emit(bytes);
     }
-    if slot.device.0 == number
-        && let Some(bytes) = data.get_mut(slot.device.1..slot.device.1 + DEVICE_WORD_LEN)
-    {
+    if let Some(bytes) = part(mdts, slot.device.0, slot.device.1..slot.device.1 + DEVICE_WORD_LEN) {
         let mut control = station.command;
         control.set(DeviceControl::MASTER_VALID, station.is_active());
         control.set(DeviceControl::RING_CLOSED, ring && station.is_active());
@@ -159,16 +159,23 @@ fn fill_station(data: &mut [u8], number: u8, slot: Slot, station: &Station, ring
     }
 }
 
-/// Writes what a slave consumes into the MDT that has it.
-fn fill_connections(data: &mut [u8], number: u8, layout: &CyclicLayout, index: usize, station: &Station) {
+/// Writes what a slave consumes.
+fn fill_connections(mdts: &mut Mdts<'_>, layout: &CyclicLayout, index: usize, station: &Station) {
     let Some(Some(places)) = layout.slaves.get(index) else { return };
     for (connection, end) in station.connections.iter().zip(&station.ends) {
         let End::Producer(producer) = end else { continue };
         let place = places.connections.iter().find(|place| place.instance == connection.instance);
-        if let Some(place) = place.filter(|place| place.at.telegram == number)
-            && let Some(bytes) = data.get_mut(place.at.range(usize::from(place.len)))
-        {
+        let range = place.map(|place| (place.at.telegram, place.at.range(usize::from(place.len))));
+        if let Some(bytes) = range.and_then(|(telegram, range)| part(mdts, telegram, range)) {
             producer.emit(bytes);
         }
     }
+}
+
+/// The data fields of the MDTs by number.
+type Mdts<'a> = [Option<&'a mut [u8]>; TELEGRAMS_MAX];
+
+/// A part of an MDT.
+fn part<'a>(mdts: &'a mut Mdts<'_>, telegram: u8, range: Range<usize>) -> Option<&'a mut [u8]> {
+    mdts.get_mut(usize::from(telegram))?.as_mut()?.get_mut(range)
 }

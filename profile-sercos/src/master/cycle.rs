@@ -168,6 +168,7 @@ impl Master {
         }
         self.condition = match self.state {
             State::Leave1 | State::Leave2 | State::Leave3 | State::Down => self.all_have_left(),
+            State::Cp4 => true,
             _ => (0..self.found).all(|index| !self.stations[index].is_active() || self.meets(index)),
         };
         if self.state.serves() {

@@ -40,6 +40,8 @@ pub(super) struct Frames {
     next: usize,
     /// Data fields of the ATs that have come back, four for each route.
     received: Vec<[u8; DATA_LEN_MAX]>,
+    /// Their lengths; 0 for one that has not come back in this cycle.
+    arrived: [usize; TELEGRAMS_MAX * Route::ALL.len()],
 }
 
 impl Frames {
@@ -55,6 +57,7 @@ impl Frames {
             used: 0,
             next: 0,
             received: vec![[0; DATA_LEN_MAX]; TELEGRAMS_MAX * Route::ALL.len()],
+            arrived: [0; TELEGRAMS_MAX * Route::ALL.len()],
         }
     }
 
@@ -64,6 +67,7 @@ impl Frames {
         self.out = true;
         self.used = 0;
         self.next = 0;
+        self.arrived.fill(0);
     }
 
     /// No frames are out: whatever comes is refused.
@@ -71,6 +75,7 @@ impl Frames {
         self.out = false;
         self.used = 0;
         self.next = 0;
+        self.arrived.fill(0);
     }
 
     /// Adds a telegram with `len` bytes of data, at most 1494, on each port that there is. `fill` gets them zeroed;
@@ -111,6 +116,34 @@ impl Frames {
             }
             None if self.ports == Ports::Two => secondary(data),
             None => {}
+        }
+    }
+
+    /// The data fields of the MDTs on the first port, by number, to be filled.
+    pub fn mdts(&mut self) -> [Option<&mut [u8]>; TELEGRAMS_MAX] {
+        let mut mdts = [const { None }; TELEGRAMS_MAX];
+        let step = if self.ports == Ports::Both { 2 } else { 1 };
+        for frame in self.sent[..self.used].iter_mut().step_by(step) {
+            if frame.telegram.kind() == Kind::Mdt
+                && let Some(mdt) = mdts.get_mut(usize::from(frame.telegram.number()))
+            {
+                *mdt = Some(&mut frame.bytes[HEADER_LEN..frame.len]);
+            }
+        }
+        mdts
+    }
+
+    /// Gives the MDTs on the second port the data of those on the first.
+    pub fn copy_mdts(&mut self) {
+        if self.ports != Ports::Both {
+            return;
+        }
+        for pair in self.sent[..self.used].chunks_exact_mut(2) {
+            let (first, second) = pair.split_at_mut(1);
+            if first[0].telegram.kind() == Kind::Mdt {
+                second[0].bytes[HEADER_LEN..second[0].len]
+                    .copy_from_slice(&first[0].bytes[HEADER_LEN..first[0].len]);
+            }
         }
     }
 
@@ -170,6 +203,7 @@ impl Frames {
             let place = route.index() * TELEGRAMS_MAX + usize::from(header.telegram.number());
             if let Some(received) = self.received.get_mut(place) {
                 received[..frame.len() - HEADER_LEN].copy_from_slice(&frame[HEADER_LEN..]);
+                self.arrived[place] = frame.len() - HEADER_LEN;
             }
         }
         Ok(header.telegram.kind())
@@ -197,12 +231,9 @@ impl Frames {
 
     /// The data field of an AT that came back in this cycle.
     pub fn at(&self, route: Route, number: u8) -> Option<&[u8]> {
-        let telegram = TelegramType::new(route.channel, Kind::At, number);
-        let sent = self.sent[..self.used]
-            .iter()
-            .find(|sent| sent.telegram == telegram && sent.back[route.port.index()])?;
         let place = route.index() * TELEGRAMS_MAX + usize::from(number);
-        self.received.get(place).map(|received| &received[..sent.len - HEADER_LEN])
+        let len = *self.arrived.get(place).filter(|&&len| len > 0)?;
+        self.received.get(place).map(|received| &received[..len])
     }
 }
 

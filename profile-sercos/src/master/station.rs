@@ -122,7 +122,8 @@ pub(super) struct Station {
     pub check_failed: bool,
     /// Rows of the report that come from the first reading; a new attempt keeps them.
     pub read_rows: usize,
-    pub report: ArrayVec<ReportRow, REPORT_MAX>,
+    /// At most [`REPORT_MAX`] rows, for which the room is set aside.
+    pub report: Vec<ReportRow>,
     /// Buffer of the master's own list requests.
     pub list: Vec<u8>,
     /// S-0-0021 or S-0-0022 after a failed check.
@@ -153,7 +154,7 @@ impl Station {
             cursor: Cursor::default(),
             check_failed: false,
             read_rows: 0,
-            report: ArrayVec::new(),
+            report: Vec::with_capacity(REPORT_MAX),
             list: Vec::with_capacity(config.list_capacity),
             invalid: Vec::with_capacity(config.list_capacity / 4),
         }
@@ -218,7 +219,9 @@ impl Station {
 
     pub fn note(&mut self, row: ReportRow) {
         // The report is for people: rows that do not fit are left out.
-        let _ = self.report.try_push(row);
+        if self.report.len() < REPORT_MAX {
+            self.report.push(row);
+        }
     }
 }
 

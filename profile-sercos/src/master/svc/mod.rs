@@ -101,7 +101,10 @@ pub(crate) struct ServiceChannel {
     turn: u64,
     /// Steps since a command in process was asked about.
     unasked: u16,
-    slots: [Slot; REQUESTS_MAX + 1],
+    /// Requests that wait or are parked, and those of the application that are finished: most of the time there are none.
+    pending: usize,
+    finished: usize,
+    slots: Box<[Slot; REQUESTS_MAX + 1]>,
     serial: u64,
 }
 
@@ -119,7 +122,9 @@ impl ServiceChannel {
             changed: 0,
             turn: 0,
             unasked: 0,
-            slots: core::array::from_fn(|_| Slot::empty()),
+            pending: 0,
+            finished: 0,
+            slots: Box::new(core::array::from_fn(|_| Slot::empty())),
             serial: 0,
         }
     }
@@ -147,12 +152,13 @@ impl ServiceChannel {
 
     /// Whether a request is on the wire, or a procedure command in process.
     pub fn is_running(&self) -> bool {
-        self.active.is_some() || self.slots.iter().any(|slot| matches!(slot.place, Place::Parked(..)))
+        let parked = |slot: &Slot| matches!(slot.place, Place::Parked(..));
+        self.active.is_some() || (self.pending > 0 && self.slots.iter().any(parked))
     }
 
     /// Whether nothing is on the wire and nothing waits.
     pub fn is_idle(&self) -> bool {
-        !self.is_running() && !self.slots.iter().any(|slot| matches!(slot.place, Place::Waiting))
+        self.active.is_none() && self.pending == 0
     }
 
     /// The data status which the slave gave last for a request under way: how far a procedure command is. `None` when
@@ -183,12 +189,17 @@ impl ServiceChannel {
 
     fn occupy(&mut self, index: usize, request: SvcRequest) -> u64 {
         self.serial += 1;
+        let again = matches!(self.slots[index].place, Place::Waiting | Place::Parked(..));
+        self.pending += usize::from(!again);
         self.slots[index] = Slot { place: Place::Waiting, serial: self.serial, request };
         self.serial
     }
 
     /// The outcome of one finished request of the application, oldest first, with its place and serial number.
     pub fn take_outcome(&mut self) -> Option<(usize, u64, SvcOutcome)> {
+        if self.finished == 0 {
+            return None;
+        }
         let index = (0..OWN)
             .filter(|&index| matches!(self.slots[index].place, Place::Finished(_)))
             .min_by_key(|&index| self.slots[index].serial)?;
@@ -207,6 +218,9 @@ impl ServiceChannel {
             return None;
         };
         slot.place = Place::Free;
+        if index != OWN {
+            self.finished -= 1;
+        }
         Some(SvcOutcome {
             idn: slot.request.idn,
             operation: slot.request.operation,
@@ -219,11 +233,12 @@ impl ServiceChannel {
     pub fn abort(&mut self, failure: SvcFailure) {
         self.active = None;
         self.free = false;
-        for slot in &mut self.slots {
-            if matches!(slot.place, Place::Waiting | Place::Active | Place::Parked(..)) {
-                slot.place = Place::Finished(Err(failure));
+        for index in 0..self.slots.len() {
+            if matches!(self.slots[index].place, Place::Waiting | Place::Active | Place::Parked(..)) {
+                self.finish(index, Err(failure));
             }
         }
+        self.pending = 0;
     }
 
     /// Puts the first step of a waiting request on the wire when the slave was through in the last cycle.
@@ -290,8 +305,19 @@ impl ServiceChannel {
         }
     }
 
+    /// A request has come to its end.
+    fn finish(&mut self, index: usize, result: Result<SvcReply, SvcFailure>) {
+        self.slots[index].place = Place::Finished(result);
+        if index != OWN {
+            self.finished += 1;
+        }
+    }
+
     /// Makes the most urgent request the active one.
     fn start(&mut self) -> bool {
+        if self.pending == 0 {
+            return false;
+        }
         let Some(index) = self.next() else {
             return false;
         };
@@ -304,6 +330,7 @@ impl ServiceChannel {
             }
             _ => Transfer::new(&mut slot.request),
         };
+        self.pending -= 1;
         self.active = Some((index, transfer, false));
         true
     }
@@ -348,11 +375,13 @@ impl ServiceChannel {
                     self.turn += 1;
                     if let Some((_, transfer, _)) = self.active.take() {
                         self.slots[index].place = Place::Parked(transfer, self.turn);
+                        self.pending += 1;
                     }
                     self.start();
                 }
                 Flow::Finished(result) => {
-                    self.slots[*index].place = Place::Finished(result);
+                    let index = *index;
+                    self.finish(index, result);
                     self.active = None;
                     info = Ok(0);
                     self.start();
@@ -375,7 +404,7 @@ impl ServiceChannel {
 
     fn fail(&mut self, failure: SvcFailure) {
         if let Some((index, _, _)) = self.active.take() {
-            self.slots[index].place = Place::Finished(Err(failure));
+            self.finish(index, Err(failure));
         }
         self.missing_cycles = 0;
         self.busy_since = None;
