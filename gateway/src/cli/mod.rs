@@ -202,9 +202,12 @@ enum Simulate {
 /// Arguments of `simulate sercos-drive`.
 #[derive(Debug, Args)]
 struct SercosDriveArguments {
-    /// The network interface, such as eth1.
+    /// The network interface, such as eth1; it leads to the master's port 1.
     #[arg(long, value_name = "IF")]
     interface: String,
+    /// A second interface, where the line goes on to other drives or the ring closes.
+    #[arg(long, value_name = "IF2")]
+    ring: Option<String>,
     /// How many drives hang on the line.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
     slaves: u16,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use arrayvec::ArrayVec;
 use profile_generic::scaling::UnitKind;
 
 use super::progress::Progress;
@@ -13,7 +14,7 @@ use super::report::{AxisResult, RunResult, failure};
 use super::{CliError, ControllerArguments, SercosDriveArguments, script, signal};
 use crate::mapping::Mapping;
 use crate::simulate::controller::{self, Endpoints};
-use crate::simulate::line;
+use crate::simulate::drives;
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
@@ -42,10 +43,15 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
             format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into()
         );
     }
-    let socket = PacketSocket::open(&arguments.interface, ETHER_TYPE_SERCOS)?;
+    let mut sockets = ArrayVec::new();
+    sockets.push(PacketSocket::open(&arguments.interface, ETHER_TYPE_SERCOS)?);
+    if let Some(ring) = &arguments.ring {
+        sockets.push(PacketSocket::open(ring, ETHER_TYPE_SERCOS)?);
+    }
     let kind =
         |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
-    let mut drives = line::line((arguments.address..=last).map(|address| (address, kind(&address))));
+    let addresses = (arguments.address..=last).map(|address| (address, kind(&address)));
+    let mut drives = drives::drives(addresses, arguments.ring.is_some());
     let stop = signal::stop_on_signals()?;
     if let Some(seconds) = arguments.seconds {
         end_after(Arc::clone(&stop), seconds);
@@ -58,10 +64,10 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         "{} drives with addresses {} to {last} on {}{}",
         arguments.slaves,
         arguments.address,
-        arguments.interface,
+        arguments.ring.iter().fold(arguments.interface.clone(), |all, ring| format!("{all}, {ring}")),
         if refused.is_empty() { String::new() } else { format!(" ({refused})") }
     ));
-    line::run(&mut drives, &socket, &stop)?;
+    drives::run(&mut drives, &sockets, &stop)?;
     Ok(ExitCode::SUCCESS)
 }
 

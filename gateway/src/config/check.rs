@@ -631,7 +631,7 @@ impl Checker {
     }
 
     fn sercos(&mut self, table: &SercosTable) -> Option<Sercos> {
-        let link = self.link(&table.interface);
+        let link = self.link(&table.interface, table.ring_interface.as_ref());
         let cycle_time = self.cycle_time(&table.cycle_time);
         let master_mac = match &table.master_mac {
             Some(text) => self.mac(text).map(Some),
@@ -666,10 +666,39 @@ impl Checker {
         })
     }
 
-    fn link(&mut self, name: &Spanned<String>) -> Option<Link> {
+    fn link(&mut self, name: &Spanned<String>, ring: Option<&Spanned<String>>) -> Option<Link> {
+        let first = self.interface(name);
+        let second = ring.map(|ring| self.interface(ring));
+        let Some(ring) = ring else {
+            return first.map(|first| match first {
+                None => Link::InProcess { ring: false },
+                Some(name) => Link::Interface { name, ring: None },
+            });
+        };
+        match (first?, second??) {
+            (None, None) => Some(Link::InProcess { ring: true }),
+            (Some(first), Some(second)) if first != second => {
+                Some(Link::Interface { name: first, ring: Some(second) })
+            }
+            (Some(first), Some(_)) => self.report(
+                ring.span(),
+                format_args!("`{first}` is the interface of the first port already"),
+                "expected another interface: both ends of a ring have a port of their own",
+            ),
+            _ => self.report(
+                ring.span(),
+                "simulated and real drives cannot share a ring",
+                "expected two names of interfaces, or \"in-process\" for both",
+            ),
+        }
+    }
+
+    /// The name of an interface, `None` for drives in the process.
+    #[expect(clippy::option_option, reason = "the outer one says that there is an error, as everywhere here")]
+    fn interface(&mut self, name: &Spanned<String>) -> Option<Option<String>> {
         let text = name.get_ref();
         if text == IN_PROCESS {
-            return Some(Link::InProcess);
+            return Some(None);
         }
         if text.is_empty() || text.len() > INTERFACE_LEN_MAX || text.contains(['/', ' ', '\0']) {
             return self.report(
@@ -678,7 +707,7 @@ impl Checker {
                 "expected the name of an interface, 1 to 15 characters, or \"in-process\"",
             );
         }
-        Some(Link::Interface(text.clone()))
+        Some(Some(text.clone()))
     }
 
     fn cycle_time(&mut self, text: &Spanned<String>) -> Option<DurationNs> {

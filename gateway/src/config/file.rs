@@ -209,6 +209,9 @@ pub struct SouthTable {
 pub struct SercosTable {
     /// Network interface of the bus, such as `"enp3s0"`, or `"in-process"` for simulated drives.
     pub interface: Spanned<String>,
+    /// Interface of the master's second port, where the other end of a ring is plugged in, or a second line; `"in-process"`
+    /// closes the ring of simulated drives. Default: none, and the drives are a line.
+    pub ring_interface: Option<Spanned<String>>,
     /// Communication cycle: `31.25 us`, `62.5 us`, `125 us`, `250 us`, or a multiple of `250 us` up to `65
     /// ms`.
     pub cycle_time: Spanned<String>,

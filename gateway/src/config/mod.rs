@@ -315,9 +315,25 @@ impl StoppingAction {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Link {
     /// Simulated drives inside this process.
-    InProcess,
-    /// A network interface of the host.
-    Interface(String),
+    InProcess {
+        /// In a ring; else in a line.
+        ring: bool,
+    },
+    /// Network interfaces of the host.
+    Interface {
+        /// The master's port 1.
+        name: String,
+        /// Its port 2: the other end of a ring, or a second line.
+        ring: Option<String>,
+    },
+}
+
+impl Link {
+    /// Whether the master has both of its ports.
+    #[must_use]
+    pub const fn has_ring(&self) -> bool {
+        matches!(self, Self::InProcess { ring: true } | Self::Interface { ring: Some(_), .. })
+    }
 }
 
 /// The SERCOS III bus.

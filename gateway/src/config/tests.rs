@@ -104,7 +104,7 @@ fn defaults_are_those_of_the_documentation() {
     assert_eq!(
         config.sercos,
         Sercos {
-            link: Link::InProcess,
+            link: Link::InProcess { ring: false },
             cycle_time: DurationNs(2_000_000),
             master_mac: None,
             jitter: DurationNs(50_000),
@@ -164,7 +164,7 @@ fn values_given_are_taken() {
         }
     );
     let sercos = &config.sercos;
-    assert_eq!(sercos.link, Link::Interface("enp3s0".to_owned()));
+    assert_eq!(sercos.link, Link::Interface { name: "enp3s0".to_owned(), ring: None });
     assert_eq!((sercos.cycle_time, sercos.jitter), (DurationNs(62_500), DurationNs(15_625)));
     assert_eq!(sercos.master_mac, Some([2, 0, 0, 0, 0, 0xAF]));
     assert_eq!((sercos.cp0_stable_cycles, sercos.allowed_losses), (1, 65_535));

@@ -19,7 +19,7 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
-use profile_sercos::master::config::{Connections, MasterConfig, SlaveConfig};
+use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConfig};
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
 use super::bus::SercosBus;
@@ -130,6 +130,7 @@ fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
     let sercos = &config.sercos;
     let ns = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
     let mut master = MasterConfig::new(sercos.master_mac.unwrap_or(host.mac), ns(sercos.cycle_time));
+    master.ports = if sercos.link.has_ring() { Ports::Both } else { Ports::One };
     master.mst_jitter_ns = ns(sercos.jitter);
     master.stable_cycles = sercos.cp0_stable_cycles;
     master.mst_losses = sercos.allowed_losses;

@@ -38,15 +38,12 @@ use crate::mapping::{Mapping, TableErrors};
 use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
-use crate::simulate::line::InProcessLine;
+use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 use crate::simulate::setup::HOST_CLOCK;
 use crate::status::BoxStatus;
 use crate::sys::clock::{SystemClock, TimeScale, monotonic_now};
-use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
+use crate::sys::packet_socket::OpenError;
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
-
-/// Ethernet address of the master on simulated drives: locally administered.
-const SIMULATED_MAC: [u8; 6] = [0x02, 0x41, 0x42, 0x00, 0x00, 0x01];
 
 /// How often notices are taken from the cycle thread.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
@@ -131,11 +128,11 @@ pub fn start(
         Some(dir) => Mapping::from_folder(dir)?,
         None => Mapping::embedded()?,
     };
-    let socket = match &config.sercos.link {
-        Link::Interface(name) => Some(PacketSocket::open(name, ETHER_TYPE_SERCOS)?),
-        Link::InProcess => None,
+    let wire = match &config.sercos.link {
+        Link::Interface { name, ring } => Some(PacketPort::open(name, ring.as_deref())?),
+        Link::InProcess { .. } => None,
     };
-    let mac = socket.as_ref().map_or(SIMULATED_MAC, PacketSocket::mac);
+    let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
     let Built { mut engine, mut adapters, notices, status } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
@@ -144,9 +141,9 @@ pub fn start(
 
     let (recorder, mut taps) = record(config, capture)?;
     let mut tap = || taps.pop();
-    let south: Box<dyn SouthPort + Send> = match socket {
-        Some(socket) => Box::new(PacketPort::new(socket, tap())),
-        None => Box::new(InProcessLine::of(config, tap())),
+    let south: Box<dyn SouthPort + Send> = match wire {
+        Some(wire) => Box::new(wire.recorded(tap())),
+        None => Box::new(InProcessDrives::of(config, tap())),
     };
     let mut north = Vec::with_capacity(config.devices.len());
     let mut markers = Vec::with_capacity(config.devices.len());
@@ -269,8 +266,10 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
     settings.north =
         config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
     settings.south = match &config.sercos.link {
-        Link::Interface(name) => name.clone(),
-        Link::InProcess => "simulated SERCOS III line".to_owned(),
+        Link::Interface { name, ring: None } => name.clone(),
+        Link::Interface { name, ring: Some(ring) } => format!("{name}, {ring}"),
+        Link::InProcess { ring: false } => "simulated SERCOS III line".to_owned(),
+        Link::InProcess { ring: true } => "simulated SERCOS III ring".to_owned(),
     };
     settings.depth = 4096;
     // The bus, and for each device its I/O and its explicit side.

@@ -2,6 +2,7 @@
 
 use std::net::SocketAddrV4;
 
+use arrayvec::ArrayVec;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 
@@ -9,7 +10,7 @@ use crate::capture::Side;
 use crate::capture::recorder::Tap;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock;
-use crate::sys::packet_socket::PacketSocket;
+use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
 use crate::sys::udp::IoSocket;
 
 /// The UDP socket of one motion device.
@@ -53,39 +54,69 @@ impl NorthPort for UdpPort {
     }
 }
 
-/// The network interface of a SERCOS III line.
+/// The network interfaces of a SERCOS III master: its port 1, and its port 2 where it has one.
 #[derive(Debug)]
 pub struct PacketPort {
-    socket: PacketSocket,
+    sockets: ArrayVec<PacketSocket, 2>,
+    /// Which one is asked first: the other one than last time.
+    first: usize,
     tap: Option<Tap>,
 }
 
 impl PacketPort {
-    /// A port on an open socket.
+    /// Opens the interfaces.
+    ///
+    /// # Errors
+    /// One of them cannot be opened.
+    pub fn open(name: &str, ring: Option<&str>) -> Result<Self, OpenError> {
+        let mut sockets = ArrayVec::new();
+        sockets.push(PacketSocket::open(name, ETHER_TYPE_SERCOS)?);
+        if let Some(ring) = ring {
+            sockets.push(PacketSocket::open(ring, ETHER_TYPE_SERCOS)?);
+        }
+        Ok(Self { sockets, first: 0, tap: None })
+    }
+
+    /// The same, with a recording of what goes to and fro.
     #[must_use]
-    pub fn new(socket: PacketSocket, tap: Option<Tap>) -> Self {
-        Self { socket, tap }
+    pub fn recorded(self, tap: Option<Tap>) -> Self {
+        Self { tap, ..self }
+    }
+
+    /// Ethernet address of port 1, from which both send.
+    #[must_use]
+    pub fn mac(&self) -> [u8; 6] {
+        self.sockets[0].mac()
     }
 }
 
+/// The ports by the number of their socket.
+const PORTS: [Port; 2] = [Port::One, Port::Two];
+
 impl SouthPort for PacketPort {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
-        // A link that is down gives nothing, which the master sees by itself.
-        let received = self.socket.recv(buffer).ok().flatten()?;
-        let len = received.len.min(buffer.len());
-        if let Some(tap) = self.tap.as_mut() {
-            tap.frame(received.at.unwrap_or_else(clock::realtime_now), Side::South, &buffer[..len]);
+        let count = self.sockets.len();
+        for step in 0..count {
+            let number = (self.first + step) % count;
+            // A link that is down gives nothing, which the master sees by itself.
+            let Some(received) = self.sockets[number].recv(buffer).ok().flatten() else { continue };
+            self.first = (number + 1) % count;
+            let len = received.len.min(buffer.len());
+            if let Some(tap) = self.tap.as_mut() {
+                tap.frame(received.at.unwrap_or_else(clock::realtime_now), Side::South, &buffer[..len]);
+            }
+            return Some((PORTS[number], len));
         }
-        Some((Port::One, len))
+        None
     }
 
     fn send(&mut self, _now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
-        if port != Port::One {
-            return false;
-        }
+        let socket =
+            PORTS.iter().position(|known| *known == port).and_then(|number| self.sockets.get(number));
+        let Some(socket) = socket else { return false };
         if let Some(tap) = self.tap.as_mut() {
             tap.frame(clock::realtime_now(), Side::South, frame);
         }
-        self.socket.send(frame).is_ok()
+        socket.send(frame).is_ok()
     }
 }

@@ -3,7 +3,7 @@
 //! The protocol engines live in the profile crates; here they get sockets, a clock and a program.
 
 pub mod controller;
-pub mod line;
+pub mod drives;
 pub mod program;
 pub mod script;
 pub mod setup;

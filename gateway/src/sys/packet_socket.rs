@@ -9,6 +9,7 @@ use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
 use std::time::Duration;
 
+use arrayvec::ArrayVec;
 use thiserror::Error;
 
 use super::clock::KernelTime;
@@ -276,24 +277,6 @@ impl PacketSocket {
         Ok(None)
     }
 
-    /// Waits until a frame can be received or `timeout` is over; `true` when one can.
-    ///
-    /// For threads that are not the cycle's.
-    ///
-    /// # Errors
-    /// What `poll` refuses.
-    pub fn wait(&self, timeout: Duration) -> io::Result<bool> {
-        let mut entry = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-        let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
-        // SAFETY: `entry` is one valid, writable `pollfd` that outlives the call.
-        let ready = unsafe { libc::poll(&raw mut entry, 1, milliseconds) };
-        if ready < 0 {
-            let error = io::Error::last_os_error();
-            return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
-        }
-        Ok(ready > 0)
-    }
-
     /// Frames the kernel dropped since the last call because they were not fetched in time.
     #[must_use]
     pub fn take_dropped(&self) -> u32 {
@@ -311,6 +294,30 @@ impl PacketSocket {
         };
         if result == 0 { statistics.tp_drops } else { 0 }
     }
+}
+
+/// Waits until a frame can be received from one of the sockets (two at most) or `timeout` is over; `true` when one can.
+///
+/// For threads that are not the cycle's.
+///
+/// # Errors
+/// What `poll` refuses.
+pub fn wait(sockets: &[PacketSocket], timeout: Duration) -> io::Result<bool> {
+    let entry = |socket: &PacketSocket| libc::pollfd {
+        fd: socket.socket.as_raw_fd(),
+        events: libc::POLLIN,
+        revents: 0,
+    };
+    let mut entries: ArrayVec<_, 2> = sockets.iter().take(2).map(entry).collect();
+    let count = libc::nfds_t::try_from(entries.len()).unwrap_or(0);
+    let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: `entries` are `count` valid, writable `pollfd`s that outlive the call.
+    let ready = unsafe { libc::poll(entries.as_mut_ptr(), count, milliseconds) };
+    if ready < 0 {
+        let error = io::Error::last_os_error();
+        return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
+    }
+    Ok(ready > 0)
 }
 
 impl AsFd for PacketSocket {
@@ -406,7 +413,7 @@ mod tests {
 
             let mut buffer = [0xA5; 1518];
             for payload in [2, 3] {
-                assert!(b.wait(Duration::from_secs(5)).unwrap());
+                assert!(wait(std::slice::from_ref(&b), Duration::from_secs(5)).unwrap());
                 let received = b.recv(&mut buffer).unwrap().unwrap();
                 assert_eq!(buffer[..received.len], frame(ETHER_TYPE_SERCOS, payload));
                 if b.has_time_stamps() {
@@ -416,7 +423,7 @@ mod tests {
             }
             assert_eq!(b.recv(&mut buffer).unwrap(), None);
             assert_eq!(a.recv(&mut buffer).unwrap(), None, "the sender sees its own frames");
-            assert!(!a.wait(Duration::from_millis(1)).unwrap());
+            assert!(!wait(std::slice::from_ref(&a), Duration::from_millis(1)).unwrap());
             assert_eq!(b.take_dropped(), 0);
         });
     }
@@ -447,7 +454,7 @@ mod tests {
             ip("link set south1 up");
             assert_eq!(b.recv(&mut buffer), Err(LinkError::Down));
             a.send(&frame(ETHER_TYPE_SERCOS, 7)).unwrap();
-            assert!(b.wait(Duration::from_secs(5)).unwrap());
+            assert!(wait(std::slice::from_ref(&b), Duration::from_secs(5)).unwrap());
             assert_eq!(b.recv(&mut buffer).unwrap().unwrap().len, 60);
 
             ip("link del south0");

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use axisbridge::simulate::line::{DriveLine, line};
+use axisbridge::simulate::drives::{DriveNetwork, drives};
 use criterion::{BenchmarkId, Criterion};
 use profile_generic::scaling::UnitKind;
 use profile_generic::time::MonotonicTime;
@@ -37,7 +37,7 @@ struct Frame {
 struct Bus {
     now: MonotonicTime,
     master: Master,
-    line: DriveLine,
+    line: DriveNetwork,
     frames: Vec<Frame>,
     slaves: u16,
 }
@@ -60,7 +60,7 @@ impl Bus {
         };
         let mut master = Master::new(config).expect("a sound configuration");
         master.set_target_phase(Phase::CP4);
-        let line = line((1..=slaves).map(|address| (address, UnitKind::Rotary)));
+        let line = drives((1..=slaves).map(|address| (address, UnitKind::Rotary)), false);
         let mut bus =
             Self { now: MonotonicTime(1), master, line, frames: Vec::with_capacity(FRAMES), slaves };
         for _ in 0..CYCLES_UP {

@@ -25,7 +25,7 @@ use axisbridge::engine::notice::Notice;
 use axisbridge::latest::Reader;
 use axisbridge::mapping::Mapping;
 use axisbridge::north::AdapterEnd;
-use axisbridge::simulate::line::{DriveLine, line};
+use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::simulate::setup;
 use axisbridge::status::BoxStatus;
 use profile_cip::controller::sets::DataSets;
@@ -136,7 +136,7 @@ pub struct Rig {
     /// What the engine told.
     pub notices: Vec<Notice>,
     /// The drives.
-    pub line: DriveLine,
+    pub line: DriveNetwork,
     /// What was seen of each drive.
     pub watched: Vec<Watched>,
     /// The network between controller and box.
@@ -176,7 +176,7 @@ impl Rig {
     pub fn new(settings: Settings) -> Self {
         let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
         let (engine, adapter, link, notice_queue, status) = assemble(&config);
-        let line = line(settings.drives.iter().copied());
+        let line = drives(settings.drives.iter().copied(), false);
         Self {
             controller: None,
             events: Vec::new(),

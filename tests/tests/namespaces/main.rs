@@ -2,6 +2,8 @@
 //!
 //! Needs root and iproute2: a visible skip where they are missing, a failure in CI.
 
+mod sercos;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -50,7 +52,7 @@ fn wait_for(log: &Path, text: &str, process: &mut Running) {
 
 /// The shipped example, with this test's interface and addresses.
 fn configuration(name: &str) -> PathBuf {
-    let example = include_str!("../../examples/two-axes-sercos.toml")
+    let example = include_str!("../../../examples/two-axes-sercos.toml")
         .replace("enp3s0", "sercos0")
         .replace("192.168.1.10", "192.168.10.20")
         // The machine of the tests has no processor to spare.

@@ -1,0 +1,252 @@
+//! Simulated SERCOS III drives: slaves with a servo behind them, inside this process or between network interfaces.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use arrayvec::ArrayVec;
+use profile_generic::quantity::{Acceleration, Position, Torque, TorqueAbsolute, Velocity};
+use profile_generic::scaling::UnitKind;
+use profile_generic::servo::ServoParameters;
+use profile_generic::time::MonotonicTime;
+use profile_sercos::master::event::Port;
+use profile_sercos::slave::drive::Drive;
+use profile_sercos::slave::{Config as SlaveConfig, Network, Slave};
+
+use crate::capture::Side;
+use crate::capture::recorder::Tap;
+use crate::config::{AxisKind, Config};
+use crate::engine::port::{FRAME_MAX, SouthPort};
+use crate::sys::clock;
+use crate::sys::packet_socket::{self, LinkState, PacketSocket};
+
+/// Ethernet address of the master on drives in the same process: locally administered.
+pub const SIMULATED_MAC: [u8; 6] = [0x02, 0x41, 0x42, 0x00, 0x00, 0x01];
+
+/// Drives and the cables between them.
+pub type DriveNetwork = Network<Drive>;
+
+/// Frames on their way back: a cycle has eight on each port, those of two cycles fit.
+const FRAMES_MAX: usize = 32;
+
+/// How long the drives wait for a frame before it looks after its time-outs.
+const WAIT: Duration = Duration::from_millis(10);
+
+/// Longest pause that does not hold up the end of the process.
+const FRAMES_PER_WAKE: usize = 64;
+
+/// A servo of a turning axis: 1 Nm, 3000 revolutions per minute.
+#[must_use]
+pub fn rotary() -> ServoParameters {
+    ServoParameters::default()
+}
+
+/// A linear motor: 200 N on a slide of 10 kg, 1.5 m/s.
+#[must_use]
+pub fn linear() -> ServoParameters {
+    const MILLIMETRE: i64 = 1_000_000_000;
+    ServoParameters {
+        kind: UnitKind::Linear,
+        encoder_counts: 10_000,
+        encoder_bits: 32,
+        rated_torque: TorqueAbsolute(200_000_000),
+        inertia: 10_000_000,
+        coulomb_friction: Torque(20_000),
+        viscous_friction: Torque(30_000),
+        rated_velocity: Velocity(1_000 * MILLIMETRE),
+        velocity_limit: Velocity(1_500 * MILLIMETRE),
+        deceleration_limit: Acceleration(20_000 * MILLIMETRE),
+        position_error_tolerance: Position(20 * MILLIMETRE),
+        in_position_window: Position(MILLIMETRE / 100),
+        standstill_window: Velocity(MILLIMETRE),
+        marker_distance: Position(20 * MILLIMETRE),
+        ..ServoParameters::default()
+    }
+}
+
+/// Drives with these SERCOS addresses, nearest to the master's port 1 first: in a ring, or else in a line.
+///
+/// # Panics
+/// Never with the servos of this module; a test builds both.
+#[must_use]
+pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
+    let slaves = drives.into_iter().map(|(address, kind)| {
+        let servo = match kind {
+            UnitKind::Rotary => rotary(),
+            UnitKind::Linear => linear(),
+        };
+        let drive = Drive::new(servo).expect("the servos of this module work");
+        let [low, high] = address.to_le_bytes();
+        let mac = [0x02, 0x41, 0x42, 0x01, high, low];
+        let config = SlaveConfig { address, mac, serial: u32::from(address), ..SlaveConfig::default() };
+        Slave::new(&config, drive)
+    });
+    let slaves = slaves.collect();
+    if ring { Network::ring(slaves) } else { Network::line(slaves) }
+}
+
+/// Drives inside this process: what is sent comes back at once, changed as the slaves change it. The frames are the
+/// same as on a wire.
+#[derive(Debug)]
+pub struct InProcessDrives {
+    network: DriveNetwork,
+    returned: Returned,
+    tap: Option<Tap>,
+}
+
+/// Frames that have come back and were not taken yet.
+#[derive(Debug)]
+struct Returned {
+    frames: Box<[(Port, [u8; FRAME_MAX], usize); FRAMES_MAX]>,
+    first: usize,
+    count: usize,
+}
+
+impl Returned {
+    fn new() -> Self {
+        Self { frames: Box::new([(Port::One, [0; FRAME_MAX], 0); FRAMES_MAX]), first: 0, count: 0 }
+    }
+
+    /// Keeps a frame; one for which there is no room is lost.
+    fn push(&mut self, port: Port, frame: &[u8]) {
+        if self.count == FRAMES_MAX {
+            return;
+        }
+        let (on, bytes, length) = &mut self.frames[(self.first + self.count) % FRAMES_MAX];
+        let Some(place) = bytes.get_mut(..frame.len()) else { return };
+        place.copy_from_slice(frame);
+        (*on, *length) = (port, frame.len());
+        self.count += 1;
+    }
+
+    fn pop(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        self.count = self.count.checked_sub(1)?;
+        let (port, frame, length) = &self.frames[self.first];
+        let length = (*length).min(buffer.len());
+        buffer[..length].copy_from_slice(&frame[..length]);
+        self.first = (self.first + 1) % FRAMES_MAX;
+        Some((*port, length))
+    }
+}
+
+impl InProcessDrives {
+    /// The master's ports on `network`.
+    #[must_use]
+    pub fn new(network: DriveNetwork, tap: Option<Tap>) -> Self {
+        Self { network, returned: Returned::new(), tap }
+    }
+
+    /// The drives of a configuration, each for the axis it is to move.
+    #[must_use]
+    pub fn of(config: &Config, tap: Option<Tap>) -> Self {
+        let kind =
+            |drive: usize| match config.axes.iter().find(|axis| axis.drive == drive).map(|axis| axis.kind) {
+                Some(AxisKind::Linear) => UnitKind::Linear,
+                _ => UnitKind::Rotary,
+            };
+        let addresses = config.sercos.drives.iter().enumerate();
+        let addresses = addresses.map(|(number, drive)| (drive.address, kind(number)));
+        Self::new(drives(addresses, config.sercos.link.has_ring()), tap)
+    }
+}
+
+impl SouthPort for InProcessDrives {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        let (port, length) = self.returned.pop(buffer)?;
+        if let Some(tap) = self.tap.as_mut() {
+            tap.frame(clock::realtime_now(), Side::South, &buffer[..length]);
+        }
+        Some((port, length))
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        let mut buffer = [0; FRAME_MAX];
+        let Some(bytes) = buffer.get_mut(..frame.len()) else { return false };
+        bytes.copy_from_slice(frame);
+        if let Some(tap) = self.tap.as_mut() {
+            tap.frame(clock::realtime_now(), Side::South, frame);
+        }
+        let Self { network, returned, .. } = self;
+        network.handle_time(now);
+        network.send(now, port, bytes, &mut |port, frame| returned.push(port, frame));
+        true
+    }
+}
+
+/// Runs drives between network interfaces until `stop` is set: the first one is the one nearer to the master's port 1,
+/// and behind the second one, where there is one, the line goes on or the ring closes.
+///
+/// # Errors
+/// An interface is gone.
+pub fn run(
+    network: &mut DriveNetwork,
+    sockets: &ArrayVec<PacketSocket, 2>,
+    stop: &AtomicBool,
+) -> std::io::Result<()> {
+    let mut buffer = [0; FRAME_MAX];
+    // As the links were when they were looked at last; all drives begin with both.
+    let mut up = [true; 2];
+    while !stop.load(Ordering::Relaxed) {
+        network.handle_time(clock::monotonic_now());
+        let waiting = packet_socket::wait(sockets, WAIT)?;
+        for (number, socket) in sockets.iter().enumerate() {
+            let is_up = socket.link_state() == LinkState::Up;
+            if std::mem::replace(&mut up[number], is_up) != is_up {
+                let cable = if number == 0 { 0 } else { network.slaves().len() };
+                network.set_cable(cable, is_up, is_up);
+            }
+        }
+        if !waiting {
+            continue;
+        }
+        for _ in 0..FRAMES_PER_WAKE {
+            let mut any = false;
+            for (socket, port) in sockets.iter().zip(Port::ALL) {
+                // A link that went down gives nothing until it is back.
+                let Ok(Some(received)) = socket.recv(&mut buffer) else { continue };
+                any = true;
+                let Some(frame) = buffer.get_mut(..received.len) else { continue };
+                network.send(clock::monotonic_now(), port, frame, &mut |port, frame| {
+                    let leaves = sockets.iter().zip(Port::ALL).find(|(_, known)| *known == port);
+                    if let Some((socket, _)) = leaves {
+                        // A frame that cannot be sent is one that was lost on the way.
+                        let _ = socket.send(frame);
+                    }
+                });
+            }
+            if !any {
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_kinds_of_drive_can_be_built() {
+        let line = drives([(7, UnitKind::Rotary), (9, UnitKind::Linear)], false);
+        assert_eq!(line.slaves().len(), 2);
+    }
+
+    #[test]
+    fn what_goes_into_a_ring_comes_out_at_the_other_port() {
+        let frame = [0xFF; 60];
+        let ways =
+            [(false, Port::One, Port::One), (true, Port::One, Port::Two), (true, Port::Two, Port::One)];
+        for (ring, port, back) in ways {
+            let mut port_of = InProcessDrives::new(drives([(7, UnitKind::Rotary)], ring), None);
+            assert!(port_of.send(MonotonicTime::ZERO, port, &frame));
+            let mut buffer = [0; FRAME_MAX];
+            assert_eq!(port_of.receive(&mut buffer), Some((back, frame.len())), "ring {ring}, {port}");
+            assert_eq!(&buffer[..frame.len()], frame);
+            assert_eq!(port_of.receive(&mut buffer), None);
+        }
+        let mut nobody = InProcessDrives::new(drives([(7, UnitKind::Rotary)], false), None);
+        assert!(nobody.send(MonotonicTime::ZERO, Port::Two, &frame));
+        assert_eq!(nobody.receive(&mut [0; FRAME_MAX]), None);
+        assert!(!nobody.send(MonotonicTime::ZERO, Port::One, &[0; FRAME_MAX + 1]));
+    }
+}

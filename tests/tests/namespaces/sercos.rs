@@ -1,0 +1,174 @@
+//! SERCOS III lines and rings of simulated drives in processes of their own, behind virtual cables.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::Duration;
+
+use axisbridge_tests::namespace::{Namespace, cable};
+use axisbridge_tests::peer;
+use axisbridge_tests::process::Running;
+
+use super::{in_namespace, scratch, wait_for};
+
+/// Address of the box, where its controller is in the same namespace.
+const BOX: &str = "127.0.0.2";
+
+/// A configuration with so many turning axes, each on the drive with its number as address.
+fn configuration(name: &str, axes: usize, cycle: &str, ring: bool) -> PathBuf {
+    let names = (1..=axes).map(|axis| format!("\"axis-{axis}\"")).collect::<Vec<_>>().join(", ");
+    let mut text = format!(
+        "[box]\nname = \"test\"\n[log]\nlevel = \"info\"\n\
+         [[device]]\nname = \"front\"\nlisten = \"{BOX}\"\naxes = [{names}]\n\
+         update_period = {{ min = \"4 ms\", max = \"32 ms\" }}\n\
+         [device.identity]\nvendor_id = 1\nproduct_code = 1\nserial_number = 1\n\
+         [south.sercos]\ninterface = \"sercos0\"\n{}cycle_time = \"{cycle}\"\n\
+         jitter = \"200 us\"\nallowed_losses = 50\n",
+        if ring { "ring_interface = \"sercos1\"\n" } else { "" }
+    );
+    for axis in 1..=axes {
+        let _ = write!(
+            text,
+            "[[south.sercos.drive]]\nname = \"drive-{axis}\"\naddress = {axis}\n\
+             [[axis]]\nname = \"axis-{axis}\"\ninstance = {axis}\ndrive = \"drive-{axis}\"\nunit = \"revolution\"\n"
+        );
+    }
+    let path = scratch(&format!("{name}.toml"));
+    std::fs::write(&path, text).expect("the scratch folder can be written");
+    path
+}
+
+/// The box and processes of drives one behind the other, in namespaces of their own.
+struct Bus {
+    gateway: Namespace,
+    /// Each with interface `in`, nearer to the box's port 1, and `out`.
+    segments: Vec<Namespace>,
+    drives: Vec<Running>,
+    run: Running,
+    log: PathBuf,
+}
+
+impl Bus {
+    /// Starts so many processes with so many drives each, and the box.
+    fn start(name: &str, processes: usize, drives_each: usize, cycle: &str, ring: bool) -> Self {
+        let gateway = Namespace::new("box");
+        let segments: Vec<_> = (0..processes).map(|number| Namespace::new(&format!("d{number}"))).collect();
+        cable((&gateway, "sercos0", None), (&segments[0], "in", None));
+        for pair in segments.windows(2) {
+            cable((&pair[0], "out", None), (&pair[1], "in", None));
+        }
+        if ring {
+            cable((&segments[processes - 1], "out", None), (&gateway, "sercos1", None));
+        }
+        let drives = segments.iter().enumerate().map(|(number, segment)| {
+            let (count, first) = (drives_each.to_string(), (number * drives_each + 1).to_string());
+            let arguments =
+                ["simulate", "sercos-drive", "--interface", "in", "--slaves", &count, "--address", &first];
+            let mut command = in_namespace(segment, &arguments);
+            if ring || number + 1 < processes {
+                command.args(["--ring", "out"]);
+            }
+            command.args(["--seconds", "90"]).stderr(Stdio::inherit());
+            Running::start("simulate sercos-drive", &mut command)
+        });
+        let drives = drives.collect();
+        let config = configuration(name, processes * drives_each, cycle, ring);
+        let log = scratch(&format!("{name}.log"));
+        let mut command = in_namespace(&gateway, &["run", "--config", config.to_str().expect("UTF-8")]);
+        command.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
+        let run = Running::start("run", &mut command);
+        Self { gateway, segments, drives, run, log }
+    }
+
+    fn wait_for(&mut self, text: &str) {
+        wait_for(&self.log, text, &mut self.run);
+    }
+
+    /// A controller that moves all axes.
+    fn controller(&self, axes: usize, seconds: u32) -> Running {
+        let (axes, seconds) = (axes.to_string(), seconds.to_string());
+        let arguments = [
+            "simulate",
+            "controller",
+            "--target",
+            BOX,
+            "--bind",
+            "127.0.0.1",
+            "--axes",
+            &axes,
+            "--speed",
+            "2",
+            "--seconds",
+            &seconds,
+            "--update-period-us",
+            "16000",
+            "--json",
+        ];
+        let mut command = in_namespace(&self.gateway, &arguments);
+        command.stdout(Stdio::null()).stderr(Stdio::inherit());
+        Running::start("simulate controller", &mut command)
+    }
+
+    fn end(mut self) -> String {
+        assert!(self.run.ended().is_none(), "the box still runs");
+        assert_eq!(self.run.terminate(Duration::from_secs(10)).code(), Some(0));
+        for mut drives in self.drives {
+            drives.terminate(Duration::from_secs(10));
+        }
+        text(&self.log)
+    }
+}
+
+fn text(log: &Path) -> String {
+    std::fs::read_to_string(log).expect("the box has a log")
+}
+
+/// Takes a line to CP4 and moves every axis.
+fn moves(name: &str, processes: usize, drives_each: usize, cycle: &str) {
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let mut bus = Bus::start(name, processes, drives_each, cycle, false);
+    bus.wait_for("CP4");
+    let mut controller = bus.controller(processes * drives_each, 2);
+    let status = controller.wait(Duration::from_secs(60));
+    assert!(status.success(), "the controller moved all axes: {status}\n{}", text(&bus.log));
+    bus.end();
+}
+
+#[test]
+fn one_drive_at_1_ms() {
+    moves("one_drive_at_1_ms", 1, 1, "1 ms");
+}
+
+#[test]
+fn four_drives_in_four_processes_at_2_ms() {
+    moves("four_drives_in_four_processes_at_2_ms", 4, 1, "2 ms");
+}
+
+#[test]
+fn sixteen_drives_in_four_processes_at_4_ms() {
+    moves("sixteen_drives_in_four_processes_at_4_ms", 4, 4, "4 ms");
+}
+
+/// A ring of eight drives is cut in the middle and closed again while all axes move. No axis notices.
+#[test]
+fn a_ring_of_eight_is_cut_and_healed_while_all_axes_move() {
+    let name = "a_ring_of_eight_is_cut_and_healed_while_all_axes_move";
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let mut bus = Bus::start(name, 2, 4, "4 ms", true);
+    bus.wait_for("CP4");
+    let mut controller = bus.controller(8, 6);
+    bus.wait_for("-> Running");
+    bus.segments[0].set_link("out", false);
+    bus.wait_for("no connection between the slave with address 4 and the slave with address 5");
+    bus.segments[0].set_link("out", true);
+    bus.wait_for("the ring is closed again");
+    let status = controller.wait(Duration::from_secs(60));
+    let log = text(&bus.log);
+    assert!(status.success(), "the controller moved all axes: {status}\n{log}");
+    assert!(!log.contains("lost"), "no slave was lost: {log}");
+    bus.end();
+}
