@@ -12,6 +12,7 @@ pub mod mapping;
 pub mod modbus;
 pub mod north;
 pub mod runner;
+pub mod scan;
 pub mod settings;
 pub mod simulate;
 pub mod status;

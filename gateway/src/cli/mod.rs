@@ -9,6 +9,7 @@ mod eds;
 mod progress;
 mod report;
 mod run;
+mod scan;
 mod script;
 mod signal;
 mod simulate;
@@ -34,6 +35,8 @@ enum Command {
     Run(RunArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
+    /// Look at the south bus: who is there, and a configuration to begin with.
+    Scan(ScanArguments),
     /// Print the frames of a capture file as an indented tree.
     Decode(DecodeArguments),
     /// Print what a profile has: attributes, parameters, codes, services.
@@ -83,6 +86,23 @@ struct EdsArguments {
     /// Write each sheet into this folder as NAME.eds; without it the one sheet goes to standard output.
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
+}
+
+/// Arguments of `scan`.
+#[derive(Debug, Args)]
+struct ScanArguments {
+    /// Look at the bus of this configuration, and say where it is another one.
+    #[arg(long, value_name = "FILE", required_unless_present = "interface", conflicts_with = "interface")]
+    config: Option<PathBuf>,
+    /// Look at what hangs on this network interface.
+    #[arg(long, value_name = "IF")]
+    interface: Option<String>,
+    /// The interface at the other end of the ring, or of a second line.
+    #[arg(long, value_name = "IF2", requires = "interface")]
+    ring: Option<String>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Arguments of `decode`.
@@ -274,6 +294,7 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),

@@ -126,7 +126,9 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     Ok(Built { engine, adapters, notices, status })
 }
 
-fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
+/// The SERCOS III master of a configuration.
+#[must_use]
+pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     let sercos = &config.sercos;
     let ns = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
     let mut master = MasterConfig::new(sercos.master_mac.unwrap_or(host.mac), ns(sercos.cycle_time));
@@ -145,15 +147,19 @@ fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
     master.slaves = sercos.drives.iter().map(slave).collect();
     master.slaves_max =
         u16::try_from(sercos.drives.len()).unwrap_or(SLAVES_MAX).saturating_add(SPARE_SLAVES).min(SLAVES_MAX);
+    master
+}
+
+fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
     let drives = config
         .axes
         .iter()
         .map(|axis| {
-            let drive = &sercos.drives[axis.drive];
+            let drive = &config.sercos.drives[axis.drive];
             (drive.address, needs(axis, drive))
         })
         .collect();
-    Ok(SercosBus::new(master, drives)?)
+    Ok(SercosBus::new(master_config(config, host), drives)?)
 }
 
 fn kind(axis: &Axis) -> UnitKind {

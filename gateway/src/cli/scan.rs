@@ -1,0 +1,129 @@
+//! `axisbridge scan`: what is on the south bus, and a configuration to begin with.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+use profile_generic::time::DurationNs;
+use profile_sercos::master::config::{MasterConfig, Ports};
+
+use super::progress::Progress;
+use super::{CliError, ScanArguments, signal};
+use crate::config::{Config, Link};
+use crate::engine::build::{Host, master_config};
+use crate::engine::port::SouthPort;
+use crate::mapping::Mapping;
+use crate::runner::port::PacketPort;
+use crate::scan::{self, Bus, Scanner};
+use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
+use crate::sys::clock;
+
+/// Cycle that is declared where there is no configuration. No cycle of this length is run: the scan ends in CP2.
+const CYCLE_NS: u32 = 2_000_000;
+
+/// Longest time of a scan: 511 slaves with a busy service channel take less.
+const LIMIT: DurationNs = DurationNs::from_secs(120);
+
+/// Looks at the bus and prints what is there.
+///
+/// # Errors
+/// The configuration is faulty, the interface cannot be opened, the output cannot be written.
+pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
+    let config = arguments.config.as_deref().map(Config::load).transpose()?;
+    let mapping = Mapping::embedded()?;
+    let link = match (&config, &arguments.interface) {
+        (Some(config), _) => config.sercos.link.clone(),
+        (None, Some(name)) => Link::Interface { name: name.clone(), ring: arguments.ring.clone() },
+        // clap lets nothing else through.
+        (None, None) => return Err("expected --config FILE or --interface IF".into()),
+    };
+    let (mut south, mac): (Box<dyn SouthPort>, _) = match (&link, &config) {
+        (Link::Interface { name, ring }, _) => {
+            let port = PacketPort::open(name, ring.as_deref())?;
+            let mac = port.mac();
+            (Box::new(port), mac)
+        }
+        (Link::InProcess { .. }, Some(config)) => {
+            (Box::new(InProcessDrives::of(config, None)), SIMULATED_MAC)
+        }
+        (Link::InProcess { .. }, None) => return Err("there are no drives in this process".into()),
+    };
+    let master = match &config {
+        Some(config) => master_config(config, Host { mac, incarnation: 1 }),
+        None => MasterConfig {
+            ports: if link.has_ring() { Ports::Both } else { Ports::One },
+            ..MasterConfig::new(mac, CYCLE_NS)
+        },
+    };
+    let interface = match &link {
+        Link::InProcess { .. } => "in-process",
+        Link::Interface { name, .. } => name,
+    };
+    let stop = signal::stop_on_signals()?;
+    let mut progress = Progress::new(arguments.json);
+    progress.step(&format!("scanning {interface}"));
+    let mut scanner = Scanner::new(master)?;
+    let end = clock::monotonic_now() + LIMIT;
+    loop {
+        let now = clock::monotonic_now();
+        if stop.load(Ordering::Relaxed) {
+            scanner.give_up("interrupted");
+        } else if end <= now {
+            scanner.give_up("not done in time");
+        }
+        if scanner.step(now, &mut *south) {
+            break;
+        }
+        let Some(at) = scanner.wake_at() else { break };
+        clock::sleep_until(at)?;
+    }
+    let bus = scanner.finish();
+    let output = if arguments.json {
+        format!("{:#}\n", scan::json(&bus, &mapping.dictionaries.sercos))
+    } else {
+        report(&bus, &mapping, &link, interface, config.as_ref())
+    };
+    match io::stdout().lock().write_all(output.as_bytes()) {
+        // Whoever reads has seen enough, as `head` has.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
+        Err(error) => return Err(format!("cannot write: {error}").into()),
+        Ok(()) => {}
+    }
+    let good =
+        bus.findings.is_empty() && !bus.slaves.is_empty() && !bus.slaves.iter().any(|slave| slave.lost);
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What was found as remarks, and behind it a configuration: the whole is a file that `axisbridge run` takes.
+fn report(bus: &Bus, mapping: &Mapping, link: &Link, interface: &str, config: Option<&Config>) -> String {
+    let mut remarks = format!("axisbridge scan of {interface}: ");
+    remarks.push_str(&scan::text(bus, &mapping.dictionaries.sercos));
+    if let Some(config) = config {
+        for difference in differences(bus, config) {
+            remarks.push_str(&format!("\n! {difference}"));
+        }
+    }
+    let mut out = String::new();
+    for line in remarks.lines() {
+        out.push_str(format!("# {line}").trim_end());
+        out.push('\n');
+    }
+    if let Some(starter) = scan::starter(bus, link) {
+        out.push('\n');
+        out.push_str(&starter);
+    }
+    out
+}
+
+/// Where the bus is another one than the configuration says.
+fn differences(bus: &Bus, config: &Config) -> Vec<String> {
+    let drives = &config.sercos.drives;
+    let missing = drives.iter().filter(|drive| bus.slaves.iter().all(|slave| slave.address != drive.address));
+    let missing = missing.map(|drive| {
+        format!("drive \"{}\" of the configuration, address {}, is not there", drive.name, drive.address)
+    });
+    let unknown = bus.slaves.iter().filter(|slave| drives.iter().all(|drive| slave.address != drive.address));
+    let unknown =
+        unknown.map(|slave| format!("the slave with address {} is not in the configuration", slave.address));
+    missing.chain(unknown).collect()
+}

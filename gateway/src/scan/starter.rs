@@ -1,0 +1,121 @@
+//! A configuration to begin with: one device in front, one axis for each drive that was found.
+
+use std::fmt::Write as _;
+
+use super::questions as ask;
+use super::report::title;
+use super::{Bus, Found};
+use crate::config::{AXES_MAX, Link};
+
+/// What S-0-1302.0.1 is for a drive.
+const FSP_DRIVE: u32 = 2;
+
+/// Bits 2..0 of S-0-0076 of an axis that slides.
+const METHOD_LINEAR: u64 = 1;
+
+/// The configuration as text, for the bus that `link` leads to. It is whole: `axisbridge run` takes it. What nobody but the
+/// machine's builder knows (limits, the address in front, who made the box) stands in it with a value that is safe and a
+/// remark.
+///
+/// `None` without a drive that has an address of its own.
+#[must_use]
+pub fn starter(bus: &Bus, link: &Link) -> Option<String> {
+    let unique =
+        |slave: &&Found| bus.slaves.iter().filter(|other| other.address == slave.address).count() == 1;
+    let drives: Vec<_> = bus.slaves.iter().filter(|slave| slave.address != 0).filter(unique).collect();
+    let drives: Vec<_> = drives.into_iter().filter(|slave| is_drive(slave)).take(AXES_MAX).collect();
+    if drives.is_empty() {
+        return None;
+    }
+    let mut out = String::new();
+    let names: Vec<_> = drives.iter().map(|slave| format!("\"axis-{}\"", slave.address)).collect();
+    let _ = write!(
+        out,
+        "\
+[box]
+name = \"axisbridge\"
+
+[[device]]
+name = \"front\"
+listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
+axes = [{}]
+power_structure_class_id = 0
+update_period = {{ min = \"2 ms\", max = \"32 ms\" }}
+
+[device.identity]
+vendor_id = 1 # CHANGE: the number ODVA gave you
+product_code = 1
+revision = \"1.1\"
+serial_number = 1 # CHANGE: every box has its own
+product_name = \"Axisbridge\"
+",
+        names.join(", ")
+    );
+    let interfaces = match link {
+        Link::InProcess { ring: false } => "interface = \"in-process\"\n".to_owned(),
+        Link::InProcess { ring: true } => {
+            "interface = \"in-process\"\nring_interface = \"in-process\"\n".to_owned()
+        }
+        Link::Interface { name, ring: None } => format!("interface = \"{name}\"\n"),
+        Link::Interface { name, ring: Some(ring) } => {
+            format!("interface = \"{name}\"\nring_interface = \"{ring}\"\n")
+        }
+    };
+    for (number, slave) in drives.iter().enumerate() {
+        axis(&mut out, number + 1, slave);
+    }
+    let _ = write!(
+        out,
+        "
+[south.sercos]
+{interfaces}cycle_time = \"2 ms\"
+"
+    );
+    for slave in &drives {
+        let _ = write!(
+            out,
+            "
+[[south.sercos.drive]] # {}
+name = \"drive-{}\"
+address = {}
+",
+            title(slave),
+            slave.address,
+            slave.address
+        );
+    }
+    Some(out)
+}
+
+/// Whether a slave says that it is a drive, or has operation modes as a drive has.
+fn is_drive(slave: &Found) -> bool {
+    slave.facts.fsp_type == Some(FSP_DRIVE) || slave.words(ask::OPERATION_MODES).next().is_some()
+}
+
+fn axis(out: &mut String, instance: usize, slave: &Found) {
+    let linear = slave.number(ask::POSITION_SCALING).is_some_and(|word| word & 0b111 == METHOD_LINEAR);
+    // Slow enough for a first look at any machine.
+    let (unit, resolution, velocity, acceleration) = if linear {
+        ("millimetre", 10_000, "10.0", "100.0")
+    } else {
+        ("revolution", 1_000_000, "0.5", "5.0")
+    };
+    let address = slave.address;
+    let _ = write!(
+        out,
+        "
+[[axis]]
+name = \"axis-{address}\"
+instance = {instance}
+drive = \"drive-{address}\"
+unit = \"{unit}\"
+motion_resolution = {resolution} # counts in one {unit}
+on_command_loss = \"current-decel-and-disable\"
+
+[axis.limits] # CHANGE: these are for a first, slow look
+velocity = {velocity} # {unit}s per second
+acceleration = {acceleration} # {unit}s per second squared
+torque_percent = 50.0
+"
+    );
+}

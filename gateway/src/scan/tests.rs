@@ -1,0 +1,111 @@
+//! Scans of simulated drives in virtual time.
+
+use profile_generic::scaling::UnitKind;
+use profile_generic::time::MonotonicTime;
+use profile_sercos::master::config::MasterConfig;
+use profile_sercos::master::event::Port;
+
+use super::*;
+use crate::config::{AxisKind, Config, Link};
+use crate::mapping::Mapping;
+use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC, drives};
+
+fn config() -> MasterConfig {
+    MasterConfig { stable_cycles: 10, ..MasterConfig::new(SIMULATED_MAC, 2_000_000) }
+}
+
+fn wire() -> Link {
+    Link::Interface { name: "enp3s0".to_owned(), ring: None }
+}
+
+fn scan_of(south: &mut dyn SouthPort) -> Bus {
+    let mut scanner = Scanner::new(config()).unwrap();
+    let mut now = MonotonicTime::ZERO;
+    for _ in 0..100_000 {
+        if scanner.step(now, south) {
+            return scanner.finish();
+        }
+        now = now.max(scanner.wake_at().unwrap_or(now));
+    }
+    panic!("the scan does not end");
+}
+
+fn scan(slaves: impl IntoIterator<Item = (u16, UnitKind)>) -> Bus {
+    scan_of(&mut InProcessDrives::new(drives(slaves, false), None))
+}
+
+#[test]
+fn two_drives_tell_who_they_are() {
+    let bus = scan([(7, UnitKind::Rotary), (3, UnitKind::Linear)]);
+    let mapping = Mapping::embedded().unwrap();
+    insta::assert_snapshot!("two_drives_text", text(&bus, &mapping.dictionaries.sercos));
+    insta::assert_snapshot!("two_drives_json", format!("{:#}", json(&bus, &mapping.dictionaries.sercos)));
+}
+
+#[test]
+fn the_starter_is_a_configuration_of_the_drives_that_were_found() {
+    let bus = scan([(7, UnitKind::Rotary), (3, UnitKind::Linear)]);
+    let starter = starter(&bus, &wire()).unwrap();
+    insta::assert_snapshot!("two_drives_starter", starter);
+    let config = Config::parse(&starter, "starter.toml").unwrap_or_else(|error| panic!("{error}"));
+    let addresses: Vec<_> = config.sercos.drives.iter().map(|drive| drive.address).collect();
+    let kinds: Vec<_> = config.axes.iter().map(|axis| (axis.instance, axis.drive, axis.kind)).collect();
+    assert_eq!(addresses, [7, 3]);
+    assert_eq!(kinds, [(1, 0, AxisKind::Rotary), (2, 1, AxisKind::Linear)]);
+}
+
+#[test]
+fn the_same_address_twice_is_told_and_gets_no_axis() {
+    let bus = scan([(7, UnitKind::Rotary), (5, UnitKind::Rotary), (7, UnitKind::Rotary)]);
+    assert_eq!(bus.findings, ["slave at position 1 and slave at position 3 both have address 7"]);
+    assert_eq!(bus.slaves.len(), 3);
+    let config = Config::parse(&starter(&bus, &wire()).unwrap(), "starter.toml").unwrap();
+    assert_eq!(config.sercos.drives.iter().map(|drive| drive.address).collect::<Vec<_>>(), [5]);
+    assert_eq!(starter(&scan([(0, UnitKind::Rotary)]), &wire()), None);
+}
+
+#[test]
+fn more_slaves_than_two_telegrams_hold_are_scanned_again_with_four() {
+    let bus = scan((1..=260).map(|address| (address, UnitKind::Rotary)));
+    assert_eq!((bus.slaves.len(), bus.findings.as_slice()), (260, [].as_slice()));
+    assert!(bus.slaves.iter().all(|slave| slave.text(questions::DEVICE_ID).is_some()));
+}
+
+/// A port from which nothing comes back.
+struct Nobody;
+
+impl SouthPort for Nobody {
+    fn receive(&mut self, _: &mut [u8]) -> Option<(Port, usize)> {
+        None
+    }
+
+    fn send(&mut self, _: MonotonicTime, _: Port, _: &[u8]) -> bool {
+        true
+    }
+}
+
+#[test]
+fn an_empty_bus_is_told() {
+    let bus = scan_of(&mut Nobody);
+    assert_eq!(bus.findings, ["no slave answers"]);
+    assert!(bus.slaves.is_empty());
+    let mapping = Mapping::embedded().unwrap();
+    assert_eq!(text(&bus, &mapping.dictionaries.sercos), "0 slaves\n! no slave answers\n");
+}
+
+#[test]
+fn a_scan_that_is_given_up_takes_the_line_down() {
+    let mut south = InProcessDrives::new(drives([(7, UnitKind::Rotary)], false), None);
+    let mut scanner = Scanner::new(config()).unwrap();
+    let mut now = MonotonicTime::ZERO;
+    while scanner.stage != Stage::Asking {
+        scanner.step(now, &mut south);
+        now = now.max(scanner.wake_at().unwrap_or(now));
+    }
+    scanner.give_up("interrupted");
+    while !scanner.step(now, &mut south) {
+        now = now.max(scanner.wake_at().unwrap_or(now));
+    }
+    let bus = scanner.finish();
+    assert_eq!((bus.slaves.len(), bus.findings), (1, vec!["interrupted".to_owned()]));
+}
