@@ -223,6 +223,12 @@ pub fn run(
 
 #[cfg(test)]
 mod tests {
+    use profile_generic::time::DurationNs;
+    use profile_sercos::master::Master;
+    use profile_sercos::master::config::{MasterConfig, Ports};
+    use profile_sercos::master::event::Output;
+    use profile_sercos::wire::header::Phase;
+
     use super::*;
 
     #[test]
@@ -233,20 +239,31 @@ mod tests {
 
     #[test]
     fn what_goes_into_a_ring_comes_out_at_the_other_port() {
-        let frame = [0xFF; 60];
-        let ways =
-            [(false, Port::One, Port::One), (true, Port::One, Port::Two), (true, Port::Two, Port::One)];
-        for (ring, port, back) in ways {
-            let mut port_of = InProcessDrives::new(drives([(7, UnitKind::Rotary)], ring), None);
-            assert!(port_of.send(MonotonicTime::ZERO, port, &frame));
-            let mut buffer = [0; FRAME_MAX];
-            assert_eq!(port_of.receive(&mut buffer), Some((back, frame.len())), "ring {ring}, {port}");
-            assert_eq!(&buffer[..frame.len()], frame);
-            assert_eq!(port_of.receive(&mut buffer), None);
+        let ways = [(false, Port::One, Some(Port::One)), (false, Port::Two, None)];
+        let round = [(true, Port::One, Some(Port::Two)), (true, Port::Two, Some(Port::One))];
+        for (ring, from, back) in ways.into_iter().chain(round) {
+            let mut master = MasterConfig::new(SIMULATED_MAC, 2_000_000);
+            master.ports = if from == Port::One { Ports::One } else { Ports::Two };
+            let mut master = Master::new(master).unwrap();
+            master.set_target_phase(Phase::CP0);
+            let mut drives = InProcessDrives::new(drives([(7, UnitKind::Rotary)], ring), None);
+            let now = master.wake_at().unwrap_or(MonotonicTime::ZERO);
+            let mut sent = 0;
+            // The pause before CP0 passes without telegrams.
+            for wake in 0..1000 {
+                let now = now + DurationNs::from_millis(wake);
+                while let Some(Output::Transmit { port, frame }) = master.poll(now) {
+                    assert_eq!(port, from);
+                    assert!(drives.send(now, port, frame));
+                    sent += 1;
+                    let mut buffer = [0; FRAME_MAX];
+                    let came = drives.receive(&mut buffer);
+                    assert_eq!(came, back.map(|back| (back, frame.len())), "ring {ring}, from {from}");
+                    assert_eq!(drives.receive(&mut buffer), None);
+                }
+            }
+            assert!(sent > 100, "{sent} telegrams");
+            assert!(!drives.send(now, from, &[0; FRAME_MAX + 1]));
         }
-        let mut nobody = InProcessDrives::new(drives([(7, UnitKind::Rotary)], false), None);
-        assert!(nobody.send(MonotonicTime::ZERO, Port::Two, &frame));
-        assert_eq!(nobody.receive(&mut [0; FRAME_MAX]), None);
-        assert!(!nobody.send(MonotonicTime::ZERO, Port::One, &[0; FRAME_MAX + 1]));
     }
 }
