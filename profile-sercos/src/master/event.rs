@@ -167,6 +167,12 @@ pub enum Event {
         /// The phase that cannot be left: CP2 or CP3.
         phase: Phase,
     },
+    /// The slave has been checked for CP3 and takes no part any more. It would write where it was told to, over what
+    /// others have there in a new layout: the master goes back to CP0.
+    Stale {
+        /// The slave.
+        slave: SlaveId,
+    },
     /// The telegrams of CP3 and CP4 cannot be laid out.
     LayoutRefused(LayoutError),
     /// Slaves did not stop or start within the time of a phase switch.
@@ -274,6 +280,9 @@ impl fmt::Display for Event {
             }
             Event::CheckFailed { slave, phase } => {
                 write!(f, "{slave}: the check to leave {phase} failed, parameters are invalid")
+            }
+            Event::Stale { slave } => {
+                write!(f, "{slave} was left out after its check for CP3: back to CP0")
             }
             Event::LayoutRefused(error) => write!(f, "telegrams of CP3 and CP4: {error}"),
             Event::SwitchFailed { from, to, slave: Some(slave) } => {

@@ -11,7 +11,7 @@ use super::report::{ReportRow, RowOutcome};
 use super::station::{End, Station, Work};
 use super::svc::request::{SvcData, SvcFailure, SvcOutcome};
 use crate::wire::connection::CONNECTION_CONTROL_LEN;
-use crate::wire::header::Kind;
+use crate::wire::header::{Kind, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 
@@ -197,6 +197,8 @@ impl Master {
         if let SvcData::Buffer(buffer) = outcome.data {
             station.list = buffer;
         }
+        station.checked |=
+            idn == Idn::CP3_CHECK && step == Step::CheckExecute && row.outcome == RowOutcome::Done;
         station.work = if failure.is_some() { Work::Failed } else { Work::Free };
         if failure.is_none() && step == Step::Address {
             self.take_address(index);
@@ -208,6 +210,12 @@ impl Master {
 
     /// Computes the telegrams of CP3 and CP4 and makes the ends of the connections.
     fn lay_out(&mut self) -> bool {
+        let stale = |station: &Station| !station.is_active() && station.checked;
+        if let Some(index) = self.stations[..self.found].iter().position(stale) {
+            self.target = Some(Phase::CP0);
+            self.emit(Event::Stale { slave: SlaveId::from_index(index) });
+            return false;
+        }
         let stations = &mut self.stations[..self.found];
         let timing = Timing {
             cycle_ns: self.config.cycle_ns,

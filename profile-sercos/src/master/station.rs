@@ -120,6 +120,8 @@ pub(super) struct Station {
     pub work: Work,
     pub cursor: Cursor,
     pub check_failed: bool,
+    /// S-0-0127 went through since the last scan: the slave will enter CP3 with the places it was told.
+    pub checked: bool,
     /// Rows of the report that come from the first reading; a new attempt keeps them.
     pub read_rows: usize,
     /// At most [`REPORT_MAX`] rows, for which the room is set aside.
@@ -153,6 +155,7 @@ impl Station {
             work: Work::Done,
             cursor: Cursor::default(),
             check_failed: false,
+            checked: false,
             read_rows: 0,
             report: Vec::with_capacity(REPORT_MAX),
             list: Vec::with_capacity(config.list_capacity),
@@ -183,6 +186,7 @@ impl Station {
         self.returned = false;
         self.work = Work::Done;
         self.check_failed = false;
+        self.checked = false;
         self.read_rows = 0;
         self.report.clear();
         self.invalid.clear();

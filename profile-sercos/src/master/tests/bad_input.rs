@@ -375,3 +375,25 @@ fn data_that_a_slave_calls_invalid_is_told_with_its_status() {
     let outcome = rig.request(BAD_ID, SvcRequest::read(MODE));
     assert!(outcome.result.unwrap().status.contains(DataStatus::INVALID));
 }
+
+#[test]
+fn a_slave_left_out_after_its_check_does_not_enter_cp3_with_old_places() {
+    let mut rig = full_rig(3);
+    // The third slave fails its check while the bad one's goes through.
+    rig.line.slaves_mut()[2].application_mut().refuses = Some(Phase::CP3);
+    rig.auto_proceed = false;
+    rig.master.set_target_phase(Phase::CP4);
+    rig.state(State::Await2);
+    rig.master.proceed().unwrap();
+    rig.state(State::Check2);
+    rig.state(State::Await2);
+    rig.line.slaves_mut()[2].application_mut().refuses = None;
+    rig.master.exclude(BAD_ID).unwrap();
+    rig.master.proceed().unwrap();
+    rig.run_until("noticed", |rig| rig.saw(&Event::Stale { slave: BAD_ID }));
+    rig.state(State::Cp0);
+    rig.auto_proceed = true;
+    rig.up_to(Phase::CP4);
+    rig.cycles(3);
+    runs(&mut rig, &[0, 1, 2]);
+}
