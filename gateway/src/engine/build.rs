@@ -191,7 +191,8 @@ fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
                 [OperatingMode::Position].into_iter().collect()
             }
         },
-        modulo: false,
+        // Positions of a linear drive reach for hundreds of kilometres.
+        modulo: axis.kind == AxisKind::Rotary && axis.unwind_counts.is_some(),
         set_scaling: drive.set_scaling,
         parameters,
         captures: axis.events,

@@ -499,6 +499,10 @@ impl Drive {
     ) -> bool {
         match mapping.sercos_program(&self.needs, &self.facts) {
             Ok(program) => {
+                // A drive that works modulo has a longest step from one position command to the next.
+                if self.needs.modulo && program.position_step().is_none() {
+                    notice(Notice::Ends { axis: index(axis) });
+                }
                 axes[axis].set_south(program);
                 true
             }

@@ -70,6 +70,11 @@ pub enum Notice {
         /// What differs.
         difference: Difference,
     },
+    /// The drive of an axis without ends does not work modulo: its positions end where its 32 bits do.
+    Ends {
+        /// The axis.
+        axis: u8,
+    },
     /// An axis changed its generic state.
     State {
         /// The axis.
@@ -158,6 +163,7 @@ impl Notice {
             | Self::PassedOver { axis, .. }
             | Self::Program { axis, .. }
             | Self::Difference { axis, .. }
+            | Self::Ends { axis }
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
             | Self::Fault { axis, .. }
@@ -186,6 +192,10 @@ impl fmt::Display for Notice {
                 write!(f, "the drive with SERCOS address {address} cannot be used: {error}; it is left out")
             }
             Self::Difference { difference, .. } => write!(f, "{difference}; the drive is followed"),
+            Self::Ends { .. } => f.write_str(
+                "unwind_counts wants an axis without ends, but the positions of its drive have them: expected modulo \
+                 (S-0-0076 bit 7, S-0-0103), or set_scaling = true",
+            ),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),

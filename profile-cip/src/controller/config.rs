@@ -156,6 +156,14 @@ impl AxisSetup {
     }
 }
 
+impl AxisSetup {
+    /// Whether Command Position can be so many counts: a DINT, of an axis that the device unwinds a DINT of cycles as well.
+    pub(super) fn has_room_for(&self, counts: f64) -> bool {
+        let counts = self.unwind.map_or(counts, |unwind| counts / f64::from(unwind));
+        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts)
+    }
+}
+
 /// How long the controller waits for what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeOuts {

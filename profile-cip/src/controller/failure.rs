@@ -369,7 +369,7 @@ pub enum Failure {
         /// Why.
         error: ProfileError,
     },
-    /// A motion would leave the 32-bit range of Command Position (attributes 360 and 361).
+    /// A motion would leave the 32-bit range of Command Position (attributes 360 and 361), or of its Unwind Cycle Count.
     OutOfRange {
         /// Instance number.
         axis: u8,

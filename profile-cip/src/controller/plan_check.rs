@@ -89,7 +89,7 @@ fn unlimited(limits: Limits) -> Limits {
 fn in_range(setup: &AxisSetup, axis: u8, units: f64) -> Result<(), Failure> {
     let Scaling::Counts(scale) = setup.scaling else { return Ok(()) };
     let counts = units * scale;
-    if (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts) {
+    if setup.has_room_for(counts) {
         return Ok(());
     }
     Err(Failure::OutOfRange { axis, counts })

@@ -7,15 +7,17 @@ use axisbridge::mapping::Mapping;
 use axisbridge::simulate::setup::make_cyclic;
 use axisbridge_tests::rig::motion::{NANO, TURNTABLE, millis};
 use axisbridge_tests::rig::ports::Bytes;
-use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::controller::{AxisSet, Limits, Step};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cip::controller::{AxisSet, ControllerConfig, Limits, Step};
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::motion::codes::{AxisControl, ControlMode};
 use profile_cip::wire::motion::{
     ActualBlock, ActualFrame, ActualPosition, ActualWriter, CommandBlock, CommandFrame, CommandPosition,
     CommandValues, CommandWriter,
 };
+use profile_generic::cast::f64_from_i64;
 use profile_generic::image::Signal;
+use profile_generic::quantity::Position;
 
 /// Room for any update.
 const ROOM: usize = 1_500;
@@ -265,4 +267,114 @@ fn an_axis_in_torque_control_gives_the_torque_it_is_told_and_is_disabled_out_of_
     let report = rig.run(millis(20_000));
     assert_eq!(report.failure, None, "{}", rig.log());
     assert!(rig.torque_free());
+}
+
+/// A box whose turntable has no ends, in front of a drive that works modulo 512 turns.
+fn endless() -> Settings {
+    let turntable = "unit = \"revolution\"\nunwind_counts = 1_000_000";
+    let drive = "name = \"drive-a\"\naddress = 1\nset_scaling = true";
+    let configuration = BOX.replacen("unit = \"revolution\"", turntable, 1).replacen(
+        "name = \"drive-a\"\naddress = 1",
+        drive,
+        1,
+    );
+    Settings { configuration, ..Settings::default() }
+}
+
+/// A controller that counts the turntable's cycles, and what it makes of it.
+fn endless_config(rig: &Rig) -> ControllerConfig {
+    let mut config = rig.controller_config();
+    make_cyclic(&Mapping::embedded().expect("sound tables"), &mut config.axes[0], UNWIND);
+    config
+}
+
+/// Somebody turns the shaft of the turntable, 200 turns in a cycle of the bus, which is less than half of the drive's 512.
+fn turn_by_hand(rig: &mut Rig, from: i64, to: i64) {
+    let step = 200 * NANO;
+    let mut at = from;
+    while at != to {
+        at += (to - at).clamp(-step, step);
+        rig.drive_mut(0).servo_mut().set_position(Position(at));
+        rig.run_for(millis(2));
+    }
+    rig.run_for(millis(20));
+}
+
+const FAST: Limits = Limits { velocity: 40.0, acceleration: 400.0, jerk: 8_000.0 };
+
+#[test]
+fn an_axis_without_ends_turns_on_smoothly_where_the_drive_starts_anew() {
+    let mut rig = Rig::ready(endless());
+    turn_by_hand(&mut rig, 0, 500 * NANO);
+    let config = endless_config(&rig);
+    let go = |distance| Step::MoveRelative { axis: 1, distance, limits: FAST };
+    rig.connect_with(config, vec![Step::Enable(AxisSet::one(1)), go(30.0), go(-540.0), go(11.0)]);
+    rig.run_until(millis(20_000), "Running", |rig| rig.report().steps_finished == 1);
+    // From one cycle of the bus to the next: the way that is commanded, and the velocity that the drive really has.
+    let (mut steepest, mut roughest, mut wraps) = (0, 0, 0);
+    let (mut before, mut last) = (commanded(&rig), rig.velocity(0));
+    for (steps, target) in [(2, 530 * NANO), (3, -10 * NANO), (4, NANO)] {
+        while rig.report().steps_finished < steps {
+            rig.cycle_in(|cycle| cycle());
+            let (now, velocity) = (commanded(&rig), rig.velocity(0));
+            let turn = 512 * NANO;
+            wraps += i32::from(now.div_euclid(turn) != before.div_euclid(turn));
+            steepest = steepest.max((now - before).abs());
+            roughest = roughest.max((velocity - last).abs());
+            (before, last) = (now, velocity);
+        }
+        let away = rig.position(0) - target;
+        assert!(away.abs() < NANO / 100, "{away} nanorevolutions away from {target}");
+    }
+    assert_eq!(wraps, 4, "over 512 turns and back, and below zero and back");
+    // 40 turns a second are 0.08 in 2 ms; 400 turns a second squared are 0.8 turns a second in 2 ms.
+    assert!((79_000_000..81_000_000).contains(&steepest), "{steepest}");
+    assert!(roughest < NANO, "{roughest}");
+    let report = rig.run(millis(60_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert!(!rig.told().contains("unwind_counts wants"), "{}", rig.told());
+}
+
+#[test]
+fn a_million_turns_lose_not_a_count() {
+    let mut rig = Rig::ready(endless());
+    let config = endless_config(&rig);
+    let far = 1_000_000;
+    let mut at = 0;
+    for turns in [far, -far, 0] {
+        rig.kill_controller();
+        rig.run_for(millis(1_000));
+        turn_by_hand(&mut rig, at, turns * NANO);
+        rig.connect_with(
+            config.clone(),
+            vec![
+                Step::Enable(AxisSet::one(1)),
+                Step::MoveRelative { axis: 1, distance: 3.25, limits: FAST },
+                Step::Dwell { seconds: 0.3 },
+                Step::MoveRelative { axis: 1, distance: -3.125, limits: FAST },
+                Step::Dwell { seconds: 0.3 },
+            ],
+        );
+        for (steps, away) in [(3, 3 * NANO + NANO / 4), (5, NANO / 8)] {
+            rig.run_until(millis(30_000), "an end", |rig| rig.report().steps_finished == steps);
+            let error = rig.position(0) - turns * NANO - away;
+            assert!(error.abs() < 1_000, "{error} nanorevolutions away at {turns} turns");
+            // What the controller is told is not one count of a millionth of a turn away either.
+            let told = rig.report().axes[0].actual.expect("a position")
+                - f64::from(i32::try_from(turns).expect("a million"));
+            assert!((told - f64_from_i64(away) / 1e9).abs() < 1.5e-6, "{told} at {turns} turns");
+        }
+        let report = rig.run(millis(5_000));
+        assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+        at = rig.position(0);
+    }
+}
+
+#[test]
+fn a_drive_that_keeps_its_ends_is_told_of() {
+    let configuration = endless().configuration.replacen("set_scaling = true", "set_scaling = false", 1);
+    let rig = Rig::ready(Settings { configuration, ..Settings::default() });
+    let told = rig.told();
+    assert!(told.contains("axis 1: unwind_counts wants an axis without ends"), "{told}");
+    assert_eq!(told.matches("unwind_counts wants").count(), 1, "{told}");
 }

@@ -124,7 +124,7 @@ fn millions_of_cycles_lose_no_count_in_either_direction() {
         assert_eq!(chain.pass((0, Some(0))), (0, 0));
         let mut whole: i64 = 0;
         let mut cycles: i64 = 0;
-        // The drive's own modulo allows less than half a turn between two telegrams.
+        // Somewhat less than half a turn between two telegrams.
         let step = 170_003;
         for direction in [1, -1, -1, 1] {
             for _ in 0..6_000 {
@@ -136,6 +136,25 @@ fn millions_of_cycles_lose_no_count_in_either_direction() {
         }
         assert_eq!(whole, 0);
         assert!(cycles > 2_000_000, "{cycles}");
+    }
+}
+
+#[test]
+fn millions_of_turns_lose_no_count_of_the_drive_in_either_direction() {
+    for inverted in [false, true] {
+        let mut chain = Chain::new(UNWIND, inverted);
+        assert_eq!(chain.pass((0, Some(0))), (0, 0));
+        let mut whole: i64 = 0;
+        // 249 turns and three counts; the drive's own modulo of 512 turns allows less than half of that between two telegrams.
+        let step = 249 * UNWIND + 3;
+        for direction in [1, -1, -1, 1] {
+            for _ in 0..6_000 {
+                whole += direction * step;
+                let at = (whole.rem_euclid(UNWIND), whole.div_euclid(UNWIND));
+                assert_eq!(chain.pass((at.0, Some(at.1))), at, "{whole}");
+            }
+            assert!(whole == 0 || whole.abs() > 1_400_000 * UNWIND, "{whole}");
+        }
     }
 }
 

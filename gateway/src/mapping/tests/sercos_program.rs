@@ -78,8 +78,8 @@ fn commands_and_actions_become_a_telegram() {
     let mut telegram = [0xA5; 12];
     let mut report = ConversionReport::default();
     let word = program.encode(&command, Action::Enable, 0, &mut telegram, &mut report);
-    // 0xE000; -90 degrees are 270 within the modulo range: 2700000; 15000000; -125.
-    let expected = [0x00, 0xE0, 0xE0, 0x32, 0x29, 0x00, 0xC0, 0xE1, 0xE4, 0x00, 0x83, 0xFF];
+    // 0xE000; -90 degrees within the modulo range of 512 turns: 1842300000; 15000000; -125.
+    let expected = [0x00, 0xE0, 0x60, 0x44, 0xCF, 0x6D, 0xC0, 0xE1, 0xE4, 0x00, 0x83, 0xFF];
     assert_eq!((word, telegram, report.is_clean()), (0xE000, expected, true));
     command.mode = OperatingMode::Torque;
     let word = program.encode(&command, Action::Halt, word, &mut telegram, &mut report);
@@ -100,9 +100,8 @@ fn telegrams_of_the_drive_become_feedback() {
     let (mut trackers, mut report) = (program.feedback.trackers(), ConversionReport::default());
     let mut feedback =
         AxisFeedback { status: StatusBits::IN_POSITION | StatusBits::FAULT, ..AxisFeedback::default() };
-    // In operation, following, second mode; 3599999 counts, then 1: one step over the end of the turn and
-    // on.
-    let mut telegram = [0x08, 0xC1, 0x7F, 0xEE, 0x36, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
+    // In operation, following, second mode; 1843199999 counts, then 1: one step over the end of 512 turns and on.
+    let mut telegram = [0x08, 0xC1, 0xFF, 0xFF, 0xDC, 0x6D, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
     assert_eq!(program.decode(&telegram, &mut feedback, &mut trackers, &mut report), Some(0xC108));
     assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
     assert_eq!(
@@ -110,12 +109,12 @@ fn telegrams_of_the_drive_become_feedback() {
         StatusBits::IN_POSITION | StatusBits::ENABLED | StatusBits::POWER | StatusBits::TRACKING,
         "bits that other words carry stay, those of the status word follow it"
     );
-    assert_eq!((feedback.position.0, feedback.torque), (999_999_722, Torque(125_000)));
+    assert_eq!((feedback.position.0, feedback.torque), (511_999_999_722, Torque(125_000)));
     // 0.0001 1/min backward are -1666.67 nanounits a second.
     assert_eq!(feedback.velocity, Velocity(-1_667));
     telegram[2..6].copy_from_slice(&1_i32.to_le_bytes());
     program.decode(&telegram, &mut feedback, &mut trackers, &mut report);
-    assert_eq!((feedback.position.0, report.is_clean()), (1_000_000_278, true));
+    assert_eq!((feedback.position.0, report.is_clean()), (512_000_000_278, true));
     assert_eq!(program.decode(&[0], &mut feedback, &mut trackers, &mut report), None);
 }
 

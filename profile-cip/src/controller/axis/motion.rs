@@ -161,7 +161,7 @@ impl Axis {
         self.setup.limits.check_motion(axis, limits)?;
         self.setup.limits.check_position(axis, units)?;
         let target = units * scale;
-        if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&target) {
+        if !self.setup.has_room_for(target) {
             return Err(Failure::OutOfRange { axis, counts: target });
         }
         let limits = limits.scaled(scale);

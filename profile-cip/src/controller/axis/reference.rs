@@ -40,8 +40,7 @@ impl Axis {
             Redefine::By(distance) => distance * scale,
         };
         let end = present + displacement;
-        let range = f64::from(i32::MIN)..=f64::from(i32::MAX);
-        let whole = i32::try_from(counts(displacement)).ok().filter(|_| range.contains(&end));
+        let whole = i32::try_from(counts(displacement)).ok().filter(|_| self.setup.has_room_for(end));
         let Some(displacement) = whole.filter(|_| displacement.is_finite()) else {
             return Err(Failure::OutOfRange { axis, counts: end });
         };
