@@ -89,8 +89,7 @@ impl MotionDevice {
         system_time: Option<SystemTime>,
         out: &mut [u8],
     ) -> Option<usize> {
-        self.poll(now, system_time);
-        let size = usize::from(self.connection.as_ref()?.parameters.t_to_o_size).min(out.len());
+        let size = self.prepare(now, system_time)?.min(out.len());
         let (sequence, update) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
         let len = self.produce(now, system_time, update)?;
         *sequence = self.connection.as_ref()?.transmit_sequence.to_le_bytes();
@@ -105,10 +104,14 @@ impl MotionDevice {
         system_time: Option<SystemTime>,
         out: &mut [u8],
     ) -> Option<usize> {
-        self.poll(now, system_time);
-        let size = usize::from(self.connection.as_ref()?.parameters.t_to_o_size).checked_sub(SEQUENCE_LEN)?;
-        let size = size.min(out.len());
+        let size = self.prepare(now, system_time)?.checked_sub(SEQUENCE_LEN)?.min(out.len());
         self.produce(now, system_time, &mut out[..size])
+    }
+
+    /// Does what is due, and gives the size of the connection, which counts a sequence count in any case.
+    fn prepare(&mut self, now: MonotonicTime, system_time: Option<SystemTime>) -> Option<usize> {
+        self.poll(now, system_time);
+        Some(usize::from(self.connection.as_ref()?.parameters.t_to_o_size))
     }
 
     /// Writes the update that is due.

@@ -18,7 +18,12 @@ pub struct Client {
     handle: u32,
 }
 
-fn packet(command: Command, session_handle: u32, data: &[u8]) -> Vec<u8> {
+/// An encapsulation packet.
+///
+/// # Panics
+/// When the data are too long for one.
+#[must_use]
+pub fn packet(command: Command, session_handle: u32, data: &[u8]) -> Vec<u8> {
     let status = EncapsulationStatus::SUCCESS;
     let packet = Packet { command, session_handle, status, sender_context: *b"explicit", options: 0, data };
     let mut bytes = vec![0; packet.buffer_len()];
@@ -59,11 +64,32 @@ impl Client {
         self.request(rig, service, &path, data)
     }
 
+    /// The session.
+    #[must_use]
+    pub const fn handle(&self) -> u32 {
+        self.handle
+    }
+
     /// Sends a service to any object; returns general status and data.
     ///
     /// # Panics
     /// When there is no answer in time, or none that can be read.
     pub fn request(&self, rig: &mut Rig, service: u8, path: &[u8], data: &[u8]) -> (u8, Vec<u8>) {
+        let (status, _, data) = self.request_extended(rig, service, path, data);
+        (status, data)
+    }
+
+    /// Sends a service to any object; returns general status, first word of the extended status or 0, and data.
+    ///
+    /// # Panics
+    /// When there is no answer in time, or none that can be read.
+    pub fn request_extended(
+        &self,
+        rig: &mut Rig,
+        service: u8,
+        path: &[u8],
+        data: &[u8],
+    ) -> (u8, u16, Vec<u8>) {
         let request = Request { service: Service(service), path, data };
         let mut message = vec![0; request.buffer_len()];
         request.emit(&mut message).expect("it fits");
@@ -78,6 +104,6 @@ impl Client {
         let answer = rig.exchange(self.slot, &bytes, millis(500));
         let body = EncapsulatedPacket::parse(&answer[HEADER_LEN..]).expect("an answer");
         let reply = Reply::parse(body.packet.items[1].data).expect("a reply");
-        (reply.status.0, reply.data.to_vec())
+        (reply.status.0, reply.extended.first().copied().unwrap_or(0), reply.data.to_vec())
     }
 }

@@ -2,15 +2,13 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use axisbridge_tests::rig::explicit::{Client, packet};
 use axisbridge_tests::rig::motion::{in_motion, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::target::adapter::SessionSlot;
 use profile_cip::target::counters::Counters;
 use profile_cip::wire::ConnectionTriad;
-use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
-use profile_cip::wire::encapsulation::{Command, EncapsulationStatus, HEADER_LEN, Header, Packet};
+use profile_cip::wire::encapsulation::{Command, EncapsulationStatus, Header};
 use profile_cip::wire::forward_open::{ForwardOpen, Transport, Trigger};
-use profile_cip::wire::message_router::{Reply, Request};
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 
 const MANAGER: &[u8] = &[0x20, 6, 0x24, 1];
@@ -24,23 +22,15 @@ fn box_with_power_structure() -> Settings {
     Settings { configuration, ..Settings::default() }
 }
 
+const STRANGER: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 66);
+
 fn stranger() -> SocketAddrV4 {
-    SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 66), 50_066)
+    SocketAddrV4::new(STRANGER, 50_066)
 }
 
-fn packet(command: Command, session_handle: u32, data: &[u8]) -> Vec<u8> {
-    let status = EncapsulationStatus::SUCCESS;
-    let packet = Packet { command, session_handle, status, sender_context: *b"bad inpu", options: 0, data };
-    let mut bytes = vec![0; packet.buffer_len()];
-    packet.emit(&mut bytes).expect("it fits");
-    bytes
-}
-
-/// A stream with a registered session.
-fn session(rig: &mut Rig) -> (SessionSlot, u32) {
-    let slot = rig.open_stream(stranger()).expect("room for a stream");
-    let answer = rig.exchange(slot, &packet(Command::REGISTER_SESSION, 0, &[1, 0, 0, 0]), millis(100));
-    (slot, Header::parse(&answer).expect("a header").session_handle)
+/// A client with a registered session.
+fn client(rig: &mut Rig) -> Client {
+    Client::connect(rig, STRANGER)
 }
 
 fn direction(size: u16) -> NetworkParameters {
@@ -72,23 +62,11 @@ fn good_open() -> ForwardOpen<'static> {
 }
 
 /// Sends a Forward_Open and returns general and first extended status.
-fn open(rig: &mut Rig, (slot, handle): (SessionSlot, u32), open: &ForwardOpen<'_>) -> (u8, u16) {
+fn open(rig: &mut Rig, client: Client, open: &ForwardOpen<'_>) -> (u8, u16) {
     let mut data = vec![0; open.buffer_len()];
     open.emit(&mut data).expect("it fits");
-    let request = Request { service: open.service(), path: MANAGER, data: &data };
-    let mut message = vec![0; request.buffer_len()];
-    request.emit(&mut message).expect("it fits");
-    let items = [
-        Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
-        Item { item_type: ItemType::UNCONNECTED_DATA, data: &message },
-    ];
-    let body = EncapsulatedPacket { packet: CommonPacket::new(&items), ..EncapsulatedPacket::default() };
-    let mut bytes = vec![0; body.buffer_len()];
-    body.emit(&mut bytes).expect("it fits");
-    let answer = rig.exchange(slot, &packet(Command::SEND_RR_DATA, handle, &bytes), millis(200));
-    let body = EncapsulatedPacket::parse(&answer[HEADER_LEN..]).expect("an answer");
-    let reply = Reply::parse(body.packet.items[1].data).expect("a reply");
-    (reply.status.0, reply.extended.to_vec().first().copied().unwrap_or(0))
+    let (status, extended, _) = client.request_extended(rig, open.service().0, MANAGER, &data);
+    (status, extended)
 }
 
 #[test]
@@ -127,7 +105,7 @@ fn a_forward_open_that_does_not_fit_is_refused_with_the_status_of_the_standard()
         ),
     ];
     let mut rig = Rig::ready(box_with_power_structure());
-    let client = session(&mut rig);
+    let client = client(&mut rig);
     let count = u64::try_from(cases.len()).expect("some cases");
     for (name, request, expected) in cases {
         assert_eq!(open(&mut rig, client, &request), expected, "{name}");
@@ -142,7 +120,7 @@ fn a_forward_open_that_does_not_fit_is_refused_with_the_status_of_the_standard()
 #[test]
 fn a_second_controller_is_refused_and_the_first_one_moves_on() {
     let mut rig = in_motion(box_with_power_structure());
-    let client = session(&mut rig);
+    let client = client(&mut rig);
     // Ownership conflict.
     assert_eq!(open(&mut rig, client, &good_open()), (1, 0x106));
     let report = rig.run(millis(20_000));
@@ -153,7 +131,7 @@ fn a_second_controller_is_refused_and_the_first_one_moves_on() {
 fn broken_encapsulation_is_refused_while_the_axes_move_on() {
     type Counter = fn(&Counters) -> u64;
     let mut rig = in_motion(Settings::default());
-    let (_, handle) = session(&mut rig);
+    let handle = client(&mut rig).handle();
     let mut long = packet(Command::SEND_RR_DATA, handle, &[]);
     long[2..4].copy_from_slice(&65_511_u16.to_le_bytes());
     let mut optional = packet(Command::LIST_IDENTITY, 0, &[]);

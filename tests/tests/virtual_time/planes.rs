@@ -22,44 +22,37 @@ use profile_generic::quantity::Position;
 /// Room for any update.
 const ROOM: usize = 1_500;
 
-/// Changes the cyclic block of axis 1 in a datagram of the controller.
-fn change_command(datagram: &mut Bytes, change: impl FnOnce(&mut CommandBlock)) {
-    let bytes = datagram.as_slice().to_vec();
-    let Ok(data) = Class1Datagram::parse(&bytes).map(|datagram| datagram.data) else { return };
-    let Ok(frame) = CommandFrame::parse(data) else { return };
-    let mut buffer = [0; ROOM];
-    let mut writer = CommandWriter::new(&mut buffer, frame.header()).expect("room");
-    let mut change = Some(change);
-    for mut instance in frame.instances() {
-        if let (1, Some(block)) = (instance.number, &mut instance.cyclic)
-            && let Some(change) = change.take()
-        {
-            change(block);
+/// Changes the cyclic block of axis 1 in a datagram of one direction.
+macro_rules! change {
+    ($(#[$doc:meta])* $name:ident, $block:ty, $frame:ty, $writer:ty) => {
+        $(#[$doc])*
+        fn $name(datagram: &mut Bytes, change: impl FnOnce(&mut $block)) {
+            let bytes = datagram.as_slice().to_vec();
+            let Ok(data) = Class1Datagram::parse(&bytes).map(|datagram| datagram.data) else { return };
+            let Ok(frame) = <$frame>::parse(data) else { return };
+            let mut buffer = [0; ROOM];
+            let mut writer = <$writer>::new(&mut buffer, frame.header()).expect("room");
+            let mut change = Some(change);
+            for mut instance in frame.instances() {
+                if let (1, Some(block)) = (instance.number, &mut instance.cyclic)
+                    && let Some(change) = change.take()
+                {
+                    change(block);
+                }
+                writer.instance(&instance).expect("room");
+            }
+            let length = writer.finish();
+            replace(datagram, &bytes, data.len(), &buffer[..length]);
         }
-        writer.instance(&instance).expect("room");
-    }
-    let length = writer.finish();
-    replace(datagram, &bytes, data.len(), &buffer[..length]);
+    };
 }
-
-/// Changes the cyclic block of axis 1 in a datagram of the box.
-fn change_actual(datagram: &mut Bytes, change: impl FnOnce(&mut ActualBlock)) {
-    let bytes = datagram.as_slice().to_vec();
-    let Ok(data) = Class1Datagram::parse(&bytes).map(|datagram| datagram.data) else { return };
-    let Ok(frame) = ActualFrame::parse(data) else { return };
-    let mut buffer = [0; ROOM];
-    let mut writer = ActualWriter::new(&mut buffer, frame.header()).expect("room");
-    let mut change = Some(change);
-    for mut instance in frame.instances() {
-        if let (1, Some(block)) = (instance.number, &mut instance.cyclic)
-            && let Some(change) = change.take()
-        {
-            change(block);
-        }
-        writer.instance(&instance).expect("room");
-    }
-    let length = writer.finish();
-    replace(datagram, &bytes, data.len(), &buffer[..length]);
+change! {
+    /// In a datagram of the controller.
+    change_command, CommandBlock, CommandFrame, CommandWriter
+}
+change! {
+    /// In a datagram of the box.
+    change_actual, ActualBlock, ActualFrame, ActualWriter
 }
 
 /// Puts other data behind the header of a datagram and corrects the length in its item.

@@ -2,7 +2,7 @@
 
 use super::cip::CipDictionary;
 use super::{Code, CodeRange, Enumeration, RangeKind, SetKind};
-use crate::mapping::format::{CipBitsRow, CipEnumerationRow, CipRangeRow, DataSetRow, Name, Source};
+use crate::mapping::format::{CipRangeRow, CipSetRow, DataSetRow, Name, Source};
 use crate::mapping::resolver::Resolver;
 
 /// A set that belongs to nothing is of no use to a reader.
@@ -13,8 +13,8 @@ const ELEMENT_BITS: u32 = 8;
 
 /// Reads sets of codes and of bits into the dictionary, which has the attributes already.
 pub(super) fn resolve_sets(
-    enumerations: &[CipEnumerationRow],
-    bits: &[CipBitsRow],
+    enumerations: &[CipSetRow],
+    bits: &[CipSetRow],
     dictionary: &mut CipDictionary,
     resolver: &mut Resolver<'_>,
 ) {
@@ -22,44 +22,57 @@ pub(super) fn resolve_sets(
         if dictionary.enumeration(row.name.get_ref()).is_some() {
             resolver.error(row.name.span(), "name", "the set is there twice");
         }
-        let set = resolve_codes(row, dictionary, resolver);
+        if let Some(width) = &row.width {
+            resolver.error(width.span(), "width", "expected none: only a set of bits has one");
+        }
+        let set = resolve_set(row, SetKind::Codes, "code", dictionary, resolver);
         dictionary.enumerations.push(set);
     }
     for row in bits {
         if dictionary.bits(row.name.get_ref()).is_some() {
             resolver.error(row.name.span(), "name", "the set is there twice");
         }
-        let set = resolve_bits(row, dictionary, resolver);
+        if let Some(field) = &row.field {
+            resolver.error(field.span(), "field", "expected none: a set of bits is the whole value");
+        }
+        let Some(width) = row.width.as_ref().map(|width| *width.get_ref()) else {
+            resolver.error(row.name.span(), "width", "expected the bits of the value, got none");
+            continue;
+        };
+        let set = resolve_set(row, SetKind::Bits { width }, "bit", dictionary, resolver);
         dictionary.bits.push(set);
     }
 }
 
-fn resolve_codes(
-    row: &CipEnumerationRow,
+fn resolve_set(
+    row: &CipSetRow,
+    kind: SetKind,
+    key: &'static str,
     dictionary: &CipDictionary,
     resolver: &mut Resolver<'_>,
 ) -> Enumeration {
-    let mut set = empty(&row.name, SetKind::Codes, &row.source);
+    let mut set = empty(&row.name, kind, &row.source);
     set.element = row.element.clone().unwrap_or_default();
     set.note = row.note.clone().unwrap_or_default();
     hold(&mut set, &row.name, [&row.attributes, &row.class_attributes], dictionary, resolver);
-    let whole = value_bits(&set, dictionary).unwrap_or(ELEMENT_BITS);
-    let mut width = whole;
-    if let Some(field) = &row.field {
-        let [first, last] = *field.get_ref();
-        if first > last || last >= whole {
-            let message = format!("expected first and last bit below {whole}, got [{first}, {last}]");
-            resolver.error(field.span(), "field", message);
-        } else {
-            width = last - first + 1;
+    let whole = value_bits(&set, dictionary);
+    let beyond = match kind {
+        SetKind::Codes => {
+            let whole = whole.unwrap_or(ELEMENT_BITS);
+            // A set with a field of an attribute and a whole octet elsewhere is as wide as the field.
+            1_u64.checked_shl(field(&mut set, row, whole, resolver)).unwrap_or(u64::MAX)
         }
-        set.field = Some((first, last));
-    }
-    // A set with a field of an attribute and a whole octet elsewhere is as wide as the field.
-    let beyond = 1_u64.checked_shl(width).unwrap_or(u64::MAX);
+        SetKind::Bits { width } => {
+            if let Some(whole) = whole.filter(|whole| *whole != width) {
+                let message = format!("expected width {whole}, as its attribute has, got {width}");
+                resolver.error(row.name.span(), "width", message);
+            }
+            u64::from(width)
+        }
+    };
     for code in &row.codes {
         let number = *code.code.get_ref();
-        below(beyond, number, code.code.span(), "code", resolver);
+        below(beyond, number, code.code.span(), key, resolver);
         set.codes.push(Code {
             code: number,
             name: code.name.get_ref().clone(),
@@ -74,33 +87,17 @@ fn resolve_codes(
     set
 }
 
-fn resolve_bits(row: &CipBitsRow, dictionary: &CipDictionary, resolver: &mut Resolver<'_>) -> Enumeration {
-    let mut set = empty(&row.name, SetKind::Bits { width: row.width }, &row.source);
-    set.element = row.element.clone().unwrap_or_default();
-    set.note = row.note.clone().unwrap_or_default();
-    hold(&mut set, &row.name, [&row.attributes, &row.class_attributes], dictionary, resolver);
-    if let Some(width) = value_bits(&set, dictionary)
-        && width != row.width
-    {
-        let message = format!("expected width {width}, as its attribute has, got {}", row.width);
-        resolver.error(row.name.span(), "width", message);
+/// Notes the field that holds the code; gives its bits.
+fn field(set: &mut Enumeration, row: &CipSetRow, whole: u32, resolver: &mut Resolver<'_>) -> u32 {
+    let Some(field) = &row.field else { return whole };
+    let [first, last] = *field.get_ref();
+    set.field = Some((first, last));
+    if first > last || last >= whole {
+        let message = format!("expected first and last bit below {whole}, got [{first}, {last}]");
+        resolver.error(field.span(), "field", message);
+        return whole;
     }
-    let beyond = u64::from(row.width);
-    for bit in &row.bits {
-        let number = *bit.bit.get_ref();
-        below(beyond, number, bit.bit.span(), "bit", resolver);
-        set.codes.push(Code {
-            code: number,
-            name: bit.name.get_ref().clone(),
-            need: resolve_need(bit.need.as_ref(), resolver),
-            rule: bit.rule.clone().unwrap_or_default(),
-            note: bit.note.clone().unwrap_or_default(),
-            limits: limits(&bit.limits, &set, dictionary, resolver),
-        });
-    }
-    set.unique(row.bits.iter().map(|bit| &bit.name), resolver);
-    ranges(&mut set, &row.ranges, beyond, resolver);
-    set
+    last - first + 1
 }
 
 /// The bits of a data set, beside what its elements carry.

@@ -136,43 +136,47 @@ pub struct CipEnumerationFile {
     /// `cip-motion`.
     pub profile: Name,
     /// Sets of named codes.
-    pub enumeration: Vec<CipEnumerationRow>,
+    pub enumeration: Vec<CipSetRow>,
     /// Sets of named bits.
-    pub bits: Vec<CipBitsRow>,
+    pub bits: Vec<CipSetRow>,
 }
 
-/// A set of named codes.
+/// A set of named codes or of named bits.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CipEnumerationRow {
+pub struct CipSetRow {
     /// Name of the set.
     pub name: Name,
-    /// Attributes of the axis that hold such a code.
+    /// Attributes of the axis that hold such a value.
     #[serde(default)]
     pub attributes: Vec<Name>,
-    /// Attributes of instance 0 that hold such a code.
+    /// Attributes of instance 0 that hold such a value.
     #[serde(default)]
     pub class_attributes: Vec<Name>,
     /// The field or the part of the attribute that holds it, in words.
     pub element: Option<String>,
-    /// First and last bit of the code where it is only a part of the value.
+    /// First and last bit of the code where it is only a part of the value; not of a set of bits.
     pub field: Option<Spanned<[u32; 2]>>,
+    /// How many bits the value has; of a set of bits only.
+    pub width: Option<Spanned<u32>>,
     /// Where it comes from.
     pub source: Source,
     /// Anything worth knowing.
     pub note: Option<String>,
-    /// The codes.
+    /// The codes; `bits` in a set of bits.
+    #[serde(alias = "bits")]
     pub codes: Vec<CipCodeRow>,
-    /// Codes without a name of their own.
+    /// Codes or bits without a name of their own.
     #[serde(default)]
     pub ranges: Vec<CipRangeRow>,
 }
 
-/// One named code.
+/// One named code or bit.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CipCodeRow {
-    /// The code.
+    /// The code; `bit`, its number from 0, in a set of bits.
+    #[serde(alias = "bit")]
     pub code: Spanned<u32>,
     /// Its name.
     pub name: Name,
@@ -185,33 +189,6 @@ pub struct CipCodeRow {
     pub limits: Vec<Name>,
     /// Anything worth knowing.
     pub note: Option<String>,
-}
-
-/// A set of named bits.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CipBitsRow {
-    /// Name of the set.
-    pub name: Name,
-    /// Attributes of the axis that hold the bits.
-    #[serde(default)]
-    pub attributes: Vec<Name>,
-    /// Attributes of instance 0 that hold the bits.
-    #[serde(default)]
-    pub class_attributes: Vec<Name>,
-    /// The field or the part of the attribute that holds them, in words.
-    pub element: Option<String>,
-    /// How many bits the value has.
-    pub width: u32,
-    /// Where it comes from.
-    pub source: Source,
-    /// Anything worth knowing.
-    pub note: Option<String>,
-    /// The bits.
-    pub bits: Vec<CipBitRow>,
-    /// Bits without a name of their own.
-    #[serde(default)]
-    pub ranges: Vec<CipRangeRow>,
 }
 
 /// Codes or bits without a name of their own.
@@ -228,25 +205,6 @@ pub struct CipRangeRow {
     pub name: Option<String>,
     /// `R`, `O`, `C` or `-`.
     pub need: Option<Name>,
-    /// Anything worth knowing.
-    pub note: Option<String>,
-}
-
-/// One named bit.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CipBitRow {
-    /// Number of the bit, 0 first.
-    pub bit: Spanned<u32>,
-    /// Its name.
-    pub name: Name,
-    /// `R`, `O`, `C` or `-`.
-    pub need: Option<Name>,
-    /// To what the need applies.
-    pub rule: Option<String>,
-    /// Attributes that say when the condition is met, for sets of faults and alarms.
-    #[serde(default)]
-    pub limits: Vec<Name>,
     /// Anything worth knowing.
     pub note: Option<String>,
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{CipBitsRow, CipEnumerationRow, Name, Source};
+use super::{CipSetRow, Name, Source};
 
 /// `mappings/dictionary/cip-faults.toml`.
 #[derive(Debug, Clone, Deserialize)]
@@ -14,9 +14,9 @@ pub struct CipFaultFile {
     /// `cip-motion`.
     pub profile: Name,
     /// Sets of named codes.
-    pub enumeration: Vec<CipEnumerationRow>,
+    pub enumeration: Vec<CipSetRow>,
     /// Sets of named bits.
-    pub bits: Vec<CipBitsRow>,
+    pub bits: Vec<CipSetRow>,
     /// What the types of faults and alarms mean.
     pub fault_record: Vec<FaultRecordRow>,
     /// What the exception actions do.

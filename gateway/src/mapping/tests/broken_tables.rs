@@ -140,6 +140,19 @@ const CASES: &[Case] = &[
         "{ code = 16, name = \"Torque Control\"",
     ),
     ("field above the value", |t| &mut t.cip_enumerations, "field = [0, 3]", "field = [5, 8]"),
+    ("codes with a width", |t| &mut t.cip_enumerations, "field = [0, 3]", "width = 8"),
+    (
+        "bits without a width",
+        |t| &mut t.cip_enumerations,
+        "attributes = [\"Control Status\"]\nwidth = 8\n",
+        "attributes = [\"Control Status\"]\n",
+    ),
+    (
+        "bits with a field",
+        |t| &mut t.cip_enumerations,
+        "attributes = [\"Control Status\"]\nwidth = 8\n",
+        "attributes = [\"Control Status\"]\nwidth = 8\nfield = [0, 3]\n",
+    ),
     (
         "range over a code",
         |t| &mut t.cip_enumerations,

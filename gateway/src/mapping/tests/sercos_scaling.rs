@@ -338,8 +338,8 @@ fn modulo_positions_know_their_longest_step() {
     let axis = rotary_axis(true);
     let facts = obedient(mapping, &axis);
     let program = mapping.sercos_program(&axis, &facts).unwrap();
-    // Half a turn less one count of 1/3600000.
-    assert_eq!(program.position_step(), Some(499_999_722));
+    // Half of 512 turns less one count of 1/3600000 turn.
+    assert_eq!(program.position_step(), Some(255_999_999_722));
     assert_eq!(
         mapping
             .sercos_program(
