@@ -186,6 +186,7 @@ fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
         },
         modulo: false,
         set_scaling: drive.set_scaling,
+        silent: !drive.acknowledges,
         parameters,
         captures: axis.events,
     }

@@ -21,7 +21,7 @@ use profile_generic::image::Signal;
 const ROOM: usize = 1_500;
 
 /// Changes the cyclic block of axis 1 in a datagram of the controller.
-fn change_command(datagram: &mut Bytes, change: impl FnOnce(&mut CommandBlock)) {
+pub(super) fn change_command(datagram: &mut Bytes, change: impl FnOnce(&mut CommandBlock)) {
     let bytes = datagram.as_slice().to_vec();
     let Ok(data) = Class1Datagram::parse(&bytes).map(|datagram| datagram.data) else { return };
     let Ok(frame) = CommandFrame::parse(data) else { return };
