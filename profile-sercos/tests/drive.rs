@@ -278,14 +278,14 @@ fn scaling_is_guarded() {
     assert_eq!(bench.write(0, Idn::standard(91), 0), Err(SvcError::BELOW_MINIMUM));
     assert_eq!(bench.write(0, Idn::standard(104), 0xFFFF), Err(SvcError::INVALID_DATA), "unstable");
     bench.configure();
-    bench.write(0, Idn::standard(76), 1).unwrap();
+    bench.write(0, Idn::standard(76), 3).unwrap();
     bench.command(0, Idn::CP3_CHECK).unwrap();
     bench.switch(profile_sercos::wire::header::Phase::CP3);
     assert_eq!(bench.command(0, Idn::CP4_CHECK), Ok(CommandState::Failed));
     assert_eq!(
         bench.read_list(0, Idn::INVALID_CP3),
         Ok(76u32.to_le_bytes().to_vec()),
-        "linear on a rotary axis"
+        "neither linear nor rotational"
     );
 }
 

@@ -791,7 +791,8 @@ impl Checker {
             },
         };
         let set_scaling = table.set_scaling.unwrap_or(false);
-        Some(Drive { name: name?, address: address?, set_scaling, rated: rated? })
+        let acknowledges = table.acknowledges.unwrap_or(true);
+        Some(Drive { name: name?, address: address?, set_scaling, acknowledges, rated: rated? })
     }
 
     /// A name that other parts of the file refer to.

@@ -254,6 +254,9 @@ pub struct DriveTable {
     /// Whether the drive's scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
     /// Default: false.
     pub set_scaling: Option<bool>,
+    /// Whether its status word (S-0-0135) tells that it follows command values (bit 3) and that it is halted (bit 4). A
+    /// drive without them is held by its command instead of its halt. Default: true.
+    pub acknowledges: Option<bool>,
     /// Rated (continuous stall) torque or force of its motor, such as `"2.5 Nm"` or `"200 N"`: needed where the drive's
     /// torque values are in newton metre, newton or their inch units. Default: not known.
     pub rated_torque: Option<Spanned<String>>,

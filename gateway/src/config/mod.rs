@@ -366,6 +366,8 @@ pub struct Drive {
     pub address: u16,
     /// Whether its scaling is set to the preferential one of the axis's unit; else it is read and left as it is.
     pub set_scaling: bool,
+    /// Whether its status word tells that it follows command values, and that it is halted.
+    pub acknowledges: bool,
     /// Rated torque or force of its motor, where it is known.
     pub rated: Option<Rated>,
 }

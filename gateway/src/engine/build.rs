@@ -194,6 +194,7 @@ fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
         // Positions of a linear drive reach for hundreds of kilometres.
         modulo: axis.kind == AxisKind::Rotary && axis.unwind_counts.is_some(),
         set_scaling: drive.set_scaling,
+        silent: !drive.acknowledges,
         parameters,
         captures: axis.events,
     }

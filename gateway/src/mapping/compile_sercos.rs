@@ -50,6 +50,8 @@ pub struct SercosAxis {
     pub parameters: Vec<(Parameter, i64)>,
     /// How the drive's captures are used.
     pub captures: CaptureMode,
+    /// The drive's status word does not tell whether it follows command values and whether it is halted.
+    pub silent: bool,
 }
 
 /// The IDNs in the two telegrams of an axis, in order. The control and the status word come first.
@@ -189,6 +191,7 @@ pub struct SercosProgram {
     parameters: Vec<ParameterEntry>,
     rejected: Vec<Parameter>,
     position_step: Option<i64>,
+    acknowledges: bool,
 }
 
 impl Telegram {
@@ -367,6 +370,7 @@ impl SercosProgram {
             parameters: Vec::new(),
             rejected: Vec::new(),
             position_step: None,
+            acknowledges: !axis.silent,
         };
         let compiler = Compiler { tables, dictionary, axis, facts };
         program.position_step = compiler.position_step()?;
@@ -383,7 +387,8 @@ impl SercosProgram {
         for (action, pattern) in &tables.actions {
             program.actions.set(*action, *pattern);
         }
-        for (pattern, report) in &tables.reports {
+        let fits = |wanted: &Option<bool>| wanted.is_none_or(|wanted| wanted != axis.silent);
+        for (pattern, report, _) in tables.reports.iter().filter(|(.., wanted)| fits(wanted)) {
             if !program.reports.push(*pattern, *report) {
                 return Err(SercosError::Full("the table of reports"));
             }
@@ -391,9 +396,10 @@ impl SercosProgram {
         for (mode, slot) in axis.modes.iter().zip(&tables.slots) {
             program.modes.push(ModeEntry { mode: *mode, control: slot.control, status: slot.status });
         }
-        for row in &tables.status {
-            program.status.try_push(*row).map_err(|_| SercosError::Full("the table of status bits"))?;
-            program.known_status |= row.1;
+        for (pattern, bit, _) in tables.status.iter().filter(|(.., wanted)| fits(wanted)) {
+            let row = (*pattern, *bit);
+            program.status.try_push(row).map_err(|_| SercosError::Full("the table of status bits"))?;
+            program.known_status |= *bit;
         }
         for row in &tables.faults {
             program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
@@ -521,6 +527,11 @@ impl SercosProgram {
     /// other way round. Nanounits.
     pub fn position_step(&self) -> Option<i64> {
         self.position_step
+    }
+
+    /// Whether the drive's status word tells that it follows command values, and that it is halted.
+    pub fn acknowledges(&self) -> bool {
+        self.acknowledges
     }
 
     /// The drive's captures.

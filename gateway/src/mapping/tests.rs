@@ -62,6 +62,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
         set_scaling: true,
         parameters: Vec::new(),
         captures: CaptureMode::Off,
+        silent: false,
     }
 }
 

@@ -26,7 +26,7 @@ const ROOM: usize = 1_500;
 macro_rules! change {
     ($(#[$doc:meta])* $name:ident, $block:ty, $frame:ty, $writer:ty) => {
         $(#[$doc])*
-        fn $name(datagram: &mut Bytes, change: impl FnOnce(&mut $block)) {
+        pub(super) fn $name(datagram: &mut Bytes, change: impl FnOnce(&mut $block)) {
             let bytes = datagram.as_slice().to_vec();
             let Ok(data) = Class1Datagram::parse(&bytes).map(|datagram| datagram.data) else { return };
             let Ok(frame) = <$frame>::parse(data) else { return };

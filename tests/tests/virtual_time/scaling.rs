@@ -3,7 +3,8 @@
 
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::{AxisSet, Step};
+use profile_cip::controller::{AxisSet, Limits, Step};
+use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 use profile_sercos::wire::idn::Idn;
 
@@ -178,4 +179,29 @@ fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
         assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
         assert_ne!(rig.engine.axes()[1].state(), DriveState::NotReady, "{told}");
     }
+}
+
+/// Half of a modulo range is the longest way that a command can lead in a cycle: a longer one would lead the drive the
+/// other way round. It is not sent; the axis stops.
+#[test]
+fn a_command_that_a_modulo_drive_would_take_backward_is_not_sent() {
+    let mut rig = Rig::new(Settings::default());
+    // A hundredth of a turn: half of it is 2.5 turns a second in cycles of 2 ms.
+    preset(&mut rig, 0, &[(76, 0xC2), (103, 36_000)]);
+    rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+    rig.connect(vec![
+        Step::Enable(AxisSet::one(1)),
+        Step::MoveAbsolute { axis: 1, position: 1.0, limits: Limits { velocity: 2.0, ..TURNTABLE } },
+        Step::MoveAbsolute { axis: 1, position: 20.0, limits: TURNTABLE },
+    ]);
+    rig.run_until(millis(20_000), "the slow move", |rig| rig.report().steps_finished == 2);
+    assert!((rig.position(0) - NANO).abs() < NANO / 200, "{} after many wraps", rig.position(0));
+    let mut last = 0;
+    rig.run_until(millis(20_000), "the fault", |rig| {
+        assert!(rig.velocity(0) > -NANO / 20, "backward at {}", rig.velocity(0));
+        last = rig.velocity(0);
+        rig.engine.axes()[0].faults().any(|active| active.fault.cause == FaultCause::VELOCITY_COMMAND_LIMIT)
+    });
+    assert!(last > 2 * NANO && last < 26 * NANO / 10, "stopped at {last}");
+    rig.run_until(millis(3_000), "the end of the torque", |rig| rig.velocity(0).abs() < NANO / 100);
 }

@@ -8,7 +8,7 @@ use profile_generic::image::FeedbackSet;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
-use profile_generic::state::{DriveState, Event, Report};
+use profile_generic::state::{Action, DriveState, Event, Report};
 use profile_generic::time::{MonotonicTime, SystemTime};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 
@@ -49,6 +49,16 @@ impl AxisChannel {
         if self.feedback.present.contains(FeedbackSet::POSITION) {
             let position = self.feedback.position;
             self.captures.sample(program.captures(), consumer.data, position, sampled);
+        }
+        let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();
+        let stands = self.feedback.velocity.get().unsigned_abs() <= zero_speed;
+        if !program.acknowledges()
+            && self.action == Action::Halt
+            && stands
+            && self.feedback.report == Report::Operating
+        {
+            // Nothing in its status word would say so.
+            self.feedback.report = Report::Halted;
         }
         self.count_saturated(conversions.saturated);
         let report = self.feedback.report;

@@ -43,6 +43,9 @@ pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
 /// How long a drive may take to come to rest before its torque is taken away.
 pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
 
+/// How long a drive in operation may take to another operating mode.
+pub const MODE_TIME_OUT: DurationNs = DurationNs::from_millis(100);
+
 /// How long the drive may take to clear its faults after a reset.
 pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 
@@ -133,6 +136,8 @@ pub struct AxisChannel {
     /// The instant that the last command is for, and when it was made.
     acts_at: SystemTime,
     made_at: MonotonicTime,
+    /// Since when the drive in operation shows another operating mode than it is told.
+    other_mode_since: Option<MonotonicTime>,
     command: AxisCommand,
     feedback: AxisFeedback,
     /// The action whose bits stand in the control word.
@@ -198,6 +203,7 @@ impl AxisChannel {
             caught: None,
             acts_at: SystemTime::default(),
             made_at: MonotonicTime::default(),
+            other_mode_since: None,
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             action: Action::TorqueOff,

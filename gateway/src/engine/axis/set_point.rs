@@ -1,7 +1,7 @@
 //! From the controller's set-points to the telegram of the drive.
 
-use super::{AxisChannel, Loss};
-use crate::mapping::CyclicValues;
+use super::{AxisChannel, Loss, MODE_TIME_OUT};
+use crate::mapping::{CyclicValues, SercosProgram};
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, FeedbackSet};
@@ -190,7 +190,7 @@ impl AxisChannel {
     /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it
     /// begins to.
     pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
-        self.acts_at = acts_at;
+        let span = acts_at.since(std::mem::replace(&mut self.acts_at, acts_at));
         self.made_at = now;
         let test_torque = self.run_test(now, system);
         let operating = self.state() == DriveState::Operating;
@@ -210,16 +210,51 @@ impl AxisChannel {
                 FinePoints { torque, ..self.led_by_box(now) }
             }
         };
-        // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it.
-        let led = operating && self.command.mode == OperatingMode::Position && !self.drive_leads();
-        let rest = if led { self.command.position } else { self.feedback.position };
+        self.watch_mode(now, system);
+        let last = self.command;
+        // Until the drive shows the new operating mode it goes on by the values of the old one.
+        let still = |mode| operating && self.feedback.mode == mode && last.mode != mode;
+        // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it;
+        // only a drive that knows no halt has nothing else to hold by.
+        let led = operating && last.mode == OperatingMode::Position && !self.drive_leads();
+        let velocity = points.velocity.unwrap_or(last.velocity);
+        let rest = if still(OperatingMode::Position) {
+            last.position.saturating_add(way(velocity, span))
+        } else if led || self.halts_by_command() {
+            last.position
+        } else {
+            self.feedback.position
+        };
+        let kept = |mode, value: i64| if still(mode) { value } else { 0 };
         let all = FinePoints {
             position: Some(points.position.unwrap_or(rest)),
-            velocity: Some(points.velocity.unwrap_or(Velocity::ZERO)),
+            velocity: Some(
+                points.velocity.unwrap_or(Velocity(kept(OperatingMode::Velocity, last.velocity.0))),
+            ),
             acceleration: Some(points.acceleration.unwrap_or_default()),
-            torque: Some(points.torque.unwrap_or(Torque::ZERO)),
+            torque: Some(points.torque.unwrap_or(Torque(kept(OperatingMode::Torque, last.torque.0)))),
         };
         all.write_to(&mut self.command);
+    }
+
+    /// A drive that does not come to the operating mode that it is told follows values that are meant for no one.
+    fn watch_mode(&mut self, now: MonotonicTime, system: SystemTime) {
+        let led = self.state() == DriveState::Operating && self.action == Action::Enable;
+        if !led || self.feedback.mode == self.command.mode {
+            self.other_mode_since = None;
+            return;
+        }
+        let since = *self.other_mode_since.get_or_insert(now);
+        if now.since(since) > MODE_TIME_OUT {
+            self.other_mode_since = None;
+            self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
+        }
+    }
+
+    /// Whether the drive is to halt and has no halt of its own: then its command stands still.
+    fn halts_by_command(&self) -> bool {
+        let knows = |(program, _): &(SercosProgram, _)| program.acknowledges();
+        self.action == Action::Halt && !self.south.as_ref().is_none_or(knows)
     }
 
     pub(super) fn follow(&mut self, now: MonotonicTime, system: SystemTime, transition: Transition) {
@@ -246,4 +281,10 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(cause, system));
         }
     }
+}
+
+/// The way at a velocity in a time.
+fn way(velocity: Velocity, span: DurationNs) -> Position {
+    let way = i128::from(velocity.get()) * i128::from(span.as_nanos()) / 1_000_000_000;
+    Position(i64::try_from(way).unwrap_or(0))
 }

@@ -301,6 +301,8 @@ pub struct ReportRow {
     pub pattern: Vec<FieldValueRow>,
     /// Report.
     pub report: Name,
+    /// Whether it is for drives that acknowledge (follow command values, halt), or for those that do not. Default: both.
+    pub acknowledges: Option<bool>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -315,6 +317,8 @@ pub struct SercosStatusRow {
     pub pattern: Vec<FieldValueRow>,
     /// Generic status bit.
     pub status: Name,
+    /// As in a report.
+    pub acknowledges: Option<bool>,
     /// Where it comes from.
     pub source: Source,
 }

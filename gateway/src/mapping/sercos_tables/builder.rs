@@ -347,7 +347,7 @@ impl<'a> Builder<'a> {
             let report =
                 self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
-                self.tables.reports.push((pattern, report));
+                self.tables.reports.push((pattern, report, row.acknowledges));
             }
         }
         if self.tables.reports.len() > MAX_STATE_ROWS {
@@ -364,7 +364,7 @@ impl<'a> Builder<'a> {
                 self.resolver.error(row.word.span(), "word", message);
             }
             if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
-                self.tables.status.push((pattern, bit));
+                self.tables.status.push((pattern, bit, row.acknowledges));
             }
         }
     }

@@ -82,6 +82,13 @@ pub struct Drive {
     locked: bool,
     referenced: bool,
     probe: Probe,
+    /// Ready state shown while an error locks the drive.
+    locked_ready: ReadyState,
+    /// It shows neither bit 3 nor bit 4 of S-0-0135, and knows no halt.
+    silent: bool,
+    /// Time from the selection of an operation mode to the mode, and how long one has been selected.
+    mode_delay: DurationNs,
+    mode_selected: DurationNs,
     /// The set-point that the drive makes up by itself.
     motion: Motion,
     homing: Homing,
@@ -116,6 +123,10 @@ impl Drive {
             follows: false,
             locked: false,
             referenced: false,
+            locked_ready: ReadyState::NotReady,
+            silent: false,
+            mode_delay: DurationNs::ZERO,
+            mode_selected: DurationNs::ZERO,
             motion: Motion::default(),
             homing: Homing::default(),
         })
@@ -172,6 +183,22 @@ impl Drive {
         self.referenced = referenced;
     }
 
+    /// Makes it a drive whose status word does not say whether it follows command values, and that knows no halt by bit 13
+    /// of S-0-0134.
+    pub fn set_silent(&mut self, silent: bool) {
+        self.silent = silent;
+    }
+
+    /// What bits 15 and 14 of S-0-0135 show while an error locks the drive: families differ, 00 or 10.
+    pub fn set_locked_ready(&mut self, ready: ReadyState) {
+        self.locked_ready = ready;
+    }
+
+    /// How long it takes to another operation mode.
+    pub fn set_mode_delay(&mut self, delay: DurationNs) {
+        self.mode_delay = delay;
+    }
+
     /// Limits and windows of the parameters, as the servo takes them.
     fn servo_parameters(&self, scales: &Scales, store: &Store, lag_less: bool) -> ServoParameters {
         let number = |idn| store.number_of(idn);
@@ -215,8 +242,12 @@ impl Drive {
     }
 
     /// The operation mode that the control word selects; `None` if there is none behind the number.
-    fn select_mode(&mut self, store: &Store) -> Option<OperatingMode> {
-        let number = self.control.mode();
+    fn select_mode(&mut self, elapsed: DurationNs, store: &Store) -> Option<OperatingMode> {
+        let selected = self.control.mode();
+        self.mode_selected =
+            if selected == self.mode_number { DurationNs::ZERO } else { self.mode_selected + elapsed };
+        let waits = self.mode_selected <= self.mode_delay && self.in_operation();
+        let number = if waits { self.mode_number } else { selected };
         let block = MODE_BLOCKS[usize::from(number & 7)];
         let [low, high, ..] = store.number_of(Idn::standard(block)).to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
@@ -251,7 +282,7 @@ impl Drive {
             return if waits { ServoControl::Halt } else { ServoControl::Disable };
         }
         self.off_for = DurationNs::ZERO;
-        let halt = !self.control.contains(DriveControl::RESTART);
+        let halt = !self.control.contains(DriveControl::RESTART) && !self.silent;
         let running = matches!(self.actual.report, Report::Operating | Report::Halted);
         if halt && running { ServoControl::Halt } else { ServoControl::Enable }
     }
@@ -545,6 +576,7 @@ impl Drive {
             (State::In(Phase::CP4), Report::FaultReaction) => ReadyState::InOperation,
             (State::In(Phase::CP4), Report::Ready | Report::Enabling) => ReadyState::PowerOn,
             (State::In(Phase::CP4), Report::AwaitingPower) => ReadyState::ReadyForPower,
+            (State::In(Phase::CP4), Report::Faulted) => self.locked_ready,
             _ => ReadyState::NotReady,
         };
         let diagnosis = self.diagnosis();
@@ -552,8 +584,10 @@ impl Drive {
         status.set(DriveStatus::ERROR, diagnosis.errors != 0);
         status.set(DriveStatus::WARNING, diagnosis.warnings != 0);
         status.set(DriveStatus::REFERENCED, self.referenced);
-        status.set(DriveStatus::HALT, self.actual.report == Report::Halted);
-        status.set(DriveStatus::FOLLOWS, self.follows && self.actual.report == Report::Operating);
+        if !self.silent {
+            status.set(DriveStatus::HALT, self.actual.report == Report::Halted);
+            status.set(DriveStatus::FOLLOWS, self.follows && self.actual.report == Report::Operating);
+        }
         status
     }
 
@@ -670,7 +704,7 @@ impl Application for Drive {
             self.locked = true;
         }
         let wants = self.control.contains(enabling) && cycle.connected;
-        let mode = self.select_mode(store);
+        let mode = self.select_mode(cycle.elapsed, store);
         if mode.is_none() && wants {
             self.servo.raise_fault(FaultCause::ILLEGAL_MODE);
         } else {
@@ -723,3 +757,6 @@ impl Application for Drive {
         self.actual.fault.is_none()
     }
 }
+
+#[cfg(test)]
+mod tests;
