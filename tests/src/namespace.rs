@@ -8,7 +8,9 @@ static NEXT: AtomicU32 = AtomicU32::new(0);
 /// Whether this process may make network namespaces.
 #[must_use]
 pub fn available() -> bool {
-    let name = format!("axb-probe-{}", std::process::id());
+    // Tests of one process ask at the same time.
+    let serial = NEXT.fetch_add(1, Ordering::Relaxed);
+    let name = format!("axb-{}-{serial}-probe", std::process::id());
     let made = ip(&["netns", "add", &name]);
     if made {
         ip(&["netns", "del", &name]);
