@@ -57,7 +57,7 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         end_after(Arc::clone(&stop), seconds);
     }
     // Without real-time scheduling the drives answer later, which the master counts; nothing else changes.
-    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), cpu: None, lock_memory: false };
+    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), ..realtime::Request::default() };
     let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
     let mut progress = Progress::new(false);
     progress.step(&format!(

@@ -773,6 +773,7 @@ impl Checker {
             priority: priority.map(|priority| (priority > 0).then_some(priority))?,
             cpu: cpu?,
             lock_memory,
+            stay_awake: table.and_then(|table| table.stay_awake).unwrap_or(false),
         })
     }
 

@@ -241,6 +241,9 @@ pub struct RealtimeTable {
     pub cpu: Option<Spanned<i64>>,
     /// Keep the memory of the process resident. Default: true.
     pub lock_memory: Option<bool>,
+    /// Keep the host's processors from sleeping while the box runs: the most even cycle, at full consumption. Default:
+    /// false.
+    pub stay_awake: Option<bool>,
 }
 
 /// `[[south.sercos.drive]]`

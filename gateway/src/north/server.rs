@@ -41,7 +41,7 @@ pub const STALL_LIMIT: Duration = Duration::from_secs(30);
 ///
 /// Whoever asks once mostly asks again, and to be woken costs more than to answer. It is bounded, so that a quiet
 /// server costs nothing, and below the priority of the cycle thread.
-const POLL_FOR: DurationNs = DurationNs::from_micros(60);
+const POLL_FOR: DurationNs = DurationNs::from_micros(200);
 
 /// How often the application is called and the statistics are published.
 const ATTEND_PERIOD: DurationNs = DurationNs::from_millis(500);

@@ -80,7 +80,7 @@ pub fn run(
 ) -> Result<Report, RunError> {
     let mut controller = Controller::new(config, program)?;
     // A controller is a real-time device too; where the host refuses, its updates only come less evenly.
-    let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), cpu: None, lock_memory: false });
+    let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), ..realtime::Request::default() });
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
     let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;

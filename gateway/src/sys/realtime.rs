@@ -6,7 +6,8 @@
 #![allow(unsafe_code)]
 
 use std::fmt;
-use std::io;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write as _};
 
 use arrayvec::ArrayVec;
 
@@ -15,6 +16,9 @@ pub const PRIORITY_MAX: u8 = 99;
 
 /// Without real-time scheduling a wake-up may be put off by this much less than the kernel's usual 50 us.
 const TIMER_SLACK_NS: libc::c_ulong = 1;
+
+/// Takes the longest time in microseconds that a processor may need to wake, as four octets.
+const LATENCY_LIMIT: &str = "/dev/cpu_dma_latency";
 
 /// What to ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,6 +29,8 @@ pub struct Request {
     pub cpu: Option<u16>,
     /// Keep all memory of the process resident, so that the cycle never waits for a page.
     pub lock_memory: bool,
+    /// Let no processor of the host sleep so deep that waking takes time, as long as the [`Report`] lives.
+    pub stay_awake: bool,
 }
 
 /// One thing asked of the kernel.
@@ -47,6 +53,8 @@ pub enum Measure {
     /// Memory locked as far as it is allocated now: the process has a limit on locked memory, and locking
     /// what comes later would make allocations fail once the limit is reached.
     LockPresentMemory,
+    /// Processors that wake at once (PM QoS limit of 0 us).
+    StayAwake,
 }
 
 impl fmt::Display for Measure {
@@ -57,6 +65,7 @@ impl fmt::Display for Measure {
             Self::Affinity { cpu } => write!(f, "processor {cpu}"),
             Self::LockMemory => f.write_str("memory locked"),
             Self::LockPresentMemory => f.write_str("memory locked as allocated now"),
+            Self::StayAwake => f.write_str("processors kept awake"),
         }
     }
 }
@@ -84,6 +93,9 @@ impl Outcome {
             (Measure::LockMemory | Measure::LockPresentMemory, libc::EPERM | libc::ENOMEM | libc::EAGAIN) => {
                 "needs CAP_IPC_LOCK or a higher LimitMEMLOCK="
             }
+            (Measure::StayAwake, libc::EACCES | libc::EPERM | libc::ENOENT) => {
+                "needs to write to /dev/cpu_dma_latency"
+            }
             _ => "the kernel refused",
         })
     }
@@ -102,10 +114,12 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// What the kernel granted and refused.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// What the kernel granted and refused. Dropped, it lets the processors sleep again; all else stays with the thread.
+#[derive(Debug, Default)]
 pub struct Report {
-    outcomes: ArrayVec<Outcome, 4>,
+    outcomes: ArrayVec<Outcome, 5>,
+    /// The limit holds as long as its file is open.
+    awake: Option<File>,
 }
 
 impl Report {
@@ -124,6 +138,21 @@ impl Report {
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.refused().next().is_none()
+    }
+
+    fn stay_awake(&mut self) {
+        let asked = OpenOptions::new().write(true).open(LATENCY_LIMIT).and_then(|mut file| {
+            file.write_all(&0_i32.to_ne_bytes())?;
+            Ok(file)
+        });
+        let result = match asked {
+            Ok(file) => {
+                self.awake = Some(file);
+                Ok(())
+            }
+            Err(error) => Err(error.raw_os_error().unwrap_or(libc::EINVAL)),
+        };
+        self.outcomes.push(Outcome { measure: Measure::StayAwake, result });
     }
 
     fn record(&mut self, measure: Measure, result: libc::c_int) {
@@ -165,6 +194,9 @@ pub fn apply(request: &Request) -> Report {
         // SAFETY: mlockall takes flags and changes no contents of memory.
         let result = unsafe { libc::mlockall(flags) };
         report.record(measure, result);
+    }
+    if request.stay_awake {
+        report.stay_awake();
     }
     if let Some(cpu) = request.cpu {
         let result = set_affinity(cpu);
@@ -223,8 +255,19 @@ mod tests {
     }
 
     #[test]
+    fn staying_awake_is_granted_or_refused_with_a_reason() {
+        let report = on_own_thread(Request { stay_awake: true, ..Request::default() });
+        let outcome = report.outcomes()[1];
+        assert_eq!(outcome.measure, Measure::StayAwake);
+        assert_eq!(
+            (report.awake.is_some(), outcome.hint().is_none()),
+            (outcome.result.is_ok(), outcome.result.is_ok())
+        );
+    }
+
+    #[test]
     fn refusals_are_reported_with_a_reason_and_do_not_stop_the_rest() {
-        let request = Request { cpu: Some(u16::MAX), priority: Some(100), lock_memory: false };
+        let request = Request { cpu: Some(u16::MAX), priority: Some(100), ..Request::default() };
         let report = on_own_thread(request);
         assert!(!report.is_complete());
         let refused: Vec<_> = report.refused().map(|outcome| (outcome.measure, outcome.result)).collect();
