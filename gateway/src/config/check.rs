@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::time::DurationNs;
+use profile_sercos::master::config::AddressPolicy;
 use toml::Spanned;
 
 use super::diagnostic::Problem;
@@ -661,6 +662,10 @@ impl Checker {
             jitter: jitter?,
             cp0_stable_cycles: cp0_stable_cycles?,
             allowed_losses: allowed_losses?,
+            addresses: match table.assign_addresses {
+                Some(true) => AddressPolicy::Assign,
+                Some(false) | None => AddressPolicy::Refuse,
+            },
             realtime: realtime?,
             drives: drives.into_iter().collect::<Option<_>>()?,
         })

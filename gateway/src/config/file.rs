@@ -225,6 +225,9 @@ pub struct SercosTable {
     /// Cycles in a row that may be lost in phases 3 and 4 before a slave or the master gives up, 1 to 65535.
     /// Default: 5.
     pub allowed_losses: Option<Spanned<i64>>,
+    /// Give free addresses to slaves that have none or share one, so that the bus can run (S-0-1040); else they are told, and the
+    /// bus stays in phase 2. Such slaves take part without an axis. Default: false.
+    pub assign_addresses: Option<bool>,
     /// What to ask of the kernel for the cycle thread; refusals are reported and do not stop the box.
     pub realtime: Option<RealtimeTable>,
     /// The drives, at least one.

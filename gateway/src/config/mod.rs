@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use profile_cip::wire::motion::Format;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::time::DurationNs;
+use profile_sercos::master::config::AddressPolicy;
 
 pub use diagnostic::{ConfigError, Diagnostic, Report};
 pub(crate) use diagnostic::{Problem, diagnose};
@@ -351,6 +352,8 @@ pub struct Sercos {
     pub cp0_stable_cycles: u16,
     /// Cycles in a row that may be lost before a slave or the master gives up (S-0-1003).
     pub allowed_losses: u16,
+    /// What to do about slaves that have no address or share one.
+    pub addresses: AddressPolicy,
     /// What to ask of the kernel for the cycle thread.
     pub realtime: realtime::Request,
     /// The drives on it.

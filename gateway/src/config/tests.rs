@@ -110,6 +110,7 @@ fn defaults_are_those_of_the_documentation() {
             jitter: DurationNs(50_000),
             cp0_stable_cycles: 100,
             allowed_losses: 5,
+            addresses: AddressPolicy::Refuse,
             realtime: realtime::Request {
                 priority: Some(80),
                 cpu: None,
@@ -147,7 +148,7 @@ fn values_given_are_taken() {
         .replace("serial_number = 3", "serial_number = 0xFFFF_FFFF\nrevision = \"127.255\"\nproduct_name = \"P\"")
         .replace("axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\"]\npower_structure_class_id = 7\nupdate_period = { min = \"4 ms\", max = \"4 ms\" }")
         .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
-        .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\ncp0_stable_cycles = 1\nallowed_losses = 65535\nrealtime = { priority = 0, cpu = 3, lock_memory = false, stay_awake = true }")
+        .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\nassign_addresses = true\ncp0_stable_cycles = 1\nallowed_losses = 65535\nrealtime = { priority = 0, cpu = 3, lock_memory = false, stay_awake = true }")
         .replace("in-process", "enp3s0")
         .replace("address = 2", "address = 511\nset_scaling = true\nacknowledges = false\nrated_torque = \"2.5 Nm\"");
     let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
@@ -185,6 +186,7 @@ fn values_given_are_taken() {
     assert_eq!((sercos.cycle_time, sercos.jitter), (DurationNs(62_500), DurationNs(15_625)));
     assert_eq!(sercos.master_mac, Some([2, 0, 0, 0, 0, 0xAF]));
     assert_eq!((sercos.cp0_stable_cycles, sercos.allowed_losses), (1, 65_535));
+    assert_eq!(sercos.addresses, AddressPolicy::Assign);
     assert_eq!(
         sercos.realtime,
         realtime::Request { priority: None, cpu: Some(3), lock_memory: false, stay_awake: true }

@@ -133,6 +133,7 @@ pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     let ns = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
     let mut master = MasterConfig::new(sercos.master_mac.unwrap_or(host.mac), ns(sercos.cycle_time));
     master.ports = if sercos.link.has_ring() { Ports::Both } else { Ports::One };
+    master.addresses = sercos.addresses;
     master.mst_jitter_ns = ns(sercos.jitter);
     master.stable_cycles = sercos.cp0_stable_cycles;
     master.mst_losses = sercos.allowed_losses;

@@ -1,7 +1,8 @@
 //! Looking at a south bus without a configuration: who is there, and what they say of themselves.
 //!
 //! A [`Scanner`] takes the line to CP2, reads what a person asks first about a drive, and takes the line down again. No
-//! connection is set up and nothing is written, so that nothing can move.
+//! connection is set up and nothing is written but the active communication classes (S-0-1000.0.1), so that nothing can
+//! move.
 
 mod questions;
 mod report;
@@ -14,7 +15,7 @@ use std::collections::VecDeque;
 
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::Master;
-use profile_sercos::master::config::{ConfigError, MasterConfig};
+use profile_sercos::master::config::{AddressPolicy, ConfigError, MasterConfig};
 use profile_sercos::master::event::{Event, Output, SlaveId, Ticket};
 use profile_sercos::master::station::Facts;
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
@@ -137,12 +138,17 @@ pub struct Scanner {
 }
 
 impl Scanner {
-    /// A scan with this master; slaves and room of the configuration do not matter.
+    /// A scan with this master; its slaves, their room and what to do about addresses do not matter.
     ///
     /// # Errors
     /// A value of the configuration is out of its range.
     pub fn new(config: MasterConfig) -> Result<Self, ConfigError> {
-        let config = MasterConfig { slaves: Vec::new(), slaves_max: SLAVES_FEW, ..config };
+        let config = MasterConfig {
+            slaves: Vec::new(),
+            slaves_max: SLAVES_FEW,
+            addresses: AddressPolicy::Refuse,
+            ..config
+        };
         Ok(Self {
             master: up(config)?,
             stage: Stage::Up,

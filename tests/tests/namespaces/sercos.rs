@@ -9,7 +9,7 @@ use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
 
-use super::{in_namespace, scratch, wait_for};
+use super::{in_namespace, one_bus, scratch, wait_for};
 
 /// Address of the box, where its controller is in the same namespace.
 const BOX: &str = "127.0.0.2";
@@ -128,6 +128,7 @@ fn moves(name: &str, processes: usize, drives_each: usize, cycle: &str) {
     if !peer::namespaces_or_skip(name) {
         return;
     }
+    let _alone = one_bus();
     let mut bus = Bus::start(name, processes, drives_each, cycle, false);
     bus.wait_for("CP4");
     let mut controller = bus.controller(processes * drives_each, 2);
@@ -158,6 +159,7 @@ fn a_ring_of_eight_is_cut_and_healed_while_all_axes_move() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
+    let _alone = one_bus();
     let mut bus = Bus::start(name, 2, 4, "4 ms", true);
     bus.wait_for("CP4");
     let mut controller = bus.controller(8, 6);
