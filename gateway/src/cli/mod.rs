@@ -17,7 +17,7 @@ mod simulate;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgGroup, Args, Parser, Subcommand};
 
 /// Motion protocol gateway: to a controller it is CIP Motion drives; behind it, it masters the real ones.
 #[derive(Debug, Parser)]
@@ -90,9 +90,10 @@ struct EdsArguments {
 
 /// Arguments of `scan`.
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("bus").required(true).args(["config", "interface"])))]
 struct ScanArguments {
     /// Look at the bus of this configuration, and say where it is another one.
-    #[arg(long, value_name = "FILE", required_unless_present = "interface", conflicts_with = "interface")]
+    #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Look at what hangs on this network interface.
     #[arg(long, value_name = "IF")]
