@@ -5,6 +5,7 @@
 //! in CI (`CI=true`) it is a failure.
 
 pub mod expected;
+pub mod host;
 pub mod modbus;
 pub mod namespace;
 pub mod peer;

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use axisbridge::capture::reader::Reader;
+use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 use axisbridge_tests::tshark::Frame;
 use axisbridge_tests::{expected, peer, tshark};
@@ -27,6 +28,11 @@ fn demo(seconds: u32, listen: &str, name: &str) -> (serde_json::Value, PathBuf) 
 
 #[test]
 fn both_axes_reach_their_targets_and_tshark_agrees_on_every_frame() {
+    let name = "both_axes_reach_their_targets_and_tshark_agrees_on_every_frame";
+    in_real_time(name, || both_axes_reach_their_targets(name));
+}
+
+fn both_axes_reach_their_targets(name: &str) {
     let (result, capture) = demo(3, "127.0.0.34", "demo-tshark");
     let axes = result["axes"].as_array().expect("an array `axes`");
     assert_eq!(axes.len(), 2);
@@ -41,7 +47,7 @@ fn both_axes_reach_their_targets_and_tshark_agrees_on_every_frame() {
         assert!(number("cycles") > 200.0, "{axis}");
         assert!(axis["lost_updates"].is_u64() && axis["late_updates"].is_u64(), "{axis}");
     }
-    if peer::tshark_or_skip("both_axes_reach_their_targets_and_tshark_agrees_on_every_frame") {
+    if peer::tshark_or_skip(name) {
         judge(&capture);
     }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 
 /// Addresses of this test alone.
@@ -83,6 +84,10 @@ fn passes(name: &str, places: &[&str]) -> serde_json::Value {
 
 #[test]
 fn a_script_runs_over_the_fixed_format() {
+    in_real_time("a_script_runs_over_the_fixed_format", runs_over_the_fixed_format);
+}
+
+fn runs_over_the_fixed_format() {
     let _box = start("fixed-box.toml", &axisbridge_tests::rig::FIXED_BOX.replace("10.0.0.2", FIXED_BOX));
     let places = ["--target", FIXED_BOX, "--bind", FIXED_CONTROLLER, "--json"];
     let result = passes("scripts/fixed-format.toml", &places);
@@ -92,6 +97,10 @@ fn a_script_runs_over_the_fixed_format() {
 
 #[test]
 fn a_script_moves_the_axes_of_a_box() {
+    in_real_time("a_script_moves_the_axes_of_a_box", moves_the_axes_of_a_box);
+}
+
+fn moves_the_axes_of_a_box() {
     let configuration = std::fs::read_to_string(example("../gateway/src/cli/demo.toml"))
         .expect("the demonstration's configuration")
         .replace("127.0.0.2", BOX);

@@ -138,8 +138,7 @@ pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     master.stable_cycles = sercos.cp0_stable_cycles;
     master.mst_losses = sercos.allowed_losses;
     // The connection's own limit stops the axis; the master need not give up on the slave before.
-    master.slave_valid_misses =
-        u8::try_from(sercos.allowed_losses).unwrap_or(u8::MAX).max(master.slave_valid_misses);
+    master.slave_valid_misses = sercos.allowed_losses.max(master.slave_valid_misses);
     // Which connections a drive needs is known once it has told what it can.
     let slave = |drive: &crate::config::Drive| SlaveConfig {
         address: drive.address,

@@ -152,7 +152,7 @@ pub struct MasterConfig {
     /// Times of the service channel.
     pub svc: SvcLimits,
     /// Consecutive cycles without SlaveValid before a slave counts as lost.
-    pub slave_valid_misses: u8,
+    pub slave_valid_misses: u16,
     /// S-0-1003, MST losses which the slaves bear in CP3 and CP4.
     pub mst_losses: u16,
     /// S-0-1027.0.1, requested MTU of the unified communication channel in bytes.

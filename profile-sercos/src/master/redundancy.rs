@@ -36,7 +36,7 @@ pub(super) struct Redundancy {
     /// Cycles in the present state of the closing.
     cycles: u16,
     /// Cycles in a row in which a slave was not seen while the ring is being closed.
-    blind: u8,
+    blind: u16,
     /// The ends that are commanded.
     ends: ArrayVec<usize, ENDS_MAX>,
 }

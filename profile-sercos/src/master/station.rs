@@ -115,7 +115,7 @@ pub(super) struct Station {
     pub svc: Option<AtSvc>,
     /// Errors and warnings of S-DEV that the application knows of.
     pub told: DeviceStatus,
-    pub misses: u8,
+    pub misses: u16,
     pub returned: bool,
     pub work: Work,
     pub cursor: Cursor,

@@ -10,6 +10,7 @@ use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::{Running, axisbridge};
@@ -78,6 +79,10 @@ fn three_processes_move_two_axes_while_a_modbus_client_reads_them() {
         return;
     }
     let _alone = one_bus();
+    in_real_time("three_processes_move_two_axes_while_a_modbus_client_reads_them", three_processes);
+}
+
+fn three_processes() {
     let (controller, gateway, drives) = (Namespace::new("ctl"), Namespace::new("box"), Namespace::new("drv"));
     cable((&controller, "net0", Some("192.168.10.1/24")), (&gateway, "net0", Some("192.168.10.20/24")));
     cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
