@@ -32,7 +32,9 @@ struct Bus {
     now: MonotonicTime,
     master: Master,
     line: Network<Drive>,
-    frames: Vec<([u8; FRAME_LEN_MAX], usize)>,
+    /// The frames of a cycle are the first so many.
+    frames: [([u8; FRAME_LEN_MAX], usize); FRAMES],
+    used: usize,
     slaves: u16,
     counted: bool,
 }
@@ -66,7 +68,8 @@ impl Bus {
             now: MonotonicTime(1),
             master,
             line,
-            frames: Vec::with_capacity(FRAMES),
+            frames: [([0; FRAME_LEN_MAX], 0); FRAMES],
+            used: 0,
             slaves,
             counted: false,
         };
@@ -99,7 +102,7 @@ impl Bus {
             self.send()
         }
         let sent = start.elapsed();
-        for (bytes, len) in &mut self.frames {
+        for (bytes, len) in &mut self.frames[..self.used] {
             assert!(self.line.round_trip(self.now, &mut bytes[..*len]), "a closed line");
         }
         let start = Instant::now();
@@ -118,16 +121,17 @@ impl Bus {
     }
 
     fn send(&mut self) {
-        self.frames.clear();
+        self.used = 0;
         while let Some(Output::Transmit { frame, .. }) = self.master.poll(self.now) {
-            let mut bytes = [0; FRAME_LEN_MAX];
+            let (bytes, len) = &mut self.frames[self.used];
             bytes[..frame.len()].copy_from_slice(frame);
-            self.frames.push((bytes, frame.len()));
+            *len = frame.len();
+            self.used += 1;
         }
     }
 
     fn receive(&mut self) {
-        for (bytes, len) in &self.frames {
+        for (bytes, len) in &self.frames[..self.used] {
             black_box(self.master.handle_frame(self.now, Port::One, &bytes[..*len])).expect("a good frame");
         }
     }

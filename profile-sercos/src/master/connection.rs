@@ -121,11 +121,11 @@ pub struct Consumer<'a> {
     pub control: ConnectionControl,
 }
 
-/// Consumer of one connection.
+/// Consumer of one connection. The state stands beside the first values: mostly it is one cache line.
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct ConsumerEnd {
     state: ConsumerState,
-    data: ArrayVec<u8, DATA_MAX>,
     control: ConnectionControl,
     /// The producer has counted once: its counter decides, not the toggle.
     counting: bool,
@@ -135,6 +135,7 @@ pub(crate) struct ConsumerEnd {
     idle_cycles: u32,
     producer_cycles: u32,
     allowed_losses: u32,
+    data: ArrayVec<u8, DATA_MAX>,
 }
 
 impl ConsumerEnd {
@@ -245,13 +246,14 @@ impl ConsumerEnd {
     }
 }
 
-/// Producer of one connection.
+/// Producer of one connection. C-CON stands beside the first values that go out.
 #[derive(Debug)]
+#[repr(C)]
 pub(crate) struct ProducerEnd {
-    data: ArrayVec<u8, DATA_MAX>,
+    control: ConnectionControl,
     /// What goes out: changed by a commit only.
     sent: ArrayVec<u8, DATA_MAX>,
-    control: ConnectionControl,
+    data: ArrayVec<u8, DATA_MAX>,
 }
 
 impl ProducerEnd {

@@ -92,31 +92,32 @@ pub(super) enum Work {
     Failed,
 }
 
-/// One slave.
+/// One slave. What every cycle touches stands together at the beginning, in as few cache lines as it fits into.
 #[derive(Debug)]
+#[repr(C)]
 pub(super) struct Station {
-    pub address: u16,
+    pub channel: ServiceChannel,
+    /// S-SVC of the last cycle; `None` when its AT did not come.
+    pub svc: Option<AtSvc>,
+    /// S-DEV of the last cycle; `None` when its AT did not come.
+    pub status: Option<DeviceStatus>,
+    /// Errors and warnings of S-DEV that the application knows of.
+    pub told: DeviceStatus,
+    /// Commanded topology and handshake bit of C-DEV.
+    pub command: DeviceControl,
+    pub misses: u16,
     pub presence: Presence,
+    /// Routes on which the last cycle brought valid data, one bit each by [`super::topology::Route::index`].
+    pub valid_routes: u8,
+    pub returned: bool,
+    pub ends: ArrayVec<End, CONNECTIONS_MAX>,
+    pub connections: Connections,
+    pub address: u16,
     pub configured: bool,
     /// The SERCOS address that it is to be given in CP2.
     pub assign: Option<u16>,
-    pub connections: Connections,
     pub facts: Facts,
     pub need: SlaveNeed,
-    pub ends: ArrayVec<End, CONNECTIONS_MAX>,
-    pub channel: ServiceChannel,
-    /// S-DEV of the last cycle; `None` when its AT did not come.
-    pub status: Option<DeviceStatus>,
-    /// Routes on which the last cycle brought valid data, one bit each by [`super::topology::Route::index`].
-    pub valid_routes: u8,
-    /// Commanded topology and handshake bit of C-DEV.
-    pub command: DeviceControl,
-    /// S-SVC of the last cycle; `None` when its AT did not come.
-    pub svc: Option<AtSvc>,
-    /// Errors and warnings of S-DEV that the application knows of.
-    pub told: DeviceStatus,
-    pub misses: u16,
-    pub returned: bool,
     pub work: Work,
     pub cursor: Cursor,
     pub check_failed: bool,
