@@ -1,13 +1,13 @@
 //! A master and its slaves in virtual time, under a police.
 //!
 //! Time jumps from cycle to cycle. The telegrams of a cycle go out back to back, pass every station, and come
-//! back in the same moment. A breach of a rule ends the test unless it is excused.
+//! back in the same moment. A breach of a rule ends the test unless it is made on purpose: see [`court`](super::court).
 
 use std::fmt;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::{Breach, Police, PoliceConfig, wire_time};
+use super::court::{Court, Tried};
 use crate::master::Master;
 use crate::master::config::{ConfigError, MasterConfig};
 use crate::master::event::{Event, Output, Port, SlaveId, Ticket};
@@ -15,9 +15,6 @@ use crate::master::phase::State;
 use crate::master::svc::request::{SvcOutcome, SvcRequest};
 use crate::slave::{Application, Network};
 use crate::wire::header::Phase;
-
-/// Smallest gap between two frames: 12 bytes at 100 Mbit/s.
-const GAP: DurationNs = DurationNs(960);
 
 /// Is told about a passage: topology address, outward, frame before and behind the station, where it may be changed.
 pub type Watch<'a> = dyn FnMut(u16, bool, &[u8], &mut [u8]) + 'a;
@@ -73,10 +70,8 @@ pub struct VirtualBus<S> {
     pub master: Master,
     /// The slaves.
     pub line: S,
-    /// The police.
-    pub police: Police,
-    /// Breaches for which the test goes on; none by default. They stay in the police's list.
-    pub excused: Box<dyn Fn(&Breach) -> bool>,
+    /// The police, and what is broken on purpose.
+    pub court: Court,
     /// Makes the master do what it does not do by itself: changes its frames before anybody sees them.
     pub outward: Cable,
     /// Makes a station do what it does not do by itself.
@@ -89,7 +84,12 @@ pub struct VirtualBus<S> {
     pub cycles: Vec<(MonotonicTime, u8)>,
     /// Calls `proceed` where the master awaits its application.
     pub auto_proceed: bool,
-    judged: usize,
+}
+
+impl<S: Stations> Tried for VirtualBus<S> {
+    fn court(&mut self) -> &mut Court {
+        &mut self.court
+    }
 }
 
 impl<S: fmt::Debug> fmt::Debug for VirtualBus<S> {
@@ -108,22 +108,20 @@ impl<S: Stations> VirtualBus<S> {
             now: MonotonicTime::ZERO,
             master: Master::new(config)?,
             line,
-            police: Police::new(PoliceConfig::default(), MonotonicTime::ZERO),
-            excused: Box::new(|_| false),
+            court: Court::new(MonotonicTime::ZERO),
             outward: Box::new(|_| true),
             station: Box::new(|_, _, _| {}),
             cable: Box::new(|_| true),
             log: Vec::new(),
             cycles: Vec::new(),
             auto_proceed: true,
-            judged: 0,
         })
     }
 
     /// One wake-up: a cycle with all its frames, and the events. Without telegrams a millisecond passes.
     ///
     /// # Panics
-    /// When a rule is broken that is not excused.
+    /// When a rule is broken that was not declared.
     pub fn step(&mut self) {
         let Some(at) = self.master.wake_at() else {
             self.now = self.now + DurationNs::from_millis(1);
@@ -138,19 +136,10 @@ impl<S: Stations> VirtualBus<S> {
         if let Some((_, first)) = out.first() {
             self.cycles.push((self.now, first[15]));
         }
-        let mut starts = [self.now; 2];
         for (port, mut frame) in out {
-            let start = starts[port.index()];
             if !(self.outward)(&mut frame) {
                 continue;
             }
-            let police = &mut self.police;
-            police.sent(start, &frame);
-            let misdeed = &mut self.station;
-            let mut watch = |slave, outward, before: &[u8], after: &mut [u8]| {
-                misdeed(slave, outward, after);
-                police.passed(start, slave, outward, before, after);
-            };
             let (now, master, cable) = (self.now, &mut self.master, &mut self.cable);
             let mut arrived = |port, frame: &mut [u8]| {
                 let mut frame = frame.to_vec();
@@ -159,13 +148,9 @@ impl<S: Stations> VirtualBus<S> {
                     let _ = master.handle_frame(now, port, &frame);
                 }
             };
-            self.line.pass(now, port, &mut frame, &mut watch, &mut arrived);
-            starts[port.index()] = start + wire_time(frame.len()) + GAP;
+            self.court.send(now, port, &mut frame, &mut self.line, &mut self.station, &mut arrived);
         }
-        for breach in &self.police.breaches()[self.judged..] {
-            assert!((self.excused)(breach), "{breach}");
-        }
-        self.judged = self.police.breaches().len();
+        self.court.judge();
         while let Some(event) = self.master.poll_event() {
             if self.auto_proceed && matches!(event, Event::AwaitingApplication { .. }) {
                 // Refused only when the target has changed meanwhile.

@@ -5,10 +5,12 @@
 //! learned from the wire, not from the master, so that master and slaves cannot agree on the same mistake. A
 //! [`Breach`] names the station and the rule.
 //!
-//! [`bus::VirtualBus`] is a master and its slaves in virtual time under a police; it carries the protocol tests.
+//! [`bus::VirtualBus`] is a master and its slaves in virtual time under a police; it carries the protocol tests. Rigs with
+//! other masters, or with the whole box in front, stand before a [`court::Court`] as well.
 //! The police allocates; it is no part of the cyclic path.
 
 pub mod bus;
+pub mod court;
 mod learned;
 #[cfg(test)]
 pub(crate) mod light;
@@ -54,7 +56,7 @@ pub struct PoliceConfig {
     /// Deviation of the MST in CP0 to CP2, where no slave has been told S-0-1023 yet.
     pub setup_jitter: DurationNs,
     /// The master sends ATs right behind the MDTs instead of at t1, as soft masters do. Masters that tell so in
-    /// S-0-1032 need not be excused here; slaves with version 1 classes are not told.
+    /// S-0-1032 need not be named here; slaves with version 1 classes are not told.
     pub soft_master: bool,
 }
 
@@ -123,6 +125,12 @@ impl Police {
     /// Takes the breaches away.
     pub fn take_breaches(&mut self) -> Vec<Breach> {
         std::mem::take(&mut self.breaches)
+    }
+
+    /// The master was switched off and is another one now, which counts anew. It owes the silence before CP0 like any
+    /// other.
+    pub fn master_restarts(&mut self) {
+        self.cycle = None;
     }
 
     fn breach(&mut self, at: MonotonicTime, offender: Offender, rule: Rule) {

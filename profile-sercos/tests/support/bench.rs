@@ -1,7 +1,10 @@
-//! A hand-driven master for a line of slaves: as little as a test needs to take them to CP4 and to use them.
+//! A hand-driven master for a line of slaves: as little as a test needs to take them to CP4 and to use them. The police
+//! judges both.
 
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::police::court::{Court, Tried};
+use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config, Network, Slave};
 use profile_sercos::wire::connection::ConnectionControl;
@@ -52,6 +55,7 @@ pub struct Feedback {
 /// The master and its line.
 pub struct Bench {
     pub line: Network<Drive>,
+    pub court: Court,
     pub now: MonotonicTime,
     pub phase: Phase,
     pub switching: Option<Phase>,
@@ -62,6 +66,12 @@ pub struct Bench {
     count: u8,
     svc: Vec<MdtSvc>,
     control: ConnectionControl,
+}
+
+impl Tried for Bench {
+    fn court(&mut self) -> &mut Court {
+        &mut self.court
+    }
 }
 
 impl Bench {
@@ -75,6 +85,7 @@ impl Bench {
         let n = slaves.len();
         Bench {
             line: Network::line(slaves),
+            court: Court::new(MonotonicTime::ZERO),
             now: MonotonicTime(1_000_000_000),
             phase: Phase::CP0,
             switching: None,
@@ -109,12 +120,34 @@ impl Bench {
         frame
     }
 
-    /// One cycle.
-    pub fn cycle(&mut self) {
+    /// Sends a frame through the line, before the police, and puts what comes back in its place. Returns whether
+    /// something did.
+    pub fn send(&mut self, frame: &mut [u8]) -> bool {
+        let mut back = None;
+        let mut arrived = |port, frame: &mut [u8]| {
+            if port == Port::One {
+                back = Some(frame.to_vec());
+            }
+        };
+        self.court.send(self.now, Port::One, frame, &mut self.line, &mut |_, _, _| {}, &mut arrived);
+        self.court.judge();
+        back.inspect(|back| frame.copy_from_slice(back)).is_some()
+    }
+
+    /// Time goes on to the next cycle.
+    fn tick(&mut self) {
         self.now = self.now + CYCLE;
         self.count = (self.count + 1) & 7;
+    }
+
+    /// One cycle.
+    pub fn cycle(&mut self) {
+        if self.phase == Phase::CP0 {
+            self.scan();
+            return;
+        }
+        self.tick();
         match self.phase {
-            Phase::CP0 => drop(self.scan()),
             Phase::CP1 | Phase::CP2 => self.slots(),
             _ => self.cyclic(),
         }
@@ -126,12 +159,13 @@ impl Bench {
 
     /// A cycle of CP0; gives what came back.
     pub fn scan(&mut self) -> AtRepr {
+        self.tick();
         let mut mdt = self.frame(Kind::Mdt, 0, MDT_LEN);
         MdtRepr::default().emit(&mut mdt[HEADER_LEN..]).unwrap();
-        assert!(self.line.round_trip(self.now, &mut mdt));
+        assert!(self.send(&mut mdt));
         let mut at = self.frame(Kind::At, 0, AT_LEN);
         AtRepr::empty(SequenceCounter::START_PRIMARY).emit(&mut at[HEADER_LEN..]).unwrap();
-        assert!(self.line.round_trip(self.now, &mut at));
+        assert!(self.send(&mut at));
         AtRepr::parse(&at[HEADER_LEN..]).unwrap()
     }
 
@@ -145,11 +179,11 @@ impl Bench {
                     mdt[HEADER_LEN + place.device + 1] = 1;
                 }
             }
-            self.line.round_trip(self.now, &mut mdt);
+            self.send(&mut mdt);
         }
         for number in 0..2 {
             let mut at = self.frame(Kind::At, number, cp12::LEN);
-            self.line.round_trip(self.now, &mut at);
+            self.send(&mut at);
             for (index, feedback) in self.feedback.iter_mut().enumerate() {
                 let place = cp12::place(u16::try_from(index + 1).unwrap()).unwrap();
                 if place.telegram == number {
@@ -174,8 +208,13 @@ impl Bench {
         (self.places(self.svc.len() - 1).2 + CONNECTION).max(DATA_LEN_MIN)
     }
 
-    /// MDT0 and AT0 of CP3 or CP4, not sent yet.
-    pub fn telegrams(&mut self) -> (Vec<u8>, Vec<u8>) {
+    /// MDT0 and AT0 of the next cycle of CP3 or CP4, to be sent by the caller.
+    pub fn next_telegrams(&mut self) -> (Vec<u8>, Vec<u8>) {
+        self.tick();
+        self.telegrams()
+    }
+
+    fn telegrams(&mut self) -> (Vec<u8>, Vec<u8>) {
         let mut mdt = self.frame(Kind::Mdt, 0, self.len());
         if self.phase == Phase::CP4 && self.producing {
             self.control = self.control.produced();
@@ -198,8 +237,8 @@ impl Bench {
 
     fn cyclic(&mut self) {
         let (mut mdt, mut at) = self.telegrams();
-        self.line.round_trip(self.now, &mut mdt);
-        self.line.round_trip(self.now, &mut at);
+        self.send(&mut mdt);
+        self.send(&mut at);
         self.collect(&at[HEADER_LEN..]);
     }
 
@@ -315,8 +354,15 @@ impl Bench {
         self.cycle();
     }
 
+    /// The master starts anew with CP0, after the silence of a master that has just been switched on.
+    pub fn restart(&mut self) {
+        self.now = self.now + DurationNs::from_millis(130);
+        self.phase = Phase::CP0;
+    }
+
     pub fn up_to_cp2(&mut self) {
         self.cycles(2);
+        self.svc.fill(MdtSvc::default());
         self.switch(Phase::CP1);
         for svc in &mut self.svc {
             svc.control = SvcControl::new(true, Element::Close, false, false);

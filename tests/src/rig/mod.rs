@@ -5,6 +5,9 @@
 //!            --datagrams (Knobs)-->         (NorthQueue, SouthQueue)
 //! ```
 //!
+//! Every telegram stands before the police of `profile_sercos`; a test that has a rule broken on purpose says which one
+//! with [`Tried::breaking`](profile_sercos::police::court::Tried::breaking).
+//!
 //! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a
 //! test that fails
 //! prints the seed.
@@ -40,6 +43,8 @@ use profile_cip::wire::motion::Format;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::police::court::{Court, Tried};
+use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
@@ -137,6 +142,8 @@ pub struct Rig {
     pub notices: Vec<Notice>,
     /// The drives.
     pub line: DriveNetwork,
+    /// The police over the line.
+    pub court: Court,
     /// What was seen of each drive.
     pub watched: Vec<Watched>,
     /// The network between controller and box.
@@ -167,6 +174,12 @@ pub struct Rig {
     actuals: Pipe<Bytes>,
 }
 
+impl Tried for Rig {
+    fn court(&mut self) -> &mut Court {
+        &mut self.court
+    }
+}
+
 impl Rig {
     /// A box that has just been switched on, with nobody connected.
     ///
@@ -185,6 +198,7 @@ impl Rig {
             notices: Vec::new(),
             watched: vec![Watched::default(); line.slaves().len()],
             line,
+            court: Court::new(START),
             knobs: settings.knobs,
             tamper_command: None,
             tamper_actual: None,
@@ -378,7 +392,9 @@ impl Rig {
         (self.notice_queue, self.status) = (notice_queue, status);
         self.north = NorthQueue::default();
         self.south = SouthQueue::default();
-        self.engine_due = self.now;
+        // A box takes longer to start; the last telegrams of the old one are through by then.
+        self.engine_due = self.now + STEP_MAX;
+        self.court.police.master_restarts();
     }
 
     /// The status that the box publishes.
@@ -522,12 +538,21 @@ impl Rig {
     fn after_cycle(&mut self) {
         self.line.handle_time(self.now);
         while let Some(mut frame) = self.south.outbound.pop_front() {
-            let back = self.cable && self.line.round_trip(self.now, frame.as_mut_slice());
-            let kept = self.tamper_frame.as_mut().is_none_or(|tamper| tamper(&mut frame));
-            if back && kept {
-                self.south.inbound.push_back(frame);
+            if !self.cable {
+                self.court.sent(self.now, Port::One, frame.as_slice());
+                continue;
             }
+            let (tamper, inbound) = (&mut self.tamper_frame, &mut self.south.inbound);
+            let mut arrived = |port, frame: &mut [u8]| {
+                let mut frame = Bytes::of(frame);
+                if port == Port::One && tamper.as_mut().is_none_or(|tamper| tamper(&mut frame)) {
+                    inbound.push_back(frame);
+                }
+            };
+            let frame = frame.as_mut_slice();
+            self.court.send(self.now, Port::One, frame, &mut self.line, &mut |_, _, _| {}, &mut arrived);
         }
+        self.court.judge();
         while let Some((mut datagram, _)) = self.north.outbound.pop_front() {
             if self.tamper_actual.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
                 self.actuals.send(self.now, &self.knobs, datagram);

@@ -1,6 +1,7 @@
 use super::peer::Faults;
 use super::*;
-use crate::police::{Offender, Rule};
+use crate::police::court::Tried;
+use crate::police::{Breach, Offender, Rule};
 use crate::wire::svc::Element;
 use crate::wire::svc_error::SvcError;
 
@@ -286,9 +287,9 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
         rig.state(if state == State::Leave2 { State::Await2 } else { State::Await3 });
         rig.line.peers[0].faults.stubborn = true;
         let late = Rule::InsertsWhileSwitching { phase: from };
-        rig.excused = Box::new(move |breach| breach.rule == late && breach.offender == Offender::Slave(1));
         let failed = Event::SwitchFailed { from, to, slave: Some(SlaveId(0)) };
-        rig.run_until("failed", |rig| rig.log.contains(&failed));
+        let named = move |breach: &Breach| breach.rule == late && breach.offender == Offender::Slave(1);
+        rig.breaking(named, |rig| rig.run_until("failed", |rig| rig.log.contains(&failed)));
         assert_eq!(
             failed.to_string(),
             format!("{from} to {to}: slave at position 1 did not stop inserting data in time")

@@ -6,8 +6,8 @@ use crate::master::Master;
 use crate::master::config::Ports;
 use crate::master::event::End;
 use crate::master::topology::Topology;
+use crate::police::court::{Court, Tried};
 use crate::police::light::{COMMAND, Mirror};
-use crate::police::{Police, PoliceConfig, wire_time};
 use crate::slave::Network;
 use crate::wire::header::{Channel, Kind};
 
@@ -18,7 +18,7 @@ pub(super) struct RingRig {
     now: MonotonicTime,
     pub master: Master,
     pub network: Network<Mirror>,
-    police: Police,
+    court: Court,
     tamper: Tamper,
     pub log: Vec<Event>,
     /// Cables cut in the middle of a cycle, behind so many frames.
@@ -39,6 +39,12 @@ pub(super) fn ring_config(count: u16) -> MasterConfig {
     }
 }
 
+impl Tried for RingRig {
+    fn court(&mut self) -> &mut Court {
+        &mut self.court
+    }
+}
+
 impl RingRig {
     pub fn new(config: MasterConfig, network: Network<Mirror>) -> RingRig {
         RingRig {
@@ -46,7 +52,7 @@ impl RingRig {
             master: Master::new(config).unwrap(),
             missed: vec![(0, 0); network.slaves().len()],
             network,
-            police: Police::new(PoliceConfig::default(), MonotonicTime::ZERO),
+            court: Court::new(MonotonicTime::ZERO),
             tamper: Box::new(|_, _| true),
             log: Vec::new(),
             cut_after: None,
@@ -94,29 +100,20 @@ impl RingRig {
         while let Some(Output::Transmit { port, frame }) = self.master.poll(self.now) {
             out.push((port, frame.to_vec()));
         }
-        let mut starts = [self.now; 2];
         for (sent, (port, mut frame)) in out.into_iter().enumerate() {
-            let start = starts[port.index()];
-            starts[port.index()] = start + wire_time(frame.len()) + DurationNs(960);
-            if let Some((cable, after)) = self.cut_after.filter(|(_, after)| *after == sent) {
-                assert_eq!(after, sent);
+            if let Some((cable, _)) = self.cut_after.take_if(|(_, after)| *after == sent) {
                 self.network.cut(cable);
-                self.cut_after = None;
             }
             let (now, master, tamper, lenient) = (self.now, &mut self.master, &mut self.tamper, self.lenient);
-            let police = &mut self.police;
-            police.sent(start, &frame);
-            let mut watch = |slave, outward, before: &[u8], after: &mut [u8]| {
-                police.passed(start, slave, outward, before, after);
-            };
-            self.network.send_watched(now, port, &mut frame, Some(&mut watch), &mut |port, frame| {
+            let mut arrived = |port, frame: &mut [u8]| {
                 if tamper(port, frame) {
                     let taken = master.handle_frame(now, port, frame);
                     assert!(lenient || taken.is_ok(), "{taken:?} on {port}: {:02x?}", &frame[14..16]);
                 }
-            });
+            };
+            self.court.send(now, port, &mut frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
         }
-        assert_eq!(self.police.take_breaches(), []);
+        self.court.judge();
         while let Some(event) = self.master.poll_event() {
             if matches!(event, Event::AwaitingApplication { .. }) {
                 self.master.proceed().unwrap();
@@ -410,13 +407,14 @@ fn a_telegram_on_the_wrong_port_is_refused() {
             let (now, master) = (rig.now, &mut rig.master);
             if port == Port::Two {
                 // The S telegram comes in on port 1, untouched by any slave.
+                rig.court.sent(now, port, &frame);
                 assert_eq!(master.handle_frame(now, Port::One, &frame), Err(Refusal::Port));
                 continue;
             }
-            rig.network.send(now, port, &mut frame, &mut |port, frame| {
-                master.handle_frame(now, port, frame).unwrap();
-            });
+            let mut arrived = |port, frame: &mut [u8]| master.handle_frame(now, port, frame).unwrap();
+            rig.court.send(now, port, &mut frame, &mut rig.network, &mut |_, _, _| {}, &mut arrived);
         }
+        rig.court.judge();
     }
     assert_eq!((rig.master.topology(), rig.told()), (Topology::LineOne, vec![]));
     assert_eq!(rig.master.statistics().refused(Refusal::Port), 40);

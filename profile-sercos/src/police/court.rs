@@ -1,0 +1,136 @@
+//! Holds what a police finds against a test: a breach that the test has not declared ends it, and so does a
+//! declared one that does not come.
+
+use std::fmt;
+
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::bus::{Arrived, Stations};
+use super::{Breach, Police, PoliceConfig, wire_time};
+use crate::master::event::Port;
+
+/// Smallest gap between two frames: 12 bytes at 100 Mbit/s.
+const GAP: DurationNs = DurationNs(960);
+
+/// Changes a frame as it leaves a station: topology address, outward, frame.
+pub type Misdeeds<'a> = dyn FnMut(u16, bool, &mut [u8]) + 'a;
+
+/// Breaches that are made on purpose.
+struct Purpose {
+    is: Box<dyn Fn(&Breach) -> bool>,
+    came: bool,
+}
+
+/// A police, and what of its findings is meant to be.
+pub struct Court {
+    /// The police.
+    pub police: Police,
+    purposes: Vec<Purpose>,
+    judged: usize,
+    /// When each port of the master is through with its last frame.
+    free: [MonotonicTime; 2],
+}
+
+impl fmt::Debug for Court {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Court").field("police", &self.police).field("purposes", &self.purposes.len()).finish()
+    }
+}
+
+impl Court {
+    /// Begins to watch at `now`, with nothing on the wire.
+    #[must_use]
+    pub fn new(now: MonotonicTime) -> Court {
+        Court {
+            police: Police::new(PoliceConfig::default(), now),
+            purposes: Vec::new(),
+            judged: 0,
+            free: [now; 2],
+        }
+    }
+
+    /// The master sends a frame, behind those that it has just sent on the same port; gives when it begins.
+    pub fn sent(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> MonotonicTime {
+        let start = self.free[port.index()].max(now);
+        self.free[port.index()] = start + wire_time(frame.len()) + GAP;
+        self.police.sent(start, frame);
+        start
+    }
+
+    /// The master sends a frame from one of its ports through `stations`. Each passage is judged, behind what
+    /// `misdeed` makes of it; `arrived` gets what comes to a port of the master.
+    pub fn send<S: Stations>(
+        &mut self,
+        now: MonotonicTime,
+        port: Port,
+        frame: &mut [u8],
+        stations: &mut S,
+        misdeed: &mut Misdeeds<'_>,
+        arrived: &mut Arrived<'_>,
+    ) {
+        let start = self.sent(now, port, frame);
+        let police = &mut self.police;
+        let mut watch = |slave, outward, before: &[u8], after: &mut [u8]| {
+            misdeed(slave, outward, after);
+            police.passed(start, slave, outward, before, after);
+        };
+        stations.pass(now, port, frame, &mut watch, arrived);
+    }
+
+    /// Judges what was found since the last time.
+    ///
+    /// # Panics
+    /// With station and rule of a breach that was not declared.
+    pub fn judge(&mut self) {
+        let new = self.police.breaches().get(self.judged..).unwrap_or_default();
+        for breach in new {
+            let mut meant = false;
+            for purpose in self.purposes.iter_mut().filter(|purpose| (purpose.is)(breach)) {
+                (purpose.came, meant) = (true, true);
+            }
+            assert!(meant, "{breach}");
+        }
+        self.judged = self.police.breaches().len();
+    }
+}
+
+/// A test's rig whose every frame stands before a [`Court`].
+pub trait Tried: Sized {
+    /// The court.
+    fn court(&mut self) -> &mut Court;
+
+    /// Runs `script`, in which the breaches that `declared` knows are made on purpose.
+    ///
+    /// # Panics
+    /// When none of them came.
+    fn breaking<T>(
+        &mut self,
+        declared: impl Fn(&Breach) -> bool + 'static,
+        script: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        let (result, came) = tried(self, Box::new(declared), script);
+        assert!(came, "the rule that was to be broken on purpose was kept");
+        result
+    }
+
+    /// Runs `script`, in which the breaches that `declared` knows may come: where chance decides what is broken.
+    fn tolerating<T>(
+        &mut self,
+        declared: impl Fn(&Breach) -> bool + 'static,
+        script: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        tried(self, Box::new(declared), script).0
+    }
+}
+
+fn tried<R: Tried, T>(
+    rig: &mut R,
+    is: Box<dyn Fn(&Breach) -> bool>,
+    script: impl FnOnce(&mut R) -> T,
+) -> (T, bool) {
+    rig.court().purposes.push(Purpose { is, came: false });
+    let result = script(rig);
+    let court = rig.court();
+    court.judge();
+    (result, court.purposes.pop().is_some_and(|purpose| purpose.came))
+}
