@@ -1,14 +1,17 @@
-//! Scans of simulated drives in virtual time.
+//! Scans of simulated drives in virtual time, under the police.
+
+use std::collections::VecDeque;
 
 use profile_generic::scaling::UnitKind;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::config::MasterConfig;
 use profile_sercos::master::event::Port;
+use profile_sercos::police::court::Court;
 
 use super::*;
 use crate::config::{AxisKind, Config, Link};
 use crate::mapping::Mapping;
-use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC, drives};
+use crate::simulate::drives::{DriveNetwork, SIMULATED_MAC, drives};
 
 fn config() -> MasterConfig {
     MasterConfig { stable_cycles: 10, ..MasterConfig::new(SIMULATED_MAC, 2_000_000) }
@@ -16,6 +19,37 @@ fn config() -> MasterConfig {
 
 fn wire() -> Link {
     Link::Interface { name: "enp3s0".to_owned(), ring: None }
+}
+
+/// Drives with these addresses in a line before the police.
+struct Judged {
+    network: DriveNetwork,
+    court: Court,
+    returned: VecDeque<(Port, Vec<u8>)>,
+}
+
+impl Judged {
+    fn line(slaves: impl IntoIterator<Item = (u16, UnitKind)>) -> Self {
+        let (network, court) = (drives(slaves, false), Court::new(MonotonicTime::ZERO));
+        Self { network, court, returned: VecDeque::new() }
+    }
+}
+
+impl SouthPort for Judged {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        let (port, frame) = self.returned.pop_front()?;
+        buffer[..frame.len()].copy_from_slice(&frame);
+        Some((port, frame.len()))
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        self.network.handle_time(now);
+        let mut arrived = |port, frame: &mut [u8]| self.returned.push_back((port, frame.to_vec()));
+        let frame = &mut frame.to_vec();
+        self.court.send(now, port, frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
+        self.court.judge();
+        true
+    }
 }
 
 fn scan_of(south: &mut dyn SouthPort) -> Bus {
@@ -31,7 +65,7 @@ fn scan_of(south: &mut dyn SouthPort) -> Bus {
 }
 
 fn scan(slaves: impl IntoIterator<Item = (u16, UnitKind)>) -> Bus {
-    scan_of(&mut InProcessDrives::new(drives(slaves, false), None))
+    scan_of(&mut Judged::line(slaves))
 }
 
 #[test]
@@ -95,7 +129,7 @@ fn an_empty_bus_is_told() {
 
 #[test]
 fn a_scan_that_is_given_up_takes_the_line_down() {
-    let mut south = InProcessDrives::new(drives([(7, UnitKind::Rotary)], false), None);
+    let mut south = Judged::line([(7, UnitKind::Rotary)]);
     let mut scanner = Scanner::new(config()).unwrap();
     let mut now = MonotonicTime::ZERO;
     while scanner.stage != Stage::Asking {

@@ -193,7 +193,9 @@ impl Police {
         let silence = at - self.quiet_since;
         let broken = |police: &mut Police, rule| police.breach(at, Offender::Master, rule);
         let cycles = last.is_some() && silence < SILENCE;
-        if let Some((_, last)) = last {
+        // From NRT it starts with CP0 without announcement, but behind its silence; then it may count anew.
+        let start = !cycles && field.phase() == Phase::CP0 && !field.switching();
+        if let Some((_, last)) = last.filter(|(_, last)| !start || last.switching()) {
             let expected = (last.cycle_count() + 1) & 7;
             let found = field.cycle_count();
             if found != expected {
@@ -203,10 +205,7 @@ impl Police {
         let before = last.map(|(_, field)| field);
         let step = phase_step(self.phase, before, field);
         match step {
-            // A start with CP0 needs no announcement, but its silence.
-            _ if !cycles && field.phase() == Phase::CP0 && !field.switching() => {
-                self.enter(at, field.phase(), silence);
-            }
+            _ if start => self.enter(at, field.phase(), silence),
             Step::Same => {}
             Step::Announce => {
                 self.switching_since = Some(at);
