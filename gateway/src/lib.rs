@@ -17,3 +17,4 @@ pub mod settings;
 pub mod simulate;
 pub mod status;
 pub mod sys;
+pub mod translate;

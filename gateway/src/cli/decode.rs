@@ -50,7 +50,7 @@ fn options(arguments: &DecodeArguments) -> Options {
 }
 
 /// Names and lengths of the SERCOS dictionary.
-struct DictionaryNames<'a>(&'a SercosDictionary);
+pub(super) struct DictionaryNames<'a>(pub &'a SercosDictionary);
 
 impl DictionaryNames<'_> {
     /// The row of a parameter. Those of other parameter sets and structure instances are like those of the

@@ -20,7 +20,7 @@ use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 
 /// The demonstration's configuration; only the address is chosen by the caller.
-const CONFIGURATION: &str = include_str!("demo.toml");
+pub(super) const CONFIGURATION: &str = include_str!("demo.toml");
 
 /// The address that stands in the configuration.
 const ADDRESS: &str = "127.0.0.2";

@@ -13,6 +13,8 @@ mod scan;
 mod script;
 mod signal;
 mod simulate;
+mod snapshot;
+mod translate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,6 +41,10 @@ enum Command {
     Scan(ScanArguments),
     /// Print the frames of a capture file as an indented tree.
     Decode(DecodeArguments),
+    /// Print what the mapping tables make of frames, and which row made each value.
+    Translate(TranslateArguments),
+    /// Compare translated frames with the golden texts next to them.
+    Snapshot(SnapshotArguments),
     /// Print what a profile has: attributes, parameters, codes, services.
     Dictionary(DictionaryArguments),
     /// Run the other side of a protocol as a process of its own.
@@ -104,6 +110,38 @@ struct ScanArguments {
     /// Print one JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+/// Arguments of `translate`.
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("frames").required(true).args(["file", "hex"])))]
+struct TranslateArguments {
+    /// A recording (pcapng or pcap), or a list of frames as text: one a line, in hexadecimal.
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// One frame: an Ethernet frame, a class 1 datagram, a CIP Motion update, or a line of a list.
+    #[arg(long, value_name = "BYTES")]
+    hex: Option<String>,
+    /// Axes, drives and tables of this configuration; without it, those of the demonstration.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `snapshot`.
+#[derive(Debug, Args)]
+struct SnapshotArguments {
+    /// The folder with the frames: lists (*.hex) and recordings (*.pcapng, *.pcap).
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Axes, drives and tables of this configuration; without it, those of DIR/config.toml, or of the demonstration.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Make what is found now the golden texts.
+    #[arg(long)]
+    accept: bool,
 }
 
 /// Arguments of `decode`.
@@ -297,6 +335,8 @@ pub fn main() -> ExitCode {
         Command::Eds(arguments) => eds::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
+        Command::Translate(arguments) => translate::run(&arguments),
+        Command::Snapshot(arguments) => snapshot::run(&arguments),
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),

@@ -1,7 +1,7 @@
 //! EtherNet/IP: encapsulation, common packet format, and which request a reply answers.
 
 use std::collections::VecDeque;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, ItemType};
@@ -50,6 +50,12 @@ struct Context {
 }
 
 impl EtherNetIp {
+    /// The target of a connection, and whether it is one of CIP Motion.
+    pub fn connection(&self, id: u32, from: Ipv4Addr, to: Ipv4Addr) -> Option<(Ipv4Addr, bool)> {
+        let (connection, _) = self.context.connections.find(id, from, to)?;
+        Some((connection.target, connection.opening.motion))
+    }
+
     /// A UDP datagram.
     pub fn datagram(
         &mut self,

@@ -8,11 +8,12 @@
 mod connections;
 mod ethernet_ip;
 mod explicit;
-mod packet;
+pub(crate) mod packet;
 mod stream;
 mod text;
 
 use std::io::{self, Read, Write};
+use std::net::Ipv4Addr;
 
 use profile_sercos::wire::describe::{DecodeContext, Names, describe};
 use thiserror::Error;
@@ -123,7 +124,8 @@ pub fn decode<R: Read>(
     Ok(summary)
 }
 
-struct Decoder<'n> {
+/// What is known of a recording so far.
+pub(crate) struct Decoder<'n> {
     names: &'n dyn Names,
     buses: Vec<(u32, DecodeContext<'n>)>,
     ethernet_ip: EtherNetIp,
@@ -132,7 +134,7 @@ struct Decoder<'n> {
 }
 
 impl<'n> Decoder<'n> {
-    fn new(names: &'n dyn Names) -> Self {
+    pub(crate) fn new(names: &'n dyn Names) -> Self {
         Self {
             names,
             buses: Vec::new(),
@@ -142,8 +144,14 @@ impl<'n> Decoder<'n> {
         }
     }
 
+    /// The connection whose data a datagram has: the address of its target, and whether it is one of CIP Motion. `None`
+    /// when the recording has not shown how it was opened.
+    pub(crate) fn connection(&self, id: u32, from: Ipv4Addr, to: Ipv4Addr) -> Option<(Ipv4Addr, bool)> {
+        self.ethernet_ip.connection(id, from, to)
+    }
+
     /// Reads a frame and leaves its tree in `self.text`.
-    fn frame(&mut self, frame: &Frame<'_>) -> Protocol {
+    pub(crate) fn frame(&mut self, frame: &Frame<'_>) -> Protocol {
         self.text.clear();
         self.heading(frame);
         if frame.link_type != LINK_TYPE_ETHERNET {

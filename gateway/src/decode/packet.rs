@@ -20,7 +20,7 @@ const FRAGMENT: u16 = 0x3FFF;
 
 /// A TCP segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Segment<'a> {
+pub(crate) struct Segment<'a> {
     pub from: SocketAddrV4,
     pub to: SocketAddrV4,
     pub sequence: u32,
@@ -30,7 +30,7 @@ pub(super) struct Segment<'a> {
 
 /// What a frame carries.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Packet<'a> {
+pub(crate) enum Packet<'a> {
     Sercos,
     Udp {
         from: SocketAddrV4,
@@ -43,7 +43,7 @@ pub(super) enum Packet<'a> {
 }
 
 /// Reads an Ethernet frame.
-pub(super) fn parse(frame: &[u8]) -> Packet<'_> {
+pub(crate) fn parse(frame: &[u8]) -> Packet<'_> {
     let Some(mut ether_type) = u16_at(frame, 12) else {
         return short("Ethernet header", ETHERNET_LEN, frame.len());
     };

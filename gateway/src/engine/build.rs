@@ -201,7 +201,8 @@ fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
 }
 
 /// The controller's counts as the configuration has them; a controller may set others.
-fn scaling(axis: &Axis) -> CipScaling {
+#[must_use]
+pub fn scaling(axis: &Axis) -> CipScaling {
     CipScaling {
         kind: kind(axis),
         nanounits_per_unit: profile_generic::scaling::NANO,

@@ -26,6 +26,7 @@ mod drive_facts;
 mod examples;
 mod format;
 mod load;
+mod origin;
 mod resolver;
 mod scaling;
 mod sercos_tables;
@@ -65,6 +66,7 @@ pub use dictionary::{
 pub use drive_facts::{Difference, DriveFacts};
 pub use examples::ExampleFailure;
 pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};
+pub use origin::Origin;
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos_tables::{FaultRule, SercosTables};
 

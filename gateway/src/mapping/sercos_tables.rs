@@ -180,6 +180,11 @@ impl SercosTables {
         })
     }
 
+    /// Whether a row looks for faults in this word.
+    pub fn is_diagnostic(&self, idn: Idn) -> bool {
+        self.faults.iter().any(|row| row.word == idn)
+    }
+
     /// The scaling rules, for those who want to know what they look at.
     pub fn scaling_rules(&self) -> &[ScalingRule] {
         &self.scalings

@@ -1,0 +1,118 @@
+//! `axisbridge translate`: what the mapping tables make of frames.
+
+use std::fs::File;
+use std::io::{self, BufReader, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::decode::DictionaryNames;
+use super::{CliError, TranslateArguments};
+use crate::capture::reader::Reader;
+use crate::config::Config;
+use crate::mapping::Mapping;
+use crate::translate::{List, Node, RowNames, Stage, translate_capture, translate_list};
+
+/// The largest list that is read; a recording is read frame by frame.
+const LIST_MAX: u64 = 10 * 1024 * 1024;
+
+/// First bytes of recordings: pcapng, and pcap in both byte orders with micro- and nanoseconds.
+const RECORDINGS: [[u8; 4]; 5] = [
+    [0x0A, 0x0D, 0x0D, 0x0A],
+    [0xA1, 0xB2, 0xC3, 0xD4],
+    [0xD4, 0xC3, 0xB2, 0xA1],
+    [0xA1, 0xB2, 0x3C, 0x4D],
+    [0x4D, 0x3C, 0xB2, 0xA1],
+];
+
+/// The JSON object of `--json`.
+#[derive(Serialize)]
+struct Output<'a> {
+    frames: &'a [Node],
+    passed_over: usize,
+    failed: usize,
+}
+
+/// Translates and prints.
+///
+/// # Errors
+/// A file is faulty, the drives are not commissioned with the configuration, the output cannot be written.
+pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
+    let config = configuration(arguments.config.as_deref())?;
+    let stage = Arc::new(stage(&config)?);
+    let list = match (&arguments.hex, &arguments.file) {
+        (Some(hex), _) => translate_list(&stage, hex).map_err(|error| format!("--hex:{error}"))?,
+        (None, Some(file)) => translated(&stage, &config, file)?,
+        // clap lets nothing else through.
+        (None, None) => return Err("expected FILE or --hex BYTES".into()),
+    };
+    let text = if arguments.json {
+        let output = Output { frames: &list.frames, passed_over: list.passed_over, failed: list.failed };
+        serde_json::to_string_pretty(&output)? + "\n"
+    } else {
+        text(&list, RowNames::Lines)
+    };
+    match io::stdout().lock().write_all(text.as_bytes()) {
+        // Whoever reads has seen enough, as `head` has.
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("cannot write: {error}").into())
+        }
+        _ if list.failed > 0 => Ok(ExitCode::FAILURE),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// The configuration, or that of the demonstration.
+pub(super) fn configuration(path: Option<&Path>) -> Result<Config, CliError> {
+    match path {
+        Some(path) => Ok(Config::load(path)?),
+        None => Ok(Config::parse(super::demo::CONFIGURATION, "the configuration of the demonstration")?),
+    }
+}
+
+/// The programs of a configuration.
+pub(super) fn stage(config: &Config) -> Result<Stage, CliError> {
+    let mapping = match &config.mappings_dir {
+        Some(folder) => Mapping::from_folder(folder)?,
+        None => Mapping::embedded()?,
+    };
+    Ok(Stage::rehearse(config, mapping)?)
+}
+
+/// A list or a recording, as its first bytes say.
+pub(super) fn translated(stage: &Arc<Stage>, config: &Config, path: &Path) -> Result<List, CliError> {
+    let shown = path.display();
+    let mut file = File::open(path).map_err(|error| format!("{shown}: {error}"))?;
+    let mut first = [0; 4];
+    let is_recording = io::Read::read_exact(&mut file, &mut first).is_ok() && RECORDINGS.contains(&first);
+    drop(file);
+    if is_recording {
+        let file = File::open(path).map_err(|error| format!("{shown}: {error}"))?;
+        let reader = Reader::new(BufReader::new(file)).map_err(|error| format!("{shown}: {error}"))?;
+        let names = DictionaryNames(&stage.mapping.dictionaries.sercos);
+        return Ok(
+            translate_capture(stage, config, reader, &names).map_err(|error| format!("{shown}: {error}"))?
+        );
+    }
+    let length = std::fs::metadata(path).map_err(|error| format!("{shown}: {error}"))?.len();
+    if length > LIST_MAX {
+        return Err(format!("{shown}: expected a list of at most {LIST_MAX} bytes, got {length}").into());
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+    Ok(translate_list(stage, &text).map_err(|error| format!("{shown}:{error}"))?)
+}
+
+/// All trees.
+pub(super) fn text(list: &List, names: RowNames) -> String {
+    let mut text = String::new();
+    for frame in &list.frames {
+        // Writing to a string does not fail.
+        let _ = frame.write(&mut text, 0, names);
+    }
+    if list.passed_over > 0 {
+        text.push_str(&format!("{} frames carry nothing to translate\n", list.passed_over));
+    }
+    text
+}

@@ -1,0 +1,226 @@
+//! From the controller to the drive.
+
+use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
+use profile_generic::image::{AxisCommand, Signal};
+use profile_generic::program::{ConversionReport, Field};
+use profile_generic::quantity::Position;
+use profile_generic::state::{Action, DriveState};
+use profile_sercos::wire::idn::Idn;
+
+use super::tree::hex;
+use super::{Node, Translator, shown};
+use crate::mapping::CyclicValues;
+
+/// The longest telegram of a drive.
+const TELEGRAM_MAX: usize = 256;
+
+impl Translator {
+    /// Takes the cyclic command block of an instance.
+    pub(super) fn command(&mut self, instance: u8, block: &CommandBlock) -> Node {
+        let device = self.device;
+        let found =
+            self.stage.axes.iter().position(|axis| axis.device == device && axis.instance == instance);
+        let Some(number) = found else {
+            return Node::new(format!("instance {instance}: no axis of the configuration"));
+        };
+        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
+        let mapping = &self.stage.mapping;
+        let mut node = Node::new(format!("axis {} (instance {instance}) on {}", axis.name, axis.drive));
+        let control_mode = block.control_mode;
+        let Some(mode) = axis.north.mode(control_mode.0) else {
+            node.push(Node::new(format!(
+                "Control Mode {control_mode}: no row, so the axis faults with illegal_mode"
+            )));
+            return node;
+        };
+        node.push(
+            Node::new(format!("Control Mode {control_mode} -> mode {mode}"))
+                .by(mapping.control_mode_row(mode)),
+        );
+        let mut command = AxisCommand { mode, ..state.command };
+        let values = CyclicValues::from(&block.values);
+        let report = axis.north.decode(&values, 0, &mut state.north, &mut command);
+        for (text, signal) in elements(&block.values) {
+            let came =
+                command.get(signal).map_or_else(|| "left out".to_owned(), |value| shown(signal, value));
+            node.push(Node::new(format!("{text} -> {signal} {came}")).by(mapping.cyclic_row(signal)));
+        }
+        if let Some(count) = block.values.unwind_count {
+            node.push(Node::new(format!("Unwind Cycle Count {count}")));
+        }
+        if report.saturated > 0 || report.not_finite > 0 {
+            node.push(Node::new(
+                "half understood: the axis faults with position_command_limit, nothing is led by it",
+            ));
+        }
+        self.request(number, block, &mut node);
+        let refused = report.saturated > 0 || report.not_finite > 0;
+        node.push(self.telegram_of(number, command, refused));
+        node
+    }
+
+    /// What Axis Control asks for.
+    fn request(&mut self, number: usize, block: &CommandBlock, node: &mut Node) {
+        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
+        let code = block.axis_control;
+        if code.0 == 0 {
+            return;
+        }
+        let row = self.stage.mapping.request_row(code.0);
+        let Some(request) = axis.north.request(code.0) else {
+            node.push(Node::new(format!("Axis Control {code}: no row, so it is refused")));
+            return;
+        };
+        let Some(asked) = request.request else {
+            node.push(Node::new(format!("Axis Control {code}: carried out by the device")).by(row));
+            return;
+        };
+        let text = match &mut state.machine {
+            None => format!("Axis Control {code} -> {asked}"),
+            Some(machine) => {
+                let before = machine.state();
+                let transition = machine.request(asked);
+                state.take(transition.action);
+                format!(
+                    "Axis Control {code} -> {asked}: {before} -> {}, action {}",
+                    transition.next, transition.action
+                )
+            }
+        };
+        node.push(Node::new(text).by(row));
+    }
+
+    /// What the drive is told.
+    fn telegram_of(&mut self, number: usize, mut command: AxisCommand, refused: bool) -> Node {
+        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
+        let mapping = &self.stage.mapping;
+        let led = match &state.machine {
+            None => !refused,
+            Some(machine) => machine.state() == DriveState::Operating && !refused,
+        };
+        let action = if state.machine.is_none() { Action::Enable } else { state.action };
+        if !led {
+            // A drive that does not follow is shown its own position.
+            let position = state.feedback.position;
+            command = AxisCommand { mode: command.mode, ..AxisCommand::default() };
+            command.set(Signal::PositionCommand, position.0);
+        }
+        fill(&mut command, state.feedback.position);
+        let mut bytes = [0; TELEGRAM_MAX];
+        let len = usize::from(axis.south.telegram.command_bytes).min(TELEGRAM_MAX);
+        let mut report = ConversionReport::default();
+        let word = axis.south.encode(&command, action, state.control_word, &mut bytes[..len], &mut report);
+        (state.control_word, state.command) = (word, command);
+        let mut node =
+            Node::new(format!("MDT of {}, connection 0, {len} bytes: {}", axis.drive, hex(&bytes[..len])));
+        if !led {
+            node.push(Node::new("the drive does not follow: set-points are withheld"));
+        }
+        let mut telegram = axis.south.telegram.command.iter();
+        if let Some(idn) = telegram.next() {
+            let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(*idn), command.mode);
+            node.push(Node::new(text).by(mapping.action_row(action)).by(mapping.mode_row(command.mode)));
+        }
+        for (field, idn) in axis.south.command.fields().zip(telegram) {
+            let value = command.get(field.signal).unwrap_or_default();
+            let text = format!(
+                "{}: {} <- {} {}",
+                self.named(*idn),
+                raw(field, &bytes),
+                field.signal,
+                shown(field.signal, value)
+            );
+            node.push(Node::new(text).by(mapping.signal_row(field.signal)));
+        }
+        if report.saturated > 0 {
+            node.push(Node::new(format!(
+                "{} values are clamped: the axis faults with position_command_limit",
+                report.saturated
+            )));
+        }
+        node
+    }
+
+    /// What stands in a telegram from the master, read back.
+    pub(super) fn command_values(&self, number: usize, bytes: &[u8]) -> Node {
+        let axis = &self.stage.axes[number];
+        let mut node =
+            Node::new(format!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes)));
+        let mut telegram = axis.south.telegram.command.iter();
+        if let (Some(idn), Some(word)) = (telegram.next(), bytes.first_chunk()) {
+            node.push(Node::new(format!("{} {:#06x}", self.named(*idn), u16::from_le_bytes(*word))));
+        }
+        for (field, idn) in axis.south.command.fields().zip(telegram) {
+            let back = field.conversion.inverse().zip(integer(field, bytes));
+            let value = back.map_or_else(String::new, |(conversion, raw)| {
+                shown(field.signal, conversion.convert(raw).value)
+            });
+            let text = format!("{}: {} = {} {value}", self.named(*idn), raw(field, bytes), field.signal);
+            node.push(Node::new(text).by(self.stage.mapping.signal_row(field.signal)));
+        }
+        node
+    }
+
+    /// An IDN with its name.
+    pub(super) fn named(&self, idn: Idn) -> String {
+        match self.stage.mapping.dictionaries.sercos.idn(idn) {
+            Some(row) => format!("{idn} {}", row.name),
+            None => idn.to_string(),
+        }
+    }
+}
+
+/// Set-points that a mode has no use for are zero, and the position is that of the axis, as in the cycle.
+fn fill(command: &mut AxisCommand, actual: Position) {
+    if command.get(Signal::PositionCommand).is_none() {
+        command.set(Signal::PositionCommand, actual.0);
+    }
+    for signal in [Signal::VelocityCommand, Signal::AccelerationCommand, Signal::TorqueCommand] {
+        if command.get(signal).is_none() {
+            command.set(signal, 0);
+        }
+    }
+}
+
+/// The command values as they came, each with the signal that it belongs to.
+fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
+    let mut elements = Vec::new();
+    match values.position {
+        Some(CommandPosition::Float(value)) => {
+            elements.push((format!("Command Position {value} (LREAL)"), Signal::PositionCommand));
+        }
+        Some(CommandPosition::Integer(value)) => {
+            elements.push((format!("Command Position {value} (DINT)"), Signal::PositionCommand));
+        }
+        None => {}
+    }
+    let reals = [
+        ("Command Velocity", values.velocity, Signal::VelocityCommand),
+        ("Command Acceleration", values.acceleration, Signal::AccelerationCommand),
+        ("Command Torque", values.torque, Signal::TorqueCommand),
+    ];
+    for (name, value, signal) in reals {
+        elements.extend(value.map(|value| (format!("{name} {value}"), signal)));
+    }
+    elements
+}
+
+/// The bytes of a field and the number in them.
+pub(super) fn raw(field: &Field, telegram: &[u8]) -> String {
+    let start = usize::from(field.offset);
+    let bytes = telegram.get(start..start + field.width.bytes()).unwrap_or_default();
+    let number = integer(field, telegram).map_or_else(String::new, |number| format!("{number} "));
+    format!("{number}({} at {start})", hex(bytes))
+}
+
+/// The number in a field; `None` for one that is not there, or no integer.
+fn integer(field: &Field, telegram: &[u8]) -> Option<i64> {
+    let start = usize::from(field.offset);
+    let bytes = telegram.get(start..start + field.width.bytes()).filter(|_| !field.width.is_float())?;
+    let negative = field.width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
+    let mut all = [if negative { 0xFF } else { 0 }; 8];
+    for (to, from) in all.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    Some(i64::from_le_bytes(all))
+}

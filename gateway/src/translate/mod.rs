@@ -1,0 +1,272 @@
+//! Frames through the mapping tables: what the box makes of them, and which row of which file made each value.
+//!
+//! ```text
+//! C-to-D update --CipProgram--> generic command  --SercosProgram--> MDT
+//! D-to-C update <--CipProgram-- generic feedback <--SercosProgram-- AT
+//! Set attribute --AttributeTable--> generic parameter --SercosProgram--> element 7 of an IDN, and back
+//! diagnostic word --SercosProgram--> faults --CipProgram--> exceptions
+//! ```
+//!
+//! The programs are the ones that run in the cycle, made by [`Stage::rehearse`]. What depends on time is left out: a command
+//! is translated for the instant that it is meant for, without the interpolation on the way there. Frames that follow one
+//! another share the positions that are unrolled and the state of the drive; before a drive has been heard it counts as
+//! operating.
+
+mod access;
+mod command;
+mod feedback;
+mod frame;
+mod line;
+mod list;
+mod stage;
+mod tree;
+
+use std::sync::Arc;
+
+use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
+use profile_generic::program::Trackers;
+use profile_generic::quantity::{
+    Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
+};
+use profile_generic::state::{Action, BasicDrive};
+use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
+use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
+
+use crate::mapping::CipTrackers;
+
+pub use frame::{FrameError, Recognised, recognise};
+pub use line::{Line, LineError};
+pub use list::{List, ListError, translate_capture, translate_list};
+pub use stage::{Stage, StageAxis, StageError};
+pub use tree::{Node, RowNames};
+
+/// Connection of a drive with its command values, and with its actual values.
+use crate::engine::bus::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
+
+/// What is kept of an axis from frame to frame.
+#[derive(Debug)]
+struct AxisState {
+    /// The state of the drive; `None` before it was heard.
+    machine: Option<BasicDrive>,
+    action: Action,
+    control_word: u16,
+    north: CipTrackers,
+    south: Trackers,
+    command: AxisCommand,
+    feedback: AxisFeedback,
+}
+
+/// Translates frame after frame.
+#[derive(Debug)]
+pub struct Translator {
+    stage: Arc<Stage>,
+    states: Vec<AxisState>,
+    device: usize,
+}
+
+/// Why something is not translated.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TranslateError {
+    /// The bytes are no frame.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// No axis, or no drive, has this name.
+    #[error("expected {what}, one of {known}, got `{name}`")]
+    Name {
+        /// What the name would have to be.
+        what: &'static str,
+        /// The names that there are.
+        known: String,
+        /// The name.
+        name: String,
+    },
+    /// Something about a value.
+    #[error("{0}")]
+    Value(String),
+}
+
+impl Translator {
+    /// A translator for the first device of a configuration.
+    #[must_use]
+    pub fn new(stage: impl Into<Arc<Stage>>) -> Self {
+        let stage = stage.into();
+        let states = stage.axes.iter().map(|axis| AxisState {
+            machine: None,
+            action: Action::TorqueOff,
+            control_word: 0,
+            north: axis.north.trackers(),
+            south: axis.south.feedback.trackers(),
+            command: AxisCommand::default(),
+            feedback: AxisFeedback::default(),
+        });
+        Self { states: states.collect(), stage, device: 0 }
+    }
+
+    /// Takes updates as those of this device, by its number in the configuration.
+    pub fn set_device(&mut self, device: usize) {
+        self.device = device;
+    }
+
+    /// The stage.
+    #[must_use]
+    pub fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// Translates one line of a list of frames.
+    ///
+    /// # Errors
+    /// The bytes are no frame, a name is not known, a value has another length.
+    pub fn line(&mut self, line: &Line<'_>) -> Result<Node, TranslateError> {
+        match line {
+            Line::Frame(bytes) => self.frame(bytes),
+            Line::Actual { drive, bytes } => {
+                let axis = self.drive(drive)?;
+                Ok(self.feedback(axis, bytes))
+            }
+            Line::Idn { drive, idn, bytes } => {
+                let axis = self.drive(drive)?;
+                self.idn(axis, *idn, bytes)
+            }
+            Line::Set { axis, attribute, bytes } => {
+                let axis = self.axis(axis)?;
+                self.set(axis, *attribute, bytes)
+            }
+        }
+    }
+
+    /// Translates a frame, a datagram or an update.
+    ///
+    /// # Errors
+    /// The bytes are none of them.
+    pub fn frame(&mut self, bytes: &[u8]) -> Result<Node, TranslateError> {
+        Ok(match recognise(bytes)? {
+            Recognised::Command(frame) => {
+                let mut node = Node::new(format!("C-to-D update {}", frame.header().update_id));
+                node.push(decoded("as it came", &frame.to_string()));
+                for instance in frame.instances() {
+                    node.push(self.instance(&instance));
+                }
+                node
+            }
+            Recognised::FixedCommand(update) => {
+                let mut node = Node::new(format!("C-to-D update {} of the fixed format", update.update_id));
+                node.push(decoded("as it came", &update.to_string()));
+                // The format has neither Control Status nor Command Control: the device assumes these (clause 6-2.7).
+                let block = update.block(ControlStatus::empty(), CommandTarget::default());
+                node.push(self.command(1, &block));
+                node
+            }
+            Recognised::Actual(frame) => decoded("D-to-C update", &frame.to_string()),
+            Recognised::FixedActual(update) => {
+                decoded("D-to-C update of the fixed format", &update.to_string())
+            }
+            Recognised::Sercos(frame) => self.telegram(frame)?,
+        })
+    }
+
+    fn instance(&mut self, instance: &profile_cip::wire::motion::CommandInstance<'_>) -> Node {
+        let mut node = match &instance.cyclic {
+            Some(block) => self.command(instance.number, block),
+            None => Node::new(format!("instance {} without cyclic data", instance.number)),
+        };
+        if let Some(write) = &instance.write {
+            node.push(Node::new(format!("cyclic write block: {}", write.to_string().trim())));
+        }
+        if let Some(service) = &instance.service {
+            node.push(Node::new(format!("service request: {}", service.to_string().trim())));
+        }
+        node
+    }
+
+    /// Takes a SERCOS telegram apart.
+    fn telegram(&mut self, frame: &[u8]) -> Result<Node, TranslateError> {
+        let header = Header::parse(frame)
+            .map_err(|error| TranslateError::Frame(FrameError::Other(format!("SERCOS III: {error}"))))?;
+        let (kind, number, phase) = (header.telegram.kind(), header.telegram.number(), header.phase.phase());
+        let mut node = Node::new(format!("SERCOS III {kind}{number} in {phase}"));
+        if phase != Phase::CP4 {
+            node.push(Node::new("no values of drives before CP4"));
+            return Ok(node);
+        }
+        let data = frame.get(HEADER_LEN..).unwrap_or_default();
+        let wanted = if kind == Kind::At { FEEDBACK_CONNECTION } else { COMMAND_CONNECTION };
+        for axis in 0..self.stage.axes.len() {
+            let topology = self.stage.axes[axis].topology;
+            let places = self.stage.layout.devices.iter().find(|device| device.address == topology);
+            let place = places.and_then(|device| {
+                device.connections.iter().find(|place| place.index == wanted && place.at.telegram == number)
+            });
+            let Some(place) = place else { continue };
+            let name = &self.stage.axes[axis].drive;
+            let Some(bytes) = data.get(place.at.range(usize::from(place.len))) else {
+                let text = format!(
+                    "{name}: expected {} bytes at {}, the telegram has {}",
+                    place.len,
+                    place.at.offset,
+                    data.len()
+                );
+                node.push(Node::new(text));
+                continue;
+            };
+            let (control, values) = bytes.split_at(CONNECTION_CONTROL_LEN.min(bytes.len()));
+            let control = control.first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
+            if !ConnectionControl::from_bits_retain(control).contains(ConnectionControl::READY) {
+                node.push(Node::new(format!("{name}: C-CON {control:#06x}, no values")));
+                continue;
+            }
+            node.push(match kind {
+                Kind::At => self.feedback(axis, values),
+                Kind::Mdt => self.command_values(axis, values),
+            });
+        }
+        Ok(node)
+    }
+
+    fn axis(&self, name: &str) -> Result<usize, TranslateError> {
+        let known = || self.stage.axes.iter().map(|axis| axis.name.as_str());
+        self.stage.axis(name).ok_or_else(|| unknown("an axis", known(), name))
+    }
+
+    fn drive(&self, name: &str) -> Result<usize, TranslateError> {
+        let known = || self.stage.axes.iter().map(|axis| axis.drive.as_str());
+        self.stage.axis_of_drive(name).ok_or_else(|| unknown("a drive", known(), name))
+    }
+}
+
+fn unknown<'n>(what: &'static str, known: impl Iterator<Item = &'n str>, name: &str) -> TranslateError {
+    let known = known.collect::<Vec<_>>().join(", ");
+    TranslateError::Name { what, known, name: name.to_owned() }
+}
+
+/// A tree that is shown as it was decoded.
+fn decoded(title: &str, text: &str) -> Node {
+    let mut node = Node::new(title);
+    text.lines().for_each(|line| node.push(Node::new(line.trim_end())));
+    node
+}
+
+/// A value of a signal with its unit, and the integer behind it.
+fn shown(signal: Signal, value: i64) -> String {
+    quantity(signal.quantity(), value)
+}
+
+/// A value in a quantity with its unit.
+fn quantity(quantity: Quantity, value: i64) -> String {
+    match quantity {
+        Quantity::Position => Position(value).to_string(),
+        Quantity::Velocity => Velocity(value).to_string(),
+        Quantity::Acceleration => Acceleration(value).to_string(),
+        Quantity::Torque => Torque(value).to_string(),
+        Quantity::TorqueAbsolute => TorqueAbsolute(value).to_string(),
+        Quantity::Current => Current(value).to_string(),
+        Quantity::Voltage => Voltage(value).to_string(),
+        Quantity::Temperature => Temperature(value).to_string(),
+        Quantity::None => value.to_string(),
+        other => format!("{value} {}", other.unit()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+//! The programs that a configuration leads to, without a machine: the box commissions simulated drives in virtual time.
+//!
+//! What is compiled depends on what the drives tell about themselves, their scaling before all. The simulated ones stand in
+//! for those of the machine.
+
+use std::net::SocketAddrV4;
+
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_sercos::wire::layout::Layout;
+
+use crate::config::Config;
+use crate::engine::build::{BuildError, Built, Host, build, scaling};
+use crate::engine::port::NorthPort;
+use crate::mapping::{AttributeTable, CipProgram, Mapping, SercosProgram};
+use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
+
+/// Virtual time in which the drives must be ready: 511 of them take less.
+const LIMIT: DurationNs = DurationNs::from_secs(120);
+
+/// When it begins; the instant does not matter.
+const START: MonotonicTime = MonotonicTime(1_000_000_000);
+
+/// One axis with its programs.
+#[derive(Debug, Clone)]
+pub struct StageAxis {
+    /// Name of the axis.
+    pub name: String,
+    /// Number of its device in the configuration.
+    pub device: usize,
+    /// Its instance there.
+    pub instance: u8,
+    /// Name of its drive.
+    pub drive: String,
+    /// SERCOS address of the drive.
+    pub address: u16,
+    /// Topology address of the drive.
+    pub topology: u16,
+    /// The drive's status word does not tell that it follows and is halted.
+    pub silent: bool,
+    /// The program of the CIP side.
+    pub north: CipProgram,
+    /// The program of the drive.
+    pub south: SercosProgram,
+}
+
+/// All axes of a configuration, and where each drive has its place in the telegrams.
+#[derive(Debug)]
+pub struct Stage {
+    /// The tables.
+    pub mapping: Mapping,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<StageAxis>,
+    /// The attributes of each axis.
+    pub attributes: Vec<AttributeTable>,
+    /// The telegrams of CP4.
+    pub layout: Layout,
+}
+
+/// Why there are no programs.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// The configuration makes no box.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A drive was not commissioned.
+    #[error("axis {axis}: its simulated drive is not commissioned: {told}")]
+    Drive {
+        /// The axis.
+        axis: String,
+        /// What the box told about the bus last.
+        told: String,
+    },
+}
+
+/// Nobody is connected on this side.
+struct Silent;
+
+impl NorthPort for Silent {
+    fn receive(&mut self, _: &mut [u8]) -> Option<(usize, SocketAddrV4)> {
+        None
+    }
+
+    fn send(&mut self, _: &[u8], _: SocketAddrV4) -> bool {
+        false
+    }
+}
+
+impl Stage {
+    /// Commissions simulated drives as the box would.
+    ///
+    /// # Errors
+    /// The configuration makes no box, or a drive does not come to cyclic operation with it.
+    pub fn rehearse(config: &Config, mapping: Mapping) -> Result<Self, StageError> {
+        let host = Host { mac: SIMULATED_MAC, incarnation: 1 };
+        let Built { mut engine, mut notices, .. } = build(config, mapping.clone(), host)?;
+        let mut south = InProcessDrives::of(config, None);
+        let mut ports: Vec<Silent> = config.devices.iter().map(|_| Silent).collect();
+        let mut ports: Vec<&mut dyn NorthPort> =
+            ports.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
+        let mut now = START;
+        let mut told = Vec::new();
+        let ready = |engine: &crate::engine::Engine| engine.axes().iter().all(|axis| axis.south().is_some());
+        while !ready(&engine) && now.since(START) < LIMIT {
+            now = engine.cycle(now, SystemTime(now.0), &mut ports, &mut south).max(now + DurationNs(1));
+            while let Ok(notice) = notices.pop() {
+                told.push(notice.to_string());
+            }
+        }
+        let mut axes = Vec::with_capacity(config.axes.len());
+        let master = engine.bus().master();
+        for (axis, channel) in config.axes.iter().zip(engine.axes()) {
+            let drive = &config.sercos.drives[axis.drive];
+            let slave = master.slave_by_address(drive.address);
+            let (Some(south), Some(slave)) = (channel.south(), slave) else {
+                let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
+                return Err(StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() });
+            };
+            axes.push(StageAxis {
+                name: axis.name.clone(),
+                device: axis.device,
+                instance: axis.instance,
+                drive: drive.name.clone(),
+                address: drive.address,
+                topology: slave.topology_address(),
+                silent: !drive.acknowledges,
+                north: channel.north().clone(),
+                south: south.clone(),
+            });
+        }
+        let attributes =
+            config.axes.iter().map(|axis| mapping.attribute_table(&scaling(axis)).unwrap_or_default());
+        let attributes = attributes.collect();
+        let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
+        Ok(Self { attributes, axes, layout: master.layout().to_wire(topology), mapping })
+    }
+
+    /// The axis with this name.
+    #[must_use]
+    pub fn axis(&self, name: &str) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.name == name)
+    }
+
+    /// The axis on the drive with this name.
+    #[must_use]
+    pub fn axis_of_drive(&self, name: &str) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.drive == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drives_of_the_demonstration_are_commissioned() {
+        let config = Config::parse(include_str!("../cli/demo.toml"), "demo.toml").unwrap();
+        let stage = Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap();
+        let seen: Vec<_> =
+            stage.axes.iter().map(|axis| (axis.instance, axis.address, axis.topology)).collect();
+        assert_eq!(seen, [(1, 1, 1), (2, 2, 2)]);
+        let telegram = &stage.axes[0].south.telegram;
+        assert_eq!(telegram.command[0].to_string(), "S-0-0134");
+        // Hot-plug field, extended field, two service channels and two C-DEVs come before.
+        let place = stage.layout.devices[0].connections.iter().find(|place| place.index == 0).unwrap();
+        assert_eq!((place.at.telegram, usize::from(place.len)), (0, usize::from(telegram.command_bytes) + 2));
+    }
+}

@@ -1,0 +1,113 @@
+use profile_cip::wire::motion::codes::{AxisControl, ControlMode, NodeControl, TimeDataSet};
+use profile_cip::wire::motion::{
+    CommandBlock, CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter,
+};
+
+use super::*;
+use crate::config::Config;
+use crate::mapping::Mapping;
+
+fn translator() -> Translator {
+    let config = Config::parse(include_str!("../cli/demo.toml"), "demo.toml").unwrap();
+    Translator::new(Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap())
+}
+
+/// An update for the turntable.
+fn update(block: CommandBlock) -> Vec<u8> {
+    let header = CommandHeader {
+        update_id: 7,
+        node_control: NodeControl::REMOTE_CONTROL | NodeControl::DATA_VALID,
+        instance_count: 0,
+        last_received_id: 0,
+        time_stamp: None,
+        time_offset: None,
+        diagnostics: TimeDataSet::empty(),
+    };
+    let mut bytes = [0; 128];
+    let mut writer = CommandWriter::new(&mut bytes, &header).unwrap();
+    writer
+        .instance(&CommandInstance { number: 1, cyclic: Some(block), ..CommandInstance::default() })
+        .unwrap();
+    let len = writer.finish();
+    bytes[..len].to_vec()
+}
+
+fn position(counts: i32) -> CommandBlock {
+    CommandBlock {
+        control_mode: ControlMode::POSITION,
+        values: CommandValues {
+            position: Some(CommandPosition::Integer(counts)),
+            ..CommandValues::default()
+        },
+        ..CommandBlock::default()
+    }
+}
+
+fn text(node: &Node) -> String {
+    let mut text = String::new();
+    node.write(&mut text, 0, RowNames::Keys).unwrap();
+    text
+}
+
+#[test]
+fn a_position_command_becomes_an_mdt() {
+    let mut translator = translator();
+    insta::assert_snapshot!(text(&translator.frame(&update(position(250_000))).unwrap()));
+}
+
+#[test]
+fn an_at_becomes_an_update_of_the_device() {
+    let mut translator = translator();
+    let line = Line::parse("at drive-a 08 c0 20 a1 07 00 00 00 00 00 00 00").unwrap().unwrap();
+    insta::assert_snapshot!(text(&translator.line(&line).unwrap()));
+}
+
+#[test]
+fn requests_follow_the_state_of_the_drive_once_it_was_heard() {
+    let mut translator = translator();
+    let mut all = String::new();
+    let enable = CommandBlock { axis_control: AxisControl::ENABLE, ..position(0) };
+    for (at, block) in [("0080", enable), ("00c0", position(1000)), ("0020", position(2000))] {
+        let line = format!("at drive-a {at}{}", "00".repeat(10));
+        let line = Line::parse(&line).unwrap().unwrap();
+        all += &text(&translator.line(&line).unwrap());
+        all += &text(&translator.frame(&update(block)).unwrap());
+    }
+    insta::assert_snapshot!(all);
+}
+
+#[test]
+fn attributes_and_parameters_are_translated_both_ways() {
+    let mut translator = translator();
+    let mut all = String::new();
+    for line in [
+        "set turntable 473 00 00 20 41",
+        "set turntable 40 01",
+        "set turntable 473 00 00 80 7f",
+        "idn drive-a S-0-0011 84 00",
+        "idn drive-a S-0-0012 00 00",
+        "idn drive-a S-0-0104 e8 03",
+    ] {
+        let line = Line::parse(line).unwrap().unwrap();
+        all += &text(&translator.line(&line).unwrap());
+    }
+    insta::assert_snapshot!(all);
+}
+
+#[test]
+fn what_cannot_be_translated_says_why() {
+    let mut translator = translator();
+    let cases = [
+        "at drive-c 00",
+        "set drive-a 473 00",
+        "set turntable 9999 00",
+        "set turntable 473 00",
+        "06",
+        "ff 00 00",
+    ];
+    let errors: Vec<_> = cases
+        .iter()
+        .map(|line| translator.line(&Line::parse(line).unwrap().unwrap()).unwrap_err().to_string())
+        .collect();
+    insta::assert_snapshot!(errors.join("\n"));
+}

@@ -1,0 +1,142 @@
+//! `translate` and `snapshot` as a user runs them, and against what the running box sent.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::process::axisbridge;
+
+/// Address of this test alone.
+const LISTEN: &str = "127.0.0.36";
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(axisbridge()).args(arguments).output().expect("axisbridge can be started")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A folder of this test alone, empty.
+fn folder(name: &str) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("the folder of the tests can be written to");
+    path
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
+
+/// The lines below a frame that say what a drive is told.
+fn told(node: &serde_json::Value, found: &mut Vec<String>) {
+    let line = node["text"].as_str().unwrap_or_default();
+    if line.starts_with("MDT of") {
+        found.push(line.to_owned());
+    }
+    for child in node["children"].as_array().into_iter().flatten() {
+        told(child, found);
+    }
+}
+
+/// What the tables make of the updates in the recording of a demonstration is what the box sent to the drives.
+#[test]
+fn translated_updates_are_what_the_box_sent() {
+    in_real_time("translated_updates_are_what_the_box_sent", || {
+        let capture = folder("translate-demo").join("demo.pcapng");
+        let demo = run(&["demo", "--seconds", "2", "--listen", LISTEN, "--capture", path(&capture)]);
+        assert!(demo.status.success(), "{}", text(&demo.stderr));
+        let output = run(&["translate", path(&capture), "--json"]);
+        assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
+        let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        let (mut wanted, mut sent) = (HashSet::new(), Vec::new());
+        for frame in result["frames"].as_array().expect("frames") {
+            let kind = frame["children"][0]["text"].as_str().expect("what it is");
+            let mut lines = Vec::new();
+            told(frame, &mut lines);
+            if kind.starts_with("C-to-D") {
+                wanted.extend(lines);
+            } else {
+                sent.extend(lines.into_iter().filter(|line| line.contains("bytes: 00 e0")));
+            }
+        }
+        for drive in ["drive-a", "drive-b"] {
+            let of_drive: Vec<_> = sent.iter().filter(|line| line.contains(drive)).collect();
+            assert!(of_drive.len() > 100, "{drive} was led: {}", of_drive.len());
+            // At the end of the motion the axes stand, and the last command is the last update's.
+            let last = of_drive.last().expect("one");
+            assert!(wanted.contains(*last), "{last}");
+            let distinct: HashSet<_> = of_drive.iter().filter(|line| wanted.contains(**line)).collect();
+            assert!(
+                distinct.len() > 1,
+                "{drive} is told what updates say on its way as well: {}",
+                distinct.len()
+            );
+        }
+    });
+}
+
+#[test]
+fn a_frame_by_hand_names_the_rows() {
+    let update = "06 02 07 05 01 00 00 00 01 00 05 03 03 00 00 00 01 00 00 00 01 00 00 04 90 d0 03 00";
+    let output = run(&["translate", "--hex", update]);
+    let found = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{found}{}", text(&output.stderr));
+    assert!(found.contains("Command Position 250000 (DINT) -> position_command 0.250000000 u"), "{found}");
+    assert!(found.contains("MDT of drive-a, connection 0, 16 bytes: 00 e0 a0 bb 0d 00"), "{found}");
+    assert!(
+        found.contains("generic-sercos.toml:") && found.contains("[[signal]] position_command"),
+        "{found}"
+    );
+    let output = run(&["translate", "--hex", "06 0"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("--hex:1:4: expected pairs of hexadecimal digits, got `0`"));
+    let output = run(&["translate", "--hex", "06 02"]);
+    assert_eq!(output.status.code(), Some(1), "a frame that is none fails");
+    assert_eq!(run(&["translate"]).status.code(), Some(2));
+}
+
+#[test]
+fn golden_texts_are_made_compared_and_accepted() {
+    let frames = folder("snapshot-frames");
+    let list = frames.join("moves.hex");
+    std::fs::write(&list, "at drive-a 08c0 40420f00 00000000 0000 # one turn\n").expect("a file");
+    let snapshot = |more: &[&str]| {
+        let output = run(&[&["snapshot", path(&frames)], more].concat());
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    };
+    let (code, out, _) = snapshot(&[]);
+    assert!(code == Some(1) && out.contains("0 the same, 0 differ, 1 new, 0 without frames"), "{out}");
+    assert!(!frames.join("moves.golden").exists(), "nothing is written unasked");
+    assert_eq!(snapshot(&["--accept"]).0, Some(0));
+    let golden = std::fs::read_to_string(frames.join("moves.golden")).expect("the golden text");
+    assert!(
+        golden.starts_with("line 1: one turn\n") && golden.contains("[[signal]] position_actual"),
+        "{golden}"
+    );
+    let (code, out, errors) = snapshot(&[]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{out}");
+
+    std::fs::write(frames.join("moves.golden"), golden.replace("1000000", "1000001")).expect("a file");
+    let (code, out, _) = snapshot(&[]);
+    assert_eq!(code, Some(1));
+    let difference: Vec<_> = out.lines().filter(|line| line.contains("S-0-0051")).collect();
+    assert!(difference[0].starts_with("-    S-0-0051") || difference[0].starts_with('-'), "{out}");
+    assert!(difference[0].contains("1000001") && difference[1].contains("1000000"), "{out}");
+
+    std::fs::remove_file(&list).expect("it is there");
+    std::fs::write(frames.join("other.hex"), "# nothing\n").expect("a file");
+    let (code, out, _) = snapshot(&["--accept"]);
+    assert!(code == Some(0) && out.contains("moves.golden: its frames are gone"), "{out}");
+    assert!(!frames.join("moves.golden").exists());
+
+    std::fs::write(frames.join("other.hex"), "at\n").expect("a file");
+    let (code, _, errors) = snapshot(&[]);
+    assert_eq!(code, Some(1));
+    assert!(errors.contains("other.hex:1:3: expected the name of a drive"), "{errors}");
+    let empty = folder("snapshot-empty");
+    let output = run(&["snapshot", path(&empty)]);
+    assert!(text(&output.stderr).contains("expected files *.hex, *.pcap or *.pcapng, found none"));
+}
