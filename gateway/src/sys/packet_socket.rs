@@ -396,6 +396,15 @@ mod tests {
         ip("link set south1 up");
     }
 
+    /// The kernel tells of a carrier in its own time, up to a second later.
+    fn comes_to(socket: &PacketSocket, state: LinkState) {
+        let end = std::time::Instant::now() + Duration::from_secs(5);
+        while socket.link_state() != state && std::time::Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(socket.link_state(), state);
+    }
+
     #[test]
     fn frames_cross_a_cable_with_time_stamps_and_without_our_own() {
         in_namespace("frames_cross_a_cable", || {
@@ -404,7 +413,7 @@ mod tests {
             let b = PacketSocket::open("south1", ETHER_TYPE_SERCOS).unwrap();
             assert_eq!(a.mac(), [2, 0, 0, 0, 0, 0x0A]);
             assert_eq!(a.name(), "south0");
-            assert_eq!(a.link_state(), LinkState::Up);
+            comes_to(&a, LinkState::Up);
 
             let before = realtime_now();
             a.send(&frame(0x0800, 1)).unwrap();
@@ -434,14 +443,15 @@ mod tests {
             veth();
             let a = PacketSocket::open("south0", ETHER_TYPE_SERCOS).unwrap();
             let b = PacketSocket::open("south1", ETHER_TYPE_SERCOS).unwrap();
+            comes_to(&a, LinkState::Up);
             let mut buffer = [0; 1518];
 
             ip("link set south1 down");
-            assert_eq!(a.link_state(), LinkState::NoCarrier);
+            comes_to(&a, LinkState::NoCarrier);
             assert_eq!(a.send(&frame(ETHER_TYPE_SERCOS, 1)), Err(LinkError::Full));
 
             ip("link set south0 down");
-            assert_eq!(a.link_state(), LinkState::Down);
+            comes_to(&a, LinkState::Down);
             assert_eq!(a.send(&frame(ETHER_TYPE_SERCOS, 1)), Err(LinkError::Down));
             assert_eq!(a.recv(&mut buffer), Err(LinkError::Down));
             assert_eq!(a.recv(&mut buffer), Ok(None), "the error is reported once");
@@ -453,6 +463,7 @@ mod tests {
             ip("link set south0 up");
             ip("link set south1 up");
             assert_eq!(b.recv(&mut buffer), Err(LinkError::Down));
+            comes_to(&a, LinkState::Up);
             a.send(&frame(ETHER_TYPE_SERCOS, 7)).unwrap();
             assert!(wait(std::slice::from_ref(&b), Duration::from_secs(5)).unwrap());
             assert_eq!(b.recv(&mut buffer).unwrap().unwrap().len, 60);
