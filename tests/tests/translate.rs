@@ -140,3 +140,11 @@ fn golden_texts_are_made_compared_and_accepted() {
     let output = run(&["snapshot", path(&empty)]);
     assert!(text(&output.stderr).contains("expected files *.hex, *.pcap or *.pcapng, found none"));
 }
+
+/// Whatever the shipped tables make of some two thousand frames is what they made of them before.
+#[test]
+fn the_golden_texts_of_the_shipped_tables_stand() {
+    let frames = concat!(env!("CARGO_MANIFEST_DIR"), "/frames");
+    let output = run(&["snapshot", frames]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output.stdout), text(&output.stderr));
+}

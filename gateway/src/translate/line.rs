@@ -6,6 +6,7 @@
 //! at drive-a 08 c0 00 00 ...        what a drive sent in a cycle, without C-CON
 //! idn drive-a S-0-0011 04 00        element 7 of a parameter, as the drive gives it
 //! set turntable 473 00 00 20 41     the controller sets an attribute
+//! restart                           forgets what the frames before have told
 //! ```
 
 use profile_sercos::wire::idn::Idn;
@@ -34,6 +35,8 @@ pub enum Line<'t> {
         /// Element 7.
         bytes: Vec<u8>,
     },
+    /// What the frames before have told is forgotten.
+    Restart,
     /// An attribute of an axis.
     Set {
         /// Name of the axis.
@@ -82,6 +85,10 @@ impl<'t> Line<'t> {
                     word.parse().map_err(|_| words.error(word, "the number of an attribute, 0 to 65535"))?;
                 Self::Set { axis, attribute, bytes: words.bytes()? }
             }
+            "restart" => match words.next() {
+                None => Self::Restart,
+                Some(word) => return Err(words.error(word, "the end of the line")),
+            },
             _ => {
                 words.rest = code;
                 Self::Frame(words.bytes()?)
@@ -154,6 +161,7 @@ mod tests {
         assert_eq!(parse("idn d S-0-0011 04 00"), Some(Line::Idn { drive: "d", idn, bytes: vec![4, 0] }));
         let set = Line::Set { axis: "a", attribute: 473, bytes: vec![0, 0, 0x20, 0x41] };
         assert_eq!(parse("set a 473 0x00002041"), Some(set));
+        assert_eq!(parse("restart # anew"), Some(Line::Restart));
     }
 
     #[test]
@@ -163,6 +171,7 @@ mod tests {
             ("at", 3, "expected the name of a drive, got the end of the line"),
             ("idn d 11 00", 7, "expected a parameter, as S-0-0011, got `11`"),
             ("set a 65536 00", 7, "expected the number of an attribute, 0 to 65535, got `65536`"),
+            ("restart now", 9, "expected the end of the line, got `now`"),
             ("06 021", 4, "expected pairs of hexadecimal digits, got `021`"),
         ];
         for (text, column, message) in cases {

@@ -63,7 +63,10 @@ pub fn translate_list(stage: &Arc<Stage>, text: &str) -> Result<List, ListError>
         let Some(frame) = Line::parse(line).map_err(|error| ListError { line: number, error })? else {
             continue;
         };
-        list.push(format!("line {number}: {}", heading(line)), translator.line(&frame));
+        let translated = translator.line(&frame);
+        if frame != Line::Restart {
+            list.push(format!("line {number}: {}", heading(line)), translated);
+        }
     }
     Ok(list)
 }

@@ -91,6 +91,11 @@ impl Translator {
     #[must_use]
     pub fn new(stage: impl Into<Arc<Stage>>) -> Self {
         let stage = stage.into();
+        Self { states: Self::unheard(&stage), stage, device: 0 }
+    }
+
+    /// Axes of which no frame has told anything.
+    fn unheard(stage: &Stage) -> Vec<AxisState> {
         let states = stage.axes.iter().map(|axis| AxisState {
             machine: None,
             action: Action::TorqueOff,
@@ -100,7 +105,7 @@ impl Translator {
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
         });
-        Self { states: states.collect(), stage, device: 0 }
+        states.collect()
     }
 
     /// Takes updates as those of this device, by its number in the configuration.
@@ -128,6 +133,10 @@ impl Translator {
             Line::Idn { drive, idn, bytes } => {
                 let axis = self.drive(drive)?;
                 self.idn(axis, *idn, bytes)
+            }
+            Line::Restart => {
+                self.states = Self::unheard(&self.stage);
+                Ok(Node::new("restart"))
             }
             Line::Set { axis, attribute, bytes } => {
                 let axis = self.axis(axis)?;
