@@ -161,6 +161,12 @@ impl SercosBus {
         &self.master
     }
 
+    /// What the drive of an axis is needed for, and what it has told of itself.
+    #[must_use]
+    pub fn drive(&self, axis: usize) -> Option<(&SercosAxis, &DriveFacts)> {
+        self.drives.get(axis).map(|drive| (&drive.needs, &drive.facts))
+    }
+
     /// The master, for its frames.
     pub fn master_mut(&mut self) -> &mut Master {
         &mut self.master

@@ -23,7 +23,7 @@ impl Translator {
             node.push(Node::new(format!("not supported: {reason}")));
             return Ok(node);
         }
-        let Some(entry) = self.stage.attributes[number].get(id) else {
+        let Some(entry) = axis.attributes.get(id) else {
             node.push(Node::new("no row: not supported"));
             return Ok(node);
         };
@@ -119,7 +119,7 @@ impl Translator {
                 place.parameter.row().map_or_else(|| value.to_string(), |row| quantity(row.quantity, value));
             let mut read = Node::new(format!("{} {measured}", place.parameter))
                 .by(mapping.parameter_row(place.parameter));
-            for entry in self.stage.attributes[number].entries() {
+            for entry in axis.attributes.entries() {
                 let Backing::Parameter { parameter, .. } = entry.backing else { continue };
                 if parameter != place.parameter {
                     continue;

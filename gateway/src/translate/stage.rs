@@ -11,7 +11,9 @@ use profile_sercos::wire::layout::Layout;
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
 use crate::engine::port::NorthPort;
-use crate::mapping::{AttributeTable, CipProgram, Mapping, SercosProgram};
+use crate::mapping::{
+    AttributeTable, CipProgram, CipScaling, DriveFacts, Mapping, SercosAxis, SercosProgram,
+};
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 
 /// Virtual time in which the drives must be ready: 511 of them take less.
@@ -37,6 +39,14 @@ pub struct StageAxis {
     pub topology: u16,
     /// The drive's status word does not tell that it follows and is halted.
     pub silent: bool,
+    /// What the drive is needed for.
+    pub needs: SercosAxis,
+    /// What the drive has told of itself.
+    pub facts: DriveFacts,
+    /// The scaling of the controller.
+    pub scaling: CipScaling,
+    /// Its attributes.
+    pub attributes: AttributeTable,
     /// The program of the CIP side.
     pub north: CipProgram,
     /// The program of the drive.
@@ -50,8 +60,6 @@ pub struct Stage {
     pub mapping: Mapping,
     /// The axes in the order of the configuration.
     pub axes: Vec<StageAxis>,
-    /// The attributes of each axis.
-    pub attributes: Vec<AttributeTable>,
     /// The telegrams of CP4.
     pub layout: Layout,
 }
@@ -108,10 +116,13 @@ impl Stage {
         }
         let mut axes = Vec::with_capacity(config.axes.len());
         let master = engine.bus().master();
-        for (axis, channel) in config.axes.iter().zip(engine.axes()) {
+        for ((number, axis), channel) in config.axes.iter().enumerate().zip(engine.axes()) {
             let drive = &config.sercos.drives[axis.drive];
             let slave = master.slave_by_address(drive.address);
-            let (Some(south), Some(slave)) = (channel.south(), slave) else {
+            let scaling = scaling(axis);
+            let (Some(south), Some(slave), Some((needs, facts)), Some(attributes)) =
+                (channel.south(), slave, engine.bus().drive(number), mapping.attribute_table(&scaling))
+            else {
                 let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
                 return Err(StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() });
             };
@@ -123,15 +134,35 @@ impl Stage {
                 address: drive.address,
                 topology: slave.topology_address(),
                 silent: !drive.acknowledges,
+                needs: needs.clone(),
+                facts: facts.clone(),
+                scaling,
+                attributes,
                 north: channel.north().clone(),
                 south: south.clone(),
             });
         }
-        let attributes =
-            config.axes.iter().map(|axis| mapping.attribute_table(&scaling(axis)).unwrap_or_default());
-        let attributes = attributes.collect();
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
-        Ok(Self { attributes, axes, layout: master.layout().to_wire(topology), mapping })
+        Ok(Self { axes, layout: master.layout().to_wire(topology), mapping })
+    }
+
+    /// The same axes and drives with other tables.
+    ///
+    /// # Errors
+    /// A program cannot be made with them.
+    pub fn with_mapping(&self, mapping: Mapping) -> Result<Self, StageError> {
+        let axes = self.axes.iter().map(|axis| {
+            let failed = |told: String| StageError::Drive { axis: axis.name.clone(), told };
+            let south = mapping
+                .sercos_program(&axis.needs, &axis.facts)
+                .map_err(|error| failed(error.to_string()))?;
+            let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
+            let north = mapping.cip_program(&axis.scaling).ok_or_else(no_ratio)?;
+            let attributes = mapping.attribute_table(&axis.scaling).ok_or_else(no_ratio)?;
+            Ok(StageAxis { south, north, attributes, ..axis.clone() })
+        });
+        let axes = axes.collect::<Result<_, StageError>>()?;
+        Ok(Self { axes, layout: self.layout.clone(), mapping })
     }
 
     /// The axis with this name.
