@@ -24,7 +24,7 @@ pub const FRAME_LEN_LIMIT: u32 = 262_144;
 /// The longest pcapng block accepted: what Wireshark accepts.
 pub const BLOCK_LEN_LIMIT: u32 = 16 * 1024 * 1024;
 
-/// Interfaces described in one section; a file of this box has two.
+/// Interfaces described in one section; a file of this box has three.
 pub const INTERFACES_MAX: usize = 1024;
 
 /// Link type of Ethernet frames.

@@ -24,6 +24,9 @@ use crate::sys::clock::KernelTime;
 /// Bytes after which a recording is full, unless told otherwise.
 pub const FILE_LEN_MAX_DEFAULT: u64 = 4 << 30;
 
+/// Interfaces of a file.
+const SIDES: usize = Side::ALL.len();
+
 /// How long the writer thread sleeps when it has nothing to do.
 const IDLE: Duration = Duration::from_millis(2);
 
@@ -34,8 +37,8 @@ pub struct Settings {
     pub path: PathBuf,
     /// Description of the north interface in the file, such as its IP address.
     pub north: String,
-    /// Description of the south interface in the file, such as the name of the network interface.
-    pub south: String,
+    /// Descriptions of the two SERCOS ports in the file, such as the names of their network interfaces.
+    pub south: [String; 2],
     /// Records each tap can hold until the writer thread takes them; each takes about 1.5 KiB.
     pub depth: usize,
     /// Bytes of the file at which recording ends; what comes after counts as dropped.
@@ -49,7 +52,7 @@ impl Settings {
         Self {
             path: path.to_owned(),
             north: "EtherNet/IP".to_owned(),
-            south: "south bus".to_owned(),
+            south: ["SERCOS III".to_owned(), "SERCOS III".to_owned()],
             depth: 1024,
             file_len_max: FILE_LEN_MAX_DEFAULT,
         }
@@ -95,7 +98,7 @@ struct Record {
 #[derive(Debug)]
 pub struct Tap {
     queue: Producer<Record>,
-    dropped: Arc<[AtomicU64; 2]>,
+    dropped: Arc<[AtomicU64; SIDES]>,
 }
 
 impl Tap {
@@ -152,9 +155,8 @@ impl Tap {
     }
 }
 
-fn count(counters: &[AtomicU64; 2], side: Side) {
-    let index = usize::from(side == Side::South);
-    counters[index].fetch_add(1, Ordering::Relaxed);
+fn count(counters: &[AtomicU64; SIDES], side: Side) {
+    counters[side.index()].fetch_add(1, Ordering::Relaxed);
 }
 
 /// A recording that is running.
@@ -172,8 +174,9 @@ impl Recorder {
     /// The file cannot be created, or the thread not started.
     pub fn start(settings: Settings, taps: usize) -> io::Result<(Self, Vec<Tap>)> {
         let file = File::create(&settings.path)?;
-        let writer = Writer::new(file, &settings.north, &settings.south)?;
-        let dropped = Arc::new([AtomicU64::new(0), AtomicU64::new(0)]);
+        let [one, two] = &settings.south;
+        let writer = Writer::new(file, [&settings.north, one, two])?;
+        let dropped = Arc::new([const { AtomicU64::new(0) }; SIDES]);
         let mut queues = Vec::with_capacity(taps);
         let mut ends = Vec::with_capacity(taps);
         for _ in 0..taps {
@@ -187,7 +190,7 @@ impl Recorder {
             dropped,
             writer,
             synth: Synthesizer::new(),
-            written: [0; 2],
+            written: [0; SIDES],
             failed: None,
             limit: settings.file_len_max,
         };
@@ -210,10 +213,10 @@ impl Recorder {
 /// The writer thread.
 struct Task {
     queues: Vec<Consumer<Record>>,
-    dropped: Arc<[AtomicU64; 2]>,
+    dropped: Arc<[AtomicU64; SIDES]>,
     writer: Writer<File>,
     synth: Synthesizer,
-    written: [u64; 2],
+    written: [u64; SIDES],
     failed: Option<io::Error>,
     limit: u64,
 }
@@ -238,7 +241,7 @@ impl Task {
                 std::thread::sleep(IDLE);
             }
         }
-        let dropped = [&self.dropped[0], &self.dropped[1]].map(|counter| counter.load(Ordering::Relaxed));
+        let dropped = self.dropped.each_ref().map(|counter| counter.load(Ordering::Relaxed));
         if let Some(error) = self.failed {
             return Err(error);
         }
@@ -265,7 +268,7 @@ impl Task {
         }
         let data = &record.data[..usize::from(record.len)];
         let Self { writer, synth, written, failed, .. } = self;
-        let index = usize::from(side == Side::South);
+        let index = side.index();
         let mut emit = |frame: &[u8]| match writer.frame(side, record.at, frame, None) {
             Ok(()) => written[index] += 1,
             Err(error) => *failed = Some(error),
@@ -287,6 +290,8 @@ impl Task {
 #[cfg(test)]
 mod tests {
     use std::net::Ipv4Addr;
+
+    use profile_sercos::port::Port;
 
     use super::*;
     use crate::capture::reader::Reader;
@@ -320,11 +325,12 @@ mod tests {
         supervisor.opened(KernelTime(10), CLIENT, SERVER);
         supervisor.stream(KernelTime(20), CLIENT, SERVER, &[1; 1461]);
         std::thread::sleep(Duration::from_millis(50));
-        cycle.frame(KernelTime(30), Side::South, &[2; 60]);
+        cycle.frame(KernelTime(30), Side::South(Port::One), &[2; 60]);
+        cycle.frame(KernelTime(35), Side::South(Port::Two), &[2; 61]);
         cycle.datagram(KernelTime(40), SERVER, CLIENT, 0, &[3; 10]);
         std::thread::sleep(Duration::from_millis(50));
         supervisor.closed(KernelTime(50), SERVER, CLIENT);
-        assert_eq!(recorder.finish().unwrap(), Summary { frames: 10, dropped: 0 });
+        assert_eq!(recorder.finish().unwrap(), Summary { frames: 11, dropped: 0 });
         assert_eq!(
             frames(&path),
             [
@@ -334,6 +340,7 @@ mod tests {
                 (0, 20, 1514),
                 (0, 20, 55),
                 (1, 30, 60),
+                (2, 35, 61),
                 (0, 40, 52),
                 (0, 50, 54),
                 (0, 50, 54),
@@ -348,7 +355,7 @@ mod tests {
         let settings = Settings { depth: 4, file_len_max: 0, ..Settings::new(&path) };
         let (recorder, mut taps) = Recorder::start(settings, 1).unwrap();
         for number in 0..1000 {
-            taps[0].frame(KernelTime(number), Side::South, &[0; 60]);
+            taps[0].frame(KernelTime(number), Side::South(Port::One), &[0; 60]);
         }
         taps[0].datagram(KernelTime(2000), SERVER, CLIENT, 0, &[0; 1473]);
         // The file takes nothing, so that everything is dropped: in the queue, by its length or by the limit.

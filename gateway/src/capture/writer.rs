@@ -1,4 +1,4 @@
-//! Writes pcapng files with one interface for each side of the box and nanosecond time stamps.
+//! Writes pcapng files with one interface for each side and SERCOS port of the box and nanosecond time stamps.
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
@@ -26,11 +26,11 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Writes the headers: the program, and the interfaces `north` and `south`, described as given.
+    /// Writes the headers: the program, and the interfaces of [`Side::ALL`], each described as given.
     ///
     /// # Errors
     /// What the destination says.
-    pub fn new(destination: W, north: &str, south: &str) -> io::Result<Self> {
+    pub fn new(destination: W, descriptions: [&str; Side::ALL.len()]) -> io::Result<Self> {
         let program = concat!("axisbridge ", env!("CARGO_PKG_VERSION"));
         let section = SectionHeaderBlock {
             endianness: Endianness::Little,
@@ -39,7 +39,7 @@ impl<W: Write> Writer<W> {
         };
         let inner = PcapNgWriter::with_section_header(BufWriter::new(destination), section).map_err(to_io)?;
         let mut writer = Self { inner, bytes: 0 };
-        for (side, description) in Side::ALL.into_iter().zip([north, south]) {
+        for (side, description) in Side::ALL.into_iter().zip(descriptions) {
             let interface = InterfaceDescriptionBlock {
                 linktype: DataLink::ETHERNET,
                 snaplen: u32::try_from(FRAME_LEN_MAX).unwrap_or(0),
@@ -133,12 +133,14 @@ fn to_io(error: PcapError) -> io::Error {
 
 #[cfg(test)]
 mod tests {
+    use profile_sercos::port::Port;
+
     use super::*;
 
     #[test]
     fn statistics_carry_the_time_high_half_first() {
-        let mut writer = Writer::new(Vec::new(), "a", "b").unwrap();
-        writer.statistics(Side::South, KernelTime(0x0102_0304_0506_0708), 9, 2).unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
+        writer.statistics(Side::South(Port::One), KernelTime(0x0102_0304_0506_0708), 9, 2).unwrap();
         let file = writer.finish().unwrap();
         // Block type 5, interface 1, then the time.
         let block = [
@@ -150,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_bytes_written_are_those_of_the_file() {
-        let mut writer = Writer::new(Vec::new(), "a", "b").unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
         writer.frame(Side::North, KernelTime(1), &[7; 61], Some("text")).unwrap();
         let bytes = writer.bytes_written();
         let file = writer.finish().unwrap();
@@ -160,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_frame_longer_than_the_limit_keeps_its_length_on_record() {
-        let mut writer = Writer::new(Vec::new(), "a", "b").unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
         writer.frame(Side::North, KernelTime(1), &[7; 2000], None).unwrap();
         let file = writer.finish().unwrap();
         let mut reader = crate::capture::reader::Reader::new(file.as_slice()).unwrap();

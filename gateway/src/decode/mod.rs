@@ -18,6 +18,7 @@ use std::net::Ipv4Addr;
 use profile_sercos::wire::describe::{DecodeContext, Names, describe};
 use thiserror::Error;
 
+use crate::capture::Side;
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
 use crate::sys::clock::KernelTime;
 
@@ -127,7 +128,8 @@ pub fn decode<R: Read>(
 /// What is known of a recording so far.
 pub(crate) struct Decoder<'n> {
     names: &'n dyn Names,
-    buses: Vec<(u32, DecodeContext<'n>)>,
+    /// By interface; `None` for the ports of this box.
+    buses: Vec<(Option<u32>, DecodeContext<'n>)>,
     ethernet_ip: EtherNetIp,
     start: Option<KernelTime>,
     text: Text,
@@ -162,7 +164,7 @@ impl<'n> Decoder<'n> {
             Packet::Sercos => {
                 self.text.append(format_args!("SERCOS III"));
                 self.comment(frame);
-                let tree = describe(frame.data, self.bus(frame.interface));
+                let tree = describe(frame.data, self.bus(frame));
                 self.text.block(1, &tree);
                 Protocol::Sercos
             }
@@ -210,11 +212,15 @@ impl<'n> Decoder<'n> {
         }
     }
 
-    fn bus(&mut self, interface: u32) -> &mut DecodeContext<'n> {
-        let known = self.buses.iter().position(|(id, _)| *id == interface);
+    /// What is known of the bus of a frame. The two ports of this box are on the same one; each interface of another
+    /// recorder is taken for a bus of its own.
+    fn bus(&mut self, frame: &Frame<'_>) -> &mut DecodeContext<'n> {
+        let own = frame.interface_name.and_then(Side::of_name).is_some();
+        let bus = (!own).then_some(frame.interface);
+        let known = self.buses.iter().position(|(other, _)| *other == bus);
         let index = known.unwrap_or_else(|| {
             if self.buses.len() < BUSES_MAX {
-                self.buses.push((interface, DecodeContext::new(self.names)));
+                self.buses.push((bus, DecodeContext::new(self.names)));
             }
             self.buses.len() - 1
         });

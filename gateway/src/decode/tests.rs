@@ -19,6 +19,7 @@ use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, P
 use profile_cip::wire::status::{GeneralStatus, Service};
 use profile_cip::wire::unconnected_send::UnconnectedSend;
 use profile_cip::wire::{ConnectionTriad, multiple_service};
+use profile_sercos::port::Port;
 use profile_sercos::wire::describe::NoNames;
 use proptest::prelude::*;
 
@@ -45,7 +46,7 @@ struct Recording {
 
 impl Recording {
     fn new() -> Self {
-        let writer = Writer::new(Vec::new(), "north", "south").unwrap();
+        let writer = Writer::new(Vec::new(), ["north", "sercos port 1", "not used"]).unwrap();
         Self { writer, synth: Synthesizer::new(), at: 1_000_000_000 }
     }
 
@@ -312,7 +313,7 @@ fn what_cannot_be_read_is_said_and_does_not_end_it() {
     recording.reply(9, &[0x8E, 0]);
     let mut frame = [0; 60];
     frame[12..14].copy_from_slice(&[0x88, 0xCD]);
-    recording.writer.frame(Side::South, KernelTime(recording.at), &frame, Some("cut")).unwrap();
+    recording.writer.frame(Side::South(Port::One), KernelTime(recording.at), &frame, Some("cut")).unwrap();
     insta::assert_snapshot!(recording.text(&Options::default()));
 }
 

@@ -266,10 +266,11 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
     settings.north =
         config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
     settings.south = match &config.sercos.link {
-        Link::Interface { name, ring: None } => name.clone(),
-        Link::Interface { name, ring: Some(ring) } => format!("{name}, {ring}"),
-        Link::InProcess { ring: false } => "simulated SERCOS III line".to_owned(),
-        Link::InProcess { ring: true } => "simulated SERCOS III ring".to_owned(),
+        Link::Interface { name, ring } => [name.clone(), ring.as_deref().unwrap_or("not used").to_owned()],
+        Link::InProcess { ring } => {
+            let one = if *ring { "simulated SERCOS III ring" } else { "simulated SERCOS III line" };
+            [one, if *ring { one } else { "not used" }].map(str::to_owned)
+        }
     };
     settings.depth = 4096;
     // The bus, and for each device its I/O and its explicit side.

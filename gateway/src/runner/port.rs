@@ -103,7 +103,8 @@ impl SouthPort for PacketPort {
             self.first = (number + 1) % count;
             let len = received.len.min(buffer.len());
             if let Some(tap) = self.tap.as_mut() {
-                tap.frame(received.at.unwrap_or_else(clock::realtime_now), Side::South, &buffer[..len]);
+                let at = received.at.unwrap_or_else(clock::realtime_now);
+                tap.frame(at, Side::South(PORTS[number]), &buffer[..len]);
             }
             return Some((PORTS[number], len));
         }
@@ -115,7 +116,7 @@ impl SouthPort for PacketPort {
             PORTS.iter().position(|known| *known == port).and_then(|number| self.sockets.get(number));
         let Some(socket) = socket else { return false };
         if let Some(tap) = self.tap.as_mut() {
-            tap.frame(clock::realtime_now(), Side::South, frame);
+            tap.frame(clock::realtime_now(), Side::South(port), frame);
         }
         socket.send(frame).is_ok()
     }

@@ -153,7 +153,7 @@ impl SouthPort for InProcessDrives {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
         let (port, length) = self.returned.pop(buffer)?;
         if let Some(tap) = self.tap.as_mut() {
-            tap.frame(clock::realtime_now(), Side::South, &buffer[..length]);
+            tap.frame(clock::realtime_now(), Side::South(port), &buffer[..length]);
         }
         Some((port, length))
     }
@@ -163,7 +163,7 @@ impl SouthPort for InProcessDrives {
         let Some(bytes) = buffer.get_mut(..frame.len()) else { return false };
         bytes.copy_from_slice(frame);
         if let Some(tap) = self.tap.as_mut() {
-            tap.frame(clock::realtime_now(), Side::South, frame);
+            tap.frame(clock::realtime_now(), Side::South(port), frame);
         }
         let Self { network, returned, .. } = self;
         network.handle_time(now);

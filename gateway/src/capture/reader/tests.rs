@@ -1,5 +1,6 @@
 use std::fmt::Write as _;
 
+use profile_sercos::port::Port;
 use proptest::prelude::*;
 
 use super::*;
@@ -7,10 +8,12 @@ use crate::capture::Side;
 use crate::capture::writer::Writer;
 
 fn written() -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), "192.0.2.1", "in-process").unwrap();
+    let mut writer = Writer::new(Vec::new(), ["192.0.2.1", "in-process", "not used"]).unwrap();
     writer.frame(Side::North, KernelTime(1_800_000_000_000_000_007), &[1; 61], None).unwrap();
-    writer.frame(Side::South, KernelTime(1_800_000_000_001_000_000), &[2; 60], Some("phase 2")).unwrap();
-    writer.statistics(Side::South, KernelTime(1_800_000_000_002_000_000), 1, 0).unwrap();
+    writer
+        .frame(Side::South(Port::One), KernelTime(1_800_000_000_001_000_000), &[2; 60], Some("phase 2"))
+        .unwrap();
+    writer.statistics(Side::South(Port::One), KernelTime(1_800_000_000_002_000_000), 1, 0).unwrap();
     writer.frame(Side::North, KernelTime(1_800_000_000_003_000_000), &[], None).unwrap();
     writer.finish().unwrap()
 }
@@ -54,7 +57,7 @@ fn what_the_writer_wrote_is_read() {
     assert_eq!(
         listing(&written()),
         "1 at Some(1800000000000000007) on 0 Some(\"north\") link 1 len 61/61 Some(01) None\n\
-         2 at Some(1800000000001000000) on 1 Some(\"south\") link 1 len 60/60 Some(02) Some(\"phase 2\")\n\
+         2 at Some(1800000000001000000) on 1 Some(\"sercos port 1\") link 1 len 60/60 Some(02) Some(\"phase 2\")\n\
          3 at Some(1800000000003000000) on 0 Some(\"north\") link 1 len 0/0 None None\n"
     );
 }
@@ -186,8 +189,8 @@ fn a_file_cut_anywhere_gives_its_whole_frames_and_then_an_error_or_the_end() {
         );
         ends += usize::from(frames.len() == text.lines().count());
     }
-    // Clean ends: after the section header, two interfaces, two packets, the statistics.
-    assert_eq!(ends, 6);
+    // Clean ends: after the section header, three interfaces, two packets, the statistics.
+    assert_eq!(ends, 7);
 }
 
 proptest! {
