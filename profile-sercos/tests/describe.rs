@@ -28,7 +28,7 @@ impl Names for Few {
 
 #[test]
 fn the_start_up_can_be_read() {
-    let frames = support::recording();
+    let frames = support::part();
     let mut context = DecodeContext::new(&Few);
     let mut text = String::new();
     let mut lines = std::collections::BTreeSet::new();
@@ -57,7 +57,7 @@ fn the_start_up_can_be_read() {
 
 #[test]
 fn broken_frames_are_shown_not_refused() {
-    let mut bytes = support::recording()[0].clone();
+    let mut bytes = support::part()[0].clone();
     let mut context = DecodeContext::default();
     bytes[19] ^= 1;
     assert!(describe(&bytes, &mut context).contains("CRC BAD"));

@@ -127,12 +127,6 @@ impl Police {
         std::mem::take(&mut self.breaches)
     }
 
-    /// The master was switched off and is another one now, which counts anew. It owes the silence before CP0 like any
-    /// other.
-    pub fn master_restarts(&mut self) {
-        self.cycle = None;
-    }
-
     fn breach(&mut self, at: MonotonicTime, offender: Offender, rule: Rule) {
         self.breaches.push(Breach { at, offender, rule });
     }
@@ -193,9 +187,8 @@ impl Police {
         let silence = at - self.quiet_since;
         let broken = |police: &mut Police, rule| police.breach(at, Offender::Master, rule);
         let cycles = last.is_some() && silence < SILENCE;
-        // From NRT it starts with CP0 without announcement, but behind its silence; then it may count anew.
-        let start = !cycles && field.phase() == Phase::CP0 && !field.switching();
-        if let Some((_, last)) = last.filter(|(_, last)| !start || last.switching()) {
+        // Behind a silence any count may follow: some masters count the cycles in which they are silent, too.
+        if let Some((_, last)) = last.filter(|_| cycles) {
             let expected = (last.cycle_count() + 1) & 7;
             let found = field.cycle_count();
             if found != expected {
@@ -205,7 +198,10 @@ impl Police {
         let before = last.map(|(_, field)| field);
         let step = phase_step(self.phase, before, field);
         match step {
-            _ if start => self.enter(at, field.phase(), silence),
+            // A start with CP0 needs no announcement, but its silence.
+            _ if !cycles && field.phase() == Phase::CP0 && !field.switching() => {
+                self.enter(at, field.phase(), silence);
+            }
             Step::Same => {}
             Step::Announce => {
                 self.switching_since = Some(at);

@@ -78,7 +78,7 @@ pub enum Rule {
         /// The MST's.
         mst: PhaseField,
     },
-    /// The cycle counter goes up by one every cycle.
+    /// The cycle counter goes up by one every cycle. Across a silence it may go on as it likes.
     CycleCounter {
         /// Counter found.
         found: u8,

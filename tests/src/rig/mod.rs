@@ -394,7 +394,6 @@ impl Rig {
         self.south = SouthQueue::default();
         // A box takes longer to start; the last telegrams of the old one are through by then.
         self.engine_due = self.now + STEP_MAX;
-        self.court.police.master_restarts();
     }
 
     /// The status that the box publishes.
