@@ -7,7 +7,7 @@ use super::*;
 use crate::police::court::Tried;
 use crate::police::light::{FEEDBACK, MODE, Mirror};
 use crate::police::{Breach, Offender, Rule};
-use crate::slave::communication::FixedConnection;
+use crate::slave::communication::{FixedConnection, idn};
 use crate::slave::{self, Slave};
 use crate::wire::data_status::DataStatus;
 use crate::wire::device_status::DeviceStatus;
@@ -96,8 +96,13 @@ fn without_an_mst(breach: &Breach) -> bool {
 }
 
 /// Two cycles of damaged MDTs: the slaves go on with the values they had and take the next good ones.
-fn damaged_on_the_way_out(broken: fn(&Rule) -> bool, damage: fn(&mut Vec<u8>)) {
+fn damaged_on_the_way_out(said: &str, broken: fn(&Rule) -> bool, damage: fn(&mut Vec<u8>)) {
     let mut rig = in_cp4();
+    let msts_missed = |rig: &FullRig| {
+        let stores = rig.line.slaves().iter().map(Slave::store);
+        stores.map(|store| store.number_of(idn::MST_ERRORS)).collect::<Vec<_>>()
+    };
+    let before = msts_missed(&rig);
     rig.outward = Box::new(move |frame| {
         if is(frame, Kind::Mdt, 0) {
             damage(frame);
@@ -118,16 +123,25 @@ fn damaged_on_the_way_out(broken: fn(&Rule) -> bool, damage: fn(&mut Vec<u8>)) {
     for slave in rig.line.slaves() {
         assert_eq!(slave.fault(), None);
     }
+    // The master counts what comes back with the reason, and each slave the MSTs that it missed.
+    for reason in Refusal::ALL {
+        let expected = if reason.to_string() == said { 2 } else { 0 };
+        assert_eq!(rig.master.statistics().refused(reason), expected, "{reason}");
+    }
+    let missed: Vec<_> = msts_missed(&rig).iter().zip(before).map(|(now, before)| now - before).collect();
+    let none = matches!(said, "wrong length" | "wrong cycle counter");
+    assert_eq!(missed, if none { [0; 3] } else { [2; 3] }, "S-0-1028");
 }
 
 #[test]
 fn an_mdt_with_a_wrong_crc() {
-    damaged_on_the_way_out(|rule| *rule == Rule::Header, |frame| frame[16] ^= 1);
+    damaged_on_the_way_out("wrong header CRC", |rule| *rule == Rule::Header, |frame| frame[16] ^= 1);
 }
 
 #[test]
 fn an_mdt_with_a_wrong_number() {
     damaged_on_the_way_out(
+        "telegram number that is not in use",
         |rule| matches!(rule, Rule::Unexpected { .. }),
         |frame| {
             frame[14] |= 2;
@@ -139,6 +153,7 @@ fn an_mdt_with_a_wrong_number() {
 #[test]
 fn an_mdt_with_a_wrong_counter() {
     damaged_on_the_way_out(
+        "wrong cycle counter",
         |rule| matches!(rule, Rule::CycleCounter { .. }),
         |frame| {
             frame[15] ^= 0x40;
@@ -150,6 +165,7 @@ fn an_mdt_with_a_wrong_counter() {
 #[test]
 fn an_mdt_of_a_wrong_length() {
     damaged_on_the_way_out(
+        "wrong length",
         |rule| matches!(rule, Rule::Length { .. }),
         |frame| frame.truncate(HEADER_LEN + 16),
     );
@@ -179,7 +195,12 @@ fn an_mdt_of_a_wrong_phase_ends_communication_and_the_bus_comes_up_again() {
         });
     });
     for (slave, address) in (0..3).map(SlaveId).zip(1..) {
-        assert!(rig.saw(&Event::SlaveLost { slave, address, phase: Phase::CP4 }));
+        let lost = Event::SlaveLost { slave, address, phase: Phase::CP4 };
+        assert!(rig.saw(&lost));
+        assert_eq!(
+            lost.to_string(),
+            format!("slave at position {address} with address {address} was lost in CP4")
+        );
     }
     rig.state(State::Cp0);
     rig.log.clear();
@@ -241,6 +262,7 @@ fn a_slave_that_sets_error_in_its_device_status() {
     let event = Event::DeviceStatus { slave: BAD_ID, status };
     assert_eq!(rig.log, std::slice::from_ref(&event), "told once");
     assert_eq!(event.to_string(), "slave at position 2: communication warning, device error");
+    runs(&mut rig, &[0, 1, 2]);
     behave(&mut rig);
     rig.cycles(1);
     let over = Event::DeviceStatus { slave: BAD_ID, status: DeviceStatus::empty() };
@@ -257,12 +279,16 @@ fn a_slave_that_refuses_s_0_0127_is_named_and_left_out() {
     rig.master.set_target_phase(Phase::CP4);
     rig.state(State::Await2);
     rig.master.proceed().unwrap();
-    rig.run_until("refused", |rig| rig.saw(&Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2 }));
+    let refused = Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2 };
+    rig.run_until("refused", |rig| rig.saw(&refused));
+    let said = "slave at position 2: the check to leave CP2 failed, parameters are invalid";
+    assert_eq!(refused.to_string(), said);
     rig.state(State::Await2);
     assert_eq!(rig.master.invalid_parameters(BAD_ID), [MODE]);
     let report: Vec<_> = rig.master.report(BAD_ID).iter().map(ToString::to_string).collect();
     let said = "CP2 execute S-0-0127: procedure command";
     assert!(report.iter().any(|row| row.starts_with(said)), "{report:?}");
+    assert!(report.iter().any(|row| row.starts_with("CP2 read S-0-0021")), "{report:?}");
     go_on_without(&mut rig);
 }
 
@@ -384,8 +410,10 @@ fn a_connection_counter_out_of_order() {
         assert_eq!(rig.log, [warned], "one warning while it lasts");
         rig.cycles(12);
         assert_eq!(rig.master.consumer(BAD_ID, 1).unwrap().state, ConsumerState::Error);
-        let failed = Event::Connection { slave: BAD_ID, instance: 1, state: ConsumerState::Error };
-        assert_eq!(rig.log.last().map(ToString::to_string), Some(failed.to_string()));
+        let said = rig.log.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let both = ["warning", "error"]
+            .map(|state| format!("slave at position 2: connection 1 is in state {state}"));
+        assert_eq!(said, both);
         runs(rig, &[0, 2]);
         behave(rig);
         rig.master.reset_consumer(BAD_ID, 1);
@@ -399,7 +427,9 @@ fn a_slave_that_duplicates_an_address() {
     let mut rig = full_rig(3);
     rig.line.slaves_mut()[1].store_mut().set_number_of(Idn::ADDRESS, 3);
     rig.master.set_target_phase(Phase::CP4);
-    rig.run_until("refused", |rig| rig.saw(&Event::AddressConflict { slave: BAD_ID }));
+    let conflict = Event::AddressConflict { slave: BAD_ID };
+    rig.run_until("refused", |rig| rig.saw(&conflict));
+    assert_eq!(conflict.to_string(), "slave at position 2 has no address of its own: CP3 refused");
     let double = Event::DoubleAddress { address: 3, first: BAD_ID, second: SlaveId(2) };
     assert!(rig.saw(&double) && rig.saw(&Event::Missing { address: 2 }));
     assert_eq!(double.to_string(), "slave at position 2 and slave at position 3 both have address 3");

@@ -11,7 +11,8 @@ fn fix_crc(frame: &mut [u8]) {
 }
 
 /// A disturbed cable in CP4: what is refused, and that nothing else comes of it.
-fn disturbed(cable: fn(&mut Vec<u8>) -> bool, reason: Refusal) {
+fn disturbed(cable: fn(&mut Vec<u8>) -> bool, reason: Refusal, said: &str) {
+    assert_eq!(reason.to_string(), said);
     let mut rig = Rig::of(&[1, 2]);
     rig.up_to(Phase::CP4);
     rig.cycles(5);
@@ -19,11 +20,18 @@ fn disturbed(cable: fn(&mut Vec<u8>) -> bool, reason: Refusal) {
     rig.cable = Box::new(cable);
     rig.cycles(2);
     assert!(rig.master.statistics().refused(reason) >= 2, "{reason}");
-    let consumer = rig.master.consumer(SlaveId(0), 1).unwrap();
-    assert_eq!((consumer.state, consumer.missed, consumer.fresh), (ConsumerState::Warning, 1, false));
+    for other in Refusal::ALL.into_iter().filter(|&other| other != reason) {
+        assert_eq!(rig.master.statistics().refused(other), 0, "{reason}: {other}");
+    }
+    for slave in [SlaveId(0), SlaveId(1)] {
+        let consumer = rig.master.consumer(slave, 1).unwrap();
+        assert_eq!((consumer.state, consumer.missed, consumer.fresh), (ConsumerState::Warning, 1, false));
+    }
     rig.cable = Box::new(|_| true);
     rig.cycles(2);
-    assert_eq!(rig.master.consumer(SlaveId(0), 1).unwrap().state, ConsumerState::Consuming);
+    for slave in [SlaveId(0), SlaveId(1)] {
+        assert_eq!(rig.master.consumer(slave, 1).unwrap().state, ConsumerState::Consuming);
+    }
     assert!(rig.log.iter().all(|event| matches!(event, Event::Connection { .. })), "{:?}", rig.log);
 }
 
@@ -35,6 +43,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::Crc,
+        "wrong header CRC",
     );
     disturbed(
         |frame| {
@@ -43,6 +52,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::Phase,
+        "wrong phase",
     );
     disturbed(
         |frame| {
@@ -51,6 +61,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::CycleCount,
+        "wrong cycle counter",
     );
     disturbed(
         |frame| {
@@ -58,6 +69,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::Length,
+        "wrong length",
     );
     disturbed(
         |frame| {
@@ -66,6 +78,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::Number,
+        "telegram number that is not in use",
     );
     disturbed(
         |frame| {
@@ -74,6 +87,7 @@ fn refused_frames_change_nothing() {
             true
         },
         Refusal::Foreign,
+        "telegram of another master",
     );
 }
 
@@ -135,6 +149,8 @@ fn a_vanishing_slave_leaves_the_others_running() {
         rig.state(state);
         rig.line.peers[1].faults.gone = true;
         rig.run_until("noticed", |rig| rig.log.contains(&lost(phase)));
+        let said = format!("slave at position 2 with address 2 was lost in {phase}");
+        assert_eq!(lost(phase).to_string(), said);
         rig.auto_proceed = true;
         rig.master.set_target_phase(Phase::CP4);
         let _ = rig.master.proceed();
@@ -162,7 +178,14 @@ fn a_slave_that_vanishes_in_cp0_changes_the_scan() {
     rig.state(State::Scan);
     rig.state(State::Cp0);
     assert!(rig.log.contains(&Event::Scanned { slaves: 1 }));
-    assert!(rig.log.contains(&Event::Missing { address: 2 }));
+    let missing = Event::Missing { address: 2 };
+    assert!(rig.log.contains(&missing));
+    assert_eq!(missing.to_string(), "the slave with address 2 was not found");
+    // The other one goes on.
+    rig.up_to(Phase::CP4);
+    rig.cycles(5);
+    let consumer = rig.master.consumer(SlaveId(0), 1).unwrap();
+    assert_eq!((consumer.state, consumer.fresh), (ConsumerState::Consuming, true));
 }
 
 #[test]
