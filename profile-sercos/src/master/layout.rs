@@ -399,6 +399,8 @@ fn narrow(ns: u64) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+
     use proptest::collection::vec;
     use proptest::prelude::*;
 
@@ -529,6 +531,36 @@ mod tests {
         // Nothing at all still has telegrams.
         let empty = layout(&exact, &[]).unwrap();
         assert_eq!((empty.mdt_len, empty.at_len), ([40, 0, 0, 0], [40, 0, 0, 0]));
+    }
+
+    /// How many drives with connections of 8 bytes each way a cycle holds, for a hardware master and a soft one.
+    #[test]
+    fn what_the_cycles_hold() {
+        let mut table = String::new();
+        let most = |timing: &Timing| {
+            let fits = |count: usize| layout(timing, &vec![need(8, 8); count]);
+            let count = (1..=511).take_while(|&count| fits(count).is_ok()).last().unwrap_or(0);
+            let load = fits(count).map_or(0, |layout| layout.times.load_permille);
+            // One more is refused, with the time that it would take.
+            match (count, fits(count + 1)) {
+                (_, Err(LayoutError::Telegrams { needed, available, .. })) => assert!(needed > available),
+                (_, Err(LayoutError::Cycle { needed_ns, cycle_ns, .. })) => {
+                    assert!(needed_ns > u64::from(cycle_ns) && needed_ns < u64::from(cycle_ns) + 100_000);
+                }
+                (_, other) => panic!("{other:?}"),
+            }
+            (count, load)
+        };
+        for cycle_ns in [31_250, 62_500, 125_000, 250_000, 500_000, 1_000_000, 2_000_000, 4_000_000] {
+            let (hard, load) = most(&Timing { mst_jitter_ns: 1_000, ..timing(cycle_ns) });
+            let (soft, soft_load) = most(&timing(cycle_ns));
+            writeln!(
+                table,
+                "{cycle_ns:>9} ns: {hard:>3} at {load:>3} per mille, soft {soft:>3} at {soft_load:>3}"
+            )
+            .unwrap();
+        }
+        insta::assert_snapshot!(table);
     }
 
     #[test]

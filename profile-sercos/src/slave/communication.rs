@@ -371,8 +371,12 @@ mod tests {
 
     #[test]
     fn cycle_times() {
-        let good = [31_250, 62_500, 125_000, 250_000, 1_000_000, 10_000_000, 65_000_000];
-        assert!(good.into_iter().all(is_cycle_time));
+        let good = || [31_250, 62_500, 125_000].into_iter().chain((1..=260).map(|n| n * 250_000));
+        for cycle in good() {
+            assert_eq!([cycle - 1, cycle, cycle + 1].map(is_cycle_time), [false, true, false], "{cycle}");
+        }
+        let steps = (0..=2_088).map(|n| n * 31_250);
+        assert_eq!(steps.filter(|&cycle| is_cycle_time(cycle)).count(), good().count());
         let bad = [0, 31_251, 93_750, 300_000, 65_250_000, u32::MAX];
         assert!(!bad.into_iter().any(is_cycle_time));
     }

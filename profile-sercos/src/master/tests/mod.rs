@@ -65,3 +65,4 @@ mod phase_up;
 mod recording;
 mod ring;
 mod service;
+mod timing;
