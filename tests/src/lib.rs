@@ -11,4 +11,5 @@ pub mod namespace;
 pub mod peer;
 pub mod process;
 pub mod rig;
+pub mod tables;
 pub mod tshark;
