@@ -49,8 +49,11 @@ impl Bus {
         ]
         .into_iter()
         .collect();
-        let configured =
-            (1..=slaves).map(|address| SlaveConfig { address, connections: connections.clone() });
+        let configured = (1..=slaves).map(|address| SlaveConfig {
+            address,
+            connections: connections.clone(),
+            hot_plug: None,
+        });
         let config = MasterConfig {
             slaves: configured.collect(),
             slaves_max: slaves,

@@ -143,6 +143,7 @@ pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     let slave = |drive: &crate::config::Drive| SlaveConfig {
         address: drive.address,
         connections: Connections::new(),
+        hot_plug: None,
     };
     master.slaves = sercos.drives.iter().map(slave).collect();
     master.slaves_max =

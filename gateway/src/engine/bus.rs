@@ -339,6 +339,10 @@ impl SercosBus {
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
             Event::Phase(phase) if *phase < Phase::CP2 => self.lose_all(now, system, axes),
+            // The commissioning of a drive that comes later is not known here.
+            Event::HotPlugAwaits { slave, .. } => {
+                let _ = self.master.exclude(*slave);
+            }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }

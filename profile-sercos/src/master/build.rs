@@ -9,7 +9,7 @@ use super::event::SlaveId;
 use super::layout::CyclicLayout;
 use super::scan;
 use super::station::{End, Station};
-use crate::wire::cp0::{self, AtRepr, CommunicationVersion, MdtRepr, SequenceCounter};
+use crate::wire::cp0::{self, AtRepr, MdtRepr, SequenceCounter};
 use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
 use crate::wire::error::put_u16;
@@ -44,7 +44,7 @@ impl Master {
     /// Builds the telegrams of the next cycle.
     pub(super) fn build(&mut self) {
         if self.state.serves() {
-            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
+            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_served()) {
                 station.channel.kick();
             }
         }
@@ -76,11 +76,7 @@ impl Master {
     }
 
     fn build_scan(&mut self) {
-        let mut version = CommunicationVersion::ADDRESS_ALLOCATION;
-        if self.config.setup_telegrams() == 4 {
-            version |= CommunicationVersion::FOUR_TELEGRAMS;
-        }
-        let mdt = MdtRepr { version, ..MdtRepr::default() };
+        let mdt = MdtRepr { version: self.config.communication_version(), ..MdtRepr::default() };
         let emit = |data: &mut [u8]| {
             // The length is the one of the telegram.
             let _ = mdt.emit(data);
@@ -101,6 +97,7 @@ impl Master {
     ) {
         let (stations, layout, phase) = (&self.stations[..self.found], &self.layout, self.layout_phase);
         let ring = self.redundancy.is_closed();
+        let fields = self.admission.fields(&self.config, layout);
         let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
         for (number, len) in used(mdt) {
             self.frames.add(Kind::Mdt, number, len, |_| {}, |_| {});
@@ -119,7 +116,17 @@ impl Master {
                 fill_connections(&mut mdts, layout, index, station);
             }
         }
+        let fields = fields.filter(|_| phase == Phase::CP4);
+        if let (Some([primary, _]), Some(data)) = (fields, &mut mdts[0]) {
+            // MDT0 of CP4 begins with the field.
+            let _ = primary.emit(data);
+        }
         self.frames.copy_mdts();
+        if let Some([_, secondary]) = fields {
+            self.frames.edit_secondary_mdt(|data| {
+                let _ = secondary.emit(data);
+            });
+        }
         for (number, len) in used(at) {
             self.frames.add(Kind::At, number, len, |_| {}, |_| {});
         }
@@ -146,15 +153,15 @@ impl Master {
 /// Writes a slave's service channel and C-DEV into the MDT that has them. One that takes no part is told nothing but
 /// that its topology is to stay as it is.
 fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool) {
-    if station.is_active()
+    if station.is_served()
         && let Some(bytes) = part(mdts, slot.svc.0, slot.svc.1..slot.svc.1 + SVC_LEN)
     {
         let _ = station.channel.outgoing().emit(bytes);
     }
     if let Some(bytes) = part(mdts, slot.device.0, slot.device.1..slot.device.1 + DEVICE_WORD_LEN) {
         let mut control = station.command;
-        control.set(DeviceControl::MASTER_VALID, station.is_active());
-        control.set(DeviceControl::RING_CLOSED, ring && station.is_active());
+        control.set(DeviceControl::MASTER_VALID, station.is_served());
+        control.set(DeviceControl::RING_CLOSED, ring && station.is_served());
         put_u16(bytes, 0, control.bits());
     }
 }

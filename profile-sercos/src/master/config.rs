@@ -3,10 +3,11 @@
 use arrayvec::ArrayVec;
 use profile_generic::time::DurationNs;
 
+use super::layout::SlaveNeed;
 use super::svc::SvcLimits;
 use crate::port::Port;
-use crate::wire::connection::{ConfigurationType, ConnectionSetup, ConnectionTiming};
-use crate::wire::cp0;
+use crate::wire::connection::{CONNECTION_CONTROL_LEN, ConfigurationType, ConnectionSetup, ConnectionTiming};
+use crate::wire::cp0::{self, CommunicationVersion};
 use crate::wire::header::MacAddress;
 use crate::wire::idn::Idn;
 
@@ -88,6 +89,9 @@ pub struct SlaveConfig {
     pub address: u16,
     /// Its connections; may also be set in CP2 with [`super::Master::set_connections`].
     pub connections: Connections,
+    /// What the telegrams keep free for it while it is not there, so that it can be plugged in later: the lengths of its
+    /// connections with C-CON, and its times. `None`: it has to be there from the start.
+    pub hot_plug: Option<SlaveNeed>,
 }
 
 /// Which of its two ports the master has.
@@ -234,8 +238,17 @@ impl MasterConfig {
                 return Err(ConfigError::DoubleAddress(slave.address));
             }
             check_connections(slave.address, &slave.connections, self.cycle_ns)?;
+            check_room(slave)?;
         }
         Ok(())
+    }
+
+    /// The communication version of CP0.
+    pub(super) fn communication_version(&self) -> CommunicationVersion {
+        let four = self.setup_telegrams() == 4;
+        let telegrams =
+            if four { CommunicationVersion::FOUR_TELEGRAMS } else { CommunicationVersion::empty() };
+        CommunicationVersion::ADDRESS_ALLOCATION | telegrams
     }
 }
 
@@ -256,6 +269,22 @@ pub(crate) fn check_connections(
         }
         if connection.configuration == ConfigurationType::IdnList && connection.idns.is_empty() {
             return Err(ConfigError::NoIdns { address, instance });
+        }
+    }
+    Ok(())
+}
+
+/// Checks the room that is kept for a slave.
+fn check_room(slave: &SlaveConfig) -> Result<(), ConfigError> {
+    let room = slave.hot_plug.iter().flat_map(|need| &need.connections);
+    for (index, connection) in room.clone().enumerate() {
+        let (address, instance, length) = (slave.address, connection.instance, connection.len);
+        if room.clone().take(index).any(|other| other.instance == instance) {
+            return Err(ConfigError::DoubleInstance { address, instance });
+        }
+        let possible = (CONNECTION_CONTROL_LEN..=CONNECTION_LEN_MAX).contains(&usize::from(length));
+        if !possible || length % 2 != 0 {
+            return Err(ConfigError::Room { address, instance, length });
         }
     }
     Ok(())
@@ -324,6 +353,16 @@ pub enum ConfigError {
         /// The value given.
         cycles: u16,
     },
+    /// Room kept for a connection of an impossible length.
+    #[error("slave {address} connection {instance}: room of {length} bytes; an even number from 2 to 256")]
+    Room {
+        /// SERCOS address.
+        address: u16,
+        /// Connection number.
+        instance: u8,
+        /// The value given.
+        length: u16,
+    },
     /// An IDN list connection without IDNs.
     #[error("slave {address} connection {instance}: the configuration list is empty")]
     NoIdns {
@@ -357,14 +396,14 @@ mod tests {
     #[test]
     fn each_fault_has_its_error() {
         let base = MasterConfig::new(MAC, 1_000_000);
-        let slave = |address| SlaveConfig { address, connections: Connections::new() };
+        let slave = |address| SlaveConfig { address, connections: Connections::new(), hot_plug: None };
         let with = |slaves: &[SlaveConfig]| MasterConfig { slaves: slaves.to_vec(), ..base.clone() }.check();
         assert_eq!(with(&[slave(0)]), Err(ConfigError::Address(0)));
         assert_eq!(with(&[slave(512)]), Err(ConfigError::Address(512)));
         assert_eq!(with(&[slave(7), slave(7)]), Err(ConfigError::DoubleAddress(7)));
         let connection = |instance| ConnectionConfig::new(instance, true, &[Idn(40)]).unwrap();
         let connected = |connections: &[ConnectionConfig]| {
-            with(&[SlaveConfig { address: 1, connections: connections.iter().cloned().collect() }])
+            with(&[SlaveConfig { connections: connections.iter().cloned().collect(), ..slave(1) }])
         };
         assert_eq!(
             connected(&[connection(1), connection(1)]),
@@ -385,6 +424,21 @@ mod tests {
         assert_eq!(profile.setup().bits(), 0xC020);
         assert_eq!(connected(&[profile]), Ok(()));
         assert_eq!(ConnectionConfig::new(0, true, &[Idn(1); 17]), None);
+        let room =
+            |instance, len| super::super::layout::ConnectionNeed { instance, slave_produces: true, len };
+        let kept = |room: &[super::super::layout::ConnectionNeed]| {
+            let need = SlaveNeed { connections: room.iter().copied().collect(), ..SlaveNeed::default() };
+            with(&[SlaveConfig { hot_plug: Some(need), ..slave(1) }])
+        };
+        assert_eq!(kept(&[room(0, 8), room(1, 256)]), Ok(()));
+        assert_eq!(
+            kept(&[room(0, 8), room(0, 8)]),
+            Err(ConfigError::DoubleInstance { address: 1, instance: 0 })
+        );
+        for length in [0, 7, 258] {
+            let wanted = ConfigError::Room { address: 1, instance: 3, length };
+            assert_eq!(kept(&[room(3, length)]), Err(wanted));
+        }
         let short = MasterConfig { pause: DurationNs::from_millis(119), ..base.clone() };
         assert_eq!(short.check(), Err(ConfigError::Pause(DurationNs::from_millis(119))));
         let shaky = MasterConfig { mst_jitter_ns: 1_000_000, ..base };

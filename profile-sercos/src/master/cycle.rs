@@ -4,12 +4,12 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::Master;
 use super::build::slot;
-use super::event::{Event, SlaveId};
+use super::event::{Event, HotPlugRefusal, SlaveId};
 use super::phase::{PhaseEvent, State};
 use super::scan::{self, ScanResult, Survey};
 use super::station::{End, Presence, Station};
 use super::svc::request::SvcFailure;
-use super::topology::Route;
+use super::topology::{Route, Topology};
 use crate::wire::cp0::AtRepr;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::error::u16_at;
@@ -77,7 +77,7 @@ impl Master {
             State::Scan => self.scan_ready.map(|_| PhaseEvent::Ready),
             State::Cp0 if self.condition => Some(PhaseEvent::Failed),
             State::Cp0 => {
-                let known = self.found > 0;
+                let known = self.scanned > 0;
                 (known && target > Phase::CP0).then_some(PhaseEvent::Up)
             }
             State::Cp1 => (target > Phase::CP1).then_some(PhaseEvent::Up),
@@ -172,7 +172,7 @@ impl Master {
             _ => (0..self.found).all(|index| !self.stations[index].is_active() || self.meets(index)),
         };
         if self.state.serves() {
-            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_active()) {
+            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_served()) {
                 let answer = station.svc;
                 if let Some(status) = station.status {
                     station.channel.command_change(status.contains(DeviceStatus::COMMAND_CHANGE));
@@ -226,7 +226,13 @@ impl Master {
         whole
             && (0..self.found).all(|index| {
                 self.read_station(index);
-                !self.stations[index].is_active() || self.is_valid(&self.stations[index])
+                let station = &self.stations[index];
+                match station.presence {
+                    Presence::Active => self.is_valid(station),
+                    // It has nothing but a service channel yet.
+                    Presence::Joining => station.svc.is_some_and(|svc| svc.status.contains(SvcStatus::VALID)),
+                    Presence::Lost | Presence::Excluded | Presence::Absent => true,
+                }
             })
     }
 
@@ -263,6 +269,11 @@ impl Master {
         let station = &mut self.stations[index];
         (station.status, station.svc) = (best.1, best.2);
         station.valid_routes = valid_routes;
+    }
+
+    /// The status of a slave that is there, in this cycle.
+    pub(super) fn valid_status(&self, index: usize) -> Option<DeviceStatus> {
+        self.stations.get(index)?.status.filter(|&status| self.shows_valid(status))
     }
 
     /// A slave is there: S-DEV is not empty in CP2, SlaveValid in the other phases.
@@ -333,7 +344,7 @@ impl Master {
                     station.returned = true;
                     self.emit(Event::SlaveReturned { slave: SlaveId::from_index(index) });
                 }
-                Presence::Lost | Presence::Excluded => {}
+                Presence::Lost | Presence::Excluded | Presence::Absent | Presence::Joining => {}
             }
         }
         if !self.stations[..self.found].iter().any(Station::is_active) {
@@ -341,7 +352,7 @@ impl Master {
         }
     }
 
-    fn lose(&mut self, index: usize) {
+    pub(super) fn lose(&mut self, index: usize) {
         let station = &mut self.stations[index];
         station.presence = Presence::Lost;
         station.channel.abort(SvcFailure::SlaveLost);
@@ -424,6 +435,7 @@ impl Master {
             State::Cp4 => {
                 self.open_channels(true);
                 self.emit(Event::Phase(Phase::CP4));
+                self.measuring.start(self.redundancy.topology() == Topology::Ring);
             }
             State::Await2 | State::Await3 => self.enter_await(last),
             State::Read2
@@ -467,18 +479,18 @@ impl Master {
         }
     }
 
-    /// Makes the slaves of the finished scan known.
+    /// Makes the slaves of the finished scan known, and keeps places for those that may come later.
     fn take_scan(&mut self) {
-        self.found = usize::from(self.scan_ready.take().unwrap_or(0));
-        for index in 0..self.found {
+        let scanned = usize::from(self.scan_ready.take().unwrap_or(0));
+        (self.found, self.scanned) = (scanned, scanned);
+        for index in 0..scanned {
             let address = self.scan.address(index);
             let config = self.config.slaves.iter().find(|slave| slave.address == address);
-            self.stations[index].found(address, config.map(|slave| &slave.connections));
+            self.stations[index].found(address, config);
         }
-        let slaves = SlaveId::from_index(self.found).0;
-        self.emit(Event::Scanned { slaves });
+        self.emit(Event::Scanned { slaves: SlaveId::from_index(scanned).0 });
         self.take_topology();
-        for index in 0..self.found {
+        for index in 0..scanned {
             let (slave, address) = (SlaveId::from_index(index), self.stations[index].address);
             if !self.stations[index].configured {
                 self.emit(Event::Unknown { slave, address });
@@ -490,9 +502,24 @@ impl Master {
             }
         }
         for index in 0..self.config.slaves.len() {
-            let address = self.config.slaves[index].address;
-            if !self.stations[..self.found].iter().any(|station| station.address == address) {
-                self.emit(Event::Missing { address });
+            let slave = &self.config.slaves[index];
+            let address = slave.address;
+            if self.stations[..scanned].iter().any(|station| station.address == address) {
+                continue;
+            }
+            self.emit(Event::Missing { address });
+            let slave = &self.config.slaves[index];
+            if slave.hot_plug.is_none() {
+                continue;
+            }
+            if let Some(station) = self.stations.get_mut(self.found) {
+                station.found(address, Some(slave));
+                station.presence = Presence::Absent;
+                self.found += 1;
+                self.emit(Event::PlaceKept { address });
+            } else {
+                let reason = HotPlugRefusal::NoPlace;
+                self.emit(Event::HotPlugRefused { address: Some(address), reason });
             }
         }
     }

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::connection::ConsumerState;
+pub use super::hot_plug::HotPlugRefusal;
 use super::layout::LayoutError;
 use super::svc::request::{SvcFailure, SvcOutcome};
 use super::topology::Topology;
@@ -210,7 +211,7 @@ pub enum Event {
         /// Its SERCOS address.
         address: u16,
     },
-    /// A slave is not valid any more. It takes no part until the next scan.
+    /// A slave is not valid any more. It takes no part until the next scan, or until it comes in by hot plug.
     SlaveLost {
         /// The slave.
         slave: SlaveId,
@@ -223,6 +224,49 @@ pub enum Event {
     SlaveReturned {
         /// The slave.
         slave: SlaveId,
+    },
+    /// A configured slave was not found, and the telegrams keep its place: it can be plugged in later.
+    PlaceKept {
+        /// Its SERCOS address.
+        address: u16,
+    },
+    /// A slave is on its way in by hot plug and can be set up: the application may work as in this phase, and then call
+    /// `proceed_hot_plug`, or `exclude`.
+    HotPlugAwaits {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+        /// CP2, with the write protections of CP2, and then CP3.
+        phase: Phase,
+    },
+    /// A slave has come in by hot plug and takes part from now on.
+    HotPlugged {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+    },
+    /// A slave does not come in by hot plug. The others go on.
+    HotPlugRefused {
+        /// The SERCOS address which the slave has told, or which is known from before.
+        address: Option<u16>,
+        /// Why.
+        reason: HotPlugRefusal,
+    },
+    /// The slaves have measured their delays once more, because the way of the telegrams is another one.
+    Measured {
+        /// Slaves that have.
+        slaves: u16,
+    },
+    /// A slave has not measured its delays once more; it goes on with the old ones.
+    MeasureFailed {
+        /// The slave.
+        slave: SlaveId,
+        /// S-0-1015 or S-0-1024.
+        idn: Idn,
+        /// Why.
+        failure: SvcFailure,
     },
     /// Every slave is lost; the master goes back to CP0.
     AllSlavesLost,
@@ -305,6 +349,25 @@ impl fmt::Display for Event {
             }
             Event::SlaveReturned { slave } => {
                 write!(f, "{slave} is valid again and stays out until the next scan")
+            }
+            Event::PlaceKept { address } => {
+                write!(f, "a place is kept for the slave with address {address}: it can be plugged in later")
+            }
+            Event::HotPlugAwaits { slave, address, phase } => {
+                write!(f, "hot plug: {slave} with address {address} can be set up as in {phase}")
+            }
+            Event::HotPlugged { slave, address } => {
+                write!(f, "hot plug: {slave} with address {address} takes part")
+            }
+            Event::HotPlugRefused { address: Some(address), reason } => {
+                write!(f, "hot plug: the slave with address {address} does not come in: {reason}")
+            }
+            Event::HotPlugRefused { address: None, reason } => {
+                write!(f, "hot plug: nobody comes in: {reason}")
+            }
+            Event::Measured { slaves } => write!(f, "{slaves} slaves have measured their delays once more"),
+            Event::MeasureFailed { slave, idn, failure } => {
+                write!(f, "{slave} goes on with its old delay: {idn}: {failure}")
             }
             Event::AllSlavesLost => f.write_str("all slaves are lost"),
             Event::Connection { slave, instance, state } => {

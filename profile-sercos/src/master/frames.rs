@@ -147,6 +147,14 @@ impl Frames {
         }
     }
 
+    /// Changes MDT0 on port 2, once it is complete.
+    pub fn edit_secondary_mdt(&mut self, edit: impl FnOnce(&mut [u8])) {
+        let mdt0 = TelegramType::new(Channel::Secondary, Kind::Mdt, 0);
+        if let Some(frame) = self.sent[..self.used].iter_mut().find(|sent| sent.telegram == mdt0) {
+            edit(&mut frame.bytes[HEADER_LEN..frame.len]);
+        }
+    }
+
     /// The next frame to send, and the port to send it on.
     pub fn next_transmit(&mut self) -> Option<(Port, &[u8])> {
         if self.next >= self.used {

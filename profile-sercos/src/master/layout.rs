@@ -41,7 +41,7 @@ const GAP_MIN: u64 = 12 + 1;
 /// The gap grows by this share of the slaves' jitter (ns) times the thousandfold root of the passes.
 const GAP_FACTOR: (u64, u64) = (27, 640_000);
 /// Largest inter frame gap which a slave without S-0-1036 stands.
-const GAP_MAX_FIXED: u64 = 37;
+pub(super) const GAP_MAX_FIXED: u64 = 37;
 
 /// What one slave needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +80,8 @@ pub struct ConnectionPlace {
     pub at: Offset,
     /// Bytes with C-CON.
     pub len: u16,
+    /// Bytes set aside for it; more than `len` where a slave that came later needs less than was kept for it.
+    pub room: u16,
     /// Number in the network, S-0-1050.x.2.
     pub number: u16,
 }
@@ -198,6 +200,21 @@ pub struct CyclicLayout {
     pub slaves: Vec<Option<SlavePlaces>>,
     /// Times.
     pub times: Times,
+    /// The largest times of the slaves, which `times` come from.
+    pub slowest: Slowest,
+}
+
+/// The largest of the slaves' times, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Slowest {
+    /// S-0-1005.
+    pub feedback_ns: u32,
+    /// Minimum of S-0-1006, or where AT0 begins anyway.
+    pub at_start_min_ns: u32,
+    /// S-0-1037, or the configured one.
+    pub jitter_ns: u32,
+    /// S-0-1047.
+    pub consumer_ns: u32,
 }
 
 /// Hands out the bytes of the telegrams of one kind.
@@ -295,13 +312,27 @@ impl CyclicLayout {
                 }
                 let filler = if connection.slave_produces { &mut at } else { &mut mdt };
                 let (kind, at) = (filler.kind, filler.take(slave, usize::from(length)));
-                places.connections.push(ConnectionPlace { instance, kind, at, len: length, number });
+                places.connections.push(ConnectionPlace {
+                    instance,
+                    kind,
+                    at,
+                    len: length,
+                    room: length,
+                    number,
+                });
                 number += 1;
             }
         }
         self.mdt_len = mdt.finish()?;
         self.at_len = at.finish()?;
-        self.times = self.compute_times(timing, needs)?;
+        self.times = self.compute_times(timing, needs.clone())?;
+        let most = |get: fn(&SlaveNeed) -> u32| needs.clone().flatten().map(get).max().unwrap_or(0);
+        self.slowest = Slowest {
+            feedback_ns: most(|need| need.feedback_ns),
+            at_start_min_ns: self.times.at_start_ns,
+            jitter_ns: most(|need| need.jitter_ns).max(timing.slave_jitter_ns),
+            consumer_ns: most(|need| need.consumer_ns),
+        };
         Ok(())
     }
 

@@ -23,7 +23,9 @@ pub mod connection;
 mod cycle;
 pub mod event;
 mod frames;
+pub mod hot_plug;
 pub mod layout;
+mod measure;
 pub mod phase;
 mod plan;
 mod redundancy;
@@ -42,7 +44,9 @@ use self::config::{ConfigError, Connections, MasterConfig};
 use self::connection::Consumer;
 use self::event::{Event, Output, Port, Refusal, SlaveId, Statistics, Ticket};
 use self::frames::Frames;
+use self::hot_plug::Admission;
 use self::layout::CyclicLayout;
+use self::measure::Measuring;
 use self::phase::{PhaseEvent, State};
 use self::redundancy::Redundancy;
 use self::report::ReportRow;
@@ -117,11 +121,15 @@ pub struct Master {
     evaluated: bool,
     scan: Scan,
     redundancy: Redundancy,
+    admission: Admission,
+    measuring: Measuring,
     /// Slaves in a stable scan that has not been taken over yet.
     scan_ready: Option<u16>,
     stations: Vec<Station>,
-    /// Slaves found by the last scan.
+    /// Slaves found by the last scan, and places kept for others.
     found: usize,
+    /// Those of them that the scan has found.
+    scanned: usize,
     layout: CyclicLayout,
     /// Start of the present state.
     since: MonotonicTime,
@@ -155,9 +163,12 @@ impl Master {
             evaluated: true,
             scan: Scan::new(config.stable_cycles, config.scan_timeout_cycles),
             redundancy: Redundancy::new(config.ports, slaves),
+            admission: Admission::new(&config),
+            measuring: Measuring::default(),
             scan_ready: None,
             stations: (0..slaves).map(|_| Station::new(&config)).collect(),
             found: 0,
+            scanned: 0,
             layout: CyclicLayout::with_capacity(slaves),
             since: MonotonicTime::ZERO,
             cycles: 0,
@@ -210,6 +221,12 @@ impl Master {
         }
         self.proceed = true;
         Ok(())
+    }
+
+    /// The application is through with a slave that it was told of by [`Event::HotPlugAwaits`]. Its service channel
+    /// requests are finished first.
+    pub fn proceed_hot_plug(&mut self, slave: SlaveId) -> Result<(), CallError> {
+        if self.state == State::Cp4 && self.admission.proceed(slave) { Ok(()) } else { Err(CallError::State) }
     }
 
     /// When to call [`Master::poll`] next; `None` when nothing will happen by itself.
@@ -273,9 +290,11 @@ impl Master {
         None
     }
 
-    /// The slaves of the last scan in the order of the line.
+    /// The slaves of the last scan in the order of the line, then those that have come in by hot plug since.
     pub fn slaves(&self) -> impl Iterator<Item = SlaveInfo<'_>> {
-        self.stations[..self.found].iter().enumerate().map(|(index, station)| SlaveInfo {
+        let stations = self.stations[..self.found].iter().enumerate();
+        let there = stations.filter(|(_, station)| station.presence != Presence::Absent);
+        there.map(|(index, station)| SlaveInfo {
             id: SlaveId::from_index(index),
             address: station.address,
             configured: station.configured,
@@ -285,10 +304,10 @@ impl Master {
         })
     }
 
-    /// One slave of the last scan.
+    /// One slave.
     #[must_use]
     pub fn slave(&self, slave: SlaveId) -> Option<SlaveInfo<'_>> {
-        self.slaves().nth(slave.index())
+        self.slaves().find(|info| info.id == slave)
     }
 
     /// The first slave with this SERCOS address.
@@ -301,9 +320,11 @@ impl Master {
         self.stations[..self.found].get_mut(slave.index())
     }
 
-    /// Replaces the connections of a slave. Possible while the master awaits the application in CP2.
+    /// Replaces the connections of a slave. Possible while the master awaits the application in CP2, or for this slave
+    /// in [`Event::HotPlugAwaits`] of CP2.
     pub fn set_connections(&mut self, slave: SlaveId, connections: Connections) -> Result<(), CallError> {
-        if self.state != State::Await2 || self.proceed {
+        let joining = self.admission.awaits(slave) == Some(Phase::CP2);
+        if !joining && (self.state != State::Await2 || self.proceed) {
             return Err(CallError::State);
         }
         let cycle_ns = self.config.cycle_ns;
@@ -313,8 +334,12 @@ impl Master {
         Ok(())
     }
 
-    /// Leaves a slave out from now on, until the next scan. Possible while the master awaits the application.
+    /// Leaves a slave out from now on, until the next scan. Possible while the master awaits the application. A slave
+    /// that is on its way in by hot plug is not let in.
     pub fn exclude(&mut self, slave: SlaveId) -> Result<(), CallError> {
+        if self.state == State::Cp4 && self.admission.turn_away(slave) {
+            return Ok(());
+        }
         if self.state.awaits().is_none() {
             return Err(CallError::State);
         }
@@ -334,7 +359,7 @@ impl Master {
         if self.phase().is_none_or(|phase| phase < Phase::CP2) && !self.between_phases() {
             return Err((SubmitError::Phase, request));
         }
-        let Some(station) = self.station(slave).filter(|station| station.is_active()) else {
+        let Some(station) = self.station(slave).filter(|station| station.is_served()) else {
             return Err((SubmitError::NoSlave, request));
         };
         match station.channel.submit(request) {

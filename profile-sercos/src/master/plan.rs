@@ -55,6 +55,7 @@ pub(super) enum Step {
     ProducerCycle,
     AllowedLosses,
     Gap,
+    CounterMax,
     UcTimes,
     MtuRequested,
     MtuEffective,
@@ -107,10 +108,14 @@ pub(super) const WRITE: &[Step] = &[
     Step::ProducerCycle,
     Step::AllowedLosses,
     Step::Gap,
+    Step::CounterMax,
     Step::UcTimes,
     Step::MtuRequested,
     Step::MtuEffective,
 ];
+
+/// Delay measuring once more, where the way of the telegrams is another one than when it was done last.
+pub(super) const MEASURE_AGAIN: &[Step] = &[Step::RingDelay, Step::MeasureExecute, Step::MeasureCancel];
 
 /// Delay measuring.
 pub(super) const MEASURE: &[Step] = &[Step::MeasureExecute, Step::MeasureCancel];
@@ -206,6 +211,7 @@ impl Step {
             Step::MeasureExecute | Step::MeasureCancel => sync >= 1,
             Step::SlaveJitter | Step::ConsumerTime => sync >= 2,
             Step::CommunicationControl => sync >= 2 || facts.version(ScpClass::SOFTWARE_CONTROL).is_some(),
+            Step::CounterMax => sync >= 3,
             Step::Gap => facts.gap,
             Step::UcTimes | Step::MtuRequested | Step::MtuEffective => facts.version(ScpClass::NRT).is_some(),
             Step::Address => station.assign.is_some(),
@@ -262,6 +268,7 @@ impl Step {
             Step::CommunicationControl => Idn::COMMUNICATION_CONTROL,
             Step::RingDelay => Idn::RING_DELAY,
             Step::SyncJitter => Idn::SYNC_JITTER,
+            Step::CounterMax => Idn::TSREF_MAX,
             Step::UcTimes => Idn::UC_TIMES,
             Step::MtuRequested => Idn::MTU_REQUESTED,
             Step::MtuEffective => Idn::MTU_EFFECTIVE,
@@ -336,6 +343,8 @@ impl Step {
             Step::ProducerCycle => connection_cycle(connection),
             Step::AllowedLosses => half(idn, connection.map_or(0, |connection| connection.allowed_losses)),
             Step::Gap => half(idn, times.gap),
+            // The counter in the extended field stays at 0.
+            Step::CounterMax => half(idn, 0),
             Step::UcTimes => {
                 let (begin, end) = times.uc_ns.unwrap_or((0, 0));
                 list(idn, [begin, end].into_iter().flat_map(u32::to_le_bytes))

@@ -11,10 +11,11 @@ use arrayvec::ArrayVec;
 use super::Master;
 use super::config::Ports;
 use super::event::{End, Event, Port, SlaveId};
+use super::phase::State;
 use super::topology::{Closing, ClosingEvent, Route, Seen, Topology, Watch};
 use crate::wire::device_control::{DeviceControl, Topology as Loop};
 use crate::wire::device_status::InactivePort;
-use crate::wire::header::{Kind, Phase};
+use crate::wire::header::{Channel, Kind, Phase};
 
 /// Cycles in which a slave has to follow a topology command.
 const COMMAND_CYCLES: u16 = 12;
@@ -89,9 +90,61 @@ impl Redundancy {
         self.watch.topology.admits(route, self.closing != Closing::Idle)
     }
 
-    /// The cables make a ring: C-DEV bit 11.
+    /// The cables make a ring, or are being made one: C-DEV bit 11.
     pub fn is_closed(&self) -> bool {
-        self.watch.topology.is_ring() || self.closing != Closing::Idle
+        self.watch.topology.is_ring() || matches!(self.closing, Closing::Commanded | Closing::Restoring)
+    }
+
+    /// Puts a slave that has come in behind the end of a line: on the port 2 side of `low`, or on the port 1 side of
+    /// `high`. Without either it is alone on its port.
+    pub fn insert(&mut self, index: usize, behind: Option<usize>, channel: Channel) {
+        if let Some(old) = self.position(index) {
+            self.order.remove(old);
+            let above = old + 1 < self.open.len() && self.open.remove(old + 1);
+            if let Some(below) = self.open.get_mut(old) {
+                *below |= above;
+            }
+        }
+        let at = match (behind.and_then(|end| self.position(end)), channel) {
+            (Some(end), Channel::Primary) => end + 1,
+            (Some(end), Channel::Secondary) => end,
+            (None, Channel::Primary) => 0,
+            (None, Channel::Secondary) => self.order.len(),
+        };
+        // As many places as there are stations were set aside.
+        if self.order.len() < self.order.capacity() && self.open.len() < self.open.capacity() {
+            self.order.insert(at, SlaveId::from_index(index).0);
+            // The cable to the end is whole; behind the new slave nothing is known to be there.
+            let outer = self.open.get(at).copied().unwrap_or(true);
+            let (below, above) = match channel {
+                Channel::Primary => (false, outer),
+                Channel::Secondary => (outer, false),
+            };
+            if let Some(cable) = self.open.get_mut(at) {
+                *cable = below;
+            }
+            self.open.insert((at + 1).min(self.open.len()), above);
+        }
+    }
+
+    /// The neighbour of a slave on the far side of its line.
+    pub fn next_to(&self, index: usize, channel: Channel) -> Option<usize> {
+        let at = self.position(index)?;
+        let next = match channel {
+            Channel::Primary => self.order.get(at + 1),
+            Channel::Secondary => at.checked_sub(1).and_then(|at| self.order.get(at)),
+        };
+        next.map(|&index| usize::from(index))
+    }
+
+    /// The slaves from port 1 to port 2.
+    pub fn in_order(&self) -> impl Iterator<Item = usize> + '_ {
+        self.order.iter().map(|&index| usize::from(index))
+    }
+
+    /// No commands to close the ring are under way.
+    pub fn is_at_ease(&self) -> bool {
+        matches!(self.closing, Closing::Idle | Closing::Settling | Closing::Refused)
     }
 
     fn position(&self, index: usize) -> Option<usize> {
@@ -117,12 +170,12 @@ impl Master {
         let (topology, from_one) = (survey.topology, usize::from(survey.from_one));
         let redundancy = &mut self.redundancy;
         redundancy.order.clear();
-        let numbered = (0..from_one).chain((from_one..self.found).rev());
+        let numbered = (0..from_one).chain((from_one..self.scanned).rev());
         redundancy.order.extend(numbered.map(|index| SlaveId::from_index(index).0));
         redundancy.open.clear();
-        redundancy.open.resize(self.found + 1, false);
+        redundancy.open.resize(self.scanned + 1, false);
         let gap = match topology {
-            Topology::LineOne => Some(self.found),
+            Topology::LineOne => Some(self.scanned),
             Topology::LineTwo => Some(0),
             Topology::BrokenRing => Some(from_one),
             _ => None,
@@ -145,6 +198,7 @@ impl Master {
     /// The handshake bits start anew with each phase.
     pub(super) fn reset_topology_commands(&mut self) {
         self.redundancy.closing = Closing::Idle;
+        self.admission.reset();
         for station in &mut self.stations[..self.found] {
             station.command = DeviceControl::empty();
         }
@@ -189,8 +243,12 @@ impl Master {
             }
         }
         self.find_open_cables();
-        if !self.redundancy.is_fixed() && self.state.announces().is_none() {
+        if !self.redundancy.is_fixed() && self.state.announces().is_none() && !self.admission.is_busy() {
             self.close_ring();
+        }
+        if self.state == State::Cp4 {
+            self.admit();
+            self.measure_again();
         }
     }
 
@@ -292,6 +350,7 @@ impl Master {
             (Closing::Commanded, Closing::Idle) => {
                 self.redundancy.open.fill(false);
                 self.emit(Event::RingClosed);
+                self.measuring.ring_closed();
             }
             (Closing::Commanded, Closing::Restoring) => {
                 let last = self.redundancy.ends.last().copied();

@@ -8,7 +8,7 @@ use super::layout::{ConnectionNeed, Timing};
 use super::phase::{PhaseEvent, State};
 use super::plan::{self, Cursor, Step, Values};
 use super::report::{ReportRow, RowOutcome};
-use super::station::{End, Station, Work};
+use super::station::{End, Presence, Station, Work};
 use super::svc::request::{SvcData, SvcFailure, SvcOutcome};
 use crate::wire::connection::CONNECTION_CONTROL_LEN;
 use crate::wire::header::{Kind, Phase};
@@ -37,33 +37,43 @@ impl Master {
             self.choose_addresses();
         }
         for index in 0..self.found {
-            let station = &mut self.stations[index];
-            // A request that was cut off by a switch of the phase gives the list buffer back.
-            if let Some(SvcOutcome { data: SvcData::Buffer(buffer), .. }) = station.channel.take_own() {
-                station.list = buffer;
+            self.begin_steps(index);
+            if state == State::Connect2 {
+                self.begin_connections(index);
             }
-            station.work = Work::Free;
-            station.cursor = Cursor::default();
-            station.check_failed = false;
-            if state != State::Connect2 {
-                continue;
-            }
-            station.need = super::layout::SlaveNeed::default();
-            station.ends.clear();
-            station.report.truncate(station.read_rows);
-            if !station.is_active() || station.connections.is_empty() {
-                continue;
-            }
-            let (slave, available) = (SlaveId::from_index(index), station.facts.connections);
-            let beyond = station.connections.iter().map(|connection| connection.instance);
-            let beyond = beyond.max().filter(|&instance| available > 0 && u16::from(instance) >= available);
-            if !station.facts.is_consistent() {
-                station.work = Work::Failed;
-                self.emit(Event::ClassMismatch { slave });
-            } else if let Some(instance) = beyond {
-                station.work = Work::Failed;
-                self.emit(Event::NoConnection { slave, instance, available });
-            }
+        }
+    }
+
+    /// Starts a list of steps at a slave.
+    pub(super) fn begin_steps(&mut self, index: usize) {
+        let station = &mut self.stations[index];
+        // A request that was cut off by a switch of the phase gives the list buffer back.
+        if let Some(SvcOutcome { data: SvcData::Buffer(buffer), .. }) = station.channel.take_own() {
+            station.list = buffer;
+        }
+        station.work = Work::Free;
+        station.cursor = Cursor::default();
+        station.check_failed = false;
+    }
+
+    /// Forgets what is known of a slave's connections, and refuses those that it cannot have.
+    pub(super) fn begin_connections(&mut self, index: usize) {
+        let station = &mut self.stations[index];
+        station.need = super::layout::SlaveNeed::default();
+        station.ends.clear();
+        station.report.truncate(station.read_rows);
+        if !station.is_served() || station.connections.is_empty() {
+            return;
+        }
+        let (slave, available) = (SlaveId::from_index(index), station.facts.connections);
+        let beyond = station.connections.iter().map(|connection| connection.instance);
+        let beyond = beyond.max().filter(|&instance| available > 0 && u16::from(instance) >= available);
+        if !station.facts.is_consistent() {
+            station.work = Work::Failed;
+            self.emit(Event::ClassMismatch { slave });
+        } else if let Some(instance) = beyond {
+            station.work = Work::Failed;
+            self.emit(Event::NoConnection { slave, instance, available });
         }
     }
 
@@ -107,14 +117,13 @@ impl Master {
     /// Goes on with the list of steps of the present state.
     pub(super) fn decide_work(&mut self) -> Option<PhaseEvent> {
         let steps = self.steps();
+        let phase = if self.state == State::Check3 { Phase::CP3 } else { Phase::CP2 };
         let (mut pending, mut failed) = (false, false);
         for index in 0..self.found {
             if !self.stations[index].is_active() {
                 continue;
             }
-            self.collect(index);
-            self.ask(index, steps);
-            match self.stations[index].work {
+            match self.work_on(index, steps, phase) {
                 Work::Free | Work::Asked(..) => pending = true,
                 Work::Failed => failed = true,
                 Work::Done => {}
@@ -138,8 +147,15 @@ impl Master {
         }
     }
 
+    /// Goes on with a list of steps at one slave. `phase` is the one whose check `CHECK` means.
+    pub(super) fn work_on(&mut self, index: usize, steps: &[Step], phase: Phase) -> Work {
+        self.collect(index);
+        self.ask(index, steps, phase);
+        self.stations[index].work
+    }
+
     /// Asks for the slave's next step, if it is free for one.
-    fn ask(&mut self, index: usize, steps: &[Step]) {
+    fn ask(&mut self, index: usize, steps: &[Step], phase: Phase) {
         let station = &mut self.stations[index];
         if station.work != Work::Free {
             return;
@@ -151,12 +167,12 @@ impl Master {
             station.work = if station.check_failed { Work::Failed } else { Work::Done };
             if station.check_failed {
                 let slave = SlaveId::from_index(index);
-                self.emit(Event::CheckFailed { slave, phase: self.layout_phase });
+                self.emit(Event::CheckFailed { slave, phase });
             }
             return;
         };
-        let check = match self.state {
-            State::Check3 => (Idn::CP4_CHECK, Idn::INVALID_CP3),
+        let check = match phase {
+            Phase::CP3 => (Idn::CP4_CHECK, Idn::INVALID_CP3),
             _ => (Idn::CP3_CHECK, Idn::INVALID_CP2),
         };
         let values = Values {
@@ -204,7 +220,14 @@ impl Master {
             self.take_address(index);
         }
         if let Some(failure) = failure {
-            self.emit(Event::StepFailed { slave: SlaveId::from_index(index), idn, failure });
+            let slave = SlaveId::from_index(index);
+            // In operation that is no reason to do without the slave.
+            let operating = self.state == State::Cp4 && self.stations[index].is_active();
+            self.emit(if operating {
+                Event::MeasureFailed { slave, idn, failure }
+            } else {
+                Event::StepFailed { slave, idn, failure }
+            });
         }
     }
 
@@ -225,26 +248,19 @@ impl Master {
             gap_adjustable: stations.iter().filter(|station| station.is_active()).all(|s| s.facts.gap),
             hot_plug_in_all: self.config.hot_plug_in_all,
         };
-        let needs = stations.iter().map(|station| station.is_active().then_some(&station.need));
+        let kept = |station: &Station| {
+            let slave = self.config.slaves.iter().find(|slave| slave.address == station.address);
+            slave.filter(|_| station.hot_plug && station.presence != Presence::Excluded)?.hot_plug.as_ref()
+        };
+        let needs = stations.iter().map(|station| match station.presence {
+            Presence::Active => Some(&station.need),
+            _ => kept(station),
+        });
         if let Err(error) = self.layout.compute(&timing, needs) {
             self.emit(Event::LayoutRefused(error));
             return false;
         }
-        for station in stations.iter_mut().filter(|station| station.is_active()) {
-            station.ends.clear();
-            for connection in &station.connections {
-                let need = station.need.connections.iter().find(|need| need.instance == connection.instance);
-                let len = need.map_or(0, |need| need.len);
-                station.ends.push(match plan::kind(connection) {
-                    Kind::Mdt => End::Producer(ProducerEnd::new(len)),
-                    Kind::At => End::Consumer(ConsumerEnd::new(
-                        len,
-                        connection.producer_cycles,
-                        connection.allowed_losses,
-                    )),
-                });
-            }
-        }
+        stations.iter_mut().filter(|station| station.is_active()).for_each(make_ends);
         true
     }
 
@@ -280,6 +296,21 @@ impl Master {
             return None;
         }
         Some(PhaseEvent::Proceed)
+    }
+}
+
+/// Makes the master's ends of a slave's connections, once their lengths are known.
+pub(super) fn make_ends(station: &mut Station) {
+    station.ends.clear();
+    for connection in &station.connections {
+        let need = station.need.connections.iter().find(|need| need.instance == connection.instance);
+        let len = need.map_or(0, |need| need.len);
+        station.ends.push(match plan::kind(connection) {
+            Kind::Mdt => End::Producer(ProducerEnd::new(len)),
+            Kind::At => {
+                End::Consumer(ConsumerEnd::new(len, connection.producer_cycles, connection.allowed_losses))
+            }
+        });
     }
 }
 

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::config::{CONNECTIONS_MAX, ConnectionConfig, Connections, MasterConfig};
+use super::config::{CONNECTIONS_MAX, ConnectionConfig, Connections, MasterConfig, SlaveConfig};
 use super::connection::{ConsumerEnd, ProducerEnd};
 use super::layout::SlaveNeed;
 use super::plan::{Cursor, Step};
@@ -29,6 +29,10 @@ pub enum Presence {
     Lost,
     /// The application has excluded it.
     Excluded,
+    /// It has not been there since the scan; its place is kept for hot plug.
+    Absent,
+    /// It is on its way in by hot plug.
+    Joining,
 }
 
 /// What a slave says about itself in CP2.
@@ -114,6 +118,8 @@ pub(super) struct Station {
     pub connections: Connections,
     pub address: u16,
     pub configured: bool,
+    /// The configuration lets it come later.
+    pub hot_plug: bool,
     /// The SERCOS address that it is to be given in CP2.
     pub assign: Option<u16>,
     pub facts: Facts,
@@ -140,6 +146,7 @@ impl Station {
             address: 0,
             presence: Presence::Active,
             configured: false,
+            hot_plug: false,
             assign: None,
             connections: Connections::new(),
             facts: Facts::default(),
@@ -165,14 +172,15 @@ impl Station {
     }
 
     /// Makes it a slave that has just been found. Outcomes that wait for the application stay.
-    pub fn found(&mut self, address: u16, config: Option<&Connections>) {
+    pub fn found(&mut self, address: u16, config: Option<&SlaveConfig>) {
         self.address = address;
         self.presence = Presence::Active;
         self.configured = config.is_some();
+        self.hot_plug = config.is_some_and(|config| config.hot_plug.is_some());
         self.assign = None;
         self.connections.clear();
-        if let Some(connections) = config {
-            self.connections.extend(connections.iter().cloned());
+        if let Some(config) = config {
+            self.connections.extend(config.connections.iter().cloned());
         }
         self.facts = Facts::default();
         self.need = SlaveNeed::default();
@@ -195,6 +203,20 @@ impl Station {
 
     pub fn is_active(&self) -> bool {
         self.presence == Presence::Active
+    }
+
+    /// It takes part, or is on its way in: its service channel is served.
+    pub fn is_served(&self) -> bool {
+        matches!(self.presence, Presence::Active | Presence::Joining)
+    }
+
+    /// It is not there and can come in by hot plug.
+    pub fn may_come(&self) -> bool {
+        match self.presence {
+            Presence::Absent => true,
+            Presence::Lost => self.hot_plug || self.facts.version(ScpClass::HOT_PLUG).is_some(),
+            Presence::Active | Presence::Excluded | Presence::Joining => false,
+        }
     }
 
     /// Commands a topology: the bits change and the handshake bit toggles.

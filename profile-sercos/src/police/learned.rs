@@ -15,6 +15,8 @@ pub(super) struct Learned {
     values: BTreeMap<Idn, Vec<u8>>,
     /// S-0-0127 was executed and done: the slave takes part in CP3.
     pub checked: bool,
+    /// S-0-0128 was executed and done.
+    pub ready: bool,
 }
 
 impl Learned {
@@ -29,11 +31,11 @@ impl Learned {
             Element::Idn if write => {
                 self.open = Some(Idn(step.info));
                 self.parts.clear();
-                if Idn(step.info) == Idn::CP3_CHECK {
-                    let [low, high, ..] = answer.to_le_bytes();
-                    let status = DataStatus::from_bits_retain(u16::from_le_bytes([low, high]));
-                    self.checked |= status.command_state() == CommandState::Done;
-                }
+                let [low, high, ..] = answer.to_le_bytes();
+                let status = DataStatus::from_bits_retain(u16::from_le_bytes([low, high]));
+                let done = status.command_state() == CommandState::Done;
+                self.checked |= done && Idn(step.info) == Idn::CP3_CHECK;
+                self.ready |= done && Idn(step.info) == Idn::CP4_CHECK;
             }
             Element::Data => {
                 let Some(idn) = self.open else { return };

@@ -11,6 +11,7 @@
 
 pub mod bus;
 pub mod court;
+mod hot_plug;
 mod learned;
 #[cfg(test)]
 pub(crate) mod light;
@@ -24,6 +25,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use self::rule::{Breach, Offender, Part, Rule};
 
+use self::hot_plug::HotPlugs;
 use self::plan::Plan;
 use self::station::Station;
 use crate::wire::connection::CONNECTION_CONTROL_LEN;
@@ -33,6 +35,7 @@ use crate::wire::error::u16_at;
 use crate::wire::header::{
     Channel, HEADER_LEN, Header, Kind, Phase, PhaseField, TELEGRAMS_MAX, TelegramType,
 };
+use crate::wire::hot_plug::HOT_PLUG_LEN;
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::SVC_LEN;
 
@@ -94,6 +97,7 @@ pub struct Police {
     leading: Channel,
     /// ATs of this cycle into which each slave has written, one bit each.
     answered: Vec<u16>,
+    hot_plugs: HotPlugs,
 }
 
 impl Police {
@@ -113,6 +117,7 @@ impl Police {
             plan: None,
             leading: Channel::Primary,
             answered: Vec::new(),
+            hot_plugs: HotPlugs::default(),
         }
     }
 
@@ -154,6 +159,9 @@ impl Police {
         let end = at + wire_time(frame.len());
         self.window(at, end, telegram);
         self.quiet_since = self.quiet_since.max(end);
+        if telegram.kind() == Kind::Mdt && telegram.number() == 0 && self.phase >= Phase::CP3 {
+            self.hot_plug_field(at, telegram.channel(), data);
+        }
         if telegram.kind() == Kind::Mdt && leads {
             self.mdt(at, telegram.number(), data);
         }
@@ -218,7 +226,9 @@ impl Police {
             }
         }
         // Whoever is gone does not insert any more.
-        self.stations.iter_mut().for_each(|station| station.inserts = false);
+        for station in &mut self.stations {
+            station.valid = std::mem::take(&mut station.inserts);
+        }
         if let Some((start, _)) = last.filter(|_| cycles) {
             self.interval(at, at - start);
         }
@@ -242,6 +252,7 @@ impl Police {
             }
         }
         self.phase = phase;
+        self.hot_plugs.reset();
         self.interval_known = false;
         for station in &mut self.stations {
             station.enter(phase);
@@ -319,6 +330,11 @@ impl Police {
 
     /// A cycle is over: every telegram of it was sent.
     fn finish_cycle(&mut self, at: MonotonicTime) {
+        let closed = self.hot_plugs.ring_is_closed(&self.stations);
+        let enabled = [Channel::Primary, Channel::Secondary].into_iter();
+        if closed && enabled.into_iter().any(|channel| self.hot_plugs.is_enabled(channel)) {
+            self.breach(at, Offender::Master, Rule::HotPlugInRing);
+        }
         let Some(cycle) = &self.cycle else { return };
         let missing: Vec<_> =
             self.expected().map(|(telegram, _)| telegram).filter(|t| !cycle.seen.contains(t)).collect();
@@ -413,7 +429,8 @@ impl Police {
         self.phase == Phase::CP4 && !switching
     }
 
-    /// A telegram has passed the slave with topology address `slave`: `before` it, and `after` it. `outward` on the
+    /// A telegram has passed the slave with topology address `slave`, or a number above 511 that tells a slave
+    /// which was in no scan from others: `before` it, and `after` it. `outward` on the
     /// way to the end of the line, where slaves write; not on the way back.
     pub fn passed(&mut self, at: MonotonicTime, slave: u16, outward: bool, before: &[u8], after: &[u8]) {
         let Ok(header) = Header::parse(before) else { return };
@@ -435,12 +452,23 @@ impl Police {
             return;
         }
         let index = usize::from(slave).saturating_sub(1);
-        let own = self.own(telegram, index);
+        if telegram.kind() == Kind::Mdt && telegram.number() == 0 {
+            self.hot_plugs.pass(index, telegram.channel());
+        }
+        let mut own = self.own(telegram, index);
+        let answers = self.may_answer(telegram, index);
+        if answers {
+            own.insert(0, 0..HOT_PLUG_LEN);
+        }
         if let Some(offset) = first_change(before, after, &own) {
             self.breach(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
         }
+        if answers {
+            self.hot_plug_answer(at, slave, telegram.channel(), before, after);
+        }
         if telegram.kind() == Kind::At && self.first_answer(index, telegram.number()) {
             self.answers(at, index, telegram.number(), after);
+            self.admit_checked(at, index);
         }
     }
 

@@ -39,7 +39,8 @@ pub(super) struct Connection {
 pub(super) struct Places {
     pub svc_mdt: Offset,
     pub svc_at: Offset,
-    pub status: Offset,
+    /// S-DEV; `None` for a slave that only has a service channel yet.
+    pub status: Option<Offset>,
     pub connections: Vec<Connection>,
     /// What it writes, in each AT, sorted.
     pub own: [Vec<Range<usize>>; TELEGRAMS_MAX],
@@ -60,9 +61,12 @@ pub(super) struct Plan {
     pub soft: bool,
     /// By position; `None` for a slave that takes no part.
     pub slaves: Vec<Option<Places>>,
+    /// Everything that has a place.
+    taken: Vec<Taken>,
 }
 
 /// A part of a telegram with its owner.
+#[derive(Debug)]
 struct Taken {
     kind: Kind,
     at: Offset,
@@ -88,6 +92,7 @@ impl Plan {
                 slave.word(Idn::COMMUNICATION_CONTROL).is_some_and(|control| control & SOFT_MASTER != 0)
             }),
             slaves: Vec::with_capacity(slaves.len()),
+            taken: Vec::new(),
         };
         let mut taken = vec![
             Taken { kind: Kind::Mdt, at: FIRST, len: HOT_PLUG_LEN, part: Part::HotPlug },
@@ -103,6 +108,7 @@ impl Plan {
         }
         plan.check_places(&mut taken, broken);
         plan.check_times(&active().map(|(_, slave)| *slave).collect::<Vec<_>>(), broken);
+        plan.taken = taken;
         plan
     }
 
@@ -111,6 +117,62 @@ impl Plan {
             Kind::Mdt => &self.mdt_len,
             Kind::At => &self.at_len,
         }
+    }
+
+    /// A slave has no places any more.
+    pub fn drop(&mut self, index: usize) {
+        let slave = u16::try_from(index + 1).unwrap_or(u16::MAX);
+        self.taken.retain(|taken| !taken.part.is_of(slave));
+        if let Some(places) = self.slaves.get_mut(index) {
+            *places = None;
+        }
+    }
+
+    /// A part that comes later lies within its telegram and on nothing else.
+    pub fn check_free(&self, kind: Kind, at: Offset, len: usize, part: Part, broken: &mut Vec<Rule>) {
+        let available = self.lengths(kind).get(usize::from(at.telegram)).copied().unwrap_or(0);
+        let range = at.range(len);
+        if range.end > available {
+            broken.push(Rule::Beyond { kind, at, len, available, part });
+        }
+        for taken in &self.taken {
+            let other = taken.at.range(taken.len);
+            let same = taken.kind == kind && taken.at.telegram == at.telegram;
+            if same && other.start < range.end && range.start < other.end {
+                broken.push(Rule::Overlap { kind, at, first: taken.part, second: part });
+            }
+        }
+    }
+
+    fn set(&mut self, index: usize, places: Option<Places>) {
+        while self.slaves.len() <= index {
+            self.slaves.push(None);
+        }
+        self.slaves[index] = places;
+    }
+
+    /// A slave that is on its way in has a service channel, and nothing else yet.
+    pub fn admit_service(&mut self, index: usize, svc_mdt: Offset, svc_at: Offset) {
+        let mut own: [Vec<Range<usize>>; TELEGRAMS_MAX] = Default::default();
+        if let Some(ranges) = own.get_mut(usize::from(svc_at.telegram)) {
+            ranges.push(svc_at.range(SVC_LEN));
+        }
+        self.drop(index);
+        self.set(index, Some(Places { svc_mdt, svc_at, status: None, connections: Vec::new(), own }));
+    }
+
+    /// A slave comes in with what it was told, beside the others and like `first`.
+    pub fn admit(&mut self, index: usize, slave: &Learned, first: &Learned, broken: &mut Vec<Rule>) {
+        let position = u16::try_from(index + 1).unwrap_or(u16::MAX);
+        self.drop(index);
+        let mut parts = Vec::new();
+        let places = places(position, slave, &mut parts, broken);
+        for part in parts {
+            self.check_free(part.kind, part.at, part.len, part.part, broken);
+            self.taken.push(part);
+        }
+        alike(position, first, slave, broken);
+        self.set(index, places);
     }
 
     fn check_places(&self, taken: &mut [Taken], broken: &mut Vec<Rule>) {
@@ -246,7 +308,7 @@ fn places(position: u16, slave: &Learned, taken: &mut Vec<Taken>, broken: &mut V
     for ranges in &mut own {
         ranges.sort_by_key(|range| range.start);
     }
-    Some(Places { svc_mdt, svc_at, status, connections, own })
+    Some(Places { svc_mdt, svc_at, status: Some(status), connections, own })
 }
 
 /// What every slave is told alike.

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::wire::header::{Kind, Phase, PhaseField, TelegramType};
+use crate::wire::hot_plug::{HotPlug, HotPlugCode};
 use crate::wire::idn::Idn;
 use crate::wire::layout::Offset;
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -38,6 +39,16 @@ pub enum Part {
     DeviceWord(u16),
     /// Connection of the slave.
     Connection(u16, u8),
+}
+
+impl Part {
+    /// Whether it belongs to this slave.
+    pub(super) fn is_of(self, slave: u16) -> bool {
+        match self {
+            Part::HotPlug | Part::Extended => false,
+            Part::Svc(owner) | Part::DeviceWord(owner) | Part::Connection(owner, _) => owner == slave,
+        }
+    }
 }
 
 impl fmt::Display for Part {
@@ -270,6 +281,37 @@ pub enum Rule {
         /// C-CON found.
         found: u16,
     },
+    /// Hot plug goes on in CP4 only.
+    HotPlugPhase {
+        /// The phase.
+        phase: Phase,
+    },
+    /// There is no hot plug in a closed ring.
+    HotPlugInRing,
+    /// The hot-plug field of MDT0 says something that makes sense: known codes, HP0 to everybody, offsets to one slave.
+    HotPlugField {
+        /// The field.
+        field: HotPlug,
+    },
+    /// HP0 tells what the slaves that take part were told.
+    HotPlugValue {
+        /// The parameter.
+        code: HotPlugCode,
+        /// The value.
+        found: u32,
+        /// What the others were told.
+        expected: u32,
+    },
+    /// HP1 gives no place to an address that has one.
+    HotPlugAddress {
+        /// The address.
+        address: u16,
+    },
+    /// A slave answers in the hot-plug field what it was asked.
+    HotPlugAnswer {
+        /// The status word.
+        word: u16,
+    },
 }
 
 impl fmt::Display for Rule {
@@ -351,6 +393,22 @@ impl fmt::Display for Rule {
             Rule::Busy => f.write_str("busy again with a step that was through"),
             Rule::Production { connection, last, found } => {
                 write!(f, "connection {connection}: C-CON {found:#06x} behind {last:#06x}")
+            }
+            Rule::HotPlugPhase { phase } => write!(f, "hot plug is on in {phase}"),
+            Rule::HotPlugInRing => f.write_str("hot plug is on in a closed ring"),
+            Rule::HotPlugField { field } => write!(
+                f,
+                "hot-plug field with selection {:#06x}, control {:#06x}, info {}",
+                field.selection, field.word, field.info
+            ),
+            Rule::HotPlugValue { code, found, expected } => {
+                write!(f, "HP0 tells {code} {found}, the others were told {expected}")
+            }
+            Rule::HotPlugAddress { address } => {
+                write!(f, "HP1 gives a place to address {address}, which takes part already")
+            }
+            Rule::HotPlugAnswer { word } => {
+                write!(f, "answers {word:#06x} in the hot-plug field, which nobody asked")
             }
         }
     }

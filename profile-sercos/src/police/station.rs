@@ -5,9 +5,10 @@ use super::plan::{Connection, Places};
 use super::rule::Rule;
 use crate::wire::connection::ConnectionControl;
 use crate::wire::cp12;
+use crate::wire::device_control::Topology;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::error::u16_at;
-use crate::wire::header::{Kind, Phase};
+use crate::wire::header::{Channel, Kind, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::svc::{AtSvc, MdtSvc, SVC_LEN, SvcStatus};
 
@@ -15,7 +16,7 @@ use crate::wire::svc::{AtSvc, MdtSvc, SVC_LEN, SvcStatus};
 const CONTROL_BITS: u16 = 0x003F;
 
 /// One slave.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Station {
     pub learned: Learned,
     /// SERCOS address of the last scan.
@@ -30,11 +31,42 @@ pub(super) struct Station {
     through: bool,
     /// The slave still puts in what has to vanish when the phase is switched.
     pub inserts: bool,
+    /// It has inserted in the last cycle: it takes part.
+    pub valid: bool,
+    /// On its way in by hot plug, with the telegrams of this channel.
+    pub joining: bool,
+    pub channel: Channel,
+    /// How it passed telegrams on in the last cycle.
+    pub topology: Option<Topology>,
     /// Reported for this switch.
     pub reported: bool,
 }
 
+impl Default for Station {
+    fn default() -> Station {
+        Station {
+            learned: Learned::default(),
+            address: 0,
+            sent: None,
+            fresh: false,
+            answer: None,
+            through: false,
+            inserts: false,
+            valid: false,
+            joining: false,
+            channel: Channel::Primary,
+            topology: None,
+            reported: false,
+        }
+    }
+}
+
 impl Station {
+    /// A slave on its way in by hot plug, of which nothing else is known yet.
+    pub fn joining(address: u16, channel: Channel) -> Station {
+        Station { address, joining: true, channel, ..Station::default() }
+    }
+
     /// New telegrams begin.
     pub fn enter(&mut self, phase: Phase) {
         self.fresh = true;
@@ -151,6 +183,7 @@ impl Station {
             _ => {
                 if let Some(status) = status {
                     self.inserts = status.contains(DeviceStatus::SLAVE_VALID);
+                    self.topology = self.inserts.then(|| status.topology());
                 }
             }
         }
@@ -174,7 +207,7 @@ fn status_place(slave: u16, phase: Phase, places: Option<&Places>) -> Option<(u8
     if phase < Phase::CP3 {
         return cp12::place(slave).map(|place| (place.telegram, place.device));
     }
-    let offset = places?.status;
+    let offset = places?.status?;
     Some((offset.telegram, usize::from(offset.offset)))
 }
 

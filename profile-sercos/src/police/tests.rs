@@ -28,6 +28,7 @@ fn bus(count: u16, connected: u16, cycle_ns: u32, hot_plug_in_all: bool) -> Bus 
     let slaves = (1..=count).map(|address| SlaveConfig {
         address,
         connections: if address <= connected { connections.clone() } else { Connections::new() },
+        hot_plug: None,
     });
     let four = count > 255;
     let config = MasterConfig {
@@ -501,7 +502,11 @@ fn addressed(configured: &[u16], found: &[u16], addresses: AddressPolicy) -> Bus
     let count = u16::try_from(found.len()).unwrap();
     let model = bus(count, 1, 1_000_000, true);
     let connections = model.master.config().slaves[0].connections.clone();
-    let slaves = configured.iter().map(|&address| SlaveConfig { address, connections: connections.clone() });
+    let slaves = configured.iter().map(|&address| SlaveConfig {
+        address,
+        connections: connections.clone(),
+        hot_plug: None,
+    });
     let config = MasterConfig { slaves: slaves.collect(), addresses, ..model.master.config().clone() };
     let slave = |&address| {
         let config = slave::Config { address, ..slave::Config::default() };

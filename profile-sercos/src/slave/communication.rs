@@ -112,6 +112,8 @@ mod attribute {
     pub const BYTE_LIST: u32 = 0x7034_0001;
     /// ns, shown in microseconds.
     pub const TIME: u32 = 0x7312_0001;
+    /// The same, written in CP2 and where the way of the telegrams has changed.
+    pub const TIME_ANY: u32 = 0x0312_0001;
     pub const U16_CP2: u32 = 0x6011_0001;
     pub const U32_CP2: u32 = 0x6012_0001;
     pub const BITS_CP2: u32 = 0x6001_0001;
@@ -171,13 +173,13 @@ pub fn define(store: &mut Store, config: &super::Config) {
         Definition::list(Idn::AT_LENGTHS, a::U16_LIST_CP2, "Lengths of ATs", &[0; 8], 8),
         number(Idn::SVC_MDT_OFFSET, a::HEX_CP2, "Service channel offset in MDT", 0),
         number(Idn::SVC_AT_OFFSET, a::HEX_CP2, "Service channel offset in AT", 0),
-        time(Idn::RING_DELAY, a::TIME_CP2, "Ring delay", 0),
+        time(Idn::RING_DELAY, a::TIME_ANY, "Ring delay", 0),
         time(s(1016), a::TIME, "Slave delay", 600),
         Definition::list(Idn::UC_TIMES, a::TIME_LIST_CP2, "Unified channel times (t6, t7)", &[0; 8], 8)
             .unit("us"),
         Definition::list(s(1019), a::BYTE_LIST, "MAC address", mac, 6),
         time(Idn::SYNC_JITTER, a::TIME_CP2, "Synchronization jitter", 0),
-        Definition::command(Idn::DELAY_MEASURING, a::COMMAND_CP2, "Ring delay measurement"),
+        Definition::command(Idn::DELAY_MEASURING, a::COMMAND_ANY, "Ring delay measurement"),
         Definition::text(s(1026), "Communication hardware version", "Axisbridge sans-IO", 40),
         number(Idn::MTU_REQUESTED, a::U16_CP2, "Requested MTU", 1500).range(46, 1500),
         number(Idn::MTU_EFFECTIVE, a::U16, "Effective MTU", 1500),

@@ -27,7 +27,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use self::application::{Application, Cycle, Diagnosis};
 pub use self::core::Core;
-pub use self::network::Network;
+pub use self::network::{Network, STRANGER};
 pub use crate::port::Port;
 
 use self::communication::{FixedConnection, Identity, idn};

@@ -18,7 +18,10 @@ const FRAME_MAX: usize = 1536;
 /// to the end of at most one more line.
 const COPIES_MAX: usize = 4;
 
-/// Is told about a passage: topology address, outward, frame before and behind the slave.
+/// Slaves that were in no scan are told of by this number and their place in the network: no topology address.
+pub const STRANGER: u16 = 512;
+
+/// Is told about a passage: topology address or [`STRANGER`] number, outward, frame before and behind the slave.
 pub type Watch<'a> = dyn FnMut(u16, bool, &[u8], &mut [u8]) + 'a;
 
 /// The way of a frame along the network.
@@ -223,8 +226,8 @@ impl<A: Application> Network<A> {
         self.send_watched(now, port, frame, None, arrived);
     }
 
-    /// The same, and tells about each slave that the frame passes: its topology address (its place in the network
-    /// before it has one), whether this is the way on which slaves write, and the frame before and behind it, where it
+    /// The same, and tells about each slave that the frame passes: its topology address (or
+    /// [`STRANGER`] number), whether this is the way on which slaves write, and the frame before and behind it, where it
     /// may be changed.
     pub fn send_watched(
         &mut self,
@@ -304,7 +307,7 @@ impl<A: Application> Network<A> {
             let forward = slave.handle_frame(now, place.entry(way), frame);
             if let Some(watch) = watch {
                 let number = match slave.topology_address() {
-                    0 => u16::try_from(index + 1).unwrap_or(u16::MAX),
+                    0 => STRANGER + u16::try_from(index).unwrap_or(0),
                     address => address,
                 };
                 watch(number, way == outward, &before[..frame.len()], frame);

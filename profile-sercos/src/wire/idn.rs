@@ -98,6 +98,8 @@ impl Idn {
     pub const CONSUMER_TIME: Idn = Idn::standard(1047);
     /// S-0-1051: image of the connection setups, one word per connection which the slave has.
     pub const CONNECTION_IMAGE: Idn = Idn::standard(1051);
+    /// Largest count of the TSref counter.
+    pub const TSREF_MAX: Idn = Idn::standard(1061);
     /// S-0-1302.0.1: function specific profile type.
     pub const FSP_TYPE: Idn = Idn::structured(1302, 0, 1);
 

@@ -52,7 +52,11 @@ impl Bus {
         ]
         .into_iter()
         .collect();
-        let configs = (1..=slaves).map(|address| SlaveConfig { address, connections: connections.clone() });
+        let configs = (1..=slaves).map(|address| SlaveConfig {
+            address,
+            connections: connections.clone(),
+            hot_plug: None,
+        });
         let config = MasterConfig {
             slaves: configs.collect(),
             slaves_max: slaves,

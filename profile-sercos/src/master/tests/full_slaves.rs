@@ -14,7 +14,7 @@ pub(super) fn configured(address: u16) -> SlaveConfig {
         ConnectionConfig { allowed_losses: 60_000, ..ConnectionConfig::new(0, false, &[COMMAND]).unwrap() };
     let connections: Connections =
         [command, ConnectionConfig::new(1, true, &[FEEDBACK]).unwrap()].into_iter().collect();
-    SlaveConfig { address, connections }
+    SlaveConfig { address, connections, hot_plug: None }
 }
 
 pub(super) fn mirror(address: u16) -> Slave<Mirror> {

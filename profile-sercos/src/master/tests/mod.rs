@@ -28,7 +28,7 @@ fn slave(address: u16) -> SlaveConfig {
         ConnectionConfig::new(0, false, &idns(&[134, 36])).unwrap(),
         ConnectionConfig::new(1, true, &idns(&[135, 40, 51])).unwrap(),
     ];
-    SlaveConfig { address, connections: connections.into_iter().collect() }
+    SlaveConfig { address, connections: connections.into_iter().collect(), hot_plug: None }
 }
 
 fn config(addresses: &[u16]) -> MasterConfig {
@@ -61,6 +61,7 @@ mod bad_input;
 mod disturbance;
 mod faults;
 mod full_slaves;
+mod hot_plug;
 mod phase_up;
 mod recording;
 mod ring;

@@ -12,19 +12,23 @@ use crate::slave::Network;
 use crate::wire::header::{Channel, Kind};
 
 /// What happens to a frame on its way to the master; false when it does not arrive.
-type Tamper = Box<dyn FnMut(Port, &mut [u8]) -> bool>;
+pub(super) type Tamper = Box<dyn FnMut(Port, &mut [u8]) -> bool>;
 
 pub(super) struct RingRig {
-    now: MonotonicTime,
+    pub now: MonotonicTime,
     pub master: Master,
     pub network: Network<Mirror>,
     court: Court,
-    tamper: Tamper,
+    pub tamper: Tamper,
     pub log: Vec<Event>,
+    /// An older log, where a test keeps it.
+    pub before: Vec<Event>,
     /// Cables cut in the middle of a cycle, behind so many frames.
     cut_after: Option<(usize, usize)>,
     /// Refused frames are no failure of the test.
-    lenient: bool,
+    pub lenient: bool,
+    /// Calls `proceed_hot_plug`.
+    pub auto_proceed: bool,
     value: i32,
     /// Feedback of each slave, and the cycles in a row that did not bring it.
     missed: Vec<(u32, u32)>,
@@ -49,14 +53,16 @@ impl RingRig {
     pub fn new(config: MasterConfig, network: Network<Mirror>) -> RingRig {
         RingRig {
             now: MonotonicTime::ZERO,
+            missed: vec![(0, 0); network.slaves().len().max(config.slaves.len())],
             master: Master::new(config).unwrap(),
-            missed: vec![(0, 0); network.slaves().len()],
             network,
             court: Court::new(MonotonicTime::ZERO),
             tamper: Box::new(|_, _| true),
             log: Vec::new(),
+            before: Vec::new(),
             cut_after: None,
             lenient: false,
+            auto_proceed: true,
             value: 0,
         }
     }
@@ -118,6 +124,11 @@ impl RingRig {
             if matches!(event, Event::AwaitingApplication { .. }) {
                 self.master.proceed().unwrap();
             }
+            if let Event::HotPlugAwaits { slave, .. } = event
+                && self.auto_proceed
+            {
+                self.master.proceed_hot_plug(slave).unwrap();
+            }
             self.log.push(event);
         }
         for (index, (most, row)) in (0u16..).zip(&mut self.missed) {
@@ -146,7 +157,7 @@ impl RingRig {
     }
 
     /// Longest row of cycles without data, by slave.
-    fn gaps(&self) -> Vec<u32> {
+    pub fn gaps(&self) -> Vec<u32> {
         self.missed.iter().map(|(most, _)| *most).collect()
     }
 
@@ -161,7 +172,7 @@ impl RingRig {
     }
 
     /// Each slave has the newest or the last command value, and its own.
-    fn commands_arrive(&self) -> Vec<bool> {
+    pub fn commands_arrive(&self) -> Vec<bool> {
         let value = |index: usize| {
             let address = self.network.slaves()[index].store().number_of(Idn::ADDRESS);
             let place = self.addresses().iter().position(|&other| i64::from(other) == address).unwrap();
