@@ -1,11 +1,13 @@
 //! The Axisbridge gateway.
 
 pub mod capture;
+pub mod check;
 pub mod cli;
 pub mod config;
 pub mod decode;
 pub mod eds;
 pub mod engine;
+pub mod finding;
 pub mod host;
 pub mod latest;
 pub mod mapping;

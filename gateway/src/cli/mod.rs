@@ -2,6 +2,7 @@
 //!
 //! Data goes to standard output, errors and progress to standard error. Exit status 0 is good, 1 findings or failure, 2 usage.
 
+mod check;
 mod decode;
 mod demo;
 mod dictionary;
@@ -35,6 +36,8 @@ enum Command {
     Demo(DemoArguments),
     /// Run the gateway box.
     Run(RunArguments),
+    /// Check mapping tables, overlays and a configuration, and explain what is found.
+    Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
     /// Look at the south bus: who is there, and a configuration to begin with.
@@ -78,6 +81,42 @@ struct RunArguments {
     /// Record both sides into this file (pcapng).
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+struct CheckArguments {
+    /// The configuration of a box (TOML), with the tables and overlays that it names.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A folder of tables in place of the built-in ones, an overlay, or a folder of overlays; may be given several times, and
+    /// comes after those of the configuration.
+    #[arg(long, value_name = "PATH")]
+    mappings: Vec<PathBuf>,
+    /// How to print it.
+    #[arg(long, value_enum, default_value_t = CheckFormat::Text)]
+    format: CheckFormat,
+    /// Show notes as well (JSON has them anyway).
+    #[arg(long)]
+    notes: bool,
+    /// Explain a code, such as AX0012, and check nothing.
+    #[arg(long, value_name = "CODE", conflicts_with_all = ["config", "mappings", "notes", "list"])]
+    explain: Option<String>,
+    /// List all codes, and check nothing.
+    #[arg(long, conflicts_with_all = ["config", "mappings", "notes"])]
+    list: bool,
+}
+
+/// How `check` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum CheckFormat {
+    /// Each finding with its line.
+    #[value(alias = "human")]
+    Text,
+    /// One object, for programs.
+    Json,
+    /// Of `--list` only: the page of the documentation.
+    Markdown,
 }
 
 /// Arguments of `eds`.
@@ -332,6 +371,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),

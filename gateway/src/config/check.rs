@@ -5,13 +5,13 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;
 
+use crate::finding::registry::{self as code, Code};
+use crate::finding::{Problem, Spanned};
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
-use toml::Spanned;
 
-use super::diagnostic::Problem;
 use super::duration;
 use super::file::{
     AxisTable, DeviceTable, DriveTable, File, IdentityTable, LimitsTable, RealtimeTable, SercosTable,
@@ -72,18 +72,24 @@ impl Checker {
         title: impl Display,
         expected: impl Display,
     ) -> Option<T> {
-        let (title, expected) = (title.to_string(), expected.to_string());
-        self.problems.push(Problem { span, title, expected, related: None });
+        self.report_as(code::CONFIG_VALUE, span, title, expected)
+    }
+
+    pub(super) fn report_as<T>(
+        &mut self,
+        code: Code,
+        span: Range<usize>,
+        title: impl Display,
+        expected: impl Display,
+    ) -> Option<T> {
+        self.problems.push(Problem::new(code, span).title(title.to_string()).expected(expected.to_string()));
         None
     }
 
     fn duplicate(&mut self, what: &str, first: Range<usize>, second: Range<usize>) {
-        self.problems.push(Problem {
-            span: second,
-            title: format!("{what} is used twice"),
-            expected: "expected one that is not used yet".to_owned(),
-            related: Some((first, "used here first".to_owned())),
-        });
+        let problem = Problem::new(code::TWICE, second).title(format!("{what} is used twice"));
+        self.problems
+            .push(problem.expected("expected one that is not used yet").related(first, "used here first"));
     }
 
     /// Reports every value that has come before.
@@ -112,21 +118,20 @@ impl Checker {
             }
             None => None,
         };
-        let mappings_dir = match &file.mappings {
-            Some(table) if table.dir.get_ref().is_empty() => {
-                return self.report(table.dir.span(), "the mappings folder is empty", "expected a path");
-            }
-            Some(table) => Some(PathBuf::from(table.dir.get_ref())),
-            None => None,
-        };
+        let mappings = file.mappings.as_ref();
+        let paths = mappings.iter().flat_map(|table| table.dir.iter().chain(&table.overlays));
+        for path in paths {
+            self.path(path, "mapping tables");
+        }
+        let path = |path: &Spanned<String>| PathBuf::from(path.get_ref());
+        let mappings_dir = mappings.and_then(|table| table.dir.as_ref()).map(path);
+        let overlays = mappings.iter().flat_map(|table| &table.overlays).map(path).collect();
 
-        let settings_file = match &file.the_box.settings_file {
-            Some(path) if path.get_ref().is_empty() => {
-                return self.report(path.span(), "the settings file has no name", "expected a path");
-            }
-            Some(path) => Some(PathBuf::from(path.get_ref())),
-            None => None,
-        };
+        let settings_file = file.the_box.settings_file.as_ref();
+        if let Some(path) = settings_file {
+            self.path(path, "the settings file");
+        }
+        let settings_file = settings_file.map(path);
 
         let sercos = self.sercos(&file.south.sercos);
         let cycle_time = sercos.as_ref().map_or(DurationNs(0), |sercos| sercos.cycle_time);
@@ -155,6 +160,7 @@ impl Checker {
             log_level: log_level?,
             modbus,
             mappings_dir,
+            overlays,
             settings_file,
             devices: devices.into_iter().collect::<Option<_>>()?,
             axes: axes.into_iter().collect::<Option<_>>()?,
@@ -162,9 +168,16 @@ impl Checker {
         })
     }
 
+    fn path(&mut self, path: &Spanned<String>, what: &str) {
+        if path.get_ref().is_empty() {
+            self.report::<()>(path.span(), format_args!("the path of {what} is empty"), "expected a path");
+        }
+    }
+
     fn time(&mut self, file: &File) -> Option<TimeSource> {
         match file.time.as_ref().and_then(|table| table.source.as_ref()) {
-            Some(source) if source.get_ref() != "host" => self.report(
+            Some(source) if source.get_ref() != "host" => self.report_as(
+                code::UNKNOWN_WORD,
                 source.span(),
                 format_args!("unknown time source `{}`", source.get_ref()),
                 "expected \"host\"",
@@ -180,7 +193,8 @@ impl Checker {
         let levels = [LogLevel::Error, LogLevel::Warn, LogLevel::Info, LogLevel::Debug, LogLevel::Trace];
         match levels.into_iter().find(|candidate| candidate.name() == level.get_ref()) {
             Some(level) => Some(level),
-            None => self.report(
+            None => self.report_as(
+                code::UNKNOWN_WORD,
                 level.span(),
                 format_args!("unknown log level `{}`", level.get_ref()),
                 "expected \"error\", \"warn\", \"info\", \"debug\" or \"trace\"",
@@ -190,7 +204,8 @@ impl Checker {
 
     fn count<T>(&mut self, tables: &[Spanned<T>], what: &str, most: usize) {
         if let Some(excess) = tables.get(most) {
-            self.report::<()>(
+            self.report_as::<()>(
+                code::TOO_MANY,
                 excess.span(),
                 format_args!("too many {what}: {}", tables.len()),
                 format_args!("expected at most {most}"),
@@ -231,7 +246,8 @@ impl Checker {
         for (axis, owner) in axes.iter().zip(&owners) {
             if owner.is_none() {
                 let name = &axis.get_ref().name;
-                self.report::<()>(
+                self.report_as::<()>(
+                    code::CONFIG_REFERENCE,
                     name.span(),
                     format_args!("the axis `{}` belongs to no device", name.get_ref()),
                     "expected its name under `axes` of a [[device]]",
@@ -249,7 +265,8 @@ impl Checker {
             let count = device.axes.get_ref().len();
             // Without any there is a report already.
             if count > 0 && !(least..=most).contains(&count) {
-                self.report::<()>(
+                self.report_as::<()>(
+                    code::TOO_MANY,
                     device.axes.span(),
                     format_args!("the device `{}` has {count} axes", device.name.get_ref()),
                     format_args!(
@@ -282,7 +299,8 @@ impl Checker {
 
     fn unknown<'a>(&mut self, what: &str, name: &Spanned<String>, known: impl Iterator<Item = &'a String>) {
         let known: Vec<String> = known.map(|name| format!("`{name}`")).collect();
-        self.report::<()>(
+        self.report_as::<()>(
+            code::CONFIG_REFERENCE,
             name.span(),
             format_args!("there is no {what} `{}`", name.get_ref()),
             format_args!("expected one of {}", known.join(", ")),
@@ -376,7 +394,8 @@ impl Checker {
         if let Some(text) = given_min
             && min < cycle_time
         {
-            return self.report(
+            return self.report_as(
+                code::CONTRADICTION,
                 text.span(),
                 format_args!(
                     "the shortest update period {} is shorter than the bus cycle",
@@ -386,7 +405,8 @@ impl Checker {
             );
         }
         match given_max.or(given_min) {
-            Some(text) if min > max => self.report(
+            Some(text) if min > max => self.report_as(
+                code::CONTRADICTION,
                 text.span(),
                 format_args!(
                     "the shortest update period {} is longer than the longest {}",
@@ -427,7 +447,8 @@ impl Checker {
         let kind = match table.unit.get_ref().as_str() {
             "revolution" => Some(AxisKind::Rotary),
             "millimetre" => Some(AxisKind::Linear),
-            other => self.report(
+            other => self.report_as(
+                code::UNKNOWN_WORD,
                 table.unit.span(),
                 format_args!("unknown axis unit `{other}`"),
                 "expected \"revolution\" or \"millimetre\"",
@@ -479,7 +500,8 @@ impl Checker {
         else {
             let known: Vec<String> =
                 AxisFunction::ALL.iter().map(|known| format!("\"{}\"", known.name())).collect();
-            return self.report(
+            return self.report_as(
+                code::UNKNOWN_WORD,
                 name.span(),
                 format_args!("unknown axis function `{}`", name.get_ref()),
                 format_args!("expected one of {}", known.join(", ")),
@@ -506,12 +528,10 @@ impl Checker {
         ];
         let before = self.problems.len();
         for ((key, span), why) in misfits.into_iter().filter_map(|(found, why)| Some((found?, why))) {
-            self.problems.push(Problem {
-                span,
-                title: format!("an axis of function \"{}\" has no {key}", function.name()),
-                expected: format!("expected no {key}: {why}"),
-                related: Some((name.span(), "the function of the axis".to_owned())),
-            });
+            let title = format!("an axis of function \"{}\" has no {key}", function.name());
+            let problem = Problem::new(code::CONTRADICTION, span).title(title);
+            let problem = problem.expected(format!("expected no {key}: {why}"));
+            self.problems.push(problem.related(name.span(), "the function of the axis"));
         }
         (self.problems.len() == before).then_some(function)
     }
@@ -522,7 +542,8 @@ impl Checker {
             "cyclic" => Some(CaptureMode::Cyclic),
             "service-channel" => Some(CaptureMode::ServiceChannel),
             "off" => Some(CaptureMode::Off),
-            other => self.report(
+            other => self.report_as(
+                code::UNKNOWN_WORD,
                 name.span(),
                 "unknown way to capture events",
                 format!("expected cyclic, service-channel or off, found {other}"),
@@ -536,7 +557,8 @@ impl Checker {
         if action.is_none() {
             let known: Vec<String> =
                 StoppingAction::ALL.iter().map(|action| format!("\"{}\"", action.name())).collect();
-            return self.report(
+            return self.report_as(
+                code::UNKNOWN_WORD,
                 name.span(),
                 format_args!("unknown stopping action `{}`", name.get_ref()),
                 format_args!("expected one of {}", known.join(", ")),
@@ -573,7 +595,8 @@ impl Checker {
             (None, None) => return Some((None, None)),
             (Some(min), Some(max)) => (min, max),
             (Some(lone), None) | (None, Some(lone)) => {
-                return self.report(
+                return self.report_as(
+                    code::CONTRADICTION,
                     lone.span(),
                     "one position limit without the other",
                     "expected both position_min and position_max, or neither",
@@ -581,18 +604,17 @@ impl Checker {
             }
         };
         if let Some(unwind) = unwind {
-            self.problems.push(Problem {
-                span: min.span(),
-                title: "an axis without ends has no position limits".to_owned(),
-                expected: "expected no position_min and position_max".to_owned(),
-                related: Some((unwind.span(), "the axis starts anew after these counts".to_owned())),
-            });
+            let problem = Problem::new(code::CONTRADICTION, min.span());
+            let problem = problem.title("an axis without ends has no position limits");
+            let problem = problem.expected("expected no position_min and position_max");
+            self.problems.push(problem.related(unwind.span(), "the axis starts anew after these counts"));
             return None;
         }
         let low = self.fine(min, "the position limit", NANO)?;
         let high = self.fine(max, "the position limit", NANO)?;
         if low >= high {
-            return self.report(
+            return self.report_as(
+                code::CONTRADICTION,
                 max.span(),
                 format_args!("position_max {} is not above position_min {}", max.get_ref(), min.get_ref()),
                 "expected more than position_min",
@@ -611,7 +633,8 @@ impl Checker {
         let Some(value) = value else { return Some(None) };
         match self.fine(value, what, scale)? {
             fine if fine > 0 => Some(Some(fine)),
-            _ => self.report(
+            _ => self.report_as(
+                code::OUT_OF_RANGE,
                 value.span(),
                 format_args!("{what} is {}", value.get_ref()),
                 "expected a number above 0",
@@ -623,7 +646,8 @@ impl Checker {
     fn fine(&mut self, value: &Spanned<f64>, what: &str, scale: Option<Ratio>) -> Option<i64> {
         match scale?.apply_f64(*value.get_ref(), Rounding::Nearest) {
             Ok(fine) => Some(fine),
-            Err(_) => self.report(
+            Err(_) => self.report_as(
+                code::OUT_OF_RANGE,
                 value.span(),
                 format_args!("{what} {} is too large", value.get_ref()),
                 "expected a number that fits 64 bits in units of 1e-9",
@@ -690,7 +714,8 @@ impl Checker {
                 format_args!("`{first}` is the interface of the first port already"),
                 "expected another interface: both ends of a ring have a port of their own",
             ),
-            _ => self.report(
+            _ => self.report_as(
+                code::CONTRADICTION,
                 ring.span(),
                 "simulated and real drives cannot share a ring",
                 "expected two names of interfaces, or \"in-process\" for both",
@@ -875,7 +900,8 @@ impl Checker {
         let given = *value.get_ref();
         match T::try_from(given) {
             Ok(number) if range.contains(&given) => Some(number),
-            _ => self.report(
+            _ => self.report_as(
+                code::OUT_OF_RANGE,
                 value.span(),
                 format_args!("{what} is {given}"),
                 format_args!("expected {} to {}", range.start(), range.end()),

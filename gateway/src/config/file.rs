@@ -3,11 +3,13 @@
 //! Times are strings with a unit: `"2 ms"`, `"31.25 us"`, `"31250 ns"`, `"1 s"`. Names are 1 to 32 letters,
 //! digits, `-` and `_`. Positions count in axis units: revolutions or millimetres.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 /// The whole file.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct File {
     /// The box itself.
@@ -30,7 +32,7 @@ pub struct File {
 }
 
 /// `[box]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoxTable {
     /// Name of the box in logs, recordings and the status block.
@@ -41,7 +43,7 @@ pub struct BoxTable {
 }
 
 /// `[time]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeTable {
     /// Where system time comes from. Default: `"host"`, the host's clock (TAI where the kernel knows the
@@ -50,7 +52,7 @@ pub struct TimeTable {
 }
 
 /// `[log]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogTable {
     /// `"error"`, `"warn"`, `"info"`, `"debug"` or `"trace"`. Default: `"info"`.
@@ -58,7 +60,7 @@ pub struct LogTable {
 }
 
 /// `[modbus]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModbusTable {
     /// Address and port, such as `"0.0.0.0:502"`.
@@ -68,16 +70,20 @@ pub struct ModbusTable {
 }
 
 /// `[mappings]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MappingsTable {
     /// A folder of dictionaries and mapping tables used in place of the built-in ones; counts from the folder
     /// of this file.
-    pub dir: Spanned<String>,
+    pub dir: Option<Spanned<String>>,
+    /// Files, or folders of files, with rows that are laid over the tables, in this order; they count from the folder of this
+    /// file.
+    #[serde(default)]
+    pub overlays: Vec<Spanned<String>>,
 }
 
 /// `[[device]]`: a CIP Motion device.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceTable {
     /// Name, unique among devices.
@@ -100,7 +106,7 @@ pub struct DeviceTable {
 
 /// `identity` of a `[[device]]`; its device type follows from its axes: 47, CIP Motion Encoder, where all of them are
 /// encoders; 48, CIP Motion Converter, where all are converters; else 37, CIP Motion Drive.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityTable {
     /// Vendor number given by ODVA, 1 to 65535.
@@ -121,7 +127,7 @@ pub struct IdentityTable {
 }
 
 /// `update_period` of a `[[device]]`; both from `250 us` to `100 ms`, in whole microseconds.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpdatePeriodTable {
     /// Shortest, at least the bus cycle. Default: `"1 ms"`, or the bus cycle where that is longer.
@@ -131,7 +137,7 @@ pub struct UpdatePeriodTable {
 }
 
 /// `[[axis]]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisTable {
     /// Name, unique among axes.
@@ -163,7 +169,7 @@ pub struct AxisTable {
 }
 
 /// `limits` of an `[[axis]]`; each is left to the drive where it is not given.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitsTable {
     /// Lowest position command, in axis units; only for an axis with ends, and together with `position_max`.
@@ -196,7 +202,7 @@ impl LimitsTable {
 }
 
 /// `[south]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SouthTable {
     /// The SERCOS III bus.
@@ -204,7 +210,7 @@ pub struct SouthTable {
 }
 
 /// `[south.sercos]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosTable {
     /// Network interface of the bus, such as `"enp3s0"`, or `"in-process"` for simulated drives.
@@ -235,7 +241,7 @@ pub struct SercosTable {
 }
 
 /// `[south.sercos.realtime]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RealtimeTable {
     /// `SCHED_FIFO` priority, 1 to 99; 0 for no real-time scheduling. Default: 80.
@@ -250,7 +256,7 @@ pub struct RealtimeTable {
 }
 
 /// `[[south.sercos.drive]]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriveTable {
     /// Name, unique among drives.

@@ -1,12 +1,11 @@
 //! The configuration file of the box: TOML in, a checked [`Config`] out.
 //!
 //! [`mod@file`] is the file as it is written: every key, what it means, its default. `check` turns it into the
-//! types below, in which every reference is an index and every value is in range, or into a [`ConfigError`]
-//! that shows each fault at its line.
+//! types below, in which every reference is an index and every value is in range, or into [`Findings`]
+//! that show each fault at its line.
 
 mod check;
 mod connection_format;
-mod diagnostic;
 pub(crate) mod duration;
 pub mod file;
 mod rated;
@@ -19,9 +18,7 @@ use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
 
-pub use diagnostic::{ConfigError, Diagnostic, Report};
-pub(crate) use diagnostic::{Problem, diagnose};
-
+use crate::finding::{Findings, Source, deserialize, read_file, tree};
 use crate::mapping::{CaptureMode, Rated};
 use crate::sys::realtime;
 
@@ -47,6 +44,8 @@ pub struct Config {
     pub modbus: Option<Modbus>,
     /// A folder of mapping tables in place of the built-in ones.
     pub mappings_dir: Option<PathBuf>,
+    /// What is laid over the tables, files and folders, in this order.
+    pub overlays: Vec<PathBuf>,
     /// Where what controllers set is kept; `None` keeps it until the process ends.
     pub settings_file: Option<PathBuf>,
     /// The CIP Motion devices seen by controllers.
@@ -61,38 +60,71 @@ impl Config {
     /// Reads and checks a file. Paths in it count from the file's own folder.
     ///
     /// # Errors
-    /// [`ConfigError`]: the file cannot be read, or what is wrong in it, each fault shown at its place.
-    pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let name = path.display().to_string();
-        let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
-        let length = std::fs::metadata(path).map_err(unreadable)?.len();
-        if length > FILE_LEN_MAX {
-            return Err(ConfigError::TooLong { path: path.to_owned(), length });
+    /// The file cannot be read, or what is wrong in it, each fault shown at its place.
+    pub fn load(path: &Path) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        match Written::load(path, &mut findings) {
+            Some(written) => Ok(written.config),
+            None => Err(findings),
         }
-        let source = std::fs::read_to_string(path).map_err(unreadable)?;
-        let mut config = Self::parse(&source, &name)?;
-        if let Some(folder) = path.parent() {
-            for path in config.mappings_dir.iter_mut().chain(&mut config.settings_file) {
-                *path = folder.join(&*path);
-            }
-        }
-        Ok(config)
     }
 
     /// Checks the text of a file; `name` is shown in errors.
     ///
     /// # Errors
-    /// [`ConfigError::Invalid`] with every fault found.
-    pub fn parse(source: &str, name: &str) -> Result<Self, ConfigError> {
-        let file: file::File = toml::from_str(source).map_err(|error| {
-            ConfigError::invalid(source, name, vec![diagnostic::Problem::from_toml(&error)])
-        })?;
-        check::check(&file).map_err(|problems| ConfigError::invalid(source, name, problems))
+    /// Every fault found.
+    pub fn parse(source: &str, name: &str) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        match Written::parse(source, name, &mut findings) {
+            Some(written) => Ok(written.config),
+            None => Err(findings),
+        }
     }
 
     /// The axes of a device, with their number in [`Config::axes`].
     pub fn axes_of(&self, device: usize) -> impl Iterator<Item = (usize, &Axis)> {
         self.axes.iter().enumerate().filter(move |(_, axis)| axis.device == device)
+    }
+}
+
+/// A checked configuration with the text that it comes from.
+#[derive(Debug)]
+pub struct Written {
+    /// The text, for messages.
+    pub text: Source,
+    /// The file as it is written.
+    pub file: file::File,
+    /// What it comes to.
+    pub config: Config,
+}
+
+impl Written {
+    /// Reads and checks a file; `None` with errors. Paths in it count from the file's own folder.
+    pub fn load(path: &Path, findings: &mut Findings) -> Option<Self> {
+        let source = read_file(path, FILE_LEN_MAX).map_err(|found| findings.extend(found)).ok()?;
+        let mut written = Self::parse(&source, &path.display().to_string(), findings)?;
+        if let Some(folder) = path.parent() {
+            let config = &mut written.config;
+            let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
+            for path in paths.chain(&mut config.settings_file) {
+                *path = folder.join(&*path);
+            }
+        }
+        Some(written)
+    }
+
+    /// Checks the text of a file, whose name is shown in errors; `None` with them.
+    pub fn parse(source: &str, name: &str, findings: &mut Findings) -> Option<Self> {
+        let text = Source::new(name, source);
+        let tree = tree(source, &text, findings)?;
+        let file: file::File = deserialize(tree, &text, findings)?;
+        match check::check(&file) {
+            Ok(config) => Some(Self { text, file, config }),
+            Err(problems) => {
+                problems.into_iter().for_each(|problem| findings.push(&text, problem));
+                None
+            }
+        }
     }
 }
 

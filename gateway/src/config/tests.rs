@@ -61,7 +61,7 @@ fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
     assert_eq!((config.time, config.log_level, config.modbus), (TimeSource::Host, LogLevel::Info, None));
-    assert_eq!((&config.mappings_dir, &config.settings_file), (&None, &None));
+    assert_eq!((&config.mappings_dir, &config.settings_file, config.overlays.len()), (&None, &None, 0));
     let device = &config.devices[0];
     assert_eq!(
         (device.update_period_min, device.update_period_max),
@@ -144,7 +144,7 @@ fn defaults_are_those_of_the_documentation() {
 #[test]
 fn values_given_are_taken() {
     let text = GOOD
-        .replace("[[device]]", "[time]\nsource = \"host\"\n[log]\nlevel = \"debug\"\n[modbus]\nlisten = \"[::1]:502\"\nclients_max = 3\n[mappings]\ndir = \"maps\"\n[[device]]")
+        .replace("[[device]]", "[time]\nsource = \"host\"\n[log]\nlevel = \"debug\"\n[modbus]\nlisten = \"[::1]:502\"\nclients_max = 3\n[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
         .replace("serial_number = 3", "serial_number = 0xFFFF_FFFF\nrevision = \"127.255\"\nproduct_name = \"P\"")
         .replace("axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\"]\npower_structure_class_id = 7\nupdate_period = { min = \"4 ms\", max = \"4 ms\" }")
         .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
@@ -314,7 +314,7 @@ fn every_fault_of_a_file_is_reported_in_its_order() {
         .replace("2 ms", "7 us");
     let error = Config::parse(&text, "box.toml").unwrap_err();
     let places: Vec<_> =
-        error.diagnostics().iter().map(|found| (found.line, found.column, found.title.as_str())).collect();
+        error.list().iter().map(|found| (found.line, found.column, found.title.as_str())).collect();
     assert_eq!(
         places,
         [
@@ -338,19 +338,19 @@ fn too_many_axes_and_devices_are_refused() {
     }
     let text = text.replace("axes = [\"x\", \"y\"]", &format!("axes = [{list}]"));
     let error = Config::parse(&text, "box.toml").unwrap_err();
-    let titles: Vec<_> = error.diagnostics().iter().map(|found| found.title.as_str()).collect();
+    let titles: Vec<_> = error.list().iter().map(|found| found.title.as_str()).collect();
     assert_eq!(titles, ["the device `front` has 17 axes", "too many axes: 17"]);
-    let expected = &error.diagnostics()[0].expected;
+    let expected = &error.list()[0].expected;
     assert_eq!(expected, "expected 1 to 16 axes of a node on EtherNet/IP (IEC 61800-7-302 clause 7.2)");
 }
 
 #[test]
 fn a_file_that_cannot_be_read_is_named() {
     let error = Config::load(Path::new("/nonexistent/box.toml")).unwrap_err();
-    assert!(
-        error.to_string().starts_with("cannot read the configuration /nonexistent/box.toml: No such file")
+    assert_eq!(
+        error.to_string(),
+        "error[AX0001]: the file cannot be read\n --> /nonexistent/box.toml\n  = expected a file, got: No such file or directory (os error 2)"
     );
-    assert!(error.diagnostics().is_empty());
 }
 
 #[test]
@@ -373,12 +373,13 @@ fn paths_count_from_the_file() {
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("box.toml");
     let text = GOOD
-        .replace("[[device]]", "[mappings]\ndir = \"maps\"\n[[device]]")
+        .replace("[[device]]", "[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
         .replace("[box]", "[box]\nsettings_file = \"set.toml\"");
     std::fs::write(&path, text).unwrap();
     let config = Config::load(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(config.mappings_dir, Some(folder.join("maps")));
+    assert_eq!(config.overlays, [folder.join("own.toml")]);
     assert_eq!(config.settings_file, Some(folder.join("set.toml")));
 }
 

@@ -28,8 +28,10 @@ use profile_generic::parameter::{Parameter, ParameterRow};
 use profile_generic::quantity::Quantity;
 
 use super::format::{GenericFile, Name};
-use super::load::{Parsed, TableErrors, Tables};
+use super::load::{Parsed, Tables};
 use super::resolver::Resolver;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 
 /// Signals and parameters of the generic model, as the generic dictionary lists them. The catalogue in code
 /// decides; the dictionary must say the same.
@@ -40,7 +42,7 @@ pub struct GenericDictionary {
 }
 
 impl GenericDictionary {
-    fn resolve(file: &Parsed<GenericFile>, errors: &mut TableErrors) -> Self {
+    fn resolve(file: &Parsed<GenericFile>, errors: &mut Findings) -> Self {
         let mut resolver = Resolver::new(&file.text, errors);
         let rows = &file.rows;
         resolver.head(&rows.format, "profile", &rows.profile, "generic");
@@ -55,7 +57,7 @@ impl GenericDictionary {
             same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
             same(&mut resolver, "access", &row.access, access);
             if dictionary.signals.contains(&signal) {
-                resolver.error(row.name.span(), "name", "the signal is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the signal is there twice");
             }
             dictionary.signals.push(signal);
         }
@@ -68,7 +70,7 @@ impl GenericDictionary {
             same(&mut resolver, "type", &row.data_type, known.kind.name());
             same(&mut resolver, "access", &row.access, known.access.name());
             if dictionary.parameters.iter().any(|other| other.parameter == known.parameter) {
-                resolver.error(row.name.span(), "name", "the parameter is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is there twice");
             }
             dictionary.parameters.push(known);
         }
@@ -100,7 +102,12 @@ impl GenericDictionary {
 /// Checks that a dictionary repeats what the catalogue says.
 fn same(resolver: &mut Resolver<'_>, key: &str, name: &Name, expected: &str) {
     if name.get_ref() != expected {
-        resolver.error(name.span(), key, format!("expected `{expected}`, got `{}`", name.get_ref()));
+        resolver.error(
+            code::CONTRADICTS_CATALOGUE,
+            name.span(),
+            key,
+            format!("expected `{expected}`, got `{}`", name.get_ref()),
+        );
     }
 }
 
@@ -209,7 +216,7 @@ impl Enumeration {
     fn unique<'a>(&self, names: impl Iterator<Item = &'a Name>, resolver: &mut Resolver<'_>) {
         for (at, (code, name)) in self.codes.iter().zip(names).enumerate() {
             if self.codes[..at].iter().any(|known| known.code == code.code || known.name == code.name) {
-                resolver.error(name.span(), "name", "the code or its name is there twice");
+                resolver.error(code::TWICE, name.span(), "name", "the code or its name is there twice");
             }
         }
     }
@@ -240,7 +247,7 @@ pub struct Dictionaries {
 }
 
 impl Dictionaries {
-    pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
+    pub(super) fn resolve(tables: &Tables, errors: &mut Findings) -> Self {
         Self {
             generic: GenericDictionary::resolve(&tables.generic, errors),
             cip: CipDictionary::resolve(tables, errors),

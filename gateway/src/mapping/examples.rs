@@ -12,30 +12,12 @@ use profile_sercos::wire::idn::Idn;
 use super::cip_tables::CipTables;
 use super::compile_sercos::{Compiler, unit_of};
 use super::format::{CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow};
-use super::load::{TableText, Tables};
+use super::load::Tables;
 use super::{
     AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Rated, Reference,
     SercosAxis,
 };
-
-/// An example whose numbers do not come out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ExampleFailure {
-    /// The file.
-    pub file: String,
-    /// Line, 1 first.
-    pub line: usize,
-    /// Column, 1 first.
-    pub column: usize,
-    /// What was expected and what came.
-    pub message: String,
-}
-
-impl fmt::Display for ExampleFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)
-    }
-}
+use crate::finding::{Findings, Problem, Source, registry as code};
 
 /// What is wrong, and the value it is wrong about.
 type Wrong = (Range<usize>, String);
@@ -43,12 +25,12 @@ type Wrong = (Range<usize>, String);
 struct Runner<'m> {
     mapping: &'m Mapping,
     count: usize,
-    failures: Vec<ExampleFailure>,
+    findings: &'m mut Findings,
 }
 
 /// Runs every example and returns how many there are.
-pub(super) fn run(mapping: &Mapping, tables: &Tables) -> Result<usize, Vec<ExampleFailure>> {
-    let mut runner = Runner { mapping, count: 0, failures: Vec::new() };
+pub(super) fn run(mapping: &Mapping, tables: &Tables, findings: &mut Findings) -> usize {
+    let mut runner = Runner { mapping, count: 0, findings };
     let cip = &tables.cip_generic;
     for row in &cip.rows.cyclic {
         for example in &row.examples {
@@ -75,15 +57,14 @@ pub(super) fn run(mapping: &Mapping, tables: &Tables) -> Result<usize, Vec<Examp
             runner.note(&sercos.text, result);
         }
     }
-    if runner.failures.is_empty() { Ok(runner.count) } else { Err(runner.failures) }
+    runner.count
 }
 
 impl Runner<'_> {
-    fn note(&mut self, text: &TableText, result: Result<(), Wrong>) {
+    fn note(&mut self, text: &Source, result: Result<(), Wrong>) {
         self.count += 1;
         if let Err((span, message)) = result {
-            let (line, column) = text.place(span.start);
-            self.failures.push(ExampleFailure { file: text.path.clone(), line, column, message });
+            self.findings.push(text, Problem::new(code::EXAMPLE_FAILS, span).expected(message));
         }
     }
 }

@@ -20,8 +20,10 @@ pub use dictionary::*;
 pub use generic_sercos::*;
 pub use sercos_dictionary::*;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 /// A name that some dictionary must know.
 pub type Name = Spanned<String>;
@@ -33,7 +35,7 @@ pub type Source = Spanned<String>;
 pub type RatioRow = Spanned<[i64; 2]>;
 
 /// How a unit of a profile becomes the unit of a generic quantity.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UnitRow {
     /// Unit as the dictionary names it.

@@ -1,17 +1,15 @@
-//! Reading the table files, built in or from a folder, and reporting what is wrong with them.
+//! Reading the table files: built in, from a folder in their place, and what is laid over them.
 
-use std::fmt;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-use annotate_snippets::renderer::DecorStyle;
-use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
-use serde::de::DeserializeOwned;
 
 use super::format::{
     CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipNetworkFile, CipServiceFile,
     GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
+use super::overlay::Overlay;
+use super::rows;
+use crate::finding::registry as code;
+use crate::finding::{Findings, Source, read_file};
 
 /// The file format this build understands.
 pub const FORMAT: u32 = 1;
@@ -20,7 +18,7 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-const FILES: [(&str, &str); 13] = [
+pub(super) const FILES: [(&str, &str); 13] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
@@ -39,6 +37,12 @@ const FILES: [(&str, &str); 13] = [
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
 ];
 
+/// The name of a table: that of its file without folder and ending.
+pub(super) fn table_name(path: &str) -> &str {
+    let file = path.rsplit(['/', '\\']).next().unwrap_or(path);
+    file.strip_suffix(".toml").unwrap_or(file)
+}
+
 /// The text of one table file and what it is called in messages.
 #[derive(Debug, Clone)]
 pub struct TableText {
@@ -48,7 +52,7 @@ pub struct TableText {
     pub text: String,
 }
 
-/// The texts of all table files.
+/// The texts of all table files, and what is laid over them.
 #[derive(Debug, Clone)]
 pub struct TableTexts {
     /// Generic dictionary.
@@ -77,13 +81,15 @@ pub struct TableTexts {
     pub cip_generic: TableText,
     /// Generic to SERCOS.
     pub generic_sercos: TableText,
+    /// What is laid over them, in this order.
+    pub overlays: Vec<Overlay>,
 }
 
 /// A parsed file together with its text.
 #[derive(Debug, Clone)]
 pub struct Parsed<T> {
-    /// The text, for messages.
-    pub text: TableText,
+    /// The text, and that of what was laid over it, for messages.
+    pub text: Source,
     /// The rows.
     pub rows: T,
 }
@@ -119,108 +125,6 @@ pub struct Tables {
     pub generic_sercos: Parsed<GenericSercosFile>,
 }
 
-/// One thing that is wrong with a table file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TableError {
-    /// The file.
-    pub file: String,
-    /// Line, 1 first; 0 when the file could not be read at all.
-    pub line: usize,
-    /// Column in characters, 1 first.
-    pub column: usize,
-    /// The key whose value is wrong; empty when the text is no TOML.
-    pub key: String,
-    /// What was expected and what came.
-    pub message: String,
-    rendered: String,
-}
-
-impl fmt::Display for TableError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.rendered)
-    }
-}
-
-/// Everything that is wrong with the table files.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct TableErrors(pub Vec<TableError>);
-
-impl fmt::Display for TableErrors {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, error) in self.0.iter().enumerate() {
-            if index > 0 {
-                f.write_str("\n\n")?;
-            }
-            write!(f, "{error}")?;
-        }
-        Ok(())
-    }
-}
-
-impl std::error::Error for TableErrors {}
-
-impl TableErrors {
-    /// `Ok` when nothing is wrong.
-    pub(super) fn into_result<T>(self, value: T) -> Result<T, TableErrors> {
-        if self.0.is_empty() { Ok(value) } else { Err(self) }
-    }
-
-    /// Notes that the value of `key`, which stands at `span`, is wrong.
-    pub(super) fn push(
-        &mut self,
-        file: &TableText,
-        span: Range<usize>,
-        key: &str,
-        message: impl Into<String>,
-    ) {
-        let message = message.into();
-        let (line, column) = file.place(span.start);
-        let title = if key.is_empty() { message.clone() } else { format!("`{key}`: {message}") };
-        let end = file.text.len();
-        let span = span.start.min(end)..span.end.min(end);
-        let report = [Level::ERROR.primary_title(&title).element(
-            Snippet::source(file.text.as_str())
-                .path(&file.path)
-                .annotation(AnnotationKind::Primary.span(span)),
-        )];
-        let rendered = Renderer::plain().decor_style(DecorStyle::Ascii).render(&report);
-        self.0.push(TableError {
-            file: file.path.clone(),
-            line,
-            column,
-            key: key.to_owned(),
-            message,
-            rendered,
-        });
-    }
-
-    fn unreadable(path: &Path, message: String) -> Self {
-        let file = path.display().to_string();
-        let rendered = format!("error: {message}\n --> {file}");
-        TableErrors(vec![TableError { file, line: 0, column: 0, key: String::new(), message, rendered }])
-    }
-}
-
-impl TableText {
-    /// Line and column of a byte offset, both from 1; the column counts characters.
-    pub fn place(&self, offset: usize) -> (usize, usize) {
-        let before = self.text.get(..offset).unwrap_or(&self.text);
-        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
-    }
-
-    pub(super) fn parse<T: DeserializeOwned>(self, errors: &mut TableErrors) -> Option<Parsed<T>> {
-        match toml::from_str::<T>(&self.text) {
-            Ok(rows) => Some(Parsed { text: self, rows }),
-            Err(error) => {
-                let span = error.span().unwrap_or(0..0);
-                errors.push(&self, span, "", error.message());
-                None
-            }
-        }
-    }
-}
-
 impl TableTexts {
     /// The tables built into the binary.
     pub fn embedded() -> Self {
@@ -234,18 +138,47 @@ impl TableTexts {
     /// # Errors
     /// The folder cannot be read, a file is too large or not UTF-8, or there is a `.toml` file that is none
     /// of these: a misspelt name would otherwise be ignored without a word.
-    pub fn from_folder(folder: &Path) -> Result<Self, TableErrors> {
+    pub fn from_folder(folder: &Path) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
         for below in [PathBuf::new(), PathBuf::from("dictionary")] {
-            refuse_strangers(folder, &below)?;
+            refuse_strangers(folder, &below, &mut findings);
         }
         let mut texts = Self::embedded();
         for ((path, _), table) in FILES.iter().zip(texts.as_array_mut()) {
             let path = folder.join(path);
             if path.exists() {
-                *table = TableText { path: path.display().to_string(), text: read(&path)? };
+                match read_file(&path, MAX_FILE_BYTES) {
+                    Ok(text) => *table = TableText { path: path.display().to_string(), text },
+                    Err(found) => findings.extend(found),
+                }
             }
         }
-        Ok(texts)
+        findings.into_result(texts)
+    }
+
+    /// The tables in a folder, or those in the binary, and over them files or folders of files.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn load(folder: Option<&Path>, overlays: &[PathBuf]) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        let mut texts = match folder.map(Self::from_folder) {
+            None => Self::embedded(),
+            Some(Ok(texts)) => texts,
+            Some(Err(found)) => {
+                findings.extend(found);
+                Self::embedded()
+            }
+        };
+        for path in overlays {
+            texts.lay_over(path, &mut findings);
+        }
+        findings.into_result(texts)
+    }
+
+    /// Whether a path is a folder with a file that replaces a table; else it is an overlay, or a folder of them.
+    pub fn replaces(path: &Path) -> bool {
+        path.is_dir() && FILES.iter().any(|(file, _)| path.join(file).exists())
     }
 
     /// The texts in the order of [`FILES`].
@@ -279,6 +212,7 @@ impl TableTexts {
             sercos_codes,
             cip_generic,
             generic_sercos,
+            overlays: Vec::new(),
         }
     }
 
@@ -297,6 +231,7 @@ impl TableTexts {
             sercos_codes,
             cip_generic,
             generic_sercos,
+            overlays: _,
         } = self;
         [
             generic,
@@ -315,70 +250,63 @@ impl TableTexts {
         ]
     }
 
-    /// Parses all files.
-    ///
-    /// # Errors
-    /// Every file that is no TOML, or has unknown, missing or mistyped keys, with the place.
-    pub fn parse(self) -> Result<Tables, TableErrors> {
-        let mut errors = TableErrors::default();
-        let generic = self.generic.parse(&mut errors);
-        let cip_attributes = self.cip_attributes.parse(&mut errors);
-        let cip_enumerations = self.cip_enumerations.parse(&mut errors);
-        let cip_faults = self.cip_faults.parse(&mut errors);
-        let cip_services = self.cip_services.parse(&mut errors);
-        let cip_networks = self.cip_networks.parse(&mut errors);
-        let sercos_terms = self.sercos_terms.parse(&mut errors);
-        let sercos_idns = self.sercos_idns.parse(&mut errors);
-        let sercos_communication = self.sercos_communication.parse(&mut errors);
-        let sercos_bits = self.sercos_bits.parse(&mut errors);
-        let sercos_codes = self.sercos_codes.parse(&mut errors);
-        let cip_generic = self.cip_generic.parse(&mut errors);
-        let generic_sercos = self.generic_sercos.parse(&mut errors);
-        let tables = || {
-            Some(Tables {
-                generic: generic?,
-                cip_attributes: cip_attributes?,
-                cip_enumerations: cip_enumerations?,
-                cip_faults: cip_faults?,
-                cip_services: cip_services?,
-                cip_networks: cip_networks?,
-                sercos_terms: sercos_terms?,
-                sercos_idns: sercos_idns?,
-                sercos_communication: sercos_communication?,
-                sercos_bits: sercos_bits?,
-                sercos_codes: sercos_codes?,
-                cip_generic: cip_generic?,
-                generic_sercos: generic_sercos?,
-            })
-        };
-        tables().ok_or(errors)
+    /// Parses all files and lays over them what is to be laid over them. `None` with errors: every file that is no TOML,
+    /// or has unknown, missing or mistyped keys, with the place.
+    pub(super) fn parse(&self, findings: &mut Findings) -> Option<Tables> {
+        let layers = super::overlay::layers(&self.overlays, findings);
+        let generic = rows::parse(&self.generic, "generic", &layers, findings);
+        let cip_attributes = rows::parse(&self.cip_attributes, "cip-attributes", &layers, findings);
+        let cip_enumerations = rows::parse(&self.cip_enumerations, "cip-enumerations", &layers, findings);
+        let cip_faults = rows::parse(&self.cip_faults, "cip-faults", &layers, findings);
+        let cip_services = rows::parse(&self.cip_services, "cip-services", &layers, findings);
+        let cip_networks = rows::parse(&self.cip_networks, "cip-networks", &layers, findings);
+        let sercos_terms = rows::parse(&self.sercos_terms, "sercos-terms", &layers, findings);
+        let sercos_idns = rows::parse(&self.sercos_idns, "sercos-idns", &layers, findings);
+        let sercos_communication =
+            rows::parse(&self.sercos_communication, "sercos-communication", &layers, findings);
+        let sercos_bits = rows::parse(&self.sercos_bits, "sercos-bits", &layers, findings);
+        let sercos_codes = rows::parse(&self.sercos_codes, "sercos-codes", &layers, findings);
+        let cip_generic = rows::parse(&self.cip_generic, "cip-generic", &layers, findings);
+        let generic_sercos = rows::parse(&self.generic_sercos, "generic-sercos", &layers, findings);
+        if findings.has_errors() {
+            return None;
+        }
+        Some(Tables {
+            generic: generic?,
+            cip_attributes: cip_attributes?,
+            cip_enumerations: cip_enumerations?,
+            cip_faults: cip_faults?,
+            cip_services: cip_services?,
+            cip_networks: cip_networks?,
+            sercos_terms: sercos_terms?,
+            sercos_idns: sercos_idns?,
+            sercos_communication: sercos_communication?,
+            sercos_bits: sercos_bits?,
+            sercos_codes: sercos_codes?,
+            cip_generic: cip_generic?,
+            generic_sercos: generic_sercos?,
+        })
     }
 }
 
-fn refuse_strangers(folder: &Path, below: &Path) -> Result<(), TableErrors> {
+fn refuse_strangers(folder: &Path, below: &Path, findings: &mut Findings) {
     let place = folder.join(below);
     if !below.as_os_str().is_empty() && !place.exists() {
-        return Ok(());
+        return;
     }
-    let unreadable = |error: std::io::Error| TableErrors::unreadable(&place, format!("cannot read: {error}"));
-    for entry in place.read_dir().map_err(unreadable)? {
-        let name = entry.map_err(unreadable)?.file_name();
-        let path = below.join(&name);
+    let entries = match place.read_dir() {
+        Ok(entries) => entries,
+        Err(error) => {
+            return findings.push_file(code::UNREADABLE, &place, format!("expected a folder, got: {error}"));
+        }
+    };
+    for entry in entries.flatten() {
+        let path = below.join(entry.file_name());
         let is_table = path.extension().is_some_and(|extension| extension == "toml");
         if is_table && !FILES.iter().any(|(known, _)| Path::new(known) == path) {
             let known: Vec<&str> = FILES.iter().map(|(known, _)| *known).collect();
             let message = format!("expected one of {}, got `{}`", known.join(", "), path.display());
-            return Err(TableErrors::unreadable(&folder.join(&path), message));
+            findings.push_file(code::STRANGER, &folder.join(&path), message);
         }
     }
-    Ok(())
-}
-
-fn read(path: &Path) -> Result<String, TableErrors> {
-    let size = path.metadata().map_err(|e| TableErrors::unreadable(path, format!("cannot read: {e}")))?.len();
-    if size > MAX_FILE_BYTES {
-        let message = format!("expected at most {MAX_FILE_BYTES} bytes, got {size}");
-        return Err(TableErrors::unreadable(path, message));
-    }
-    std::fs::read_to_string(path).map_err(|e| TableErrors::unreadable(path, format!("cannot read: {e}")))
 }

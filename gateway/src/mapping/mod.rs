@@ -24,17 +24,19 @@ mod device_link;
 mod dictionary;
 mod drive_facts;
 mod examples;
-mod format;
+pub mod format;
 mod load;
 mod origin;
+mod overlay;
 mod resolver;
+mod rows;
 mod scaling;
 mod sercos_tables;
 
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use profile_cip::target::attribute::AttributeDefinition;
 
@@ -64,13 +66,13 @@ pub use dictionary::{
     networks,
 };
 pub use drive_facts::{Difference, DriveFacts};
-pub use examples::ExampleFailure;
-pub use load::{FORMAT, TableError, TableErrors, TableText, TableTexts};
+pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use origin::Origin;
+pub use overlay::{OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos_tables::{FaultRule, SercosTables};
 
-use load::Tables;
+use crate::finding::Findings;
 use profile_cip::target::attribute::{DefaultValue, ElementRule};
 use profile_cip::target::exception;
 
@@ -94,29 +96,50 @@ impl Mapping {
     ///
     /// # Errors
     /// None with the tables that are shipped; a test holds that.
-    pub fn embedded() -> Result<Self, TableErrors> {
-        Self::from_texts(TableTexts::embedded())
+    pub fn embedded() -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::embedded())
     }
 
     /// The tables in a folder; files that are not there come from the binary.
     ///
     /// # Errors
     /// Everything that is wrong with the files.
-    pub fn from_folder(folder: &Path) -> Result<Self, TableErrors> {
-        Self::from_texts(TableTexts::from_folder(folder)?)
+    pub fn from_folder(folder: &Path) -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::from_folder(folder)?)
+    }
+
+    /// The tables in a folder, or those in the binary, and over them files or folders of files.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the files.
+    pub fn load(folder: Option<&Path>, overlays: &[PathBuf]) -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::load(folder, overlays)?)
     }
 
     /// The tables in these texts.
     ///
     /// # Errors
     /// Everything that is wrong with them.
-    pub fn from_texts(texts: TableTexts) -> Result<Self, TableErrors> {
-        let tables = texts.parse()?;
-        let mut errors = TableErrors::default();
-        let dictionaries = Dictionaries::resolve(&tables, &mut errors);
-        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut errors);
-        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, &mut errors);
-        errors.into_result(Self { dictionaries, cip, sercos, tables })
+    pub fn from_texts(texts: &TableTexts) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        match Self::resolve(texts, &mut findings) {
+            Some(mapping) => Ok(mapping),
+            None => Err(findings),
+        }
+    }
+
+    /// The tables in these texts, and everything that is found in them; `None` with errors.
+    pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
+        let tables = texts.parse(findings)?;
+        let dictionaries = Dictionaries::resolve(&tables, findings);
+        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
+        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
+        (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, tables })
+    }
+
+    /// The rows as they stand in the files, with their places.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
     }
 
     /// The program of an axis on the CIP side. `None` when a ratio of the scaling does not fit 64 bits.
@@ -194,9 +217,8 @@ impl Mapping {
 
     /// Runs every worked example of the tables.
     ///
-    /// # Errors
-    /// Each example whose numbers do not come out, with its place.
-    pub fn run_examples(&self) -> Result<usize, Vec<ExampleFailure>> {
-        examples::run(self, &self.tables)
+    /// Returns how many there are; an example whose numbers do not come out is a finding.
+    pub fn run_examples(&self, findings: &mut Findings) -> usize {
+        examples::run(self, &self.tables, findings)
     }
 }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::Mapping;
 use super::format::Name;
-use super::load::TableText;
+use crate::finding::Source;
 
 /// Where a row stands.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -35,7 +35,7 @@ impl fmt::Display for Origin {
 
 /// The row whose named value is `wanted`.
 fn find<R>(
-    text: &TableText,
+    text: &Source,
     section: &'static str,
     rows: &[R],
     name: impl Fn(&R) -> &Name,
@@ -45,9 +45,10 @@ fn find<R>(
     Some(origin(text, section, name(row)))
 }
 
-fn origin(text: &TableText, section: &'static str, name: &Name) -> Origin {
-    let file = text.path.rsplit('/').next().unwrap_or_default().to_owned();
-    Origin { file, line: text.place(name.span().start).0, section, key: name.get_ref().clone() }
+fn origin(text: &Source, section: &'static str, name: &Name) -> Origin {
+    let (path, line, _) = text.place(name.span().start);
+    let file = path.rsplit('/').next().unwrap_or_default().to_owned();
+    Origin { file, line, section, key: name.get_ref().clone() }
 }
 
 /// Rows between CIP Motion and the generic model.

@@ -2,40 +2,44 @@
 
 use std::ops::Range;
 
+use crate::finding::Spanned;
 use profile_generic::program::BitPattern;
 use profile_generic::ratio::Ratio;
-use toml::Spanned;
 
 use super::format::{FieldValueRow, Name, RatioRow};
-use super::load::{FORMAT, TableErrors, TableText};
+use super::load::FORMAT;
+use crate::finding::registry::{self as code, Code};
+use crate::finding::{Findings, Problem, Source, closest};
 
 /// Looks names up on behalf of one file and notes those that nothing has.
 pub(super) struct Resolver<'a> {
-    file: &'a TableText,
-    errors: &'a mut TableErrors,
+    file: &'a Source,
+    errors: &'a mut Findings,
 }
 
 impl<'a> Resolver<'a> {
-    pub fn new(file: &'a TableText, errors: &'a mut TableErrors) -> Self {
+    pub fn new(file: &'a Source, errors: &'a mut Findings) -> Self {
         Self { file, errors }
     }
 
     /// Notes that the value at `span` is wrong.
-    pub fn error(&mut self, span: Range<usize>, key: &str, message: impl Into<String>) {
-        self.errors.push(self.file, span, key, message);
+    pub fn error(&mut self, code: Code, span: Range<usize>, key: &str, message: impl Into<String>) {
+        self.errors.push(self.file, Problem::new(code, span).key(key).expected(message));
     }
 
     /// Checks the head of a file.
     pub fn head(&mut self, format: &Spanned<u32>, key: &str, title: &Name, expected: &str) {
         if *format.get_ref() != FORMAT {
-            self.error(
-                format.span(),
-                "format",
-                format!("expected format {FORMAT}, got {}", format.get_ref()),
-            );
+            let message = format!("expected format {FORMAT}, got {}", format.get_ref());
+            self.error(code::WRONG_HEAD, format.span(), "format", message);
         }
         if title.get_ref() != expected {
-            self.error(title.span(), key, format!("expected `{expected}`, got `{}`", title.get_ref()));
+            self.error(
+                code::WRONG_HEAD,
+                title.span(),
+                key,
+                format!("expected `{expected}`, got `{}`", title.get_ref()),
+            );
         }
     }
 
@@ -48,24 +52,41 @@ impl<'a> Resolver<'a> {
         find: impl FnOnce(&str) -> Option<T>,
         known: impl IntoIterator<Item = &'n str>,
     ) -> Option<T> {
-        let text = name.get_ref().as_str();
-        let found = find(text);
+        let found = find(name.get_ref());
         if found.is_none() {
-            let mut message = format!("expected {what}, got `{text}`");
-            if let Some(closest) = closest(text, known) {
-                message.push_str(&format!("; did you mean `{closest}`?"));
-            }
-            self.error(name.span(), key, message);
+            self.unknown(code::UNKNOWN_NAME, key, name, what, known);
         }
         found
+    }
+
+    /// Notes that nothing has the name.
+    fn unknown<'n>(
+        &mut self,
+        code: Code,
+        key: &str,
+        name: &Name,
+        what: &str,
+        known: impl IntoIterator<Item = &'n str>,
+    ) {
+        let text = name.get_ref().as_str();
+        let problem =
+            Problem::new(code, name.span()).key(key).expected(format!("expected {what}, got `{text}`"));
+        let problem = match closest(text, known) {
+            Some(closest) => problem.help(format!("did you mean `{closest}`?")),
+            None => problem,
+        };
+        self.errors.push(self.file, problem);
     }
 
     /// One of a few words.
     pub fn word<T: Copy>(&mut self, key: &str, name: &Name, words: &[(&str, T)]) -> Option<T> {
         let list: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
         let what = format!("one of {}", list.join(", "));
-        let find = |text: &str| words.iter().find(|(word, _)| *word == text).map(|(_, value)| *value);
-        self.name(key, name, &what, find, list.iter().copied())
+        let found = words.iter().find(|(word, _)| word == name.get_ref()).map(|(_, value)| *value);
+        if found.is_none() {
+            self.unknown(code::UNKNOWN_WORD, key, name, &what, list.iter().copied());
+        }
+        found
     }
 
     /// A ratio above zero.
@@ -73,11 +94,8 @@ impl<'a> Resolver<'a> {
         let [num, den] = *row.get_ref();
         let ratio = Ratio::new(num, den).filter(|ratio| ratio.num() != 0);
         if ratio.is_none() {
-            self.error(
-                row.span(),
-                key,
-                format!("expected two whole numbers other than 0, got [{num}, {den}]"),
-            );
+            let message = format!("expected two whole numbers other than 0, got [{num}, {den}]");
+            self.error(code::OUT_OF_RANGE, row.span(), key, message);
         }
         ratio
     }
@@ -97,51 +115,11 @@ impl<'a> Resolver<'a> {
             let value = *row.is.get_ref();
             if value & !field_mask != 0 {
                 let message = format!("expected a value of {width} bits, got {value}");
-                self.error(row.is.span(), "is", message);
+                self.error(code::FIELD_VALUE, row.is.span(), "is", message);
                 return None;
             }
             pattern = BitPattern::new(pattern.mask | field_mask << low, pattern.value | value << low);
         }
         Some(pattern)
-    }
-}
-
-/// The word closest to `text`, if any is close enough to be what was meant.
-fn closest<'n>(text: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let limit = (text.chars().count() / 3).max(1);
-    let distances = known.into_iter().map(|word| (distance(text, word), word));
-    distances
-        .filter(|(distance, _)| *distance <= limit)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, word)| word)
-}
-
-/// Letters to insert, delete or replace to turn one word into the other; case does not count.
-fn distance(from: &str, to: &str) -> usize {
-    let to: Vec<char> = to.to_lowercase().chars().collect();
-    let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (i, letter) in from.to_lowercase().chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, other) in to.iter().enumerate() {
-            let replaced = diagonal + usize::from(letter != *other);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[to.len()]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_closest_name_is_offered_only_when_it_is_close() {
-        let known = ["position_command", "velocity_command", "torque_command"];
-        assert_eq!(closest("position_comand", known), Some("position_command"));
-        assert_eq!(closest("Velocity_Command", known), Some("velocity_command"));
-        assert_eq!(closest("temperature", known), None);
-        assert_eq!((distance("kitten", "sitting"), distance("", "abc"), distance("abc", "")), (3, 3, 3));
     }
 }

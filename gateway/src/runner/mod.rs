@@ -32,9 +32,10 @@ use crate::config::{Config, Link};
 use crate::engine::build::{BuildError, Built, Host, build};
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::SouthPort;
+use crate::finding::Findings;
 use crate::host::HostPort;
 use crate::latest::Reader;
-use crate::mapping::{Mapping, TableErrors};
+use crate::mapping::Mapping;
 use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
@@ -56,7 +57,7 @@ const STOP_TIME_OUT: Duration = Duration::from_secs(5);
 pub enum StartError {
     /// The mapping tables are faulty.
     #[error("{0}")]
-    Tables(#[from] TableErrors),
+    Tables(#[from] Findings),
     /// The configuration makes no box.
     #[error("{0}")]
     Build(#[from] BuildError),
@@ -124,10 +125,7 @@ pub fn start(
     capture: Option<&Path>,
     settings: &Arc<Store>,
 ) -> Result<RunningBox, StartError> {
-    let mapping = match &config.mappings_dir {
-        Some(dir) => Mapping::from_folder(dir)?,
-        None => Mapping::embedded()?,
-    };
+    let mapping = Mapping::load(config.mappings_dir.as_deref(), &config.overlays)?;
     let wire = match &config.sercos.link {
         Link::Interface { name, ring } => Some(PacketPort::open(name, ring.as_deref())?),
         Link::InProcess { .. } => None,

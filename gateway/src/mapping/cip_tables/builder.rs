@@ -14,6 +14,8 @@ use super::{
     CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes,
     Served, ServedAttribute, Times, capture_kind, has_direction, operating_mode, signal, unit_kind,
 };
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::cip_events::{EventRule, EventTrigger};
 use crate::mapping::compile_cip::{
     CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
@@ -25,14 +27,14 @@ use crate::mapping::format::{
     CipAttributeRow, CipEventRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
     RejectRow,
 };
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 impl CipTables {
     pub(in crate::mapping) fn resolve(
         file: &Parsed<CipGenericFile>,
         dictionaries: &Dictionaries,
-        errors: &mut TableErrors,
+        errors: &mut Findings,
     ) -> Self {
         let mut builder =
             Builder { resolver: Resolver::new(&file.text, errors), dictionaries, tables: Self::default() };
@@ -111,7 +113,12 @@ impl Builder<'_> {
         let code = self.code(set, key, name)?;
         let byte = u8::try_from(code).ok();
         if byte.is_none() {
-            self.resolver.error(name.span(), key, format!("expected a code of one byte, got {code}"));
+            self.resolver.error(
+                code::OUT_OF_RANGE,
+                name.span(),
+                key,
+                format!("expected a code of one byte, got {code}"),
+            );
         }
         byte
     }
@@ -151,14 +158,24 @@ impl Builder<'_> {
             "Feedback Unit" => false,
             other => {
                 let message = format!("expected `Motion Unit` or `Feedback Unit`, got `{other}`");
-                return self.resolver.error(row.enumeration.span(), "enumeration", message);
+                return self.resolver.error(
+                    code::UNKNOWN_WORD,
+                    row.enumeration.span(),
+                    "enumeration",
+                    message,
+                );
             }
         };
         let code = self.code(set, "code", &row.code);
         let kind = unit_kind(&mut self.resolver, &row.kind);
         let nanounits = *row.nanounits.get_ref();
         if nanounits <= 0 {
-            self.resolver.error(row.nanounits.span(), "nanounits", "expected a number above 0");
+            self.resolver.error(
+                code::OUT_OF_RANGE,
+                row.nanounits.span(),
+                "nanounits",
+                "expected a number above 0",
+            );
         }
         let (Some(code), Some(kind)) = (code, kind) else { return };
         let unit = DisplacementUnit { name: row.code.get_ref().clone(), code, kind, nanounits };
@@ -195,16 +212,16 @@ impl Builder<'_> {
         };
         if signal.is_command() != to_generic {
             let message = format!("{signal} cannot go {}", row.direction.get_ref());
-            return self.resolver.error(row.direction.span(), "direction", message);
+            return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
         }
         let carried = element.attributes.first().and_then(|id| self.dictionaries.cip.attribute_by_id(*id));
         let Some(attribute) = carried else {
             let message = format!("element {} carries no attribute", element.name);
-            return self.resolver.error(row.element.span(), "element", message);
+            return self.resolver.error(code::ROW_MISSING, row.element.span(), "element", message);
         };
         let Some(unit) = self.tables.unit(&attribute.unit, signal.quantity()) else {
             let message = no_unit(attribute, signal.quantity());
-            return self.resolver.error(row.element.span(), "element", message);
+            return self.resolver.error(code::UNIT, row.element.span(), "element", message);
         };
         self.tables.cyclic.push(CyclicElement {
             bit: element.bit,
@@ -270,7 +287,7 @@ impl Builder<'_> {
             }
             if let (Some(at), Some(axis_state)) = (at, axis_state) {
                 if seen[at] {
-                    self.resolver.error(row.state.span(), "state", "the state is there twice");
+                    self.resolver.error(code::TWICE, row.state.span(), "state", "the state is there twice");
                 }
                 seen[at] = true;
                 self.tables.states[at] = CipState { axis_state, conditions };
@@ -278,7 +295,12 @@ impl Builder<'_> {
         }
         for (state, _) in DriveState::ALL.iter().zip(seen).filter(|(_, seen)| !seen) {
             let span = rows.mapping.span();
-            self.resolver.error(span, "state", format!("expected a row for state {state}, got none"));
+            self.resolver.error(
+                code::ROW_MISSING,
+                span,
+                "state",
+                format!("expected a row for state {state}, got none"),
+            );
         }
     }
 
@@ -321,7 +343,7 @@ impl Builder<'_> {
             let number = u8::try_from(*bit.get_ref()).ok().filter(|number| (1..=63).contains(number));
             if number.is_none() {
                 let message = format!("expected a bit from 1 to 63, got {}", bit.get_ref());
-                self.resolver.error(bit.span(), "manufacturer", message);
+                self.resolver.error(code::OUT_OF_RANGE, bit.span(), "manufacturer", message);
             }
             let fault = number
                 .and_then(|code| self.axis_fault(row, "Axis Fault - Mfg", Some("Axis Alarm - Mfg"), code));
@@ -345,11 +367,11 @@ impl Builder<'_> {
             let message = format!(
                 "expected one of exception, manufacturer, node_fault, initialization and apr, got {given}"
             );
-            return self.resolver.error(row.cause.span(), "cause", message);
+            return self.resolver.error(code::CONTRADICTION, row.cause.span(), "cause", message);
         }
         if let (Some(cause), [fault]) = (cause, faults.as_slice()) {
             if self.tables.faults.iter().any(|(known, _)| *known == cause) {
-                self.resolver.error(row.cause.span(), "cause", "the cause is there twice");
+                self.resolver.error(code::TWICE, row.cause.span(), "cause", "the cause is there twice");
             }
             self.tables.faults.push((cause, *fault));
             self.exception(row, cause, *fault);
@@ -375,7 +397,7 @@ impl Builder<'_> {
             {
                 if let Some(name) = name {
                     let message = "only an exception has it: this cause is another kind of fault";
-                    self.resolver.error(name.span(), key, message);
+                    self.resolver.error(code::EXCEPTION_ACTION, name.span(), key, message);
                 }
             }
             return;
@@ -383,7 +405,7 @@ impl Builder<'_> {
         if least > major || default > major || default < least {
             let key = if row.default.is_some() { "default" } else { "least" };
             let message = "expected an action that is at least as severe as `least`, at most Major Fault";
-            return self.resolver.error(row.cause.span(), key, message);
+            return self.resolver.error(code::EXCEPTION_ACTION, row.cause.span(), key, message);
         }
         self.tables.exceptions.push(ExceptionRow {
             cause,
@@ -410,7 +432,7 @@ impl Builder<'_> {
         };
         let Some(fault_type) = find("Axis Fault Type", fault) else {
             let message = format!("the dictionary has no Axis Fault Type `{fault}`");
-            self.resolver.error(row.cause.span(), "cause", message);
+            self.resolver.error(code::ROW_MISSING, row.cause.span(), "cause", message);
             return None;
         };
         let alarm_type = alarm.and_then(|name| find("Axis Alarm Type", name));
@@ -471,7 +493,7 @@ impl Builder<'_> {
                 Some(bit) if (1..=15).contains(bit.get_ref()) => 1 << *bit.get_ref(),
                 Some(bit) => {
                     let message = format!("expected a bit from 1 to 15, got {}", bit.get_ref());
-                    self.resolver.error(bit.span(), "manufacturer", message);
+                    self.resolver.error(code::OUT_OF_RANGE, bit.span(), "manufacturer", message);
                     continue;
                 }
             };
@@ -522,13 +544,13 @@ impl Builder<'_> {
                 (None, None, Some(name)) => self.event_signal(row, name),
                 _ => {
                     let message = "expected capture and edge, or a signal";
-                    self.resolver.error(row.event.span(), "event", message);
+                    self.resolver.error(code::CONTRADICTION, row.event.span(), "event", message);
                     None
                 }
             };
             if let (Some(event), Some(checking), Some(trigger)) = (event, checking, trigger) {
                 if self.tables.events.rules.iter().any(|known| known.event == event) {
-                    self.resolver.error(row.event.span(), "event", "the event is there twice");
+                    self.resolver.error(code::TWICE, row.event.span(), "event", "the event is there twice");
                 }
                 let checking = 1 << checking;
                 self.tables.events.rules.push(EventRule { event, checking, trigger });
@@ -547,7 +569,7 @@ impl Builder<'_> {
         if let Some(unit) = &row.unit {
             let Some(found) = self.tables.unit(unit.get_ref(), signal.quantity()) else {
                 let message = format!("no [[unit]] row turns {} into {}", unit.get_ref(), signal.quantity());
-                self.resolver.error(unit.span(), "unit", message);
+                self.resolver.error(code::UNIT, unit.span(), "unit", message);
                 return None;
             };
             self.tables.events.units.push((signal, found));
@@ -574,13 +596,18 @@ impl Builder<'_> {
             }
             _ => {
                 let message = "expected one of parameter, signal and served_by";
-                self.resolver.error(row.attribute.span(), "attribute", message);
+                self.resolver.error(code::CONTRADICTION, row.attribute.span(), "attribute", message);
                 None
             }
         };
         let Some(served) = served else { return };
         if self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id) {
-            self.resolver.error(row.attribute.span(), "attribute", "the attribute is there twice");
+            self.resolver.error(
+                code::TWICE,
+                row.attribute.span(),
+                "attribute",
+                "the attribute is there twice",
+            );
         }
         let range = row.range.map(|[low, high]| (low, high));
         self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
@@ -588,7 +615,12 @@ impl Builder<'_> {
 
     fn reject(&mut self, row: &RejectRow) {
         if row.reason.get_ref().trim().is_empty() {
-            self.resolver.error(row.reason.span(), "reason", "expected a reason, got none");
+            self.resolver.error(
+                code::MISSING_KEY,
+                row.reason.span(),
+                "reason",
+                "expected a reason, got none",
+            );
         }
         for name in &row.attributes {
             let dictionaries = self.dictionaries;
@@ -597,7 +629,7 @@ impl Builder<'_> {
             let served = self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id);
             let twice = self.tables.rejected.iter().any(|(known, _)| *known == attribute.id);
             if served || twice {
-                self.resolver.error(name.span(), "attributes", "the attribute is there twice");
+                self.resolver.error(code::TWICE, name.span(), "attributes", "the attribute is there twice");
             }
             self.tables.rejected.push((attribute.id, row.reason.get_ref().clone()));
         }
@@ -610,16 +642,21 @@ impl Builder<'_> {
             self.resolver.name("parameter", name, what, |text| generic.parameter(text), generic.names())?;
         if parameter.kind != ParameterType::Integer {
             let message = format!("expected a whole number, {} is a {}", name.get_ref(), parameter.kind);
-            self.resolver.error(name.span(), "parameter", message);
+            self.resolver.error(code::WRONG_KIND, name.span(), "parameter", message);
             return None;
         }
         let Some(missing) = &row.missing else {
-            self.resolver.error(name.span(), "missing", "expected `shadow` or `reject`, got nothing");
+            self.resolver.error(
+                code::MISSING_KEY,
+                name.span(),
+                "missing",
+                "expected `shadow` or `reject`, got nothing",
+            );
             return None;
         };
         let reject = self.resolver.word("missing", missing, &[("shadow", false), ("reject", true)])?;
         let Some(unit) = self.tables.unit(&attribute.unit, parameter.quantity) else {
-            self.resolver.error(name.span(), "parameter", no_unit(attribute, parameter.quantity));
+            self.resolver.error(code::UNIT, name.span(), "parameter", no_unit(attribute, parameter.quantity));
             return None;
         };
         Some(Served::Parameter { parameter: parameter.parameter, unit, reject })
@@ -628,7 +665,7 @@ impl Builder<'_> {
     fn signal_attribute(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {
         let signal = signal(&mut self.resolver, "signal", name)?;
         let Some(unit) = self.tables.unit(&attribute.unit, signal.quantity()) else {
-            self.resolver.error(name.span(), "signal", no_unit(attribute, signal.quantity()));
+            self.resolver.error(code::UNIT, name.span(), "signal", no_unit(attribute, signal.quantity()));
             return None;
         };
         Some(Served::Signal { signal, unit })
@@ -649,7 +686,7 @@ impl Builder<'_> {
         for (key, rows, limit) in limits {
             if rows > limit {
                 let message = format!("expected at most {limit} rows, got {rows}");
-                self.resolver.error(file.rows.mapping.span(), key, message);
+                self.resolver.error(code::TOO_MANY, file.rows.mapping.span(), key, message);
             }
         }
         self.tables

@@ -6,8 +6,9 @@ use super::cip_faults::resolve_faults;
 use super::cip_networks::{CipNetwork, resolve_networks};
 use super::cip_services::{CipService, resolve_services};
 use super::{Enumeration, ExceptionAction, FaultRecord, StatusCode, named_code};
+use crate::finding::Findings;
 use crate::mapping::format::{CipAttributeFile, CipEnumerationFile, Name};
-use crate::mapping::load::{Parsed, TableErrors, Tables};
+use crate::mapping::load::{Parsed, Tables};
 use crate::mapping::resolver::Resolver;
 
 /// An element of a data set of the cyclic data block.
@@ -37,7 +38,7 @@ pub struct CipDictionary {
 }
 
 impl CipDictionary {
-    pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
+    pub(super) fn resolve(tables: &Tables, errors: &mut Findings) -> Self {
         let mut dictionary = Self::resolve_attribute_file(&tables.cip_attributes, errors);
         dictionary.resolve_enumeration_file(&tables.cip_enumerations, errors);
         resolve_faults(&tables.cip_faults, &mut dictionary, errors);
@@ -46,14 +47,14 @@ impl CipDictionary {
         dictionary
     }
 
-    fn resolve_enumeration_file(&mut self, file: &Parsed<CipEnumerationFile>, errors: &mut TableErrors) {
+    fn resolve_enumeration_file(&mut self, file: &Parsed<CipEnumerationFile>, errors: &mut Findings) {
         let mut resolver = Resolver::new(&file.text, errors);
         let rows = &file.rows;
         resolver.head(&rows.format, "profile", &rows.profile, "cip-motion");
         resolve_sets(&rows.enumeration, &rows.bits, self, &mut resolver);
     }
 
-    fn resolve_attribute_file(file: &Parsed<CipAttributeFile>, errors: &mut TableErrors) -> Self {
+    fn resolve_attribute_file(file: &Parsed<CipAttributeFile>, errors: &mut Findings) -> Self {
         let mut resolver = Resolver::new(&file.text, errors);
         let rows = &file.rows;
         resolver.head(&rows.format, "profile", &rows.profile, "cip-motion");

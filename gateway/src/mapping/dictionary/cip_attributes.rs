@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use profile_generic::program::Width;
 
+use crate::finding::registry as code;
 use crate::mapping::format::{AttributeRow, CipAttributeFile};
 use crate::mapping::resolver::Resolver;
 
@@ -212,7 +213,7 @@ pub(super) fn resolve_instance_attributes(
         {
             let message =
                 format!("expected an attribute that swaps with this one and has no `polarity`, got {with}");
-            resolver.error(other.span(), "swaps_with", message);
+            resolver.error(code::CONTRADICTION, other.span(), "swaps_with", message);
         }
         if let Some(attribute) = attributes.iter_mut().find(|attribute| attribute.id == id) {
             attribute.polarity = PolarityEffect::Swap(with);
@@ -240,13 +241,13 @@ fn resolve_rows(
     for pair in attributes.windows(2) {
         if pair[0].1.id == pair[1].1.id {
             let message = format!("attribute {} is there twice", pair[1].1.id);
-            resolver.error(pair[1].0.clone(), "id", message);
+            resolver.error(code::TWICE, pair[1].0.clone(), "id", message);
         }
     }
     let mut names = BTreeSet::new();
     for (span, attribute) in &attributes {
         if !names.insert(attribute.name.as_str()) {
-            resolver.error(span.clone(), "name", format!("`{}` is there twice", attribute.name));
+            resolver.error(code::TWICE, span.clone(), "name", format!("`{}` is there twice", attribute.name));
         }
     }
     attributes.into_iter().map(|(_, attribute)| attribute).collect()
@@ -261,7 +262,7 @@ fn push_channels(
     resolver: &mut Resolver<'_>,
 ) {
     if !first.name.contains(" n ") {
-        resolver.error(row.name.span(), "name", "expected `n` for the channel, got none");
+        resolver.error(code::MISSING_KEY, row.name.span(), "name", "expected `n` for the channel, got none");
         return;
     }
     let channels = file.feedback_channels;
@@ -269,7 +270,7 @@ fn push_channels(
         let id = channels.step.checked_mul(channel).and_then(|above| first.id.checked_add(above));
         let Some(id) = id else {
             let message = format!("expected a number that leaves room for {} channels", channels.count);
-            resolver.error(row.id.span(), "id", message);
+            resolver.error(code::OUT_OF_RANGE, row.id.span(), "id", message);
             return;
         };
         let number = channel.saturating_add(1);
@@ -290,7 +291,7 @@ fn resolve_row(
     let need = row.need.get_ref();
     if need.chars().count() != needs || !need.chars().all(|letter| "ROC-".contains(letter)) {
         let message = format!("expected {needs} letters of R, O, C and -, got `{need}`");
-        resolver.error(row.need.span(), "need", message);
+        resolver.error(code::OUT_OF_RANGE, row.need.span(), "need", message);
     }
     let polarity = match &row.polarity {
         Some(name) => resolver.word("polarity", name, &POLARITIES),
@@ -300,7 +301,7 @@ fn resolve_row(
         && min.get_ref() > max.get_ref()
     {
         let message = format!("expected at least {}, got {}", min.get_ref(), max.get_ref());
-        resolver.error(max.span(), "max", message);
+        resolver.error(code::OUT_OF_RANGE, max.span(), "max", message);
     }
     let find = |source: &str| file.clauses.iter().find(|clause| clause.source == source);
     let known = file.clauses.iter().map(|clause| clause.source.as_str());

@@ -2,6 +2,7 @@
 
 use super::cip::CipDictionary;
 use super::{Code, CodeRange, Enumeration, RangeKind, SetKind};
+use crate::finding::registry as code;
 use crate::mapping::format::{CipRangeRow, CipSetRow, DataSetRow, Name, Source};
 use crate::mapping::resolver::Resolver;
 
@@ -20,23 +21,38 @@ pub(super) fn resolve_sets(
 ) {
     for row in enumerations {
         if dictionary.enumeration(row.name.get_ref()).is_some() {
-            resolver.error(row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
         }
         if let Some(width) = &row.width {
-            resolver.error(width.span(), "width", "expected none: only a set of bits has one");
+            resolver.error(
+                code::CONTRADICTION,
+                width.span(),
+                "width",
+                "expected none: only a set of bits has one",
+            );
         }
         let set = resolve_set(row, SetKind::Codes, "code", dictionary, resolver);
         dictionary.enumerations.push(set);
     }
     for row in bits {
         if dictionary.bits(row.name.get_ref()).is_some() {
-            resolver.error(row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
         }
         if let Some(field) = &row.field {
-            resolver.error(field.span(), "field", "expected none: a set of bits is the whole value");
+            resolver.error(
+                code::CONTRADICTION,
+                field.span(),
+                "field",
+                "expected none: a set of bits is the whole value",
+            );
         }
         let Some(width) = row.width.as_ref().map(|width| *width.get_ref()) else {
-            resolver.error(row.name.span(), "width", "expected the bits of the value, got none");
+            resolver.error(
+                code::MISSING_KEY,
+                row.name.span(),
+                "width",
+                "expected the bits of the value, got none",
+            );
             continue;
         };
         let set = resolve_set(row, SetKind::Bits { width }, "bit", dictionary, resolver);
@@ -65,7 +81,7 @@ fn resolve_set(
         SetKind::Bits { width } => {
             if let Some(whole) = whole.filter(|whole| *whole != width) {
                 let message = format!("expected width {whole}, as its attribute has, got {width}");
-                resolver.error(row.name.span(), "width", message);
+                resolver.error(code::OUT_OF_RANGE, row.name.span(), "width", message);
             }
             u64::from(width)
         }
@@ -94,7 +110,7 @@ fn field(set: &mut Enumeration, row: &CipSetRow, whole: u32, resolver: &mut Reso
     set.field = Some((first, last));
     if first > last || last >= whole {
         let message = format!("expected first and last bit below {whole}, got [{first}, {last}]");
-        resolver.error(field.span(), "field", message);
+        resolver.error(code::OUT_OF_RANGE, field.span(), "field", message);
         return whole;
     }
     last - first + 1
@@ -158,7 +174,7 @@ fn hold(
         set.class_attributes.extend(found.map(|row| row.id));
     }
     if attributes.is_empty() && class_attributes.is_empty() && set.element.is_empty() {
-        resolver.error(name.span(), "name", NO_HOLDER);
+        resolver.error(code::CONTRADICTION, name.span(), "name", NO_HOLDER);
     }
 }
 
@@ -194,13 +210,23 @@ fn ranges(set: &mut Enumeration, rows: &[CipRangeRow], beyond: u64, resolver: &m
         let (first, last) = (*row.from.get_ref(), *row.to.get_ref());
         below(beyond, last, row.to.span(), "to", resolver);
         if first > last {
-            resolver.error(row.from.span(), "from", format!("expected at most {last}, got {first}"));
+            resolver.error(
+                code::OUT_OF_RANGE,
+                row.from.span(),
+                "from",
+                format!("expected at most {last}, got {first}"),
+            );
             continue;
         }
         let named = set.codes.iter().any(|code| (first..=last).contains(&code.code));
         let taken = set.ranges.iter().any(|other| first <= other.last && other.first <= last);
         if named || taken {
-            resolver.error(row.from.span(), "from", "the range takes in a code that is there already");
+            resolver.error(
+                code::OVERLAP,
+                row.from.span(),
+                "from",
+                "the range takes in a code that is there already",
+            );
         }
         let Some(kind) = resolver.word("kind", &row.kind, RangeKind::NAMED) else { continue };
         set.ranges.push(CodeRange {
@@ -216,7 +242,12 @@ fn ranges(set: &mut Enumeration, rows: &[CipRangeRow], beyond: u64, resolver: &m
 
 fn below(beyond: u64, number: u32, span: std::ops::Range<usize>, key: &str, resolver: &mut Resolver<'_>) {
     if u64::from(number) >= beyond {
-        resolver.error(span, key, format!("expected a number below {beyond}, got {number}"));
+        resolver.error(
+            code::OUT_OF_RANGE,
+            span,
+            key,
+            format!("expected a number below {beyond}, got {number}"),
+        );
     }
 }
 

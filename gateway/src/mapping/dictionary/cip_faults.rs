@@ -2,8 +2,10 @@
 
 use super::cip::CipDictionary;
 use super::cip_codes::resolve_sets;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{CipFaultFile, ExceptionActionRow, FaultRecordRow, Name, StatusCodeRow};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// What makes a fault, alarm or inhibit go.
@@ -101,7 +103,7 @@ pub struct StatusCode {
 pub(super) fn resolve_faults(
     file: &Parsed<CipFaultFile>,
     dictionary: &mut CipDictionary,
-    errors: &mut TableErrors,
+    errors: &mut Findings,
 ) {
     let mut resolver = Resolver::new(&file.text, errors);
     let rows = &file.rows;
@@ -114,14 +116,14 @@ pub(super) fn resolve_faults(
                 && known.conditions == record.conditions
         };
         if dictionary.fault_records.iter().any(same) {
-            resolver.error(row.conditions.span(), "conditions", "the record is there twice");
+            resolver.error(code::TWICE, row.conditions.span(), "conditions", "the record is there twice");
         }
         dictionary.fault_records.push(record);
     }
     for row in &rows.exception_action {
         let Some(action) = resolve_action(row, dictionary, &mut resolver) else { continue };
         if dictionary.exception_actions.iter().any(|known| known.code == action.code) {
-            resolver.error(row.action.span(), "action", "the action is there twice");
+            resolver.error(code::TWICE, row.action.span(), "action", "the action is there twice");
         }
         dictionary.exception_actions.push(action);
     }
@@ -129,7 +131,7 @@ pub(super) fn resolve_faults(
         let code = resolve_status(row);
         let same = |known: &StatusCode| (known.general, known.extended) == (code.general, code.extended);
         if dictionary.status_codes.iter().any(same) {
-            resolver.error(row.general.span(), "general", "the status is there twice");
+            resolver.error(code::TWICE, row.general.span(), "general", "the status is there twice");
         }
         dictionary.status_codes.push(code);
     }

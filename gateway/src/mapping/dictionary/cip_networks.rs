@@ -3,11 +3,14 @@
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
-use toml::Spanned;
+use crate::finding::Spanned;
 
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{CipNetworkFile, NetworkObjectRow, NetworkRow};
-use crate::mapping::load::{Parsed, TableErrors, TableTexts};
+use crate::mapping::load::{Parsed, TableTexts};
 use crate::mapping::resolver::Resolver;
+use crate::mapping::rows;
 
 /// Name of the network the box speaks to controllers on.
 pub const ETHERNET_IP: &str = "EtherNet/IP";
@@ -85,21 +88,21 @@ pub struct NetworkObject {
 /// The networks as they are built in, for whoever has no tables loaded. Empty if they are faulty, which a test excludes.
 pub fn networks() -> &'static [CipNetwork] {
     static NETWORKS: LazyLock<Vec<CipNetwork>> = LazyLock::new(|| {
-        let mut errors = TableErrors::default();
-        let file = TableTexts::embedded().cip_networks.parse(&mut errors);
+        let mut errors = Findings::default();
+        let file = rows::parse(&TableTexts::embedded().cip_networks, "cip-networks", &[], &mut errors);
         file.map(|file| resolve_networks(&file, &mut errors)).unwrap_or_default()
     });
     &NETWORKS
 }
 
 /// The networks, in the order of the file.
-pub(super) fn resolve_networks(file: &Parsed<CipNetworkFile>, errors: &mut TableErrors) -> Vec<CipNetwork> {
+pub(super) fn resolve_networks(file: &Parsed<CipNetworkFile>, errors: &mut Findings) -> Vec<CipNetwork> {
     let mut resolver = Resolver::new(&file.text, errors);
     resolver.head(&file.rows.format, "profile", &file.rows.profile, "cip-motion");
     let mut networks: Vec<CipNetwork> = Vec::with_capacity(file.rows.network.len());
     for row in &file.rows.network {
         if networks.iter().any(|known| known.name == *row.name.get_ref()) {
-            resolver.error(row.name.span(), "name", "the network is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the network is there twice");
         }
         networks.extend(resolve_network(row, &mut resolver));
     }
@@ -124,7 +127,12 @@ fn resolve_network(row: &NetworkRow, resolver: &mut Resolver<'_>) -> Option<CipN
         formats.extend(axes.map(|axes| (format, axes)));
     }
     if row.formats.get_ref().is_empty() {
-        resolver.error(row.formats.span(), "formats", "expected fixed, variable or both, got nothing");
+        resolver.error(
+            code::MISSING_KEY,
+            row.formats.span(),
+            "formats",
+            "expected fixed, variable or both, got nothing",
+        );
     }
     let trigger = resolver.word("trigger", &row.trigger, &[("cyclic", "cyclic")]);
     let priorities = [("urgent", "urgent"), ("very_high", "very_high")];
@@ -132,7 +140,7 @@ fn resolve_network(row: &NetworkRow, resolver: &mut Resolver<'_>) -> Option<CipN
     let mut objects: Vec<NetworkObject> = Vec::new();
     for object in &row.object {
         if objects.iter().any(|known| known.class == *object.class.get_ref()) {
-            resolver.error(object.class.span(), "class", "the class is there twice");
+            resolver.error(code::TWICE, object.class.span(), "class", "the class is there twice");
         }
         objects.extend(resolve_object(object, resolver));
     }
@@ -157,7 +165,7 @@ fn range(pair: &Spanned<[u8; 2]>, key: &str, resolver: &mut Resolver<'_>) -> Opt
     let [least, most] = *pair.get_ref();
     if least == 0 || least > most {
         let message = format!("expected least and most, from 1 on, got {least} and {most}");
-        resolver.error(pair.span(), key, message);
+        resolver.error(code::OUT_OF_RANGE, pair.span(), key, message);
         return None;
     }
     Some(least..=most)

@@ -1,8 +1,10 @@
 //! The services of the Motion Device Axis Object.
 
 use super::cip_attributes::DEVICE_FUNCTIONS;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{CipServiceFile, ServiceRow};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// One service.
@@ -37,14 +39,19 @@ pub struct CipService {
 }
 
 /// The services, by code.
-pub(super) fn resolve_services(file: &Parsed<CipServiceFile>, errors: &mut TableErrors) -> Vec<CipService> {
+pub(super) fn resolve_services(file: &Parsed<CipServiceFile>, errors: &mut Findings) -> Vec<CipService> {
     let mut resolver = Resolver::new(&file.text, errors);
     resolver.head(&file.rows.format, "profile", &file.rows.profile, "cip-motion");
     let mut services: Vec<CipService> = Vec::with_capacity(file.rows.service.len());
     for row in &file.rows.service {
         let Some(service) = resolve_service(row, &mut resolver) else { continue };
         if services.iter().any(|known| known.code == service.code || known.name == service.name) {
-            resolver.error(row.code.span(), "code", "the service code or its name is there twice");
+            resolver.error(
+                code::TWICE,
+                row.code.span(),
+                "code",
+                "the service code or its name is there twice",
+            );
         }
         services.push(service);
     }
@@ -57,7 +64,12 @@ fn resolve_service(row: &ServiceRow, resolver: &mut Resolver<'_>) -> Option<CipS
     const CARRIERS: [(&str, bool); 2] = [("explicit", false), ("service_data_block", true)];
     let code = *row.code.get_ref();
     if code >= 0x80 {
-        resolver.error(row.code.span(), "code", format!("expected a code below 0x80, got {code:#04x}"));
+        resolver.error(
+            code::OUT_OF_RANGE,
+            row.code.span(),
+            "code",
+            format!("expected a code below 0x80, got {code:#04x}"),
+        );
         return None;
     }
     let class = resolver.word("class", &row.class, &NEEDS);
@@ -67,7 +79,7 @@ fn resolve_service(row: &ServiceRow, resolver: &mut Resolver<'_>) -> Option<CipS
     {
         let message =
             format!("expected {} letters of R, O, C and -, got `{instance}`", DEVICE_FUNCTIONS.len());
-        resolver.error(row.instance.span(), "instance", message);
+        resolver.error(code::OUT_OF_RANGE, row.instance.span(), "instance", message);
     }
     let (mut explicit, mut service_data_block) = (false, false);
     for carrier in &row.via {
@@ -77,7 +89,12 @@ fn resolve_service(row: &ServiceRow, resolver: &mut Resolver<'_>) -> Option<CipS
         }
     }
     if row.via.is_empty() {
-        resolver.error(row.name.span(), "via", "expected what may carry the service, got nothing");
+        resolver.error(
+            code::MISSING_KEY,
+            row.name.span(),
+            "via",
+            "expected what may carry the service, got nothing",
+        );
     }
     Some(CipService {
         code,

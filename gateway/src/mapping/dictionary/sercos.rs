@@ -7,8 +7,10 @@ use super::sercos_bits::{Layout, Word, resolve_words};
 use super::sercos_codes::{CodeSet, resolve_codes};
 use super::sercos_idns::{IdnPart, SercosIdn, parse_idn, resolve_idns};
 use super::sercos_terms::SercosTerms;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{Name, SercosTermFile};
-use crate::mapping::load::{Parsed, TableErrors, Tables};
+use crate::mapping::load::{Parsed, Tables};
 use crate::mapping::resolver::Resolver;
 
 /// What a SERCOS slave and drive have.
@@ -21,7 +23,7 @@ pub struct SercosDictionary {
 }
 
 impl SercosDictionary {
-    pub(super) fn resolve(tables: &Tables, errors: &mut TableErrors) -> Self {
+    pub(super) fn resolve(tables: &Tables, errors: &mut Findings) -> Self {
         let terms = SercosTerms::resolve(&tables.sercos_terms, errors);
         let mut idns = Vec::new();
         resolve_idns(&tables.sercos_idns, IdnPart::Profile, &terms, &mut idns, errors);
@@ -36,7 +38,7 @@ impl SercosDictionary {
     }
 
     /// The scalings name IDNs that there are.
-    fn check_scalings(&self, file: &Parsed<SercosTermFile>, errors: &mut TableErrors) {
+    fn check_scalings(&self, file: &Parsed<SercosTermFile>, errors: &mut Findings) {
         let mut resolver = Resolver::new(&file.text, errors);
         for row in &self.terms.scalings {
             let _ = self.idn_or_error("type", &row.scaling_type, &mut resolver);
@@ -110,6 +112,7 @@ impl SercosDictionary {
         let row = self.idn(idn);
         if row.is_none() {
             resolver.error(
+                code::UNKNOWN_NAME,
                 name.span(),
                 key,
                 format!("expected an IDN of the dictionary, got {}", name.get_ref()),

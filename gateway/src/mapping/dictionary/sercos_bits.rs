@@ -4,8 +4,10 @@ use profile_sercos::wire::idn::Idn;
 
 use super::sercos::SercosDictionary;
 use super::sercos_terms::Trust;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{FieldRow, PatternRow, SercosBitFile, ValueRow, WordRow};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// In which SERCOS a word has these bits.
@@ -143,14 +145,14 @@ impl Word {
 pub(super) fn resolve_words(
     file: &Parsed<SercosBitFile>,
     dictionary: &mut SercosDictionary,
-    errors: &mut TableErrors,
+    errors: &mut Findings,
 ) {
     let mut resolver = Resolver::new(&file.text, errors);
     let rows = &file.rows;
     resolver.head(&rows.format, "profile", &rows.profile, "sercos");
     for row in &rows.word {
         if dictionary.word(row.name.get_ref()).is_some() {
-            resolver.error(row.name.span(), "name", "the word is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the word is there twice");
         }
         if let Some(word) = resolve_word(row, dictionary, &mut resolver) {
             dictionary.words.push(word);
@@ -162,7 +164,12 @@ fn resolve_word(row: &WordRow, dictionary: &SercosDictionary, resolver: &mut Res
     let layout = resolver.word("layout", &row.layout, Layout::NAMED)?;
     let width = *row.width.get_ref();
     if ![8, 16, 32].contains(&width) {
-        resolver.error(row.width.span(), "width", format!("expected 8, 16 or 32, got {width}"));
+        resolver.error(
+            code::OUT_OF_RANGE,
+            row.width.span(),
+            "width",
+            format!("expected 8, 16 or 32, got {width}"),
+        );
         return None;
     }
     let trust = dictionary.terms.trust(&row.source, &row.confidence, resolver);
@@ -173,18 +180,23 @@ fn resolve_word(row: &WordRow, dictionary: &SercosDictionary, resolver: &mut Res
         // A layout of the other SERCOS may have another width.
         if bits.is_some_and(|bits| bits != width && layout != Layout::Sercos12) {
             let message = format!("expected the width of {}, got {width}", idn.number());
-            resolver.error(row.width.span(), "width", message);
+            resolver.error(code::OUT_OF_RANGE, row.width.span(), "width", message);
         }
         let taken =
             dictionary.words.iter().find(|word| word.idns.contains(&idn.idn) && word.layout.meets(layout));
         if let Some(taken) = taken {
             let message = format!("{} is the word `{}` already", idn.number(), taken.name);
-            resolver.error(name.span(), "idns", message);
+            resolver.error(code::TWICE, name.span(), "idns", message);
         }
         idns.push(idn.idn);
     }
     if row.idns.is_empty() && row.element.is_none() {
-        resolver.error(row.name.span(), "name", "expected `idns` or `element`, got neither");
+        resolver.error(
+            code::CONTRADICTION,
+            row.name.span(),
+            "name",
+            "expected `idns` or `element`, got neither",
+        );
     }
     let mut word = Word {
         name: row.name.get_ref().clone(),
@@ -221,19 +233,19 @@ fn resolve_field(
         (Some(bits), None) => ("bits", bits.span(), vec![*bits.get_ref()]),
         (None, Some(parts)) => ("parts", parts.span(), parts.get_ref().clone()),
         (Some(bits), Some(_)) => {
-            resolver.error(bits.span(), "bits", "expected `bits` or `parts`, got both");
+            resolver.error(code::CONTRADICTION, bits.span(), "bits", "expected `bits` or `parts`, got both");
             return None;
         }
         (None, None) => {
             let span = row.name.as_ref().unwrap_or(&word_row.name).span();
-            resolver.error(span, "bits", "expected `bits` or `parts`, got neither");
+            resolver.error(code::CONTRADICTION, span, "bits", "expected `bits` or `parts`, got neither");
             return None;
         }
     };
     if parts.is_empty() || parts.iter().any(|[low, high]| low > high || *high >= word.width) {
         let parts: Vec<String> = parts.iter().map(|[low, high]| format!("[{low}, {high}]")).collect();
         let message = format!("expected first and last bit below {}, got {}", word.width, parts.join(", "));
-        resolver.error(span, key, message);
+        resolver.error(code::OUT_OF_RANGE, span, key, message);
         return None;
     }
     let parts: Vec<(u32, u32)> = parts.into_iter().map(|[low, high]| (low, high)).collect();
@@ -249,16 +261,18 @@ fn resolve_field(
             Some(name) => format!("the bits overlap those of `{name}`"),
             None => "the bits overlap others".to_owned(),
         };
-        resolver.error(span.clone(), key, what);
+        resolver.error(code::OVERLAP, span.clone(), key, what);
     }
     match &row.name {
         Some(name) if row.reserved => {
-            resolver.error(name.span(), "name", "expected no name for reserved bits");
+            resolver.error(code::CONTRADICTION, name.span(), "name", "expected no name for reserved bits");
         }
         Some(name) if word.field_names().any(|known| known == name.get_ref()) => {
-            resolver.error(name.span(), "name", "the field is there twice");
+            resolver.error(code::TWICE, name.span(), "name", "the field is there twice");
         }
-        None if !row.reserved => resolver.error(span, key, "expected a name, or `reserved = true`"),
+        None if !row.reserved => {
+            resolver.error(code::CONTRADICTION, span, key, "expected a name, or `reserved = true`")
+        }
         _ => {}
     }
     let codes = match &row.codes {
@@ -276,7 +290,7 @@ fn resolve_field(
     };
     for value in &row.values {
         if field.values.iter().any(|known| known.value == *value.value.get_ref()) {
-            resolver.error(value.value.span(), "value", "the value is there twice");
+            resolver.error(code::TWICE, value.value.span(), "value", "the value is there twice");
         }
         let value = resolve_value(value, &field, dictionary, resolver);
         field.values.push(value);
@@ -309,13 +323,13 @@ fn resolve_pattern(
     let [low, high] = *row.bits.get_ref();
     if low > high || high >= word.width {
         let message = format!("expected first and last bit below {}, got [{low}, {high}]", word.width);
-        resolver.error(row.bits.span(), "bits", message);
+        resolver.error(code::OUT_OF_RANGE, row.bits.span(), "bits", message);
         return None;
     }
     let value = *row.value.get_ref();
     fits(&row.value, high - low + 1, resolver);
     if word.patterns.iter().any(|known| known.bits == (low, high) && known.value.value == value) {
-        resolver.error(row.value.span(), "value", "the value is there twice");
+        resolver.error(code::TWICE, row.value.span(), "value", "the value is there twice");
     }
     let own = (row.source.as_ref(), row.confidence.as_ref());
     let value = FieldValue {
@@ -327,9 +341,9 @@ fn resolve_pattern(
     Some(Pattern { bits: (low, high), value })
 }
 
-fn fits(value: &toml::Spanned<u32>, width: u32, resolver: &mut Resolver<'_>) {
+fn fits(value: &crate::finding::Spanned<u32>, width: u32, resolver: &mut Resolver<'_>) {
     if width < u32::BITS && value.get_ref() >> width != 0 {
         let message = format!("expected a value of {width} bits, got {}", value.get_ref());
-        resolver.error(value.span(), "value", message);
+        resolver.error(code::FIELD_VALUE, value.span(), "value", message);
     }
 }

@@ -4,8 +4,10 @@ use profile_sercos::wire::idn::Idn;
 
 use super::sercos::SercosDictionary;
 use super::sercos_terms::Trust;
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{SercosCodeFile, SercosCodesRow, SercosRangeRow};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// One named code.
@@ -82,14 +84,14 @@ pub struct CodeSet {
 pub(super) fn resolve_codes(
     file: &Parsed<SercosCodeFile>,
     dictionary: &mut SercosDictionary,
-    errors: &mut TableErrors,
+    errors: &mut Findings,
 ) {
     let mut resolver = Resolver::new(&file.text, errors);
     let rows = &file.rows;
     resolver.head(&rows.format, "profile", &rows.profile, "sercos");
     for row in &rows.enumeration {
         if dictionary.codes(row.name.get_ref()).is_some() {
-            resolver.error(row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
         }
         let set = resolve_set(row, dictionary, &mut resolver);
         dictionary.code_sets.push(set);
@@ -100,7 +102,12 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
     let rows = row.idns.iter().filter_map(|name| dictionary.idn_or_error("idns", name, resolver));
     let holders: Vec<_> = rows.collect();
     if row.idns.is_empty() && row.element.is_none() {
-        resolver.error(row.name.span(), "name", "expected `idns` or `element`, got neither");
+        resolver.error(
+            code::CONTRADICTION,
+            row.name.span(),
+            "name",
+            "expected `idns` or `element`, got neither",
+        );
     }
     let bits = holders.iter().filter_map(|idn| idn.length).map(|length| u32::from(length) * 8).min();
     // What is told in words may be wider than the IDN.
@@ -110,7 +117,7 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
         let [first, last] = *field.get_ref();
         if first > last || last >= whole {
             let message = format!("expected first and last bit below {whole}, got [{first}, {last}]");
-            resolver.error(field.span(), "field", message);
+            resolver.error(code::OUT_OF_RANGE, field.span(), "field", message);
         } else {
             width = last - first + 1;
         }
@@ -129,10 +136,10 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
         let number = *code.code.get_ref();
         fits(&code.code, "code", width, resolver);
         if set.codes.iter().any(|known| known.code == number) {
-            resolver.error(code.code.span(), "code", "the code is there twice");
+            resolver.error(code::TWICE, code.code.span(), "code", "the code is there twice");
         }
         if set.codes.iter().any(|known| known.name == *code.name.get_ref()) {
-            resolver.error(code.name.span(), "name", "the name is there twice");
+            resolver.error(code::TWICE, code.name.span(), "name", "the name is there twice");
         }
         let own = (code.source.as_ref(), code.confidence.as_ref());
         set.codes.push(NamedCode {
@@ -159,13 +166,23 @@ fn resolve_group(
     let (first, last) = (*row.from.get_ref(), *row.to.get_ref());
     fits(&row.to, "to", width, resolver);
     if first > last {
-        resolver.error(row.from.span(), "from", format!("expected at most {last}, got {first}"));
+        resolver.error(
+            code::OUT_OF_RANGE,
+            row.from.span(),
+            "from",
+            format!("expected at most {last}, got {first}"),
+        );
         return None;
     }
     let named = set.codes.iter().any(|code| (first..=last).contains(&code.code));
     let taken = set.groups.iter().any(|other| first <= other.last && other.first <= last);
     if named || taken {
-        resolver.error(row.from.span(), "from", "the range takes in a code that is there already");
+        resolver.error(
+            code::OVERLAP,
+            row.from.span(),
+            "from",
+            "the range takes in a code that is there already",
+        );
     }
     let kind = resolver.word("kind", &row.kind, GroupKind::NAMED)?;
     let own = (row.source.as_ref(), row.confidence.as_ref());
@@ -179,9 +196,9 @@ fn resolve_group(
     })
 }
 
-fn fits(number: &toml::Spanned<u32>, key: &str, width: u32, resolver: &mut Resolver<'_>) {
+fn fits(number: &crate::finding::Spanned<u32>, key: &str, width: u32, resolver: &mut Resolver<'_>) {
     if width < u32::BITS && number.get_ref() >> width != 0 {
         let message = format!("expected a code of {width} bits, got {:#X}", number.get_ref());
-        resolver.error(number.span(), key, message.replace("0X", "0x"));
+        resolver.error(code::OUT_OF_RANGE, number.span(), key, message.replace("0X", "0x"));
     }
 }

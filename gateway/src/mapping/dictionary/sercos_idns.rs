@@ -4,8 +4,10 @@ use profile_sercos::wire::attribute::{Attribute, Format};
 use profile_sercos::wire::idn::Idn;
 
 use super::sercos_terms::{Confidence, SercosTerms};
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{IdnRow, Name, SercosIdnFile};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// How the value of an IDN is displayed.
@@ -150,7 +152,12 @@ pub(super) fn parse_idn(key: &str, name: &Name, resolver: &mut Resolver<'_>) -> 
     match text.replacen(".x.", ".0.", 1).parse() {
         Ok(idn) => Some((idn, every)),
         Err(error) => {
-            resolver.error(name.span(), key, format!("expected an IDN, got `{text}`: {error}"));
+            resolver.error(
+                code::BAD_IDN,
+                name.span(),
+                key,
+                format!("expected an IDN, got `{text}`: {error}"),
+            );
             None
         }
     }
@@ -162,7 +169,7 @@ pub(super) fn resolve_idns(
     part: IdnPart,
     terms: &SercosTerms,
     idns: &mut Vec<SercosIdn>,
-    errors: &mut TableErrors,
+    errors: &mut Findings,
 ) {
     let mut resolver = Resolver::new(&file.text, errors);
     let rows = &file.rows;
@@ -170,7 +177,7 @@ pub(super) fn resolve_idns(
     for row in &rows.idn {
         let Some(idn) = resolve_idn(row, part, terms, &mut resolver) else { continue };
         if idns.iter().any(|known| known.idn == idn.idn) {
-            resolver.error(row.idn.span(), "idn", format!("{} is there twice", idn.number()));
+            resolver.error(code::TWICE, row.idn.span(), "idn", format!("{} is there twice", idn.number()));
         }
         idns.push(idn);
     }
@@ -184,7 +191,12 @@ fn resolve_idn(
 ) -> Option<SercosIdn> {
     let (idn, every_instance) = parse_idn("idn", &row.idn, resolver)?;
     if part == IdnPart::Profile && row.clause.is_none() {
-        resolver.error(row.idn.span(), "clause", "expected the clause of IEC 61800-7-204, got none");
+        resolver.error(
+            code::MISSING_KEY,
+            row.idn.span(),
+            "clause",
+            "expected the clause of IEC 61800-7-204, got none",
+        );
     }
     let trust = terms.trust(&row.source, &row.confidence, resolver);
     let format = match &row.format {
@@ -194,7 +206,12 @@ fn resolve_idn(
     if let Some(length) = &row.length
         && ![1, 2, 4, 8].contains(length.get_ref())
     {
-        resolver.error(length.span(), "length", format!("expected 1, 2, 4 or 8, got {}", length.get_ref()));
+        resolver.error(
+            code::OUT_OF_RANGE,
+            length.span(),
+            "length",
+            format!("expected 1, 2, 4 or 8, got {}", length.get_ref()),
+        );
         return None;
     }
     check_write(row, resolver);
@@ -208,7 +225,12 @@ fn resolve_idn(
         }
         (None, None) => IdnUnit::None,
         (Some(_), Some(unit)) => {
-            resolver.error(unit.span(), "unit", "expected `scaling` or `unit`, got both");
+            resolver.error(
+                code::CONTRADICTION,
+                unit.span(),
+                "unit",
+                "expected `scaling` or `unit`, got both",
+            );
             return None;
         }
     };
@@ -216,7 +238,7 @@ fn resolve_idn(
     let [in_at, in_mdt] = cyclic(row, terms, resolver);
     if trust.confidence == Confidence::Unknown && says_something(row) {
         let message = "expected nothing but number, name and `command` where nothing is known";
-        resolver.error(row.confidence.span(), "confidence", message);
+        resolver.error(code::UNTRUSTED, row.confidence.span(), "confidence", message);
     }
     Some(SercosIdn {
         idn,
@@ -262,7 +284,7 @@ fn check_write(row: &IdnRow, resolver: &mut Resolver<'_>) {
     let rising = phases.windows(2).all(|pair| pair[0] < pair[1]);
     if !rising || phases.iter().any(|phase| !(2..=4).contains(phase)) {
         let message = format!("expected phases 2 to 4 in rising order, got {phases:?}");
-        resolver.error(write.span(), "write", message);
+        resolver.error(code::OUT_OF_RANGE, write.span(), "write", message);
     }
 }
 
@@ -280,7 +302,7 @@ fn check_attribute(row: &IdnRow, format: Option<IdnFormat>, resolver: &mut Resol
         && row.write.as_ref().is_none_or(|write| can_write(attribute, write.get_ref()));
     if !same {
         let message = format!("expected what the row says, got {:#010X}: {attribute}", attribute.0);
-        resolver.error(word.span(), "attribute", message.replace("0X", "0x"));
+        resolver.error(code::CONTRADICTS_ATTRIBUTE, word.span(), "attribute", message.replace("0X", "0x"));
     }
 }
 
@@ -294,7 +316,12 @@ fn cyclic(row: &IdnRow, terms: &SercosTerms, resolver: &mut Resolver<'_>) -> [St
     let Some(cyclic) = &row.cyclic else { return [String::new(), String::new()] };
     let keys = cyclic.get_ref();
     if keys.at.is_none() && keys.mdt.is_none() {
-        resolver.error(cyclic.span(), "cyclic", "expected `at`, `mdt` or both, got neither");
+        resolver.error(
+            code::CONTRADICTION,
+            cyclic.span(),
+            "cyclic",
+            "expected `at`, `mdt` or both, got neither",
+        );
     }
     [("at", &keys.at), ("mdt", &keys.mdt)].map(|(key, source)| match source {
         Some(source) => {

@@ -1,7 +1,9 @@
 //! What the rows of the SERCOS dictionary refer to: documents, units, scalings and function groups.
 
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::format::{Name, SercosTermFile, Source};
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 
 /// How far a row can be trusted.
@@ -73,7 +75,7 @@ pub struct SercosTerms {
 }
 
 impl SercosTerms {
-    pub(super) fn resolve(file: &Parsed<SercosTermFile>, errors: &mut TableErrors) -> Self {
+    pub(super) fn resolve(file: &Parsed<SercosTermFile>, errors: &mut Findings) -> Self {
         let mut resolver = Resolver::new(&file.text, errors);
         let rows = &file.rows;
         resolver.head(&rows.format, "profile", &rows.profile, "sercos");
@@ -81,7 +83,12 @@ impl SercosTerms {
             let mut known: Vec<&str> = Vec::new();
             for name in names {
                 if known.contains(&name.get_ref().as_str()) {
-                    resolver.error(name.span(), key, format!("`{}` is there twice", name.get_ref()));
+                    resolver.error(
+                        code::TWICE,
+                        name.span(),
+                        key,
+                        format!("`{}` is there twice", name.get_ref()),
+                    );
                 }
                 known.push(name.get_ref());
             }
@@ -134,12 +141,12 @@ impl SercosTerms {
                 Some(document) => families.push(&document.family),
                 None => {
                     let message = format!("expected keys of documents of sercos-terms.toml, got `{name}`");
-                    resolver.error(source.span(), key, message);
+                    resolver.error(code::UNTRUSTED, source.span(), key, message);
                 }
             }
         }
         if source.get_ref().trim().is_empty() {
-            resolver.error(source.span(), key, "expected at least one key of a document");
+            resolver.error(code::UNTRUSTED, source.span(), key, "expected at least one key of a document");
         }
         families
     }
@@ -151,7 +158,7 @@ impl SercosTerms {
         if mark == Some(Confidence::High) && families.len() < 2 {
             let message =
                 format!("expected documents of two families for `high`, got `{}`", source.get_ref());
-            resolver.error(confidence.span(), "confidence", message);
+            resolver.error(code::UNTRUSTED, confidence.span(), "confidence", message);
         }
         Trust { source: source.get_ref().clone(), confidence: mark.unwrap_or(Confidence::Low) }
     }
@@ -167,7 +174,12 @@ impl SercosTerms {
             (Some(source), Some(confidence)) => self.trust(source, confidence, resolver),
             (None, None) => otherwise.clone(),
             (Some(name), None) | (None, Some(name)) => {
-                resolver.error(name.span(), "source", "expected both `source` and `confidence`, or neither");
+                resolver.error(
+                    code::UNTRUSTED,
+                    name.span(),
+                    "source",
+                    "expected both `source` and `confidence`, or neither",
+                );
                 otherwise.clone()
             }
         }

@@ -1,12 +1,14 @@
 //! Rows of the CIP Motion dictionary.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::{Name, Source};
 
 /// `mappings/dictionary/cip-attributes.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipAttributeFile {
     /// Version of the file format.
@@ -26,7 +28,7 @@ pub struct CipAttributeFile {
 }
 
 /// How the attributes of the feedback channels repeat.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelsRow {
     /// How many channels there are.
@@ -36,7 +38,7 @@ pub struct ChannelsRow {
 }
 
 /// Where a source stands in the standard.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClauseRow {
     /// The source as rows name it.
@@ -48,7 +50,7 @@ pub struct ClauseRow {
 }
 
 /// One attribute of the Motion Device Axis Object.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AttributeRow {
     /// Attribute number.
@@ -93,7 +95,7 @@ pub struct AttributeRow {
 }
 
 /// A data set of the cyclic data block.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataSetRow {
     /// Name of the set.
@@ -110,7 +112,7 @@ pub struct DataSetRow {
 }
 
 /// One element of a data set.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ElementRow {
     /// Bit in the data set.
@@ -128,7 +130,7 @@ pub struct ElementRow {
 }
 
 /// `mappings/dictionary/cip-enumerations.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipEnumerationFile {
     /// Version of the file format.
@@ -142,7 +144,7 @@ pub struct CipEnumerationFile {
 }
 
 /// A set of named codes or of named bits.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipSetRow {
     /// Name of the set.
@@ -172,7 +174,7 @@ pub struct CipSetRow {
 }
 
 /// One named code or bit.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipCodeRow {
     /// The code; `bit`, its number from 0, in a set of bits.
@@ -192,7 +194,7 @@ pub struct CipCodeRow {
 }
 
 /// Codes or bits without a name of their own.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipRangeRow {
     /// The first of them.
@@ -210,7 +212,7 @@ pub struct CipRangeRow {
 }
 
 /// `mappings/dictionary/cip-services.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipServiceFile {
     /// Version of the file format.
@@ -222,7 +224,7 @@ pub struct CipServiceFile {
 }
 
 /// One service.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ServiceRow {
     /// Service code.

@@ -1,12 +1,14 @@
 //! Rows of the faults in the CIP Motion dictionary.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::{CipSetRow, Name, Source};
 
 /// `mappings/dictionary/cip-faults.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipFaultFile {
     /// Version of the file format.
@@ -26,7 +28,7 @@ pub struct CipFaultFile {
 }
 
 /// What one type of fault or alarm means.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultRecordRow {
     /// Set that names the codes.
@@ -54,7 +56,7 @@ pub struct FaultRecordRow {
 }
 
 /// What one exception action does.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExceptionActionRow {
     /// Name in the set Axis Exception Action.
@@ -70,7 +72,7 @@ pub struct ExceptionActionRow {
 }
 
 /// A general status code and where it occurs.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StatusCodeRow {
     /// General status.

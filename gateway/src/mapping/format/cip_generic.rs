@@ -1,12 +1,14 @@
 //! Rows of the mapping between CIP Motion and the generic model.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::{Name, Source, UnitRow};
 
 /// `mappings/cip-generic.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipGenericFile {
     /// Version of the file format.
@@ -54,7 +56,7 @@ pub struct CipGenericFile {
 }
 
 /// An event and what brings it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipEventRow {
     /// Code of Event Type.
@@ -74,7 +76,7 @@ pub struct CipEventRow {
 }
 
 /// How a capture ended, and the Event Status that says so.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaptureStatusRow {
     /// How the capture ended.
@@ -86,7 +88,7 @@ pub struct CaptureStatusRow {
 }
 
 /// Which attributes define what a count is.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipScalingRow {
     /// Attribute that chooses who scales.
@@ -114,7 +116,7 @@ pub struct CipScalingRow {
 }
 
 /// What a displacement unit is in the generic model.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DisplacementUnitRow {
     /// Enumeration that names the unit.
@@ -130,7 +132,7 @@ pub struct DisplacementUnitRow {
 }
 
 /// A cyclic element and its signal.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CyclicRow {
     /// Data set.
@@ -154,7 +156,7 @@ pub struct CyclicRow {
 }
 
 /// A worked example of a cyclic element or attribute.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipExampleRow {
     /// Code of the displacement unit, where it matters.
@@ -178,7 +180,7 @@ pub struct CipExampleRow {
 }
 
 /// An integer or a floating point number.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Number {
     /// An integer.
@@ -188,7 +190,7 @@ pub enum Number {
 }
 
 /// A control mode and its operating mode.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipModeRow {
     /// Control mode.
@@ -200,7 +202,7 @@ pub struct CipModeRow {
 }
 
 /// A feedback mode that an axis can be enabled with.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FeedbackModeRow {
     /// Feedback mode.
@@ -210,7 +212,7 @@ pub struct FeedbackModeRow {
 }
 
 /// An Axis Control request and the generic request it makes.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RequestRow {
     /// Axis Control code.
@@ -224,7 +226,7 @@ pub struct RequestRow {
 }
 
 /// What the device asks of a drive and the generic request it makes.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriveActionRow {
     /// `none`, `power_up`, `enable`, `test`, `disable`, `shutdown` or `abort`.
@@ -236,7 +238,7 @@ pub struct DriveActionRow {
 }
 
 /// A drive state and what it means to the axis state machine.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipStateRow {
     /// Drive state.
@@ -250,7 +252,7 @@ pub struct CipStateRow {
 }
 
 /// Generic status bits and the Axis Status bit they make.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StatusRow {
     /// Status bits that must all be set.
@@ -264,7 +266,7 @@ pub struct StatusRow {
 }
 
 /// A fault cause and how CIP reports it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipFaultRow {
     /// Generic cause.
@@ -290,7 +292,7 @@ pub struct CipFaultRow {
 }
 
 /// A reaction and the Axis Fault Action it is reported as.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReactionRow {
     /// Generic reaction.
@@ -304,7 +306,7 @@ pub struct ReactionRow {
 }
 
 /// An inhibit and its start inhibit.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InhibitRow {
     /// Generic inhibit.
@@ -318,7 +320,7 @@ pub struct InhibitRow {
 }
 
 /// A stopping action and what the generic model does for it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StoppingRow {
     /// Stopping Action code.
@@ -334,7 +336,7 @@ pub struct StoppingRow {
 }
 
 /// The attributes that say how the start and stop sequences run.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SequenceRow {
     /// Chooses a `[[stopping]]` row.
@@ -360,7 +362,7 @@ pub struct SequenceRow {
 }
 
 /// Attributes that the device does not have, and why.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RejectRow {
     /// Why.
@@ -370,7 +372,7 @@ pub struct RejectRow {
 }
 
 /// An attribute and what stands behind it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipAttributeRow {
     /// The attribute.

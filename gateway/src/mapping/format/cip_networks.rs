@@ -1,12 +1,14 @@
 //! Rows of the CIP networks.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::Name;
 
 /// `mappings/dictionary/cip-networks.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CipNetworkFile {
     /// Version of the file format.
@@ -18,7 +20,7 @@ pub struct CipNetworkFile {
 }
 
 /// CIP Motion on one network.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkRow {
     /// Name of the network.
@@ -52,7 +54,7 @@ pub struct NetworkRow {
 }
 
 /// Axes of a node by the format of its connection.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxesOfRow {
     /// With the fixed one.
@@ -62,7 +64,7 @@ pub struct AxesOfRow {
 }
 
 /// An object class of a device.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkObjectRow {
     /// Class code.

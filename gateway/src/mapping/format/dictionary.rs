@@ -1,12 +1,14 @@
 //! Rows of the generic dictionary.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::Name;
 
 /// `mappings/dictionary/generic.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GenericFile {
     /// Version of the file format.
@@ -20,7 +22,7 @@ pub struct GenericFile {
 }
 
 /// A signal of the generic model.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SignalRow {
     /// Name in snake case.
@@ -32,7 +34,7 @@ pub struct SignalRow {
 }
 
 /// A parameter of the generic model.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterRow {
     /// Name in snake case.

@@ -1,12 +1,14 @@
 //! Rows of the mapping between the generic model and SERCOS.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::{Name, RatioRow, Source, UnitRow};
 
 /// `mappings/generic-sercos.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GenericSercosFile {
     /// Version of the file format.
@@ -46,7 +48,7 @@ pub struct GenericSercosFile {
 }
 
 /// The drive's lists of the values that it takes in telegrams.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConfigurableDataRow {
     /// List for the drive's telegram.
@@ -58,7 +60,7 @@ pub struct ConfigurableDataRow {
 }
 
 /// How a drive captures.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosCaptureRow {
     /// Source of the capture.
@@ -85,7 +87,7 @@ pub struct SercosCaptureRow {
 }
 
 /// The words that every telegram begins with.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WordsRow {
     /// Control word.
@@ -101,7 +103,7 @@ pub struct WordsRow {
 }
 
 /// A field that has a value.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldValueRow {
     /// Name of the field.
@@ -111,7 +113,7 @@ pub struct FieldValueRow {
 }
 
 /// A bit of a polarity parameter.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolarityRow {
     /// The parameter.
@@ -121,7 +123,7 @@ pub struct PolarityRow {
 }
 
 /// The value whose sign is that of the axis.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DirectionRow {
     /// Its polarity.
@@ -131,7 +133,7 @@ pub struct DirectionRow {
 }
 
 /// How the unit of a quantity follows from the drive's scaling parameters.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosScalingRow {
     /// The `scaling` of the dictionary rows it applies to.
@@ -157,7 +159,7 @@ pub struct SercosScalingRow {
 }
 
 /// Values that refer to the load.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadRow {
     /// Mask and value in the scaling type.
@@ -169,7 +171,7 @@ pub struct LoadRow {
 }
 
 /// Modulo processing.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModuloRow {
     /// Mask and value in the scaling type.
@@ -181,7 +183,7 @@ pub struct ModuloRow {
 }
 
 /// One scaling type.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScalingMethodRow {
     /// Mask and value in the scaling type.
@@ -212,7 +214,7 @@ pub struct ScalingMethodRow {
 }
 
 /// A worked example of a scaling.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScalingExampleRow {
     /// `rotary` or `linear`.
@@ -232,7 +234,7 @@ pub struct ScalingExampleRow {
 }
 
 /// A signal and its IDN.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosSignalRow {
     /// Signal of the generic model.
@@ -250,7 +252,7 @@ pub struct SercosSignalRow {
 }
 
 /// An operating mode on SERCOS.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosModeRow {
     /// Operating mode.
@@ -268,7 +270,7 @@ pub struct SercosModeRow {
 }
 
 /// A place where the drive keeps an operation mode.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModeSlotRow {
     /// Value of the mode fields of control and status word.
@@ -280,7 +282,7 @@ pub struct ModeSlotRow {
 }
 
 /// What the control word becomes by an action.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ActionRow {
     /// Generic action.
@@ -294,7 +296,7 @@ pub struct ActionRow {
 }
 
 /// What a status word says.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportRow {
     /// Fields of the status word.
@@ -308,7 +310,7 @@ pub struct ReportRow {
 }
 
 /// A status bit in a word.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosStatusRow {
     /// Word.
@@ -324,7 +326,7 @@ pub struct SercosStatusRow {
 }
 
 /// A fault or warning in a diagnostic word.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosFaultRow {
     /// Word.
@@ -340,7 +342,7 @@ pub struct SercosFaultRow {
 }
 
 /// A parameter and its IDN.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosParameterRow {
     /// Generic parameter.
@@ -364,7 +366,7 @@ pub struct SercosParameterRow {
 }
 
 /// One step of commissioning.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CommissionRow {
     /// Communication phase, 2 to 4.
@@ -389,7 +391,7 @@ pub struct CommissionRow {
 }
 
 /// When a step of commissioning applies: all that is given must hold.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WhenRow {
     /// `rotary` or `linear`.

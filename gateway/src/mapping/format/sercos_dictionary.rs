@@ -1,12 +1,14 @@
 //! Rows of the SERCOS dictionary.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::Spanned;
+
+use crate::finding::Spanned;
 
 use super::{Name, Source};
 
 /// `mappings/dictionary/sercos-terms.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosTermFile {
     /// Version of the file format.
@@ -24,7 +26,7 @@ pub struct SercosTermFile {
 }
 
 /// A document.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceRow {
     /// The key by which rows name it.
@@ -36,7 +38,7 @@ pub struct SourceRow {
 }
 
 /// A unit.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosUnitRow {
     /// The unit as rows name it.
@@ -46,7 +48,7 @@ pub struct SercosUnitRow {
 }
 
 /// A quantity whose unit the drive's scaling gives.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuantityRow {
     /// The quantity as rows name it.
@@ -59,7 +61,7 @@ pub struct QuantityRow {
 }
 
 /// A function group or drive function.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupRow {
     /// The group as rows name it.
@@ -69,7 +71,7 @@ pub struct GroupRow {
 }
 
 /// `mappings/dictionary/sercos-idns.toml` and `sercos-communication.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosIdnFile {
     /// Version of the file format.
@@ -81,7 +83,7 @@ pub struct SercosIdnFile {
 }
 
 /// One IDN.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdnRow {
     /// The number, as in `S-0-0047` or `S-0-1050.x.6`.
@@ -125,7 +127,7 @@ pub struct IdnRow {
 }
 
 /// Who says that a telegram can carry an IDN.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdnCyclicRow {
     /// Keys of the documents that have it in the AT.
@@ -135,7 +137,7 @@ pub struct IdnCyclicRow {
 }
 
 /// `mappings/dictionary/sercos-bits.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosBitFile {
     /// Version of the file format.
@@ -147,7 +149,7 @@ pub struct SercosBitFile {
 }
 
 /// A word with named fields.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WordRow {
     /// Name of the word.
@@ -175,7 +177,7 @@ pub struct WordRow {
 }
 
 /// A field of a word.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldRow {
     /// First and last bit.
@@ -201,7 +203,7 @@ pub struct FieldRow {
 }
 
 /// A named value of a field.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValueRow {
     /// The value.
@@ -217,7 +219,7 @@ pub struct ValueRow {
 }
 
 /// A value that several fields have together.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PatternRow {
     /// First and last bit.
@@ -235,7 +237,7 @@ pub struct PatternRow {
 }
 
 /// `mappings/dictionary/sercos-codes.toml`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosCodeFile {
     /// Version of the file format.
@@ -247,7 +249,7 @@ pub struct SercosCodeFile {
 }
 
 /// A set of named codes.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosCodesRow {
     /// Name of the set.
@@ -273,7 +275,7 @@ pub struct SercosCodesRow {
 }
 
 /// One named code.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosCodeRow {
     /// The code.
@@ -289,7 +291,7 @@ pub struct SercosCodeRow {
 }
 
 /// Codes without a name of their own.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SercosRangeRow {
     /// The first of them.

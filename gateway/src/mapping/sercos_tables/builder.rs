@@ -15,6 +15,8 @@ use super::{
     Elements, FaultRule, FixedUnit, ModeRule, ParameterRule, Polarity, SercosTables, SignalRule, SlotRule,
     StepKind, StepRule,
 };
+use crate::finding::Findings;
+use crate::finding::registry as code;
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
 use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
@@ -23,7 +25,7 @@ use crate::mapping::format::{
     CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ScalingMethodRow, SercosCaptureRow,
     SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
 };
-use crate::mapping::load::{Parsed, TableErrors};
+use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
 use crate::mapping::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
 
@@ -32,7 +34,7 @@ impl SercosTables {
         file: &Parsed<GenericSercosFile>,
         dictionaries: &Dictionaries,
         cip: &CipTables,
-        errors: &mut TableErrors,
+        errors: &mut Findings,
     ) -> Self {
         let rows = &file.rows;
         let mut builder = Builder {
@@ -90,7 +92,7 @@ impl<'a> Builder<'a> {
             return Some((*idn, word));
         }
         let message = format!("expected a word of one IDN, `{}` has {}", word.name, word.idns.len());
-        self.resolver.error(name.span(), key, message);
+        self.resolver.error(code::OUT_OF_RANGE, name.span(), key, message);
         None
     }
 
@@ -101,7 +103,12 @@ impl<'a> Builder<'a> {
     fn units(&mut self, rows: &GenericSercosFile) {
         for row in &rows.unit {
             if let Some(times) = &row.times {
-                self.resolver.error(times.span(), "times", "expected no `times` for a fixed unit");
+                self.resolver.error(
+                    code::CONTRADICTION,
+                    times.span(),
+                    "times",
+                    "expected no `times` for a fixed unit",
+                );
             }
             let quantity = quantity(&mut self.resolver, &row.quantity);
             let ratio = self.resolver.ratio("generic_per_unit", &row.generic_per_unit);
@@ -140,7 +147,7 @@ impl<'a> Builder<'a> {
                 if !self.measures(feed, Quantity::None) {
                     let message =
                         format!("expected an IDN with a fixed unit of [[unit]], {} has none", feed.idn);
-                    self.resolver.error(name.span(), "feed", message);
+                    self.resolver.error(code::UNIT, name.span(), "feed", message);
                 }
                 Some(feed.idn)
             }
@@ -202,7 +209,12 @@ impl<'a> Builder<'a> {
             (Some(value), None) => Some(Term::Fixed(value)),
             (None, Some(name)) => self.idn(key, name).map(|row| Term::Drive(row.idn)),
             (Some(_), Some(name)) => {
-                self.resolver.error(name.span(), key, "expected a number or an IDN, got both");
+                self.resolver.error(
+                    code::CONTRADICTION,
+                    name.span(),
+                    key,
+                    "expected a number or an IDN, got both",
+                );
                 None
             }
         }
@@ -212,7 +224,12 @@ impl<'a> Builder<'a> {
         let idn = self.idn("polarity", &row.idn)?.idn;
         let bit = *row.bit.get_ref();
         if bit > 15 {
-            self.resolver.error(row.bit.span(), "bit", format!("expected a bit from 0 to 15, got {bit}"));
+            self.resolver.error(
+                code::OUT_OF_RANGE,
+                row.bit.span(),
+                "bit",
+                format!("expected a bit from 0 to 15, got {bit}"),
+            );
         }
         Some(Polarity { idn, bit })
     }
@@ -228,18 +245,18 @@ impl<'a> Builder<'a> {
         };
         if signal.is_command() != to_drive {
             let message = format!("{signal} cannot go {}", row.direction.get_ref());
-            return self.resolver.error(row.direction.span(), "direction", message);
+            return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
         }
         if idn.length.is_none() || idn.list {
             let message = format!("expected an IDN of known length, {} has none in the dictionary", idn.idn);
-            return self.resolver.error(row.idn.span(), "idn", message);
+            return self.resolver.error(code::NO_LENGTH, row.idn.span(), "idn", message);
         }
         if !self.measures(idn, signal.quantity()) {
             let message = format!("the unit of {} is no {}", idn.idn, signal.quantity());
-            return self.resolver.error(row.idn.span(), "idn", message);
+            return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
         if self.tables.signal(signal).is_some() {
-            self.resolver.error(row.signal.span(), "signal", "the signal is there twice");
+            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
         }
         let polarity = row.polarity.as_ref().and_then(|row| self.polarity(row));
         self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity });
@@ -269,13 +286,18 @@ impl<'a> Builder<'a> {
             codes.extend(code.and_then(|code| u16::try_from(code).ok()));
         }
         if codes.is_empty() {
-            self.resolver.error(row.mode.span(), "codes", "expected at least one operation mode");
+            self.resolver.error(
+                code::MISSING_KEY,
+                row.mode.span(),
+                "codes",
+                "expected at least one operation mode",
+            );
         }
         let command = self.mapped_signals("command", &row.command);
         let actual = self.mapped_signals("actual", &row.actual);
         if let Some(mode) = mode {
             if self.tables.modes.iter().any(|known| known.mode == mode) {
-                self.resolver.error(row.mode.span(), "mode", "the mode is there twice");
+                self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
             }
             self.tables.modes.push(ModeRule { mode, codes, command, actual });
         }
@@ -286,10 +308,20 @@ impl<'a> Builder<'a> {
         for name in names {
             let Some(signal) = signal(&mut self.resolver, key, name) else { continue };
             if self.tables.signal(signal).is_none() {
-                self.resolver.error(name.span(), key, format!("no [[signal]] row for {signal}"));
+                self.resolver.error(
+                    code::ROW_MISSING,
+                    name.span(),
+                    key,
+                    format!("no [[signal]] row for {signal}"),
+                );
             }
             if signal.is_command() != (key == "command") {
-                self.resolver.error(name.span(), key, format!("{signal} belongs to the other telegram"));
+                self.resolver.error(
+                    code::DIRECTION,
+                    name.span(),
+                    key,
+                    format!("{signal} belongs to the other telegram"),
+                );
             }
             signals.push(signal);
         }
@@ -305,7 +337,7 @@ impl<'a> Builder<'a> {
         let sercos = &self.dictionaries.sercos;
         let (Some(control), Some(status)) = (sercos.word_of(control), sercos.word_of(status)) else {
             let message = "expected IDNs whose words the dictionary describes";
-            return self.resolver.error(rows.words.control.span(), "control", message);
+            return self.resolver.error(code::ROW_MISSING, rows.words.control.span(), "control", message);
         };
         for row in &rows.mode_slot {
             let value = |field: &Name| [FieldValueRow { field: field.clone(), is: row.slot.clone() }];
@@ -325,7 +357,7 @@ impl<'a> Builder<'a> {
                     Some(idn) if idn.command => Some(idn.idn),
                     Some(idn) => {
                         let message = format!("expected a procedure command, {} is none", idn.idn);
-                        self.resolver.error(name.span(), "command", message);
+                        self.resolver.error(code::NOT_A_COMMAND, name.span(), "command", message);
                         None
                     }
                     None => None,
@@ -339,7 +371,7 @@ impl<'a> Builder<'a> {
         for action in Action::ALL {
             if !self.tables.actions.iter().any(|(known, _)| known == action) {
                 let message = format!("expected a row for action {action}, got none");
-                self.resolver.error(rows.mapping.span(), "action", message);
+                self.resolver.error(code::ROW_MISSING, rows.mapping.span(), "action", message);
             }
         }
         for row in &rows.report {
@@ -353,7 +385,7 @@ impl<'a> Builder<'a> {
         if self.tables.reports.len() > MAX_STATE_ROWS {
             let message =
                 format!("expected at most {MAX_STATE_ROWS} rows, got {}", self.tables.reports.len());
-            self.resolver.error(rows.mapping.span(), "report", message);
+            self.resolver.error(code::TOO_MANY, rows.mapping.span(), "report", message);
         }
         for row in &rows.status {
             let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
@@ -361,7 +393,7 @@ impl<'a> Builder<'a> {
             let Some((idn, word)) = self.word("word", &row.word) else { continue };
             if idn != self.tables.status_word {
                 let message = format!("expected the status word of the telegram, got {idn}");
-                self.resolver.error(row.word.span(), "word", message);
+                self.resolver.error(code::OUT_OF_RANGE, row.word.span(), "word", message);
             }
             if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
                 self.tables.status.push((pattern, bit, row.acknowledges));
@@ -388,7 +420,7 @@ impl<'a> Builder<'a> {
             if !reaction.stops() && self.exceptions.iter().any(|row| severe(&row)) {
                 let message =
                     "the drive only warns: expected a cause whose exception has default = \"Alarm\"";
-                self.resolver.error(row.cause.span(), "cause", message);
+                self.resolver.error(code::WARNING_STOPS, row.cause.span(), "cause", message);
             }
             self.tables.faults.push(FaultRule { word: idn, pattern, cause, reaction });
         }
@@ -403,7 +435,7 @@ impl<'a> Builder<'a> {
         for row in &rows.capture {
             let Some(rule) = self.capture(row) else { continue };
             if self.tables.captures.iter().any(|known| known.kind == rule.kind) {
-                self.resolver.error(row.capture.span(), "capture", "the capture is there twice");
+                self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is there twice");
             }
             self.tables.captures.push(rule);
         }
@@ -425,7 +457,7 @@ impl<'a> Builder<'a> {
                 Some(name) => *found = Some(self.idn(key, name)?),
                 None if needed => {
                     let message = format!("expected an IDN, got none for {}", row.by.get_ref());
-                    self.resolver.error(row.by.span(), key, message);
+                    self.resolver.error(code::MISSING_KEY, row.by.span(), key, message);
                     return None;
                 }
                 None => {}
@@ -437,11 +469,11 @@ impl<'a> Builder<'a> {
             && !self.measures(value, Quantity::Position)
         {
             let message = format!("the unit of {} is no {}", value.idn, Quantity::Position);
-            self.resolver.error(name.span(), "value", message);
+            self.resolver.error(code::UNIT, name.span(), "value", message);
         }
         if let (Some(command), Some(name)) = (command.filter(|command| !command.command), &row.command) {
             let message = format!("expected a procedure command, {} is none", command.idn);
-            self.resolver.error(name.span(), "command", message);
+            self.resolver.error(code::NOT_A_COMMAND, name.span(), "command", message);
         }
         let word = match (&row.word, by) {
             (Some(name), 0 | 2) => {
@@ -451,7 +483,7 @@ impl<'a> Builder<'a> {
             (None, 1 | 3) => None,
             _ => {
                 let message = "expected a word for a latch or an input, and for nothing else";
-                self.resolver.error(row.by.span(), "word", message);
+                self.resolver.error(code::CONTRADICTION, row.by.span(), "word", message);
                 return None;
             }
         };
@@ -471,7 +503,7 @@ impl<'a> Builder<'a> {
             (3, None, None, None, None) if is_sequence => CaptureBy::Sequence,
             _ => {
                 let message = format!("{} does not go with these keys", row.by.get_ref());
-                self.resolver.error(row.by.span(), "by", message);
+                self.resolver.error(code::CONTRADICTION, row.by.span(), "by", message);
                 return None;
             }
         };
@@ -507,17 +539,22 @@ impl<'a> Builder<'a> {
         };
         if row.unit_by_drive != (idn.unit == IdnUnit::None && quantity != Quantity::None) {
             let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for no other";
-            self.resolver.error(row.idn.span(), "unit_by_drive", message);
+            self.resolver.error(code::UNIT, row.idn.span(), "unit_by_drive", message);
         } else if !row.unit_by_drive && !self.measures(idn, quantity) {
             let message = format!("the unit of {} is no {quantity}", idn.idn);
-            return self.resolver.error(row.idn.span(), "idn", message);
+            return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
         if to_drive && idn.write.as_ref().is_some_and(Vec::is_empty) {
             let message = format!("{} is read only", idn.idn);
-            self.resolver.error(row.direction.span(), "direction", message);
+            self.resolver.error(code::READ_ONLY, row.direction.span(), "direction", message);
         }
         if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
-            self.resolver.error(row.parameter.span(), "parameter", "the parameter is there twice");
+            self.resolver.error(
+                code::TWICE,
+                row.parameter.span(),
+                "parameter",
+                "the parameter is there twice",
+            );
         }
         let idn = idn.idn;
         let unit_by_drive = row.unit_by_drive;
@@ -530,7 +567,7 @@ impl<'a> Builder<'a> {
         let phase = *row.phase.get_ref();
         if !(2..=4).contains(&phase) {
             let message = format!("expected a phase from 2 to 4, got {phase}");
-            self.resolver.error(row.phase.span(), "phase", message);
+            self.resolver.error(code::OUT_OF_RANGE, row.phase.span(), "phase", message);
         }
         let words = [
             ("write", Verb::Write),
@@ -574,11 +611,11 @@ impl<'a> Builder<'a> {
             (Verb::Write, Some(idn), Some(value), None) => {
                 if idn.write.as_ref().is_some_and(|phases| !phases.contains(&phase)) {
                     let message = format!("{} cannot be written in CP{phase}", idn.idn);
-                    self.resolver.error(row.phase.span(), "phase", message);
+                    self.resolver.error(code::PHASE, row.phase.span(), "phase", message);
                 }
                 if idn.length.is_none() || idn.list {
                     let message = format!("expected an IDN of known length, {} has none", idn.idn);
-                    self.resolver.error(value.span(), "value", message);
+                    self.resolver.error(code::NO_LENGTH, value.span(), "value", message);
                 }
                 Some(StepKind::WriteValue(idn.idn, *value.get_ref()))
             }
@@ -587,7 +624,7 @@ impl<'a> Builder<'a> {
                 let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
                 if rule.is_none_or(|rule| !rule.to_drive) {
                     let message = "expected a parameter with a [[parameter]] row that goes to the drive";
-                    self.resolver.error(name.span(), "parameter", message);
+                    self.resolver.error(code::ROW_MISSING, name.span(), "parameter", message);
                 }
                 Some(StepKind::WriteParameter(parameter))
             }
@@ -620,7 +657,7 @@ impl<'a> Builder<'a> {
             _ => {
                 let message = "expected `write` with idn and value or with parameter, `read` with idn, \
                                `command` with the idn of a procedure command, or a step without any";
-                self.resolver.error(row.step.span(), "do", message);
+                self.resolver.error(code::CONTRADICTION, row.step.span(), "do", message);
                 None
             }
         }

@@ -1,11 +1,12 @@
 //! Tables that are broken on purpose.
 
 use super::*;
+use crate::finding::registry as code;
 
 fn broken(change: impl Fn(&mut TableTexts)) -> String {
     let mut texts = TableTexts::embedded();
     change(&mut texts);
-    match Mapping::from_texts(texts) {
+    match Mapping::from_texts(&texts) {
         Ok(_) => "nothing found".to_owned(),
         Err(errors) => errors.to_string(),
     }
@@ -372,8 +373,8 @@ fn errors_carry_their_place_as_numbers() {
     let mut texts = TableTexts::embedded();
     replace(&mut texts.cip_generic, "signal = \"position_command\"", "signal = \"position_comand\"");
     let line = texts.cip_generic.text.lines().position(|line| line.contains("position_comand")).unwrap() + 1;
-    let errors = Mapping::from_texts(texts).unwrap_err();
-    let [error] = errors.0.as_slice() else { panic!("{errors}") };
+    let errors = Mapping::from_texts(&texts).unwrap_err();
+    let [error] = errors.list() else { panic!("{errors}") };
     assert_eq!((error.line, error.column, error.key.as_str()), (line, 10, "signal"));
     assert_eq!(error.file, "mappings/cip-generic.toml");
 }
@@ -406,8 +407,8 @@ fn errors_of_the_sercos_dictionary_carry_their_exact_place() {
         let (path, text) = (table(&mut texts).path.clone(), table(&mut texts).text.clone());
         let (line, content) = (1..).zip(text.lines()).find(|(_, content)| content.contains(wrong)).unwrap();
         let column = content.find(wrong).unwrap() + 1;
-        let errors = Mapping::from_texts(texts).unwrap_err();
-        let [error] = errors.0.as_slice() else { panic!("{errors}") };
+        let errors = Mapping::from_texts(&texts).unwrap_err();
+        let [error] = errors.list() else { panic!("{errors}") };
         assert_eq!((error.file.as_str(), error.line, error.column), (path.as_str(), line, column), "{error}");
         assert_eq!(error.key, *key, "{error}");
     }
@@ -433,8 +434,9 @@ fn a_changed_ratio_makes_an_example_fail() {
         for _ in 0..before {
             replace(table(&mut texts), from, to);
         }
-        let failures = Mapping::from_texts(texts).unwrap().run_examples().unwrap_err();
-        assert!(!failures.is_empty(), "{from}");
+        let mut findings = Findings::default();
+        Mapping::from_texts(&texts).unwrap().run_examples(&mut findings);
+        assert!(findings.list().iter().any(|found| found.code == code::EXAMPLE_FAILS), "{from}");
     }
 }
 
@@ -450,7 +452,7 @@ fn a_folder_replaces_files_and_may_hold_no_others() {
     assert_eq!(name.as_deref(), Some("Position set-point"));
     std::fs::write(folder.join("cip_generic.toml"), "").unwrap();
     let errors = Mapping::from_folder(&folder).unwrap_err();
-    assert!(errors.0[0].message.contains("got `cip_generic.toml`"), "{errors}");
+    assert!(errors.list()[0].expected.contains("got `cip_generic.toml`"), "{errors}");
     std::fs::remove_dir_all(&folder).unwrap();
-    assert!(Mapping::from_folder(&folder).unwrap_err().0[0].message.starts_with("cannot read"));
+    assert!(Mapping::from_folder(&folder).unwrap_err().list()[0].code == code::UNREADABLE);
 }

@@ -29,19 +29,18 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use profile_cip::controller::{Condition, ControllerConfig, Step};
 use profile_generic::time::DurationNs;
-use thiserror::Error;
 use toml::de::{DeTable, DeValue};
 
 use self::attributes::Attribute;
 pub use self::connection::Places;
 use self::reader::{Keys, Problems};
 use self::step::Frame;
-use crate::config::{Diagnostic, FILE_LEN_MAX, Report, diagnose};
+use crate::config::FILE_LEN_MAX;
+use crate::finding::{Findings, Source, read_file, tree};
 use crate::mapping::{CipDictionary, Mapping};
 
 /// A script that has been read and checked.
@@ -59,67 +58,31 @@ pub struct Script {
     pub titles: Vec<(String, Option<usize>)>,
 }
 
-/// Why there is no script.
-#[derive(Debug, Error)]
-pub enum ScriptError {
-    /// The file cannot be read.
-    #[error("cannot read the script {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// The file is far too long for a script.
-    #[error("{} has {length} bytes, expected a script of at most {FILE_LEN_MAX}", path.display())]
-    TooLong {
-        /// The file.
-        path: PathBuf,
-        /// Its length.
-        length: u64,
-    },
-    /// The file has faults.
-    #[error("{report}")]
-    Invalid {
-        /// Every fault with its lines of the file, as plain text.
-        report: Report,
-        /// The same for programs.
-        diagnostics: Vec<Diagnostic>,
-    },
-}
-
 impl Script {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// [`ScriptError`]: the file cannot be read, or what is wrong in it, each fault at its place.
-    pub fn load(path: &Path, mapping: &Mapping) -> Result<Self, ScriptError> {
-        let unreadable = |source| ScriptError::Read { path: path.to_owned(), source };
-        let length = std::fs::metadata(path).map_err(unreadable)?.len();
-        if length > FILE_LEN_MAX {
-            return Err(ScriptError::TooLong { path: path.to_owned(), length });
-        }
-        let source = std::fs::read_to_string(path).map_err(unreadable)?;
+    /// The file cannot be read, or what is wrong in it, each fault at its place.
+    pub fn load(path: &Path, mapping: &Mapping) -> Result<Self, Findings> {
+        let source = read_file(path, FILE_LEN_MAX)?;
         Self::parse(&source, &path.display().to_string(), mapping)
     }
 
     /// Checks the text of a script; `name` stands in the errors.
     ///
     /// # Errors
-    /// [`ScriptError::Invalid`] with every fault found.
-    pub fn parse(source: &str, name: &str, mapping: &Mapping) -> Result<Self, ScriptError> {
+    /// Every fault found.
+    pub fn parse(source: &str, name: &str, mapping: &Mapping) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        let text = Source::new(name, source);
         let problems = Problems::default();
-        let (table, errors) = DeTable::parse_recoverable(source);
-        problems.syntax(&errors);
         // What stands behind a fault of the syntax may be read wrongly.
-        let script = if errors.is_empty() { read(table.get_ref(), source, mapping, &problems) } else { None };
-        let found = problems.take();
+        let script = tree(source, &text, &mut findings)
+            .and_then(|table| read(table.get_ref(), source, mapping, &problems));
+        problems.take().into_iter().for_each(|problem| findings.push(&text, problem));
         match script {
-            Some(script) if found.is_empty() => Ok(script),
-            _ => {
-                let (report, diagnostics) = diagnose(source, name, found);
-                Err(ScriptError::Invalid { report, diagnostics })
-            }
+            Some(script) if findings.is_empty() => Ok(script),
+            _ => Err(findings),
         }
     }
 }

@@ -8,7 +8,8 @@ use profile_generic::time::DurationNs;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::config::{Problem, duration};
+use crate::config::duration;
+use crate::finding::{Problem, registry as code};
 
 /// A value with its place.
 pub(super) type Value<'t> = Spanned<DeValue<'t>>;
@@ -20,14 +21,9 @@ pub(super) struct Problems(RefCell<Vec<Problem>>);
 impl Problems {
     /// Adds one; `None`, so that it can be returned.
     pub fn report<T>(&self, span: Range<usize>, title: impl Display, expected: impl Display) -> Option<T> {
-        let (title, expected) = (title.to_string(), expected.to_string());
-        self.0.borrow_mut().push(Problem { span, title, expected, related: None });
+        let problem = Problem::new(code::SCRIPT, span).title(title.to_string());
+        self.0.borrow_mut().push(problem.expected(expected.to_string()));
         None
-    }
-
-    /// Adds the errors of the TOML itself.
-    pub fn syntax(&self, errors: &[toml::de::Error]) {
-        self.0.borrow_mut().extend(errors.iter().map(Problem::from_toml));
     }
 
     /// What was found, in the order of the file.

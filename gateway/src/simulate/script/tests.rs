@@ -19,7 +19,7 @@ fn mapping() -> Mapping {
     Mapping::embedded().expect("the shipped tables are sound")
 }
 
-fn parse(text: &str) -> Result<Script, ScriptError> {
+fn parse(text: &str) -> Result<Script, Findings> {
     Script::parse(text, "script.toml", &mapping())
 }
 
@@ -31,11 +31,11 @@ fn good(text: &str) -> Script {
 fn problems(text: &str, mapping: &Mapping) -> String {
     match Script::parse(text, "script.toml", mapping) {
         Ok(script) => format!("accepted: {:?}\n", script.steps),
-        Err(ScriptError::Invalid { diagnostics, .. }) => diagnostics
+        Err(findings) => findings
+            .list()
             .iter()
             .map(|d| format!("  {}:{} {} | {}\n", d.line, d.column, d.title, d.expected))
             .collect(),
-        Err(error) => panic!("{error}"),
     }
 }
 

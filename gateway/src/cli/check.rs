@@ -1,0 +1,130 @@
+//! `axisbridge check`: reads tables, overlays and a configuration as a lawyer would.
+
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+use super::{CheckArguments, CheckFormat, CliError};
+use crate::check::{Outcome, Request, check};
+use crate::finding::registry::{self, Code, REGISTRY};
+use crate::finding::{Severity, json_report};
+
+/// Exit status of a wrong command line, as clap has it.
+const USAGE: u8 = 2;
+
+/// Checks, or tells of the codes.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
+    if let Some(text) = &arguments.explain {
+        return match Code::parse(text) {
+            Some(code) => print(&format!("{}\n", code.entry()), ExitCode::SUCCESS),
+            None => {
+                eprintln!(
+                    "error: there is no code `{text}`: expected AX and four digits; --list has all of them"
+                );
+                Ok(ExitCode::from(USAGE))
+            }
+        };
+    }
+    if arguments.list {
+        return print(&list(arguments.format), ExitCode::SUCCESS);
+    }
+    if arguments.format == CheckFormat::Markdown {
+        eprintln!("error: --format markdown is for --list");
+        return Ok(ExitCode::from(USAGE));
+    }
+    let outcome = check(&Request { config: arguments.config.as_deref(), mappings: &arguments.mappings });
+    let findings = &outcome.findings;
+    let bad = findings.has_errors() || findings.count(Severity::Warning) > 0;
+    let text = match arguments.format {
+        CheckFormat::Json => format!("{:#}\n", json_report(findings)),
+        CheckFormat::Text | CheckFormat::Markdown => text(arguments, &outcome),
+    };
+    print(&text, if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn print(text: &str, code: ExitCode) -> Result<ExitCode, CliError> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Ok(()) => Ok(code),
+        // Whoever reads has seen enough, as `head` has.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(code),
+        Err(error) => Err(format!("cannot write: {error}").into()),
+    }
+}
+
+fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
+    let findings = &outcome.findings;
+    let mut text = String::new();
+    let shown = findings.list().iter().filter(|found| arguments.notes || found.severity() != Severity::Note);
+    for finding in shown {
+        let _ = writeln!(text, "{finding}\n");
+    }
+    if findings.beyond() > 0 {
+        let _ = writeln!(text, "{} more are not shown\n", findings.beyond());
+    }
+    let count = |severity| findings.count(severity);
+    let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
+    let _ = write!(
+        text,
+        "{}, {}, {}",
+        plural(errors, "error"),
+        plural(warnings, "warning"),
+        plural(notes, "note")
+    );
+    if notes > 0 && !arguments.notes {
+        text.push_str(" (--notes shows them)");
+    }
+    let overlays = if outcome.overlays > 0 {
+        format!(", {}", plural(outcome.overlays, "overlay"))
+    } else {
+        String::new()
+    };
+    let axes = if arguments.config.is_some() {
+        format!(", {}", plural(outcome.axes, "axis"))
+    } else {
+        String::new()
+    };
+    let _ = writeln!(
+        text,
+        "; checked the tables{overlays}{axes} and {}",
+        plural(outcome.examples, "worked example")
+    );
+    text
+}
+
+fn plural(count: usize, what: &str) -> String {
+    match (count, what) {
+        (1, _) => format!("1 {what}"),
+        (_, "axis") => format!("{count} axes"),
+        _ => format!("{count} {what}s"),
+    }
+}
+
+fn list(format: CheckFormat) -> String {
+    match format {
+        CheckFormat::Markdown => registry::page(),
+        CheckFormat::Json => {
+            let entries = REGISTRY.iter().map(|entry| {
+                serde_json::json!({
+                    "code": entry.code.to_string(),
+                    "severity": entry.severity.name(),
+                    "title": entry.title,
+                    "explanation": entry.explanation,
+                    "example": entry.example,
+                    "remedy": entry.remedy,
+                })
+            });
+            format!("{:#}\n", serde_json::Value::Array(entries.collect()))
+        }
+        CheckFormat::Text => {
+            let mut text = String::new();
+            for entry in REGISTRY {
+                let _ = writeln!(text, "{} {:7} {}", entry.code, entry.severity.name(), entry.title);
+            }
+            text
+        }
+    }
+}

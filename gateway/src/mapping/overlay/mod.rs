@@ -1,0 +1,211 @@
+//! A machine's own rows, laid over the shipped tables row by row.
+//!
+//! An overlay is a file of its own. It has rows of any table, each under the table's name, in the form of the table:
+//!
+//! ```toml
+//! format = 1
+//! overlay = "drives of line 4"
+//! base = ["drive-family.toml"]   # overlays that come before this one
+//!
+//! [[generic-sercos.parameter]]   # known by its parameter: the other keys stay as they were
+//! parameter = "jerk_limit"
+//! missing = "reject"
+//! ```
+//!
+//! A row that has the same identity ([`sections`]) as one that is there changes the keys that it has; `remove = true` takes it
+//! away, `remove = ["reaction"]` takes keys away; any other row is added.
+
+mod merge;
+mod sections;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Deserialize;
+use toml::de::{DeTable, DeValue};
+
+use super::load::{FILES, FORMAT, MAX_FILE_BYTES, TableTexts, table_name};
+use crate::finding::registry as code;
+use crate::finding::{Findings, Problem, Source, Spanned, closest, deserialize, read_file, tree};
+
+pub(super) use merge::lay;
+pub use sections::{Section, sections};
+
+/// The most overlays: one for the family of drives, one for the drive, one for the machine are usual.
+pub const OVERLAYS_MAX: usize = 64;
+
+/// The text of an overlay and what it is called in messages.
+#[derive(Debug, Clone)]
+pub struct Overlay {
+    /// Path as shown in messages.
+    pub path: Arc<str>,
+    /// The whole text.
+    pub text: Arc<str>,
+}
+
+impl Overlay {
+    /// An overlay that is no file.
+    pub fn new(path: &str, text: &str) -> Self {
+        Self { path: path.into(), text: text.into() }
+    }
+}
+
+/// The head of an overlay; the tables are read row by row.
+#[derive(Debug, Deserialize, schemars::JsonSchema)]
+pub struct OverlayHead {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// What it is for, in words.
+    pub overlay: Spanned<String>,
+    /// Overlays that come before this one; the paths count from the folder of this file.
+    #[serde(default)]
+    pub base: Vec<Spanned<String>>,
+}
+
+/// The keys of the head.
+const HEAD: [&str; 3] = ["format", "overlay", "base"];
+
+/// An overlay as a tree.
+pub(super) struct Layer<'t> {
+    overlay: &'t Overlay,
+    tree: DeTable<'t>,
+}
+
+impl<'t> Layer<'t> {
+    /// Whether it has rows of a table.
+    pub fn touches(&self, table: &str) -> bool {
+        self.tree.contains_key(table)
+    }
+
+    /// Adds its text to a source, and returns where it begins there.
+    pub fn add_to(&self, source: &mut Source) -> usize {
+        source.push(Arc::clone(&self.overlay.path), Arc::clone(&self.overlay.text))
+    }
+
+    /// Its rows of a table.
+    fn rows(&self, table: &str) -> Option<&toml::Spanned<DeValue<'t>>> {
+        self.tree.get(table)
+    }
+}
+
+/// The overlays as trees, heads checked.
+pub(super) fn layers<'t>(overlays: &'t [Overlay], findings: &mut Findings) -> Vec<Layer<'t>> {
+    overlays.iter().filter_map(|overlay| layer(overlay, findings)).collect()
+}
+
+fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>> {
+    let source = Source::new(&overlay.path, &overlay.text);
+    let tree = tree(&overlay.text, &source, findings)?;
+    let head: Option<OverlayHead> = deserialize(tree.clone(), &source, findings);
+    if let Some(head) = &head
+        && *head.format.get_ref() != FORMAT
+    {
+        let message = format!("expected format {FORMAT}, got {}", head.format.get_ref());
+        findings.push(
+            &source,
+            Problem::new(code::WRONG_HEAD, head.format.span()).key("format").expected(message),
+        );
+    }
+    let tree = tree.into_inner();
+    let names: Vec<&str> = FILES.iter().map(|(path, _)| table_name(path)).collect();
+    for key in tree.keys().filter(|key| !HEAD.contains(&key.get_ref().as_ref())) {
+        let name = key.get_ref().as_ref();
+        if !names.contains(&name) {
+            let problem = Problem::new(code::UNKNOWN_TABLE, key.span()).key(name);
+            let problem =
+                problem.expected(format!("expected rows of a table, such as [[{}.parameter]]", names[12]));
+            let close = closest(name, names.iter().copied());
+            findings.push(
+                &source,
+                match close {
+                    Some(close) => problem.help(format!("did you mean `{close}`?")),
+                    None => problem.help(format!("the tables are {}", names.join(", "))),
+                },
+            );
+        }
+    }
+    Some(Layer { overlay, tree })
+}
+
+impl TableTexts {
+    /// Lays a file, or the files of a folder in the order of their names, over the tables; what they build on comes first. What
+    /// cannot be read, or builds on itself, is a finding.
+    pub fn lay_over(&mut self, path: &Path, findings: &mut Findings) {
+        let mut files = vec![path.to_owned()];
+        if path.is_dir() {
+            match path.read_dir() {
+                Ok(entries) => files = entries.flatten().map(|entry| entry.path()).collect(),
+                Err(error) => {
+                    findings.push_file(code::UNREADABLE, path, format!("expected a folder, got: {error}"))
+                }
+            }
+            files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+            files.sort();
+        }
+        let mut reader = Reader { overlays: &mut self.overlays, findings, above: Vec::new() };
+        for file in files {
+            reader.read(&file, None);
+        }
+    }
+}
+
+/// Reads overlays with what they build on.
+struct Reader<'a> {
+    overlays: &'a mut Vec<Overlay>,
+    findings: &'a mut Findings,
+    /// The overlays that build on the one that is read, by their real paths.
+    above: Vec<PathBuf>,
+}
+
+impl Reader<'_> {
+    /// Reads a file, once; `asked` is where another one names it.
+    fn read(&mut self, path: &Path, asked: Option<(&Source, &Spanned<String>)>) {
+        let shown = path.display().to_string();
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if self.above.contains(&real) {
+            if let Some((source, name)) = asked {
+                let way: Vec<String> = self
+                    .above
+                    .iter()
+                    .chain([&real])
+                    .filter_map(|path| path.file_name())
+                    .map(|name| name.to_string_lossy().into_owned())
+                    .collect();
+                let problem = Problem::new(code::OVERLAY_CYCLE, name.span()).key("base");
+                let problem = problem.expected(format!("this one builds on itself: {}", way.join(" on ")));
+                self.findings.push(source, problem);
+            }
+            return;
+        }
+        if self.overlays.iter().any(|known| *known.path == *shown) {
+            return;
+        }
+        if self.overlays.len() >= OVERLAYS_MAX {
+            return self.findings.push_file(
+                code::TOO_MANY,
+                path,
+                format!("expected at most {OVERLAYS_MAX} overlays"),
+            );
+        }
+        let text = match read_file(path, MAX_FILE_BYTES) {
+            Ok(text) => text,
+            Err(found) => {
+                if let Some((source, name)) = asked {
+                    let problem = Problem::new(code::UNREADABLE, name.span()).key("base");
+                    self.findings.push(source, problem.expected("expected an overlay"));
+                }
+                return self.findings.extend(found);
+            }
+        };
+        let source = Source::new(&shown, &text);
+        // A head that is wrong is told when the overlay is laid over.
+        let head = toml::from_str::<OverlayHead>(&text).ok();
+        self.above.push(real);
+        for name in head.iter().flat_map(|head| &head.base) {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            self.read(&folder.join(name.get_ref()), Some((&source, name)));
+        }
+        self.above.pop();
+        self.overlays.push(Overlay { path: shown.into(), text: text.into() });
+    }
+}

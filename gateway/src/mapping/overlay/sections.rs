@@ -1,0 +1,115 @@
+//! What makes a row the row that it is.
+
+/// A list of rows in a table, or in a row.
+#[derive(Debug, Clone, Copy)]
+pub struct Section {
+    /// The key of the list.
+    pub name: &'static str,
+    /// The keys that tell one row from another. A row has the first of them at least.
+    pub key: &'static [&'static str],
+    /// Whether the first row that fits wins, so that rows that are added come before those that are there.
+    pub first_wins: bool,
+    /// Lists of rows in a row that are laid over row by row as well; any other list is replaced as a whole.
+    pub lists: &'static [Section],
+}
+
+const fn section(name: &'static str, key: &'static [&'static str]) -> Section {
+    Section { name, key, first_wins: false, lists: &[] }
+}
+
+const fn first(name: &'static str, key: &'static [&'static str]) -> Section {
+    Section { first_wins: true, ..section(name, key) }
+}
+
+const fn nested(name: &'static str, key: &'static [&'static str], lists: &'static [Section]) -> Section {
+    Section { lists, ..section(name, key) }
+}
+
+const RANGES: Section = section("ranges", &["from"]);
+const CODES: &[Section] = &[section("codes", &["code"]), RANGES];
+const BITS: &[Section] = &[section("bits", &["bit"]), RANGES];
+const SETS: [Section; 2] = [nested("enumeration", &["name"], CODES), nested("bits", &["name"], BITS)];
+const ELEMENTS: &[Section] = &[section("elements", &["bit"]), RANGES];
+const OBJECTS: &[Section] = &[section("object", &["class"])];
+const VALUES: &[Section] = &[section("values", &["value"])];
+const FIELDS: &[Section] =
+    &[nested("fields", &["bits", "parts"], VALUES), section("patterns", &["bits", "value"])];
+const METHODS: &[Section] = &[first("methods", &["pattern"])];
+
+const GENERIC: &[Section] = &[section("signal", &["name"]), section("parameter", &["name"])];
+
+const CIP_ATTRIBUTES: &[Section] = &[
+    section("clauses", &["source"]),
+    section("class_attribute", &["id"]),
+    section("attribute", &["id"]),
+    nested("data_set", &["name"], ELEMENTS),
+];
+
+const CIP_FAULTS: &[Section] = &[
+    SETS[0],
+    SETS[1],
+    section("fault_record", &["conditions", "fault_type", "alarm_type"]),
+    section("exception_action", &["action"]),
+    section("status", &["general", "extended"]),
+];
+
+const SERCOS_TERMS: &[Section] = &[
+    section("source", &["key"]),
+    section("unit", &["unit"]),
+    section("scaling", &["scaling"]),
+    section("group", &["group"]),
+];
+
+const CIP_GENERIC: &[Section] = &[
+    section("unit", &["unit", "quantity"]),
+    section("displacement_unit", &["enumeration", "code"]),
+    section("cyclic", &["set", "element"]),
+    section("mode", &["control_mode"]),
+    section("feedback_mode", &["feedback_mode"]),
+    section("request", &["axis_control"]),
+    section("drive_action", &["drive_action"]),
+    section("state", &["state"]),
+    section("status", &["status", "mode", "axis_status"]),
+    section("fault", &["cause"]),
+    section("reaction", &["reaction"]),
+    section("inhibit", &["inhibit"]),
+    section("stopping", &["stopping_action"]),
+    section("event", &["event"]),
+    section("capture_status", &["status"]),
+    section("attribute", &["attribute"]),
+    section("reject", &["reason"]),
+];
+
+const GENERIC_SERCOS: &[Section] = &[
+    section("unit", &["unit", "quantity"]),
+    nested("scaling", &["scaling"], METHODS),
+    section("signal", &["signal"]),
+    section("mode", &["mode", "feedback"]),
+    section("mode_slot", &["slot"]),
+    section("action", &["action"]),
+    first("report", &["pattern", "acknowledges"]),
+    section("status", &["status", "word", "pattern", "acknowledges"]),
+    first("fault", &["word", "pattern"]),
+    section("parameter", &["parameter"]),
+    section("capture", &["capture", "edge"]),
+    section("commission", &["do", "phase", "idn", "parameter", "value", "when"]),
+];
+
+/// The lists of a table by its name; everything else in it is a table of single keys.
+pub fn sections(table: &str) -> &'static [Section] {
+    match table {
+        "generic" => GENERIC,
+        "cip-attributes" => CIP_ATTRIBUTES,
+        "cip-enumerations" => &SETS,
+        "cip-faults" => CIP_FAULTS,
+        "cip-services" => const { &[section("service", &["code"])] },
+        "cip-networks" => const { &[nested("network", &["name"], OBJECTS)] },
+        "sercos-terms" => SERCOS_TERMS,
+        "sercos-idns" | "sercos-communication" => const { &[section("idn", &["idn"])] },
+        "sercos-bits" => const { &[nested("word", &["name", "layout"], FIELDS)] },
+        "sercos-codes" => const { &[nested("enumeration", &["name"], CODES)] },
+        "cip-generic" => CIP_GENERIC,
+        "generic-sercos" => GENERIC_SERCOS,
+        _ => &[],
+    }
+}

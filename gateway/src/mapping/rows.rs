@@ -1,0 +1,28 @@
+//! From the text of a table file to its rows.
+
+use serde::de::DeserializeOwned;
+
+use super::load::{Parsed, TableText};
+use super::overlay::{self, Layer};
+use crate::finding::{Findings, Source, deserialize, tree};
+
+/// The rows of a table with what is laid over it; `None` when something is wrong with them.
+pub(super) fn parse<T: DeserializeOwned>(
+    table: &TableText,
+    name: &str,
+    layers: &[Layer],
+    findings: &mut Findings,
+) -> Option<Parsed<T>> {
+    let mut text = Source::new(&table.path, &table.text);
+    let is_plain = !layers.iter().any(|layer| layer.touches(name));
+    if is_plain && let Ok(rows) = toml::from_str(&table.text) {
+        return Some(Parsed { text, rows });
+    }
+    let mut tree = tree(&table.text, &text, findings)?;
+    let bases: Vec<usize> = layers.iter().map(|layer| layer.add_to(&mut text)).collect();
+    for (layer, base) in layers.iter().zip(bases).filter(|(layer, _)| layer.touches(name)) {
+        overlay::lay(layer, base, name, tree.get_mut(), &text, findings);
+    }
+    let rows = deserialize(tree, &text, findings)?;
+    Some(Parsed { text, rows })
+}
