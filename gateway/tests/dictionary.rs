@@ -267,7 +267,10 @@ fn a_folder_replaces_the_tables_and_its_errors_are_told() {
     let output = run(&["cip", "--part", "services", "--mappings", place]);
     assert_eq!(output.status.code(), Some(1));
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(errors.contains("`code`: expected a code below 0x80, got 0x8e"), "{errors}");
+    assert!(
+        errors.contains("error[AX0013]: `code`") && errors.contains("expected a code below 0x80, got 0x8e"),
+        "{errors}"
+    );
     assert!(errors.contains(&format!("{}:", file.display())), "{errors}");
     std::fs::remove_dir_all(&folder).unwrap();
 }
