@@ -5,6 +5,12 @@
 //! only in the whole stands here, one file per question.
 
 mod attributes;
+mod axes;
+mod bus;
+mod faults;
+mod rows;
+pub mod schema;
+mod states;
 
 use std::path::{Path, PathBuf};
 
@@ -47,6 +53,10 @@ pub fn check(request: &Request<'_>) -> Outcome {
     if let Some(mapping) = Mapping::resolve(&texts, findings) {
         outcome.examples = mapping.run_examples(findings);
         tables(&mapping, findings);
+        if let Some(written) = &written {
+            axes::check(&mapping, written, findings);
+            bus::check(&mapping, written, findings);
+        }
     }
     outcome
 }
@@ -76,4 +86,8 @@ fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findin
 /// What can be seen in the tables alone.
 fn tables(mapping: &Mapping, findings: &mut Findings) {
     attributes::check(mapping, findings);
+    faults::check(mapping, findings);
+    states::check(mapping, findings);
+    rows::check(mapping, findings);
+    axes::tables(mapping, findings);
 }

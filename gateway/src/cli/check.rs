@@ -5,9 +5,10 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use super::{CheckArguments, CheckFormat, CliError};
-use crate::check::{Outcome, Request, check};
+use crate::check::{Outcome, Request, check, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Severity, json_report};
+use crate::mapping::Mapping;
 
 /// Exit status of a wrong command line, as clap has it.
 const USAGE: u8 = 2;
@@ -28,6 +29,9 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
             }
         };
     }
+    if let Some(name) = &arguments.schema {
+        return schema(name);
+    }
     if arguments.list {
         return print(&list(arguments.format), ExitCode::SUCCESS);
     }
@@ -43,6 +47,24 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         CheckFormat::Text | CheckFormat::Markdown => text(arguments, &outcome),
     };
     print(&text, if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// A schema, or the names of all.
+fn schema(name: &str) -> Result<ExitCode, CliError> {
+    if name.is_empty() {
+        return print(
+            &schema::names().map(|name| format!("{name}\n")).collect::<String>(),
+            ExitCode::SUCCESS,
+        );
+    }
+    match schema::schema(name, &Mapping::embedded()?) {
+        Some(schema) => print(&format!("{schema:#}\n"), ExitCode::SUCCESS),
+        None => {
+            let names: Vec<&str> = schema::names().collect();
+            eprintln!("error: there is no schema `{name}`: expected one of {}", names.join(", "));
+            Ok(ExitCode::from(USAGE))
+        }
+    }
 }
 
 fn print(text: &str, code: ExitCode) -> Result<ExitCode, CliError> {

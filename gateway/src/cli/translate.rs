@@ -74,10 +74,7 @@ pub(super) fn configuration(path: Option<&Path>) -> Result<Config, CliError> {
 
 /// The programs of a configuration.
 pub(super) fn stage(config: &Config) -> Result<Stage, CliError> {
-    let mapping = match &config.mappings_dir {
-        Some(folder) => Mapping::from_folder(folder)?,
-        None => Mapping::embedded()?,
-    };
+    let mapping = Mapping::load(config.mappings_dir.as_deref(), &config.overlays)?;
     Ok(Stage::rehearse(config, mapping)?)
 }
 

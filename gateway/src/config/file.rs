@@ -188,7 +188,7 @@ pub struct LimitsTable {
 
 impl LimitsTable {
     /// The first limit that is given, and where.
-    pub(super) fn first(&self) -> Option<(&'static str, std::ops::Range<usize>)> {
+    pub(crate) fn first(&self) -> Option<(&'static str, std::ops::Range<usize>)> {
         let all = [
             ("position_min", &self.position_min),
             ("position_max", &self.position_max),

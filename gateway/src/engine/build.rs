@@ -171,7 +171,8 @@ fn kind(axis: &Axis) -> UnitKind {
 }
 
 /// What the commissioning has to achieve.
-fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
+#[must_use]
+pub fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
     let limits = &axis.limits;
     let mut parameters = Vec::new();
     let mut limit =

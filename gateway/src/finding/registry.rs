@@ -269,6 +269,10 @@ registry! {
         "The numbers of an example do not come out: either the row or the example is wrong. Examples hold a table to what it was when somebody worked it out by hand.",
         "[[generic-sercos.parameter]]\nparameter = \"torque_limit_negative\"\nfactor = [1, 1]",
         "Work the example out again, and correct whichever is wrong.";
+    ROW_NUMBERS = 41 Note "what a row can hold":
+        "Range and step of a value, computed with the conversions of the cycle from types and scalings of both ends: of the drive as the box scales it, in the unit of the controller. A floating point number has 24 bits, or 53: beyond the value that is told it is coarser than the drive.",
+        "[[generic-sercos.signal]]\nsignal = \"torque_command\"",
+        "Nothing; compare it with what the axis has to do.";
 
     REQUIRED_UNSERVED = 50 Note "a required attribute is not served":
         "The standard requires the attribute of a device with a position, velocity or torque loop, and a [[reject]] row says why there is none.",

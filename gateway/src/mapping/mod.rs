@@ -26,6 +26,7 @@ mod drive_facts;
 mod examples;
 pub mod format;
 mod load;
+mod numbers;
 mod origin;
 mod overlay;
 mod resolver;
@@ -39,6 +40,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use profile_cip::target::attribute::AttributeDefinition;
+use profile_generic::mode::OperatingMode;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use captures::{
@@ -67,6 +69,7 @@ pub use dictionary::{
 };
 pub use drive_facts::{Difference, DriveFacts};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
+pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
@@ -135,6 +138,14 @@ impl Mapping {
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
         (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, tables })
+    }
+
+    /// The operating modes that the drives have, each once, as many as a drive has places for.
+    pub fn drive_modes(&self) -> impl Iterator<Item = OperatingMode> + '_ {
+        let rules = self.sercos.modes.iter().enumerate();
+        let first =
+            rules.filter(|(at, rule)| !self.sercos.modes[..*at].iter().any(|other| other.mode == rule.mode));
+        first.map(|(_, rule)| rule.mode).take(MAX_MODES)
     }
 
     /// The rows as they stand in the files, with their places.

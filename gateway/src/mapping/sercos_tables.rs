@@ -185,6 +185,16 @@ impl SercosTables {
         self.faults.iter().any(|row| row.word == idn)
     }
 
+    /// The faults and warnings in the diagnostic words, in the order of the rows.
+    pub fn faults(&self) -> &[FaultRule] {
+        &self.faults
+    }
+
+    /// What a status word says, in the order of the rows: pattern, report, and whether it is for drives that acknowledge.
+    pub fn reports(&self) -> &[(BitPattern, Report, Option<bool>)] {
+        &self.reports
+    }
+
     /// The scaling rules, for those who want to know what they look at.
     pub fn scaling_rules(&self) -> &[ScalingRule] {
         &self.scalings

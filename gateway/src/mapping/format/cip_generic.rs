@@ -281,6 +281,9 @@ pub struct CipFaultRow {
     pub initialization: Option<Name>,
     /// Standard fault of the absolute position recovery.
     pub apr: Option<Name>,
+    /// Whether the code stands for other causes too, and that is meant.
+    #[serde(default)]
+    pub shared: bool,
     /// Who finds an exception besides the drive: `box` or `device`.
     pub found_by: Option<Name>,
     /// The least severe action that may be set for an exception; Major Fault where it is absent.

@@ -1,0 +1,242 @@
+//! What the tables make of the axes of a configuration: programs, ranges, precision.
+
+use profile_generic::scaling::UnitKind;
+
+use crate::config::Written;
+use crate::config::file::AxisTable;
+use crate::engine::build::{needs, scaling};
+use crate::finding::registry as code;
+use crate::finding::{Findings, Problem, Source};
+use crate::mapping::{AxisUnits, CipScaling, DriveFacts, Mapping, RowNumbers, SercosAxis, SercosError};
+
+/// Nanounits, and parts per million, in the unit in which a configuration has its limits.
+const NANO: f64 = 1e9;
+const PERCENT: f64 = 1e4;
+
+/// Looks at each axis of a configuration.
+pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
+    for (axis, table) in written.config.axes.iter().zip(&written.file.axis) {
+        let table = table.get_ref();
+        let drive = &written.config.sercos.drives[axis.drive];
+        let scaling = scaling(axis);
+        let mut problem = |problem: Problem| findings.push(&written.text, problem);
+        if mapping.cip_program(&scaling).is_none() {
+            let span = table.motion_resolution.as_ref().unwrap_or(&table.instance).span();
+            let title = format!("no exact ratio for {} counts in a unit", scaling.counts_per_unit);
+            problem(
+                Problem::new(code::AXIS_TABLES, span).title(title).expected("expected one that fits 64 bits"),
+            );
+            continue;
+        }
+        let mut needs = needs(axis, drive);
+        if !drive.set_scaling {
+            let what = format!("the scaling of the drive `{}` is its own", drive.name);
+            let problem_of = Problem::new(code::DRIVE_SCALING, table.drive.span()).title(what);
+            problem(problem_of.expected("range and precision are not known before it is there"));
+        }
+        // With the drive's own scaling it can still be seen whether a program can be made at all.
+        needs.set_scaling = true;
+        match programs(mapping, &needs) {
+            Ok(program) if drive.set_scaling => {
+                let rows = mapping.row_numbers(&scaling, &program);
+                numbers(&rows, table, &written.text, findings);
+            }
+            Ok(_) => {}
+            Err(error) => refused(&error, table, findings, &written.text, drive.set_scaling),
+        }
+    }
+}
+
+/// The program behind a drive that takes all that is written to it.
+fn programs(mapping: &Mapping, needs: &SercosAxis) -> Result<crate::mapping::SercosProgram, SercosError> {
+    let facts = mapping.facts_of_obedient(needs)?;
+    let program = mapping.sercos_program(needs, &facts)?;
+    mapping.commissioning(needs, 3, &facts)?;
+    Ok(program)
+}
+
+fn refused(error: &SercosError, table: &AxisTable, findings: &mut Findings, text: &Source, certain: bool) {
+    match error {
+        SercosError::Limit { .. } | SercosError::Range { .. } => {
+            // A drive with another scaling may well hold it.
+            if certain {
+                let span = table
+                    .limits
+                    .as_ref()
+                    .and_then(|limits| limits.first())
+                    .map_or(table.name.span(), |(_, span)| span);
+                findings.push(
+                    text,
+                    Problem::new(code::LIMIT_UNFIT, span).key("limits").expected(error.to_string()),
+                );
+            }
+        }
+        error => {
+            let title = format!("the tables make no program for the axis `{}`", table.name.get_ref());
+            findings.push(
+                text,
+                Problem::new(code::AXIS_TABLES, table.name.span()).title(title).expected(error.to_string()),
+            );
+        }
+    }
+}
+
+/// Range and precision of each row on an axis.
+fn numbers(rows: &[RowNumbers], table: &AxisTable, text: &Source, findings: &mut Findings) {
+    let place = table.motion_resolution.as_ref().map_or_else(|| table.name.span(), |value| value.span());
+    for row in rows {
+        let what = format!("{} `{}`", if row.is_signal { "signal" } else { "parameter" }, row.name);
+        findings.push(
+            text,
+            Problem::new(code::ROW_NUMBERS, table.name.span())
+                .title(format!("{what} in {}", row.idn))
+                .expected(describe(row)),
+        );
+        if let Some(lost) = row.lost {
+            let title = format!("{what} loses precision in {}", row.idn);
+            let message = format!(
+                "one count of the drive is {} of {}: {} comes back as {}, and values are off by up to {}",
+                short(row.step),
+                row.unit,
+                lost.value,
+                lost.back,
+                short(lost.most)
+            );
+            findings.push(
+                text,
+                Problem::new(code::PRECISION_LOST, place.clone())
+                    .key("motion_resolution")
+                    .title(title)
+                    .expected(message),
+            );
+        }
+    }
+    let Some(limits) = &table.limits else { return };
+    let wanted = [
+        ("position_min", &limits.position_min, "position_command", NANO),
+        ("position_max", &limits.position_max, "position_command", NANO),
+        ("velocity", &limits.velocity, "velocity_command", NANO),
+        ("torque_percent", &limits.torque_percent, "torque_command", PERCENT),
+    ];
+    for (key, value, signal, scale) in wanted {
+        let Some(value) = value else { continue };
+        let Some(row) = rows.iter().find(|row| row.is_signal && row.name == signal) else { continue };
+        let Some((low, high)) = row.generic_range else { continue };
+        let (low, high) = (
+            profile_generic::cast::f64_from_i64(low) / scale,
+            profile_generic::cast::f64_from_i64(high) / scale,
+        );
+        if !(low..=high).contains(value.get_ref()) {
+            let title = format!("`{key}` is beyond what the drive can hold in {}", row.idn);
+            let message = format!(
+                "the drive ends at {} and {}: commands beyond are held there",
+                short(low),
+                short(high)
+            );
+            findings.push(
+                text,
+                Problem::new(code::RANGE_LOST, value.span()).key(key).title(title).expected(message),
+            );
+        }
+    }
+}
+
+/// What a row can hold, in words.
+fn describe(row: &RowNumbers) -> String {
+    let mut text = match row.range {
+        Some((low, high)) => format!("{} to {} {}", short(low), short(high), row.unit),
+        None => format!("without ends, in {}", row.unit),
+    };
+    text.push_str(&format!(", in steps of {}", short(row.step)));
+    if let Some(exact) = row.float_exact {
+        text.push_str(&format!("; a floating point number tells them apart up to {}", short(exact)));
+    }
+    text
+}
+
+/// A number with the digits that matter.
+pub(super) fn short(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
+        let digits: usize = if magnitude >= 1_000.0 {
+            1
+        } else if magnitude >= 1.0 {
+            4
+        } else {
+            7
+        };
+        let text = format!("{value:.digits$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
+/// The same for the tables alone: a turning and a sliding axis with the usual resolution, and drives scaled by the box.
+pub(super) fn tables(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_sercos;
+    for kind in [UnitKind::Rotary, UnitKind::Linear] {
+        let axis = SercosAxis {
+            units: AxisUnits { kind, ..AxisUnits::default() },
+            modes: mapping.drive_modes().collect(),
+            set_scaling: true,
+            ..SercosAxis::default()
+        };
+        let scaling = CipScaling {
+            kind,
+            nanounits_per_unit: profile_generic::scaling::NANO,
+            counts_per_unit: 10_000,
+            inverted: false,
+            unwind: None,
+        };
+        let made = mapping.telegram(&axis, &DriveFacts::new()).and_then(|_| programs(mapping, &axis));
+        let program = match made {
+            Ok(program) => program,
+            Err(error) => {
+                let problem = Problem::new(code::AXIS_TABLES, file.rows.mapping.span());
+                let problem = problem.title(format!("no program can be made for a {kind} axis"));
+                findings.push(&file.text, problem.expected(error.to_string()));
+                continue;
+            }
+        };
+        for row in mapping.row_numbers(&scaling, &program) {
+            let signal =
+                file.rows.signal.iter().find(|known| row.is_signal && known.signal.get_ref() == row.name);
+            let parameter = file
+                .rows
+                .parameter
+                .iter()
+                .find(|known| !row.is_signal && known.parameter.get_ref() == row.name);
+            let Some(span) = signal.map(|known| known.idn.span()).or(parameter.map(|known| known.idn.span()))
+            else {
+                continue;
+            };
+            let unit = if kind == UnitKind::Rotary { "revolution" } else { "millimetre" };
+            let title = format!("`{}` in {} on a {kind} axis of 10000 counts in a {unit}", row.name, row.idn);
+            findings.push(
+                &file.text,
+                Problem::new(code::ROW_NUMBERS, span.clone())
+                    .key("idn")
+                    .title(title)
+                    .expected(describe(&row)),
+            );
+            if let Some(lost) = row.lost.filter(|lost| lost.most > 0.5) {
+                let title = format!(
+                    "`{}` loses precision in {} on a {kind} axis of 10000 counts in a {unit}",
+                    row.name, row.idn
+                );
+                let message = format!(
+                    "one count of the drive is {} of {}: {} comes back as {}",
+                    short(row.step),
+                    row.unit,
+                    lost.value,
+                    lost.back
+                );
+                findings.push(
+                    &file.text,
+                    Problem::new(code::PRECISION_LOST, span).key("idn").title(title).expected(message),
+                );
+            }
+        }
+    }
+}
