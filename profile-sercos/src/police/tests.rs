@@ -281,6 +281,78 @@ fn every_rule_of_the_telegrams_is_seen_broken() {
     insta::assert_snapshot!(seen);
 }
 
+/// A bus in CP4 whose master sends one telegram too late.
+fn late(bus: &mut Bus) {
+    bus.now = bus.now + DurationNs::from_micros(1600);
+    bus.cycles(1);
+}
+
+#[test]
+#[should_panic(expected = "master: 1600 us from MST to MST, the cycle has 1000 us +- 23 us")]
+fn a_breach_that_was_not_declared_ends_a_test_with_station_and_rule() {
+    let mut bus = bus(1, 1, 1_000_000, true);
+    bus.up_to(Phase::CP4);
+    bus.cycles(2);
+    late(&mut bus);
+}
+
+#[test]
+#[should_panic(expected = "master: 1600 us from MST to MST")]
+fn a_declaration_is_over_with_its_script() {
+    let mut bus = bus(1, 1, 1_000_000, true);
+    bus.up_to(Phase::CP4);
+    bus.cycles(2);
+    let declared = |breach: &Breach| matches!(breach.rule, Rule::MstInterval { .. });
+    bus.breaking(declared, |bus| {
+        late(bus);
+        bus.cycles(5);
+    });
+    late(&mut bus);
+}
+
+#[test]
+#[should_panic(expected = "1600 us from MST to MST")]
+fn another_breach_than_the_declared_one_ends_a_test() {
+    let mut bus = bus(1, 1, 1_000_000, true);
+    bus.up_to(Phase::CP4);
+    bus.cycles(2);
+    bus.tolerating(|breach| breach.offender == Offender::Slave(1), late);
+}
+
+#[test]
+#[should_panic(expected = "the rule that was to be broken on purpose was kept")]
+fn a_declared_breach_that_does_not_come_ends_a_test() {
+    let mut bus = bus(1, 1, 1_000_000, true);
+    bus.up_to(Phase::CP4);
+    bus.breaking(|_| true, |bus| bus.cycles(3));
+}
+
+#[test]
+fn the_counter_is_free_across_a_silence_and_nowhere_else() {
+    let telegram = |kind, len: usize, count| {
+        let mut frame = vec![0; HEADER_LEN + len];
+        let telegram = TelegramType::new(Channel::Primary, kind, 0);
+        let phase = PhaseField::new(false, count, Phase::CP0);
+        Header { source: [2; 6], telegram, phase }.emit(&mut frame).unwrap();
+        frame
+    };
+    let mut police = Police::new(PoliceConfig::default(), MonotonicTime::ZERO);
+    let mut cycle = |now: i64, count: u8| {
+        let now = MonotonicTime::ZERO + DurationNs::from_micros(now);
+        police.sent(now, &telegram(Kind::Mdt, cp0::MDT_LEN, count));
+        police.sent(now + DurationNs::from_micros(10), &telegram(Kind::At, cp0::AT_LEN, count));
+        police.take_breaches().iter().map(|breach| breach.rule.to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(cycle(200_000, 6), [""; 0], "any count begins");
+    assert_eq!(cycle(201_000, 7), [""; 0]);
+    assert_eq!(cycle(202_000, 0), [""; 0]);
+    assert_eq!(cycle(203_000, 5), ["cycle counter 5, expected 1"]);
+    assert_eq!(cycle(204_000, 6), [""; 0]);
+    // From NRT, behind 130 ms.
+    assert_eq!(cycle(334_000, 2), [""; 0]);
+    assert_eq!(cycle(335_000, 2), ["cycle counter 2, expected 3"]);
+}
+
 #[test]
 fn a_slave_that_never_stops_inserting_is_named() {
     let mut bus = bus(2, 2, 1_000_000, true);
