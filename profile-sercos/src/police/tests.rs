@@ -363,7 +363,8 @@ fn a_slave_that_never_stops_inserting_is_named() {
             frame[DEVICE_2 + 1] = 1;
         }
     });
-    bus.breaking(|_| true, |bus| bus.cycles(205));
+    let inserts = |breach: &Breach| matches!(breach.rule, Rule::InsertsWhileSwitching { .. });
+    bus.breaking(inserts, |bus| bus.cycles(205));
     let rule = Rule::InsertsWhileSwitching { phase: Phase::CP2 };
     let found = bus.court.police.breaches().iter().find(|breach| breach.rule == rule);
     assert_eq!(found.map(|breach| breach.offender), Some(Offender::Slave(2)));
@@ -480,7 +481,7 @@ fn addresses_are_unique_from_cp3_on() {
     bus.master.set_target_phase(Phase::CP4);
     bus.state(State::Await2);
     bus.court.police.stations[2].address = 1;
-    bus.breaking(|_| true, |bus| bus.state(State::Await3));
+    bus.breaking(|breach| matches!(breach.rule, Rule::Address { .. }), |bus| bus.state(State::Await3));
     assert_eq!(bus.court.police.breaches()[0].rule, Rule::Address { slave: 3, address: 1 });
 }
 
