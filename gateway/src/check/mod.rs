@@ -83,8 +83,8 @@ fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findin
     }
 }
 
-/// What can be seen in the tables alone.
-fn tables(mapping: &Mapping, findings: &mut Findings) {
+/// What can be seen in the tables alone, beyond what keeps them from being read.
+pub fn tables(mapping: &Mapping, findings: &mut Findings) {
     attributes::check(mapping, findings);
     faults::check(mapping, findings);
     states::check(mapping, findings);

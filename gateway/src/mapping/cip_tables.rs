@@ -174,6 +174,15 @@ pub struct ServedAttribute {
     pub range: Option<(i32, i32)>,
 }
 
+/// Who finds a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finder {
+    /// The box, in what it knows of drive and bus.
+    Box,
+    /// The motion device, in what the controller does.
+    Device,
+}
+
 /// What the controller may set for an exception.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ExceptionRow {
@@ -183,8 +192,8 @@ pub struct ExceptionRow {
     pub manufacturer: bool,
     /// Its bit.
     pub bit: u8,
-    /// Whether the box or its device finds it.
-    pub found_here: bool,
+    /// Who finds it without the drive's word.
+    pub found_by: Option<Finder>,
     /// The least severe Axis Exception Action.
     pub least: u8,
     /// The Axis Exception Action until another is set.

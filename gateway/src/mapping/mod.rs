@@ -50,8 +50,8 @@ pub use captures::{
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
-    CipTables, CipUnit, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes, Served,
-    ServedAttribute, Times,
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes, SequenceAttributes,
+    Served, ServedAttribute, Times,
 };
 pub use commissioning::{CommissioningPlan, Refused, Step};
 pub use compile_cip::{
@@ -140,6 +140,40 @@ impl Mapping {
         (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, tables })
     }
 
+    /// The same with another text of one of the two mapping tables, `cip-generic.toml` or `generic-sercos.toml`: for whoever
+    /// tries a change. The dictionaries stay as they are.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, and another name of a file.
+    pub fn with_table(&self, file: &str, text: &str) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        let table = TableText { path: file.to_owned(), text: text.to_owned() };
+        let mut tables = self.tables.clone();
+        match load::table_name(file) {
+            "cip-generic" => {
+                if let Some(parsed) = rows::parse(&table, "cip-generic", &[], &mut findings) {
+                    tables.cip_generic = parsed;
+                }
+            }
+            "generic-sercos" => {
+                if let Some(parsed) = rows::parse(&table, "generic-sercos", &[], &mut findings) {
+                    tables.generic_sercos = parsed;
+                }
+            }
+            _ => {
+                let message = format!("expected cip-generic.toml or generic-sercos.toml, got `{file}`");
+                findings.push_file(crate::finding::registry::STRANGER, Path::new(file), message);
+            }
+        }
+        if findings.has_errors() {
+            return Err(findings);
+        }
+        let dictionaries = self.dictionaries.clone();
+        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut findings);
+        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, &mut findings);
+        findings.into_result(Self { dictionaries, cip, sercos, tables })
+    }
+
     /// The operating modes that the drives have, each once, as many as a drive has places for.
     pub fn drive_modes(&self) -> impl Iterator<Item = OperatingMode> + '_ {
         let rules = self.sercos.modes.iter().enumerate();
@@ -165,7 +199,9 @@ impl Mapping {
             let found = |cause| self.sercos.faults.iter().any(|row| row.cause == cause);
             let exceptions = self.cip.exceptions.iter();
             exceptions.filter(move |row| {
-                row.manufacturer == manufacturer && row.bit == bit && (row.found_here || found(row.cause))
+                row.manufacturer == manufacturer
+                    && row.bit == bit
+                    && (row.found_by.is_some() || found(row.cause))
             })
         };
         let rule = |bit| {

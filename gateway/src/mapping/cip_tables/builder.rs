@@ -11,8 +11,9 @@ use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
 
 use super::{
-    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, ScalingAttributes, SequenceAttributes,
-    Served, ServedAttribute, Times, capture_kind, has_direction, operating_mode, signal, unit_kind,
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes,
+    SequenceAttributes, Served, ServedAttribute, Times, capture_kind, has_direction, operating_mode, signal,
+    unit_kind,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
@@ -286,21 +287,32 @@ impl Builder<'_> {
                 }
             }
             if let (Some(at), Some(axis_state)) = (at, axis_state) {
-                if seen[at] {
-                    self.resolver.error(code::TWICE, row.state.span(), "state", "the state is there twice");
-                }
-                seen[at] = true;
+                self.once(&mut seen, at, "state", &row.state);
                 self.tables.states[at] = CipState { axis_state, conditions };
             }
         }
-        for (state, _) in DriveState::ALL.iter().zip(seen).filter(|(_, seen)| !seen) {
-            let span = rows.mapping.span();
-            self.resolver.error(
-                code::ROW_MISSING,
-                span,
-                "state",
-                format!("expected a row for state {state}, got none"),
-            );
+        self.all_there(rows, &seen, "state", DriveState::ALL.iter().map(|state| state.name()));
+    }
+
+    /// Notes that the row of something is there.
+    fn once(&mut self, seen: &mut [bool], at: usize, key: &str, name: &Name) {
+        if std::mem::replace(&mut seen[at], true) {
+            let message = format!("the {} is there twice", key.replace('_', " "));
+            self.resolver.error(code::TWICE, name.span(), key, message);
+        }
+    }
+
+    /// Everything has its row.
+    fn all_there<'n>(
+        &mut self,
+        rows: &CipGenericFile,
+        seen: &[bool],
+        key: &str,
+        names: impl Iterator<Item = &'n str>,
+    ) {
+        for (name, _) in names.zip(seen).filter(|(_, seen)| !**seen) {
+            let message = format!("expected a row for {} {name}, got none", key.replace('_', " "));
+            self.resolver.error(code::ROW_MISSING, rows.mapping.span(), key, message);
         }
     }
 
@@ -380,9 +392,9 @@ impl Builder<'_> {
 
     /// What the controller may set for an exception.
     fn exception(&mut self, row: &CipFaultRow, cause: FaultCause, fault: CipFault) {
-        let words = [("box", true), ("device", true)];
+        let words = [("box", Finder::Box), ("device", Finder::Device)];
         let found_by = row.found_by.as_ref();
-        let found_here = found_by.is_some_and(|name| self.resolver.word("found_by", name, &words).is_some());
+        let found_by = found_by.and_then(|name| self.resolver.word("found_by", name, &words));
         let major = ExceptionAction::MAJOR_FAULT.0;
         let mut action = |key: &str, name: &Option<Name>| {
             name.as_ref().map_or(Some(major), |name| self.byte_code("Axis Exception Action", key, name))
@@ -411,7 +423,7 @@ impl Builder<'_> {
             cause,
             manufacturer,
             bit: code,
-            found_here,
+            found_by,
             least,
             default,
         });
@@ -441,10 +453,14 @@ impl Builder<'_> {
 
     fn drive_actions(&mut self, rows: &CipGenericFile) {
         self.tables.drive_actions = DRIVE_ACTIONS.map(|(_, action)| (action, None));
+        let mut seen = [false; DRIVE_ACTIONS.len()];
         for row in &rows.drive_action {
             let Some(action) = self.resolver.word("drive_action", &row.drive_action, &DRIVE_ACTIONS) else {
                 continue;
             };
+            if let Some(at) = DRIVE_ACTIONS.iter().position(|(_, known)| *known == action) {
+                self.once(&mut seen, at, "drive_action", &row.drive_action);
+            }
             let request = match &row.request {
                 None => None,
                 Some(name) => match self.request(name) {
@@ -456,6 +472,7 @@ impl Builder<'_> {
                 *slot = request;
             }
         }
+        self.all_there(rows, &seen, "drive_action", DRIVE_ACTIONS.iter().map(|(name, _)| *name));
     }
 
     fn request(&mut self, name: &Name) -> Option<Request> {
@@ -464,6 +481,7 @@ impl Builder<'_> {
     }
 
     fn reactions(&mut self, rows: &CipGenericFile) {
+        let mut seen = [false; Reaction::ALL.len()];
         for row in &rows.reaction {
             let known = Reaction::ALL.iter().map(|reaction| reaction.name());
             let find = |text: &str| Reaction::ALL.iter().position(|reaction| reaction.name() == text);
@@ -473,8 +491,10 @@ impl Builder<'_> {
             if let (Some(at), Some(stop), Some(change)) = (at, stop, change) {
                 // Two nibbles (attribute 668).
                 self.tables.reactions[at] = u8::try_from(change << 4 | stop).unwrap_or(0);
+                self.once(&mut seen, at, "reaction", &row.reaction);
             }
         }
+        self.all_there(rows, &seen, "reaction", Reaction::ALL.iter().map(|reaction| reaction.name()));
     }
 
     fn inhibits(&mut self, rows: &CipGenericFile) {

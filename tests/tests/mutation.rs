@@ -1,0 +1,358 @@
+//! Every row of the mapping tables counts: each one is taken out, and each of its keys changed, and something must notice.
+//!
+//! A change is noticed by the checks of the tables themselves, by a worked example, or by the snapshot of everything that the
+//! tables say (`tables.rs`). The count of each is printed; what nobody notices is a survivor. With `AXISBRIDGE_TEST_SPLIT` set, what the snapshot
+//! notices is put to the golden texts of `tests/frames` as well, and those changes are named that no frame shows.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use axisbridge::check;
+use axisbridge::config::Config;
+use axisbridge::finding::Findings;
+use axisbridge::mapping::Mapping;
+use axisbridge::translate::{RowNames, Stage, translate_list};
+use axisbridge_tests::tables;
+
+/// What a key says to people alone.
+const REMARKS: [&str; 5] = ["source", "note", "examples", "reason", "name"];
+
+/// Set to see how many of the changes a frame of `tests/frames` shows, and which do not show in any.
+const SPLIT: &str = "AXISBRIDGE_TEST_SPLIT";
+
+/// The two mapping tables.
+const FILES: [(&str, &str); 2] = [
+    ("cip-generic.toml", include_str!("../../mappings/cip-generic.toml")),
+    ("generic-sercos.toml", include_str!("../../mappings/generic-sercos.toml")),
+];
+
+/// A table with one change.
+struct Mutant {
+    file: usize,
+    what: String,
+    text: String,
+}
+
+/// Who notices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Noticed {
+    Check,
+    Example,
+    Golden,
+    Listing,
+    Nobody,
+}
+
+impl fmt::Display for Noticed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Check => "noticed by the checks of the tables",
+            Self::Example => "noticed by a worked example",
+            Self::Golden => "noticed by a golden text of frames",
+            Self::Listing => "noticed by the listing of the tables",
+            Self::Nobody => "survivors",
+        })
+    }
+}
+
+/// A row: its lines, and its keys with the bytes of their values.
+struct Row {
+    name: String,
+    section: String,
+    /// `[[section]]`: one of several.
+    repeats: bool,
+    span: (usize, usize),
+    keys: Vec<(String, (usize, usize))>,
+}
+
+fn rows(text: &str) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::new();
+    let mut at = 0;
+    let mut open = 0_i32;
+    for line in text.split_inclusive('\n') {
+        let (start, end) = (at, at + line.len());
+        at = end;
+        let trimmed = line.trim();
+        if open == 0 && trimmed.starts_with('[') {
+            let section = trimmed.trim_matches(['[', ']']).to_owned();
+            let repeats = trimmed.starts_with("[[");
+            rows.push(Row { name: String::new(), section, repeats, span: (start, end), keys: Vec::new() });
+            continue;
+        }
+        let Some(row) = rows.last_mut() else { continue };
+        if open > 0 {
+            row.span.1 = end;
+            if let Some((_, value)) = row.keys.last_mut() {
+                value.1 = end;
+            }
+        } else if let Some((key, value)) = line.split_once(" = ").filter(|_| !trimmed.starts_with('#')) {
+            row.span.1 = end;
+            if row.name.is_empty() {
+                row.name = format!("[{}] {}", row.section, value.trim());
+            }
+            row.keys.push((key.trim().to_owned(), (end - value.len(), end)));
+        } else {
+            continue;
+        }
+        open += brackets(line);
+    }
+    rows
+}
+
+/// Brackets that a line opens and does not close, outside of strings.
+fn brackets(line: &str) -> i32 {
+    let (mut open, mut quoted) = (0, false);
+    for letter in line.chars() {
+        match letter {
+            '"' => quoted = !quoted,
+            '#' if !quoted => break,
+            '[' | '{' if !quoted => open += 1,
+            ']' | '}' if !quoted => open -= 1,
+            _ => {}
+        }
+    }
+    open
+}
+
+/// The values in the inline tables of a value, with their keys.
+fn inner(value: &str) -> Vec<(usize, usize, &str)> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(next) = value[at..].find(" = ") {
+        let equals = at + next;
+        at = equals + 3;
+        let key = value[..equals].rsplit([' ', '{', '\n']).next().unwrap_or_default();
+        let (mut depth, mut quoted) = (0, false);
+        let end = value[at..].char_indices().find(|(_, letter)| {
+            match letter {
+                '"' => quoted = !quoted,
+                '[' | '{' if !quoted => depth += 1,
+                ']' | '}' if !quoted => depth -= 1,
+                _ => {}
+            }
+            depth < 0 || (depth == 0 && *letter == ',' && !quoted)
+        });
+        let end = end.map_or(value.len(), |(end, _)| at + end);
+        if !REMARKS.contains(&key) {
+            found.push((at, at + value[at..end].trim_end().len(), key));
+        }
+    }
+    found
+}
+
+/// The first string in a value, without its quotation marks.
+fn string(value: &str) -> Option<(usize, usize)> {
+    let start = value.find('"')? + 1;
+    let end = start + value[start..].find('"')?;
+    Some((start, end))
+}
+
+/// The first whole number in a value.
+fn number(value: &str) -> Option<(usize, usize)> {
+    let start = value.find(|letter: char| letter.is_ascii_digit())?;
+    let rest = &value[start..];
+    let end =
+        rest.find(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_').unwrap_or(rest.len());
+    Some((start, start + end))
+}
+
+/// The value with one thing in it changed.
+fn changed(value: &str, others: &[&str]) -> Option<String> {
+    if let Some((start, end)) = string(value) {
+        let own = &value[start..end];
+        let other = others.iter().find(|other| **other != own);
+        let other = other.map_or_else(|| format!("{own}x"), |other| (*other).to_owned());
+        return Some(format!("{}{other}{}", &value[..start], &value[end..]));
+    }
+    for (word, other) in [("true", "false"), ("false", "true")] {
+        if value.trim_start().starts_with(word) {
+            return Some(value.replacen(word, other, 1));
+        }
+    }
+    let (start, end) = number(value)?;
+    let digits = value[start..end].replace('_', "");
+    let parsed = match digits.strip_prefix("0x") {
+        Some(hex) => i64::from_str_radix(hex, 16).ok()?,
+        None => digits.parse().ok()?,
+    };
+    Some(format!("{}{}{}", &value[..start], parsed + 1, &value[end..]))
+}
+
+fn mutants() -> Vec<Mutant> {
+    let mut mutants = Vec::new();
+    for (file, (_, text)) in FILES.into_iter().enumerate() {
+        let rows = rows(text);
+        // What else stands behind a key in rows of this kind.
+        let mut strings: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
+        for row in &rows {
+            for (key, (start, end)) in &row.keys {
+                if let Some((from, to)) = string(&text[*start..*end]) {
+                    let known = strings.entry((&row.section, key)).or_default();
+                    let own = &text[start + from..start + to];
+                    if !known.contains(&own) {
+                        known.push(own);
+                    }
+                }
+            }
+        }
+        for row in &rows {
+            if row.repeats {
+                let without = format!("{}{}", &text[..row.span.0], &text[row.span.1..]);
+                mutants.push(Mutant { file, what: format!("{}: taken out", row.name), text: without });
+            }
+            for (key, (start, end)) in row.keys.iter().filter(|(key, _)| !REMARKS.contains(&key.as_str())) {
+                let value = &text[*start..*end];
+                for (from, to, key) in inner(value) {
+                    let (from, to) = (start + from, start + to);
+                    let Some(other) = changed(&text[from..to], &[]) else { continue };
+                    let what = format!("{}: {key} = {} -> {other} at byte {from}", row.name, &text[from..to]);
+                    let text = format!("{}{other}{}", &text[..from], &text[to..]);
+                    mutants.push(Mutant { file, what, text });
+                }
+                if value.contains("{ ") {
+                    continue;
+                }
+                let others =
+                    strings.get(&(row.section.as_str(), key.as_str())).map_or(&[][..], Vec::as_slice);
+                let Some(other) = changed(value, others) else { continue };
+                let what = format!("{}: {key} = {} -> {}", row.name, value.trim(), other.trim());
+                let text = format!("{}{other}{}", &text[..*start], &text[*end..]);
+                mutants.push(Mutant { file, what, text });
+            }
+        }
+    }
+    mutants
+}
+
+/// The golden texts with the lists that they belong to, the shortest first.
+struct Golden {
+    lists: Vec<(String, Vec<String>)>,
+}
+
+impl Golden {
+    fn new(stage: &Arc<Stage>) -> Self {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("frames");
+        let mut lists: Vec<_> = std::fs::read_dir(folder)
+            .expect("the folder of frames")
+            .map(|entry| entry.expect("an entry").path())
+            .filter(|path| path.extension().is_some_and(|ending| ending == "hex"))
+            .map(|path| std::fs::read_to_string(path).expect("a list of frames"))
+            .map(|list| {
+                let golden = texts(stage, &list);
+                (list, golden)
+            })
+            .collect();
+        lists.sort_by_key(|(list, _)| list.len());
+        Self { lists }
+    }
+
+    fn notices(&self, stage: &Arc<Stage>) -> bool {
+        self.lists.iter().any(|(list, golden)| texts(stage, list) != *golden)
+    }
+}
+
+fn texts(stage: &Arc<Stage>, list: &str) -> Vec<String> {
+    let list = translate_list(stage, list).expect("a list of frames");
+    let text = |frame: &axisbridge::translate::Node| {
+        let mut text = String::new();
+        frame.write(&mut text, 0, RowNames::Keys).expect("a string takes it");
+        text
+    };
+    list.frames.iter().map(text).collect()
+}
+
+struct Judge {
+    mapping: Mapping,
+    stage: Arc<Stage>,
+    golden: Golden,
+    listing: String,
+    /// Warnings and notes of the shipped tables.
+    findings: usize,
+    /// Whether to tell apart what a frame shows and what the listing alone does: that takes minutes.
+    splits: bool,
+}
+
+impl Judge {
+    fn new() -> Self {
+        let config =
+            Config::parse(include_str!("../frames/config.toml"), "config.toml").expect("a configuration");
+        let mapping = Mapping::embedded().expect("the shipped tables");
+        let stage = Arc::new(Stage::rehearse(&config, mapping.clone()).expect("its drives"));
+        let golden = Golden::new(&stage);
+        let listing = tables::listing(&mapping, &stage);
+        let mut findings = Findings::default();
+        check::tables(&mapping, &mut findings);
+        Self {
+            mapping,
+            stage,
+            golden,
+            listing,
+            findings: findings.list().len(),
+            splits: std::env::var_os(SPLIT).is_some(),
+        }
+    }
+
+    fn noticed(&self, mutant: &Mutant) -> Noticed {
+        let Ok(mapping) = self.mapping.with_table(FILES[mutant.file].0, &mutant.text) else {
+            return Noticed::Check;
+        };
+        let mut findings = Findings::default();
+        mapping.run_examples(&mut findings);
+        if findings.has_errors() {
+            return Noticed::Example;
+        }
+        if tables::listing(&mapping, &self.stage) == self.listing {
+            // Only what nothing is made of may be left to the checks of the whole, which take their time.
+            check::tables(&mapping, &mut findings);
+            return if findings.list().len() == self.findings { Noticed::Nobody } else { Noticed::Check };
+        }
+        if !self.splits {
+            return Noticed::Listing;
+        }
+        // What is not a program any more does not move anything either.
+        let Ok(stage) = self.stage.with_mapping(mapping) else { return Noticed::Golden };
+        if self.golden.notices(&Arc::new(stage)) { Noticed::Golden } else { Noticed::Listing }
+    }
+}
+
+#[test]
+fn a_change_of_any_row_is_noticed() {
+    let judge = Judge::new();
+    let mutants = mutants();
+    assert!(mutants.len() > 1500, "rows were found: {}", mutants.len());
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(vec![None; mutants.len()]);
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some((number, mutant)) = {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    mutants.get(number).map(|mutant| (number, mutant))
+                } {
+                    let noticed = judge.noticed(mutant);
+                    results.lock().expect("no panic")[number] = Some(noticed);
+                }
+            });
+        }
+    });
+    let results = results.into_inner().expect("no panic");
+    let mut counts: BTreeMap<Noticed, Vec<&Mutant>> = BTreeMap::new();
+    for (mutant, noticed) in mutants.iter().zip(results) {
+        counts.entry(noticed.expect("every one was judged")).or_default().push(mutant);
+    }
+    println!("{} changes of rows", mutants.len());
+    for noticed in [Noticed::Check, Noticed::Example, Noticed::Golden, Noticed::Listing, Noticed::Nobody] {
+        println!("{:5} {noticed}", counts.get(&noticed).map_or(0, Vec::len));
+    }
+    let name = |mutant: &&Mutant| format!("{} {}", FILES[mutant.file].0, mutant.what);
+    if std::env::var_os(SPLIT).is_some() {
+        for mutant in counts.get(&Noticed::Listing).into_iter().flatten() {
+            println!("listing alone: {}", name(mutant));
+        }
+    }
+    let survivors: Vec<_> = counts.get(&Noticed::Nobody).into_iter().flatten().map(name).collect();
+    assert!(survivors.is_empty(), "nobody notices:\n{}", survivors.join("\n"));
+}
