@@ -86,14 +86,19 @@ impl Running {
         }
     }
 
+    /// Sends it a signal by its name without SIG.
+    pub fn signal(&mut self, name: &str) {
+        if self.ended().is_none() {
+            let _ = Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status();
+        }
+    }
+
     /// Asks it to end (SIGTERM), as a service manager does, and waits.
     ///
     /// # Panics
     /// When it does not end within `limit`.
     pub fn terminate(&mut self, limit: Duration) -> ExitStatus {
-        if self.ended().is_none() {
-            let _ = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status();
-        }
+        self.signal("TERM");
         self.wait(limit)
     }
 }

@@ -1,5 +1,6 @@
 //! What the tables make of the axes of a configuration: programs, ranges, precision.
 
+use profile_generic::parameter::Parameter;
 use profile_generic::scaling::UnitKind;
 
 use crate::config::Written;
@@ -7,7 +8,9 @@ use crate::config::file::AxisTable;
 use crate::engine::build::{needs, scaling};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
-use crate::mapping::{AxisUnits, CipScaling, DriveFacts, Mapping, RowNumbers, SercosAxis, SercosError};
+use crate::mapping::{
+    AxisUnits, CipScaling, DriveFacts, Mapping, RowNumbers, SercosAxis, SercosError, SercosProgram,
+};
 
 /// Nanounits, and parts per million, in the unit in which a configuration has its limits.
 const NANO: f64 = 1e9;
@@ -40,43 +43,64 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
             Ok(program) if drive.set_scaling => {
                 let rows = mapping.row_numbers(&scaling, &program);
                 numbers(&rows, table, &written.text, findings);
+                limits(&program, &needs, table, &written.text, findings);
             }
+            // Range and precision are the drive's own affair, and so is whether its scaling can be converted.
             Ok(_) => {}
-            Err(error) => refused(&error, table, findings, &written.text, drive.set_scaling),
+            Err(SercosError::Scaling(_)) if !drive.set_scaling => {}
+            Err(error) => {
+                let title = format!("the tables make no program for the axis `{}`", table.name.get_ref());
+                let problem = Problem::new(code::AXIS_TABLES, table.name.span()).title(title);
+                findings.push(&written.text, problem.expected(error.to_string()));
+            }
         }
     }
 }
 
 /// The program behind a drive that takes all that is written to it.
-fn programs(mapping: &Mapping, needs: &SercosAxis) -> Result<crate::mapping::SercosProgram, SercosError> {
+fn programs(mapping: &Mapping, needs: &SercosAxis) -> Result<SercosProgram, SercosError> {
     let facts = mapping.facts_of_obedient(needs)?;
-    let program = mapping.sercos_program(needs, &facts)?;
-    mapping.commissioning(needs, 3, &facts)?;
-    Ok(program)
+    mapping.sercos_program(needs, &facts)
 }
 
-fn refused(error: &SercosError, table: &AxisTable, findings: &mut Findings, text: &Source, certain: bool) {
-    match error {
-        SercosError::Limit { .. } | SercosError::Range { .. } => {
-            // A drive with another scaling may well hold it.
-            if certain {
-                let span = table
-                    .limits
-                    .as_ref()
-                    .and_then(|limits| limits.first())
-                    .map_or(table.name.span(), |(_, span)| span);
-                findings.push(
-                    text,
-                    Problem::new(code::LIMIT_UNFIT, span).key("limits").expected(error.to_string()),
+/// What the box writes into the drive at start fits there.
+fn limits(
+    program: &SercosProgram,
+    needs: &SercosAxis,
+    table: &AxisTable,
+    text: &Source,
+    findings: &mut Findings,
+) {
+    let Some(written) = &table.limits else { return };
+    let keys = [
+        (
+            "acceleration",
+            &written.acceleration,
+            &[Parameter::ACCELERATION_LIMIT, Parameter::DECELERATION_LIMIT][..],
+        ),
+        (
+            "torque_percent",
+            &written.torque_percent,
+            &[Parameter::TORQUE_LIMIT_POSITIVE, Parameter::TORQUE_LIMIT_NEGATIVE],
+        ),
+        ("following_error", &written.following_error, &[Parameter::POSITION_ERROR_TOLERANCE]),
+    ];
+    for (key, value, parameters) in keys {
+        let Some(value) = value else { continue };
+        for (parameter, generic) in needs.parameters.iter().filter(|(known, _)| parameters.contains(known)) {
+            let Some((row, conversion)) =
+                program.parameter(*parameter).and_then(|row| Some((row, row.to_drive?)))
+            else {
+                continue;
+            };
+            if conversion.convert(*generic).saturated {
+                let count = conversion.within(i64::MIN, i64::MAX).convert(*generic).value;
+                let message = format!(
+                    "{} holds {} to {}, and this would be {count}",
+                    row.idn, conversion.min, conversion.max
                 );
+                findings.push(text, Problem::new(code::LIMIT_UNFIT, value.span()).key(key).expected(message));
             }
-        }
-        error => {
-            let title = format!("the tables make no program for the axis `{}`", table.name.get_ref());
-            findings.push(
-                text,
-                Problem::new(code::AXIS_TABLES, table.name.span()).title(title).expected(error.to_string()),
-            );
         }
     }
 }

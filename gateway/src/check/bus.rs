@@ -36,7 +36,7 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
                 let message =
                     format!("expected at most {CONNECTION_IDNS_MAX} values and {CONNECTION_LEN_MAX} bytes");
                 let problem =
-                    Problem::new(code::TELEGRAM_FULL, table.name.span()).title(title).expected(message);
+                    Problem::new(code::CYCLE_FULL, table.name.span()).title(title).expected(message);
                 findings.push(&written.text, problem);
                 continue;
             }
@@ -71,7 +71,7 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
                 .drive
                 .get(slave)
                 .map_or_else(|| sercos.cycle_time.span(), |drive| drive.get_ref().name.span());
-            Problem::new(code::TELEGRAM_FULL, drive).expected(error.to_string())
+            Problem::new(code::CYCLE_FULL, drive).expected(error.to_string())
         }
     };
     findings.push(&written.text, problem);

@@ -14,9 +14,9 @@ mod states;
 
 use std::path::{Path, PathBuf};
 
-use crate::config::Written;
-use crate::finding::Findings;
+use crate::config::{Config, Written};
 use crate::finding::registry as code;
+use crate::finding::{Findings, Problem};
 use crate::mapping::{Mapping, TableTexts};
 
 /// What is to be checked.
@@ -31,14 +31,16 @@ pub struct Request<'a> {
 /// What was checked, and what was found.
 #[derive(Debug, Default)]
 pub struct Outcome {
+    /// The configuration, where there is one without errors.
+    pub config: Option<Config>,
+    /// The tables, where they could be resolved.
+    pub mapping: Option<Mapping>,
     /// What was found.
     pub findings: Findings,
     /// How many overlays were laid over the tables.
     pub overlays: usize,
     /// How many worked examples came out or did not.
     pub examples: usize,
-    /// How many axes the configuration has.
-    pub axes: usize,
 }
 
 /// Checks.
@@ -47,23 +49,24 @@ pub fn check(request: &Request<'_>) -> Outcome {
     let mut outcome = Outcome::default();
     let findings = &mut outcome.findings;
     let written = request.config.and_then(|path| Written::load(path, findings));
-    let Some(texts) = texts(request, written.as_ref(), findings) else { return outcome };
-    outcome.overlays = texts.overlays.len();
-    outcome.axes = written.as_ref().map_or(0, |written| written.config.axes.len());
-    if let Some(mapping) = Mapping::resolve(&texts, findings) {
+    if let Some(texts) = texts(request, written.as_ref(), findings) {
+        outcome.overlays = texts.overlays.len();
+        outcome.mapping = Mapping::resolve(&texts, findings);
+    }
+    if let Some(mapping) = &outcome.mapping {
         outcome.examples = mapping.run_examples(findings);
-        tables(&mapping, findings);
+        tables(mapping, findings);
         if let Some(written) = &written {
-            axes::check(&mapping, written, findings);
-            bus::check(&mapping, written, findings);
+            axes::check(mapping, written, findings);
+            bus::check(mapping, written, findings);
         }
     }
+    outcome.config = written.map(|written| written.config);
     outcome
 }
 
 /// The texts of the tables; `None` when some cannot be read.
 fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findings) -> Option<TableTexts> {
-    let before = findings.count(code::UNREADABLE.severity());
     let config = written.map(|written| &written.config);
     let mut folder = config.and_then(|config| config.mappings_dir.clone());
     let mut overlays = config.map(|config| config.overlays.clone()).unwrap_or_default();
@@ -74,12 +77,24 @@ fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findin
             overlays.push(path.clone());
         }
     }
-    match TableTexts::load(folder.as_deref(), &overlays) {
-        Ok(texts) => Some(texts).filter(|_| findings.count(code::UNREADABLE.severity()) == before),
-        Err(found) => {
-            findings.extend(found);
-            None
-        }
+    if let Some(written) = written {
+        named(written, findings);
+    }
+    TableTexts::load(folder.as_deref(), &overlays).map_err(|found| findings.extend(found)).ok()
+}
+
+/// Marks what the configuration names and is not there.
+fn named(written: &Written, findings: &mut Findings) {
+    let Some(table) = &written.file.mappings else { return };
+    let config = &written.config;
+    let names = table.dir.iter().chain(&table.overlays);
+    let missing =
+        names.zip(config.mappings_dir.iter().chain(&config.overlays)).filter(|(_, path)| !path.exists());
+    for (name, _) in missing {
+        findings.push(
+            &written.text,
+            Problem::new(code::UNREADABLE, name.span()).expected("expected a file or folder that is there"),
+        );
     }
 }
 

@@ -27,8 +27,25 @@ struct Kind {
     root: fn(&mut SchemaGenerator) -> Value,
 }
 
+/// Keys that go by two names: sets of codes and sets of bits have the same rows.
+const ALIASES: [(&str, &str, &str); 2] = [("CipSetRow", "codes", "bits"), ("CipCodeRow", "code", "bit")];
+
 fn root<T: JsonSchema>(generator: &mut SchemaGenerator) -> Value {
-    generator.root_schema_for::<T>().to_value()
+    let mut schema = generator.root_schema_for::<T>().to_value();
+    for (row, key, alias) in ALIASES {
+        let Some(definition) = schema.pointer_mut(&format!("/definitions/{row}")) else { continue };
+        definition["properties"][alias] = definition["properties"][key].clone();
+        if let Some(required) = definition.get_mut("required").and_then(Value::as_array_mut) {
+            required.retain(|name| name != key);
+        }
+        definition["anyOf"] = either(key, alias);
+    }
+    schema
+}
+
+/// One of two keys is required.
+fn either(one: &str, other: &str) -> Value {
+    json!([{ "required": [one] }, { "required": [other] }])
 }
 
 const KINDS: [Kind; 14] = [
@@ -123,8 +140,14 @@ fn identify(sections: &[Section], rows: &Map<String, Value>, definitions: &mut M
         let reference = rows.get(section.name).and_then(|list| list["items"]["$ref"].as_str());
         let Some(name) = reference.and_then(|path| path.rsplit('/').next()) else { continue };
         let Some(definition) = definitions.get_mut(name) else { continue };
-        if section.name != "fields" {
-            definition["required"] = json!([section.key[0]]);
+        let alias = ALIASES.iter().find(|(row, key, alias)| {
+            name.ends_with(row) && (section.key[0] == *key || section.key[0] == *alias)
+        });
+        match alias {
+            Some((_, key, alias)) => definition["anyOf"] = either(key, alias),
+            // A field has bits or pieces.
+            None if section.name == "fields" => {}
+            None => definition["required"] = json!([section.key[0]]),
         }
         if let Some(properties) = definition.get_mut("properties").and_then(Value::as_object_mut) {
             properties.insert(
@@ -144,6 +167,7 @@ fn identify(sections: &[Section], rows: &Map<String, Value>, definitions: &mut M
 fn loosen(definition: &mut Value) {
     if let Some(definition) = definition.as_object_mut() {
         definition.remove("required");
+        definition.remove("anyOf");
     }
 }
 

@@ -105,7 +105,7 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
         String::new()
     };
     let axes = if arguments.config.is_some() {
-        format!(", {}", plural(outcome.axes, "axis"))
+        format!(", {}", plural(outcome.config.as_ref().map_or(0, |config| config.axes.len()), "axis"))
     } else {
         String::new()
     };

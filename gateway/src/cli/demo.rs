@@ -55,7 +55,8 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         .collect();
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
-    let running = runner::start(&config, Some(&arguments.capture), &Arc::new(Store::open(None)?))
+    let settings = Arc::new(Store::open(None)?);
+    let running = runner::start(&config, mapping.clone(), Some(&arguments.capture), &settings)
         .map_err(|error| in_use(error, arguments.listen))?;
     progress.step(&format!(
         "gateway on {}, a simulated line of {} drives behind",

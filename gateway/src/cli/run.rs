@@ -6,11 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use tracing::{info, warn};
+use tracing::{error, info, warn};
 use tracing_subscriber::EnvFilter;
 
 use super::{CliError, RunArguments};
+use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
+use crate::finding::{Findings, Severity};
+use crate::mapping::Mapping;
 use crate::runner;
 use crate::settings::Store;
 
@@ -19,27 +22,71 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Runs the box until it is asked to end.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
-    let config = Config::load(&arguments.config)?;
-    log_to_stderr(config.log_level);
-    let stop = super::signal::stop_on_signals()?;
-    info!(name = config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
-    let settings = Arc::new(Store::open(config.settings_file.as_deref())?);
-    while run_once(&config, arguments.capture.as_deref(), &settings, &stop)? {
-        info!("axisbridge starts anew: a controller has reset the Identity object");
+    let (mut good, findings) = read(&arguments.config)?;
+    log_to_stderr(good.config.log_level);
+    tell(&findings);
+    let asked =
+        Asked { stop: super::signal::stop_on_signals()?, reload: super::signal::reload_on_hang_up()? };
+    info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
+    loop {
+        let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
+        match run_once(&good, arguments, &settings, &asked)? {
+            After::End => return Ok(ExitCode::SUCCESS),
+            After::Again(next) => good = next.map_or(good, |next| *next),
+        }
     }
-    Ok(ExitCode::SUCCESS)
 }
 
-/// Runs the box once; `true` when it is to be started again.
+/// A configuration and its tables, without errors.
+struct Good {
+    config: Config,
+    mapping: Mapping,
+}
+
+/// What the box is asked for from outside.
+struct Asked {
+    stop: Arc<AtomicBool>,
+    reload: Arc<AtomicBool>,
+}
+
+/// What comes after a run of the box.
+enum After {
+    /// Nothing.
+    End,
+    /// Another run, with other files where some were read.
+    Again(Option<Box<Good>>),
+}
+
+/// Reads the configuration and its tables, as `check` does.
+fn read(path: &Path) -> Result<(Good, Findings), Findings> {
+    let outcome = check(&Request { config: Some(path), mappings: &[] });
+    match (outcome.config, outcome.mapping) {
+        (Some(config), Some(mapping)) if !outcome.findings.has_errors() => {
+            Ok((Good { config, mapping }, outcome.findings))
+        }
+        _ => Err(outcome.findings),
+    }
+}
+
+/// Logs warnings; notes are for `check`.
+fn tell(findings: &Findings) {
+    for finding in findings.list().iter().filter(|finding| finding.severity() == Severity::Warning) {
+        warn!("{finding}");
+    }
+}
+
+/// Runs the box once. What was good stays what is run when files that are read again are not.
 fn run_once(
-    config: &Config,
-    capture: Option<&Path>,
+    good: &Good,
+    arguments: &RunArguments,
     settings: &Arc<Store>,
-    stop: &AtomicBool,
-) -> Result<bool, CliError> {
-    let running = runner::start(config, capture, settings)?;
+    asked: &Asked,
+) -> Result<After, CliError> {
+    let running = runner::start(&good.config, good.mapping.clone(), arguments.capture.as_deref(), settings)?;
     let mut told = false;
-    while !stop.load(Ordering::Relaxed) && !running.wants_restart() {
+    let mut next = None;
+    let mut reloads = false;
+    while !asked.stop.load(Ordering::Relaxed) && !running.wants_restart() && !reloads {
         std::thread::sleep(LOOK_INTERVAL);
         if !told {
             told = true;
@@ -51,13 +98,43 @@ fn run_once(
         if running.is_dead() {
             return Err("the cycle thread has ended by itself; see above".into());
         }
+        if asked.reload.swap(false, Ordering::Relaxed) {
+            next = reload(&arguments.config).or(next);
+            reloads = next.is_some() && !running.has_torque();
+            if next.is_some() && !reloads {
+                info!("an axis has torque: what was read counts from the next start of the box");
+            }
+        }
     }
-    let again = running.wants_restart() && !stop.load(Ordering::Relaxed);
+    let stops = asked.stop.load(Ordering::Relaxed);
     info!("axisbridge ends: axes stop, the bus goes down");
     if let Some(dropped) = running.stop()?.filter(|dropped| *dropped > 0) {
         warn!(dropped, "frames are missing in the recording");
     }
-    Ok(again)
+    if stops {
+        return Ok(After::End);
+    }
+    let why =
+        if reloads { "its files were read again" } else { "a controller has reset the Identity object" };
+    info!(why, "axisbridge starts anew");
+    Ok(After::Again(next))
+}
+
+/// Reads the files again; `None` when they are refused.
+fn reload(path: &Path) -> Option<Box<Good>> {
+    match read(path) {
+        Ok((good, findings)) => {
+            info!(file = %path.display(), "configuration and tables were read again, without errors");
+            tell(&findings);
+            Some(Box::new(good))
+        }
+        Err(findings) => {
+            let errors = findings.list().iter().filter(|finding| finding.severity() == Severity::Error);
+            errors.for_each(|finding| error!("{finding}"));
+            warn!("configuration and tables are refused: the box keeps those that it runs with");
+            None
+        }
+    }
 }
 
 /// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file.

@@ -1,4 +1,4 @@
-//! The wish to end: Ctrl-C, or SIGTERM from a service manager.
+//! Wishes from outside: to end (Ctrl-C, or SIGTERM from a service manager), to read the files again (SIGHUP).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,4 +30,21 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CliError> {
         });
     })?;
     Ok(stop)
+}
+
+/// A flag that each SIGHUP sets; whoever obeys clears it.
+pub fn reload_on_hang_up() -> Result<Arc<AtomicBool>, CliError> {
+    let reload = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&reload);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    std::thread::Builder::new().name("axisbridge-reload".to_owned()).spawn(move || {
+        runtime.block_on(async {
+            use tokio::signal::unix::{SignalKind, signal};
+            let Ok(mut hang_up) = signal(SignalKind::hangup()) else { return };
+            while hang_up.recv().await.is_some() {
+                flag.store(true, Ordering::Relaxed);
+            }
+        });
+    })?;
+    Ok(reload)
 }

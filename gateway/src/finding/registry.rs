@@ -348,14 +348,10 @@ registry! {
         "An axis names its drive, a device its axes; each must be there, and belong to one.",
         "[[axis]]\nname = \"x\"\ndrive = \"no-such-drive\"",
         "Correct the name, or add what it names.";
-    TELEGRAM_FULL = 82 Error "cyclic data that do not fit":
-        "The values of an axis's modes and captures, or of all drives together, are more than the telegrams of the bus can carry.",
-        "# more drives than four MDTs have room for",
-        "Take signals or captures (`events = \"service-channel\"`) out, or put drives on another bus.";
-    CYCLE_FULL = 83 Error "a bus cycle that cannot hold":
-        "The telegrams of all drives take longer on the wire than the cycle lasts, even with drives that need no time themselves.",
-        "[south.sercos]\ncycle_time = \"31.25 us\" # with 16 drives",
-        "Use a longer cycle, or fewer drives on the bus.";
+    CYCLE_FULL = 83 Error "cyclic data that the bus cannot carry":
+        "The values of an axis are more than its connection holds, those of all drives more than the telegrams hold, or the telegrams take longer on the wire than the cycle lasts: as the master lays them out, with drives that need no time themselves.",
+        "[south.sercos]\ncycle_time = \"31.25 us\" # with 60 drives",
+        "Use a longer cycle, fewer drives on the bus, or fewer signals and captures (`events = \"service-channel\"`).";
     AXIS_TABLES = 84 Error "the tables make no axis":
         "With these tables no program can be made for the axis: a mode or a slot is missing, or a scaling does not fit 64 bits.",
         "[[generic-sercos.mode_slot]]\nslot = 2\nremove = true",

@@ -31,13 +31,18 @@ impl Problem {
                 None => problem,
             };
         }
-        Self::new(code::WRONG_TYPE, span).title(title).expected(expected)
+        let code = if is_value(&title) { code::OUT_OF_RANGE } else { code::WRONG_TYPE };
+        Self::new(code, span).title(title).expected(expected)
     }
 }
 
 /// The library says what it expected behind the last comma of its message, in words of the language.
 fn parts(message: &str) -> (String, String) {
     let (title, expected) = match message.split_once(", expected ") {
+        Some((title, "u8")) if is_value(title) => (title, "expected 0 to 255".to_owned()),
+        Some((title, "u16")) if is_value(title) => (title, "expected 0 to 65535".to_owned()),
+        Some((title, "u32")) if is_value(title) => (title, "expected 0 to 4294967295".to_owned()),
+        Some((title, "i32")) if is_value(title) => (title, "expected -2147483648 to 2147483647".to_owned()),
         Some((title, "i64" | "u8" | "u16" | "u32" | "i32" | "u64")) => {
             (title, "expected a whole number".to_owned())
         }
@@ -50,4 +55,9 @@ fn parts(message: &str) -> (String, String) {
     };
     let title = title.replace("unknown field", "unknown key").replace("missing field", "missing key");
     (title, expected)
+}
+
+/// Whether the type is right and the value is not.
+fn is_value(title: &str) -> bool {
+    title.starts_with("invalid value")
 }

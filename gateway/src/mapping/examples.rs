@@ -69,16 +69,46 @@ impl Runner<'_> {
     }
 }
 
-fn expect<T: PartialEq + fmt::Debug>(
-    span: Range<usize>,
-    what: &str,
-    expected: &T,
-    got: &T,
-) -> Result<(), Wrong> {
+/// A value of an example as a person writes it.
+trait Shown {
+    fn shown(&self) -> String;
+}
+
+impl Shown for i64 {
+    fn shown(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl Shown for f64 {
+    fn shown(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl Shown for Vec<u8> {
+    fn shown(&self) -> String {
+        self.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl<T: Shown> Shown for Option<T> {
+    fn shown(&self) -> String {
+        self.as_ref().map_or_else(|| "nothing".to_owned(), Shown::shown)
+    }
+}
+
+impl<T: Shown, E: fmt::Display> Shown for Result<T, E> {
+    fn shown(&self) -> String {
+        self.as_ref().map_or_else(ToString::to_string, Shown::shown)
+    }
+}
+
+fn expect<T: PartialEq + Shown>(span: Range<usize>, what: &str, expected: &T, got: &T) -> Result<(), Wrong> {
     if expected == got {
         Ok(())
     } else {
-        Err((span, format!("{what}: the table says {expected:?}, got {got:?}")))
+        Err((span, format!("{what}: the table says {}, got {}", expected.shown(), got.shown())))
     }
 }
 

@@ -114,7 +114,7 @@ impl<'a> Resolver<'a> {
             let field_mask = if width >= 32 { u32::MAX } else { (1 << width) - 1 };
             let value = *row.is.get_ref();
             if value & !field_mask != 0 {
-                let message = format!("expected a value of {width} bits, got {value}");
+                let message = format!("expected 0 to {field_mask}, got {value}");
                 self.error(code::FIELD_VALUE, row.is.span(), "is", message);
                 return None;
             }

@@ -5,6 +5,7 @@ mod cip_codes;
 mod cip_dictionary;
 mod cip_program;
 mod cyclic_axis;
+mod overlays;
 mod sercos_dictionary;
 mod sercos_program;
 mod sercos_scaling;

@@ -22,6 +22,7 @@ use profile_cip::target::identity::{Health, ModuleState};
 use profile_cip::target::motion_device::SyncState;
 use profile_cip::target::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
+use profile_generic::state::DriveState;
 use tracing::{info, warn};
 
 use self::cycle::{CycleThread, Setup};
@@ -32,7 +33,6 @@ use crate::config::{Config, Link};
 use crate::engine::build::{BuildError, Built, Host, build};
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::SouthPort;
-use crate::finding::Findings;
 use crate::host::HostPort;
 use crate::latest::Reader;
 use crate::mapping::Mapping;
@@ -55,9 +55,6 @@ const STOP_TIME_OUT: Duration = Duration::from_secs(5);
 /// Why the box cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// The mapping tables are faulty.
-    #[error("{0}")]
-    Tables(#[from] Findings),
     /// The configuration makes no box.
     #[error("{0}")]
     Build(#[from] BuildError),
@@ -116,16 +113,16 @@ pub struct RunningBox {
     restart: Arc<AtomicBool>,
 }
 
-/// Starts a box; `capture` records both sides, and `settings` has what controllers set.
+/// Starts a box with these tables; `capture` records both sides, and `settings` has what controllers set.
 ///
 /// # Errors
 /// [`StartError`]; nothing runs then.
 pub fn start(
     config: &Config,
+    mapping: Mapping,
     capture: Option<&Path>,
     settings: &Arc<Store>,
 ) -> Result<RunningBox, StartError> {
-    let mapping = Mapping::load(config.mappings_dir.as_deref(), &config.overlays)?;
     let wire = match &config.sercos.link {
         Link::Interface { name, ring } => Some(PacketPort::open(name, ring.as_deref())?),
         Link::InProcess { .. } => None,
@@ -349,6 +346,14 @@ impl RunningBox {
     #[must_use]
     pub fn wants_restart(&self) -> bool {
         self.restart.load(Ordering::Relaxed)
+    }
+
+    /// Whether some drive may have torque.
+    #[must_use]
+    pub fn has_torque(&self) -> bool {
+        use DriveState::{FaultReaction, Operating, Starting, Stopping, Testing};
+        let torque = |state| matches!(state, Starting | Operating | Testing | Stopping | FaultReaction);
+        self.status.read().configured_axes().iter().any(|axis| torque(axis.state))
     }
 
     /// Whether the cycle thread has ended by itself, which it should never do.

@@ -1,0 +1,33 @@
+"""Validates TOML files against JSON Schemas with jsonschema (PyPI).
+
+Usage: json_schema.py FOLDER [FILE.toml SCHEMA good|bad]...
+
+Prints one line a file: `good`, or `bad` with the number of errors and the first of them. The exit status is 1 when a file is
+not what the command line says.
+"""
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+
+from jsonschema import Draft7Validator
+
+
+def main() -> int:
+    folder = Path(sys.argv[1])
+    unexpected = 0
+    for file, name, expected in zip(sys.argv[2::3], sys.argv[3::3], sys.argv[4::3]):
+        schema = json.loads((folder / f"{name}.json").read_text())
+        Draft7Validator.check_schema(schema)
+        data = tomllib.loads(Path(file).read_text())
+        errors = sorted(Draft7Validator(schema).iter_errors(data), key=lambda error: list(map(str, error.path)))
+        verdict = "bad" if errors else "good"
+        first = f" {len(errors)}: {list(errors[0].path)}: {errors[0].message[:200]}" if errors else ""
+        print(f"{verdict} {file}{first}")
+        unexpected += verdict != expected
+    return 1 if unexpected else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
