@@ -679,6 +679,16 @@ impl Checker {
         self.unique("the drive name", &names(&table.drive, |drive| &drive.name));
         self.unique("the SERCOS address", &names(&table.drive, |drive| &drive.address));
         let drives: Vec<_> = table.drive.iter().map(|drive| self.drive(drive.get_ref())).collect();
+        let later = || table.drive.iter().filter_map(|drive| drive.get_ref().hot_plug.as_ref());
+        let all = later().filter(|hot_plug| *hot_plug.get_ref()).count() == table.drive.len();
+        if let Some(first) = later().next().filter(|_| all) {
+            self.report::<()>(
+                first.span(),
+                "every drive has `hot_plug = true`",
+                "expected at least one drive without it: a bus on which nobody is does not run, and drives are plugged in \
+                 while it runs",
+            );
+        }
         Some(Sercos {
             link: link?,
             cycle_time: cycle_time?,
@@ -823,7 +833,8 @@ impl Checker {
         };
         let set_scaling = table.set_scaling.unwrap_or(false);
         let acknowledges = table.acknowledges.unwrap_or(true);
-        Some(Drive { name: name?, address: address?, set_scaling, acknowledges, rated: rated? })
+        let hot_plug = table.hot_plug.as_ref().is_some_and(|hot_plug| *hot_plug.get_ref());
+        Some(Drive { name: name?, address: address?, set_scaling, acknowledges, rated: rated?, hot_plug })
     }
 
     /// A name that other parts of the file refer to.

@@ -272,4 +272,7 @@ pub struct DriveTable {
     /// Rated (continuous stall) torque or force of its motor, such as `"2.5 Nm"` or `"200 N"`: needed where the drive's
     /// torque values are in newton metre, newton or their inch units. Default: not known.
     pub rated_torque: Option<Spanned<String>>,
+    /// Whether it may be plugged in while the bus is in operation: the bus runs without it, and its place in the
+    /// telegrams is kept. At least one drive has to be there from the start. Default: false.
+    pub hot_plug: Option<Spanned<bool>>,
 }

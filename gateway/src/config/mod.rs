@@ -405,6 +405,8 @@ pub struct Drive {
     pub acknowledges: bool,
     /// Rated torque or force of its motor, where it is known.
     pub rated: Option<Rated>,
+    /// Whether it may be plugged in while the bus is in operation.
+    pub hot_plug: bool,
 }
 
 #[cfg(test)]

@@ -123,14 +123,16 @@ fn defaults_are_those_of_the_documentation() {
                     address: 1,
                     set_scaling: false,
                     acknowledges: true,
-                    rated: None
+                    rated: None,
+                    hot_plug: false
                 },
                 Drive {
                     name: "b".to_owned(),
                     address: 2,
                     set_scaling: false,
                     acknowledges: true,
-                    rated: None
+                    rated: None,
+                    hot_plug: false
                 },
             ],
         }
@@ -150,7 +152,7 @@ fn values_given_are_taken() {
         .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
         .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\nassign_addresses = true\ncp0_stable_cycles = 1\nallowed_losses = 65535\nrealtime = { priority = 0, cpu = 3, lock_memory = false, stay_awake = true }")
         .replace("in-process", "enp3s0")
-        .replace("address = 2", "address = 511\nset_scaling = true\nacknowledges = false\nrated_torque = \"2.5 Nm\"");
+        .replace("address = 2", "address = 511\nset_scaling = true\nacknowledges = false\nrated_torque = \"2.5 Nm\"\nhot_plug = true");
     let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(config.log_level, LogLevel::Debug);
     assert_eq!(config.modbus, Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3 }));
@@ -193,6 +195,7 @@ fn values_given_are_taken() {
     );
     assert_eq!((sercos.drives[1].address, sercos.drives[1].set_scaling), (511, true));
     assert!(!sercos.drives[1].acknowledges);
+    assert_eq!([sercos.drives[0].hot_plug, sercos.drives[1].hot_plug], [false, true]);
     assert_eq!(sercos.drives[1].rated, Some(Rated { kind: UnitKind::Rotary, value: 2_500_000 }));
 }
 

@@ -20,9 +20,11 @@ use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
 use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConfig};
+use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
-use super::bus::SercosBus;
+use super::bus::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
+use super::commissioner::Commissioner;
 use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
@@ -59,6 +61,8 @@ pub struct Built {
     pub notices: rtrb::Consumer<Notice>,
     /// The status of the box.
     pub status: Reader<BoxStatus>,
+    /// What commissions drives that come later: to be polled beside the cycle.
+    pub commissioner: Commissioner,
 }
 
 /// Why a configuration makes no box.
@@ -99,7 +103,7 @@ pub struct Host {
 /// # Errors
 /// See [`BuildError`].
 pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, BuildError> {
-    let bus = bus(config, host)?;
+    let (bus, commissioner) = bus(config, host, &mapping)?;
     let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
     let mut devices = Vec::with_capacity(config.devices.len());
     let mut adapters = Vec::with_capacity(config.devices.len());
@@ -123,7 +127,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     let (producer, notices) = rtrb::RingBuffer::new(NOTICES);
     let (publisher, status) = latest::latest(BoxStatus::STARTING);
     let engine = Engine::new(Parts { mapping, bus, devices, axes, notices: producer, publisher });
-    Ok(Built { engine, adapters, notices, status })
+    Ok(Built { engine, adapters, notices, status, commissioner })
 }
 
 /// The SERCOS III master of a configuration.
@@ -151,8 +155,8 @@ pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     master
 }
 
-fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
-    let drives = config
+fn bus(config: &Config, host: Host, mapping: &Mapping) -> Result<(SercosBus, Commissioner), BuildError> {
+    let drives: Vec<_> = config
         .axes
         .iter()
         .map(|axis| {
@@ -160,7 +164,23 @@ fn bus(config: &Config, host: Host) -> Result<SercosBus, BuildError> {
             (drive.address, needs(axis, drive))
         })
         .collect();
-    Ok(SercosBus::new(master_config(config, host), drives)?)
+    let mut master = master_config(config, host);
+    for (axis, (address, needs)) in config.axes.iter().zip(&drives) {
+        let slave = master.slaves.iter_mut().find(|slave| slave.address == *address);
+        if let Some(slave) = slave.filter(|_| config.sercos.drives[axis.drive].hot_plug) {
+            slave.hot_plug = Some(room(needs, mapping));
+        }
+    }
+    let (commissioner, end) = Commissioner::new(mapping.clone(), master.mst_losses, drives.iter().cloned());
+    Ok((SercosBus::new(master, drives, end)?, commissioner))
+}
+
+/// What the telegrams keep for a drive that may come later: the longest connections that it can need.
+fn room(needs: &SercosAxis, mapping: &Mapping) -> SlaveNeed {
+    let (command, feedback) = mapping.telegram_room(needs);
+    let need = |instance, slave_produces, len| ConnectionNeed { instance, slave_produces, len };
+    let connections = [need(COMMAND_CONNECTION, false, command), need(FEEDBACK_CONNECTION, true, feedback)];
+    SlaveNeed { connections: connections.into_iter().collect(), ..SlaveNeed::default() }
 }
 
 fn kind(axis: &Axis) -> UnitKind {

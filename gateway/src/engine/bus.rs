@@ -9,16 +9,18 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
-use profile_sercos::master::event::{Event, SlaveId, Ticket};
+use profile_sercos::master::event::{Event, HotPlugRefusal, SlaveId, Ticket};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::scp::ScpClass;
 
 use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
+use super::commissioner::{CommissionerEnd, Done, Job, Run};
 use super::commissioning::Commissioning;
 use super::notice::Notice;
-use crate::mapping::{DriveFacts, Mapping, SercosAxis};
+use crate::mapping::{DriveFacts, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -49,6 +51,11 @@ enum Stage {
     Absent,
     /// Working through the plan of CP2 or CP3.
     Commissioning(Box<Commissioning>),
+    /// On its way in by hot plug, commissioned beside the cycle.
+    Joining {
+        /// The request that is under way.
+        ticket: Option<Ticket>,
+    },
     /// Through with the plan of this phase.
     Ready,
 }
@@ -85,6 +92,10 @@ struct Drive {
     slave: Option<SlaveId>,
     stage: Stage,
     facts: DriveFacts,
+    /// It may come later: nothing is missing without it.
+    hot_plug: bool,
+    /// How often it has come by hot plug.
+    runs: u32,
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
 }
 
@@ -120,15 +131,28 @@ pub struct SercosBus {
     idle: bool,
     /// The bus goes down because the box wants it to: that is no fault of any axis.
     planned: bool,
+    /// Who commissions drives that come later.
+    commissioner: CommissionerEnd,
 }
 
 impl SercosBus {
-    /// A bus whose master goes for CP4. `drives` are the SERCOS address and the needs of each axis.
+    /// A bus whose master goes for CP4. `drives` are the SERCOS address and the needs of each axis; the commissioner
+    /// knows the same.
     ///
     /// # Errors
     /// What the master finds wrong with its configuration.
-    pub fn new(config: MasterConfig, drives: Vec<(u16, SercosAxis)>) -> Result<Self, ConfigError> {
+    pub fn new(
+        config: MasterConfig,
+        drives: Vec<(u16, SercosAxis)>,
+        commissioner: CommissionerEnd,
+    ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
+        let later: Vec<_> = config
+            .slaves
+            .iter()
+            .filter(|slave| slave.hot_plug.is_some())
+            .map(|slave| slave.address)
+            .collect();
         let mut master = Master::new(config)?;
         master.set_target_phase(Phase::CP4);
         let drive = |(address, needs)| Drive {
@@ -138,6 +162,8 @@ impl SercosBus {
             slave: None,
             stage: Stage::Absent,
             facts: DriveFacts::new(),
+            hot_plug: later.contains(&address),
+            runs: 0,
             accesses: ArrayVec::new(),
         };
         Ok(Self {
@@ -152,6 +178,7 @@ impl SercosBus {
             rescan_pause: RESCAN_PAUSE,
             idle: true,
             planned: false,
+            commissioner,
         })
     }
 
@@ -196,14 +223,14 @@ impl SercosBus {
         if self.master.phase() != Some(Phase::CP4) {
             return None;
         }
-        let consumer = self.master.consumer(drive.slave?, FEEDBACK_CONNECTION)?;
+        let consumer = self.master.consumer(drive.there()?, FEEDBACK_CONNECTION)?;
         // Without the ATs of this cycle what is there is that of the last one.
         Some(Consumer { fresh: consumer.fresh && self.master.cycle_complete(), ..consumer })
     }
 
     /// Lets an axis fill its values for the next cycle.
     pub fn command(&mut self, axis: usize, fill: impl FnOnce(Option<&mut [u8]>) -> bool) {
-        let slave = self.drives.get(axis).and_then(|drive| drive.slave);
+        let slave = self.drives.get(axis).and_then(Drive::there);
         let Some(slave) = slave else {
             fill(None);
             return;
@@ -218,7 +245,7 @@ impl SercosBus {
     /// Sends a request over the drive's service channel; `false` when the drive is not there or too many wait.
     pub fn access(&mut self, axis: usize, request: SvcRequest, purpose: Purpose) -> bool {
         let Some(drive) = self.drives.get_mut(axis) else { return false };
-        let Some(slave) = drive.slave.filter(|_| !drive.accesses.is_full()) else { return false };
+        let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
         match self.master.svc_submit(slave, request) {
             Ok(ticket) => {
                 drive.accesses.push((ticket, purpose));
@@ -249,6 +276,7 @@ impl SercosBus {
             }
         }
         self.commission(mapping, axes, notice);
+        self.let_join(now, system, axes, notice);
         self.diagnose(now, axes);
         self.capture(axes);
         let alone =
@@ -313,17 +341,39 @@ impl SercosBus {
                     }
                 }
             }
+            Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
+            Event::HotPlugged { slave, .. } => {
+                let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(*slave));
+                drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
+                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
+                    (self.lost_since, self.rescan_pause) = (None, RESCAN_PAUSE);
+                }
+            }
+            Event::HotPlugRefused { address: Some(address), reason } => {
+                self.refuse_joining(now, system, *address, *reason, axes);
+            }
+            // What it was that failed; that the slave does not come in follows.
+            Event::StepFailed { slave, .. }
+            | Event::ClassMismatch { slave }
+            | Event::CheckFailed { slave, .. }
+                if self.is_joining(*slave) => {}
             Event::Phase(phase) if *phase == Phase::CP4 => {
                 self.planned = false;
-                if self.drives.iter().all(|drive| drive.slave.is_some()) {
+                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
                     self.rescan_pause = RESCAN_PAUSE;
                 } else if self.rescan_pause > RESCAN_PAUSE {
                     // It was there once and is missing after a new scan: looked for again, ever more rarely.
                     self.lost_since = Some(now);
                 }
             }
-            Event::SlaveLost { slave, .. } => {
-                self.lost_since.get_or_insert(now);
+            Event::SlaveLost { slave, address, .. } => {
+                // One that comes back by hot plug needs no new scan.
+                let facts = self.master.slave(*slave).map(|info| info.facts);
+                let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
+                let configured = |drive: &Drive| drive.address == *address && drive.hot_plug;
+                if !has_class && !self.drives.iter().any(configured) {
+                    self.lost_since.get_or_insert(now);
+                }
                 self.lose_slave(now, system, *slave, axes);
             }
             // The master waits again for its application: the others go on without the slave that stands in the way.
@@ -339,10 +389,6 @@ impl SercosBus {
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
             Event::Phase(phase) if *phase < Phase::CP2 => self.lose_all(now, system, axes),
-            // The commissioning of a drive that comes later is not known here.
-            Event::HotPlugAwaits { slave, .. } => {
-                let _ = self.master.exclude(*slave);
-            }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
@@ -391,7 +437,9 @@ impl SercosBus {
             drive.plan(axis, mapping, Phase::CP2.0, notice);
         } else {
             drive.stage = Stage::Absent;
-            notice(Notice::DriveMissing { axis: index(axis), address: drive.address });
+            if !drive.hot_plug {
+                notice(Notice::DriveMissing { axis: index(axis), address: drive.address });
+            }
         }
     }
 
@@ -433,6 +481,119 @@ impl SercosBus {
         if !busy {
             // Refused only when the master has left the phase meanwhile.
             let _ = self.master.proceed();
+        }
+    }
+
+    fn is_joining(&self, slave: SlaveId) -> bool {
+        let joining = |drive: &Drive| matches!(drive.stage, Stage::Joining { .. });
+        self.drives.iter().any(|drive| drive.slave == Some(slave) && joining(drive))
+    }
+
+    /// A slave is on its way in by hot plug: the drive of an axis, or one that nobody asked for.
+    fn begin_joining(&mut self, slave: SlaveId, address: u16, phase: Phase) {
+        let Some(axis) = self.drives.iter().position(|drive| drive.address == address) else {
+            // It takes part without connections.
+            let _ = self.master.proceed_hot_plug(slave);
+            return;
+        };
+        let drive = &mut self.drives[axis];
+        if phase == Phase::CP2 {
+            self.refused.retain(|refused| *refused != slave);
+            drive.runs = drive.runs.wrapping_add(1);
+        }
+        drive.slave = Some(slave);
+        drive.stage = Stage::Joining { ticket: None };
+        let run = drive.run(axis);
+        if !self.commissioner.push(Job::Begin(run, phase)) {
+            // It is tried again after a while.
+            drive.lose();
+            let _ = self.master.exclude(slave);
+        }
+    }
+
+    /// Carries on with the drives that are on their way in.
+    fn let_join(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        axes: &mut [AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        // Each piece of work can make one job.
+        while self.commissioner.has_room()
+            && let Some(done) = self.commissioner.pop()
+        {
+            let run = match &done {
+                Done::Told(_) => None,
+                Done::Submit(run, _)
+                | Done::Connect(run, _)
+                | Done::Program(run, _)
+                | Done::Failed(run, _) => Some(*run),
+            };
+            let Some(run) = run else {
+                if let Done::Told(told) = done {
+                    notice(told);
+                }
+                continue;
+            };
+            let axis = usize::from(run.axis);
+            let joining = self.drives.get(axis).filter(|drive| {
+                drive.run(axis) == run && matches!(drive.stage, Stage::Joining { ticket: None })
+            });
+            let Some(slave) = joining.and_then(|drive| drive.slave) else {
+                self.commissioner.push(Job::Unused(done));
+                continue;
+            };
+            let through = match done {
+                Done::Submit(run, request) => {
+                    match self.master.svc_submit(slave, request) {
+                        Ok(sent) => self.drives[axis].stage = Stage::Joining { ticket: Some(sent) },
+                        Err((_, request)) => {
+                            self.commissioner.push(Job::Unsent(run, request));
+                            let _ = self.master.exclude(slave);
+                        }
+                    }
+                    continue;
+                }
+                Done::Connect(_, connections) => self.master.set_connections(slave, connections).is_ok(),
+                Done::Program(_, program) => {
+                    axes[axis].set_south(program);
+                    true
+                }
+                Done::Failed(_, failed) => {
+                    notice(failed);
+                    false
+                }
+                Done::Told(_) => continue,
+            };
+            if through {
+                let _ = self.master.proceed_hot_plug(slave);
+            } else {
+                let _ = self.master.exclude(slave);
+                self.drives[axis].lose();
+                axes[axis].leave_south(now, system);
+            }
+        }
+    }
+
+    /// A drive does not come in.
+    fn refuse_joining(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        address: u16,
+        reason: HotPlugRefusal,
+        axes: &mut [AxisChannel],
+    ) {
+        let Some(axis) = self.drives.iter().position(|drive| drive.address == address) else { return };
+        if matches!(self.drives[axis].stage, Stage::Joining { .. }) {
+            self.drives[axis].lose();
+            axes[axis].leave_south(now, system);
+        }
+        use HotPlugRefusal as R;
+        if matches!(reason, R::Misfit(_) | R::Several | R::NoTelegram) {
+            // Nothing but a new scan brings it in.
+            self.lost_since.get_or_insert(now);
         }
     }
 
@@ -482,12 +643,24 @@ impl SercosBus {
         let axis = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
         let Some(axis) = axis else { return };
         let drive = &mut self.drives[axis];
+        if let Stage::Joining { ticket: sent } = &mut drive.stage
+            && *sent == Some(ticket)
+        {
+            *sent = None;
+            // Room was made sure of before the request was sent.
+            let run = drive.run(axis);
+            self.commissioner.push(Job::Outcome(run, outcome));
+            return;
+        }
         if let Stage::Commissioning(work) = &mut drive.stage
             && work.handle(ticket, &outcome, &mut drive.facts)
         {
             return;
         }
-        let Some(place) = drive.accesses.iter().position(|(known, _)| *known == ticket) else { return };
+        let Some(place) = drive.accesses.iter().position(|(known, _)| *known == ticket) else {
+            self.commissioner.push(Job::Spent(outcome));
+            return;
+        };
         let (_, purpose) = drive.accesses.remove(place);
         let idn = outcome.idn;
         let result = match outcome.result {
@@ -547,26 +720,45 @@ impl Drive {
         slave: SlaveId,
         notice: &mut dyn FnMut(Notice),
     ) -> bool {
-        let telegram = match mapping.telegram(&self.needs, &self.facts) {
-            Ok(telegram) => telegram,
+        match connections(mapping, &self.needs, &self.facts, self.allowed_losses) {
+            Ok(connections) => master.set_connections(slave, connections).is_ok(),
             Err(error) => {
                 notice(Notice::Program { axis: index(axis), address: self.address, error });
-                return false;
+                false
             }
-        };
-        let mut connections = Connections::new();
-        let both =
-            [(COMMAND_CONNECTION, false, &telegram.command), (FEEDBACK_CONNECTION, true, &telegram.feedback)];
-        for (instance, slave_produces, idns) in both {
-            let Some(connection) = ConnectionConfig::new(instance, slave_produces, idns) else {
-                let error = crate::mapping::SercosError::Full("a connection");
-                notice(Notice::Program { axis: index(axis), address: self.address, error });
-                return false;
-            };
-            connections.push(ConnectionConfig { allowed_losses: self.allowed_losses, ..connection });
         }
-        master.set_connections(slave, connections).is_ok()
     }
+
+    /// Its slave, where it takes part or is on the way up.
+    fn there(&self) -> Option<SlaveId> {
+        self.slave.filter(|_| !matches!(self.stage, Stage::Joining { .. }))
+    }
+
+    fn run(&self, axis: usize) -> Run {
+        Run { axis: index(axis), number: self.runs }
+    }
+}
+
+/// The two connections of a drive, from what it has told in CP2.
+///
+/// # Errors
+/// As [`Mapping::telegram`], and when a connection is too long for the master.
+pub(super) fn connections(
+    mapping: &Mapping,
+    needs: &SercosAxis,
+    facts: &DriveFacts,
+    allowed_losses: u16,
+) -> Result<Connections, SercosError> {
+    let telegram = mapping.telegram(needs, facts)?;
+    let mut connections = Connections::new();
+    let both =
+        [(COMMAND_CONNECTION, false, &telegram.command), (FEEDBACK_CONNECTION, true, &telegram.feedback)];
+    for (instance, slave_produces, idns) in both {
+        let connection = ConnectionConfig::new(instance, slave_produces, idns);
+        let connection = connection.ok_or(SercosError::Full("a connection"))?;
+        connections.push(ConnectionConfig { allowed_losses, ..connection });
+    }
+    Ok(connections)
 }
 
 fn index(axis: usize) -> u8 {

@@ -29,9 +29,9 @@ pub struct StepFailure {
     pub failure: SvcFailure,
 }
 
-/// One plan under way.
-#[derive(Debug, Default)]
-pub struct Commissioning {
+/// One plan under way. `T` tells its requests apart.
+#[derive(Debug)]
+pub struct Commissioning<T = Ticket> {
     plan: CommissioningPlan,
     /// The step under way.
     at: usize,
@@ -39,17 +39,17 @@ pub struct Commissioning {
     part: usize,
     /// How that element is transferred, where the attribute has told it.
     shape: Option<Shape>,
-    ticket: Option<Ticket>,
+    ticket: Option<T>,
     failure: Option<StepFailure>,
     /// Steps that failed and were allowed to.
     passed_over: Vec<StepFailure>,
 }
 
-impl Commissioning {
+impl<T: Copy + PartialEq> Commissioning<T> {
     /// Starts a plan.
     #[must_use]
     pub fn new(plan: CommissioningPlan) -> Self {
-        Self { plan, ..Self::default() }
+        Self { plan, at: 0, part: 0, shape: None, ticket: None, failure: None, passed_over: Vec::new() }
     }
 
     /// Whether every step is through, or one failed that must not.
@@ -71,22 +71,22 @@ impl Commissioning {
     }
 
     /// Submits what is next, when nothing is under way.
-    pub fn poll(&mut self, master: &mut Master, slave: SlaveId) {
+    pub fn poll_with(&mut self, mut submit: impl FnMut(SvcRequest) -> Option<T>) {
         while self.ticket.is_none() && !self.is_done() {
             let Some(request) = self.request() else {
                 self.next_step();
                 continue;
             };
-            match master.svc_submit(slave, request) {
-                Ok(ticket) => self.ticket = Some(ticket),
+            match submit(request) {
+                Some(ticket) => self.ticket = Some(ticket),
                 // The queue is full or the phase changes: tried again in the next cycle.
-                Err(_) => return,
+                None => return,
             }
         }
     }
 
     /// Takes an outcome if it is this plan's; `false` when it is another's.
-    pub fn handle(&mut self, ticket: Ticket, outcome: &SvcOutcome, facts: &mut DriveFacts) -> bool {
+    pub fn handle(&mut self, ticket: T, outcome: &SvcOutcome, facts: &mut DriveFacts) -> bool {
         if self.ticket != Some(ticket) {
             return false;
         }
@@ -200,5 +200,12 @@ impl Commissioning {
                 self.next_step();
             }
         }
+    }
+}
+
+impl Commissioning {
+    /// Submits what is next to a slave of the master, when nothing is under way.
+    pub fn poll(&mut self, master: &mut Master, slave: SlaveId) {
+        self.poll_with(|request| master.svc_submit(slave, request).ok());
     }
 }

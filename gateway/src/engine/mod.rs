@@ -8,11 +8,13 @@
 //! The cycle thread of the box calls [`Engine::cycle`] with real ports and clocks, the whole-system tests with queues and
 //! virtual time. After start it neither allocates, locks, logs nor waits: what people should know leaves as a
 //! [`Notice`] through a bounded queue. Commissioning is start: it compiles the programs of the drives and allocates
-//! before their cyclic operation begins.
+//! before their cyclic operation begins. Drives that come later are commissioned beside it, by the
+//! [`commissioner`].
 
 pub mod axis;
 pub mod build;
 pub mod bus;
+pub mod commissioner;
 pub mod commissioning;
 pub mod device;
 pub mod notice;

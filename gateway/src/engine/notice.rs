@@ -145,6 +145,10 @@ impl Notice {
                 | Event::Scanned { .. }
                 | Event::Topology(Topology::LineOne | Topology::LineTwo | Topology::Ring)
                 | Event::RingClosed
+                | Event::PlaceKept { .. }
+                | Event::HotPlugAwaits { .. }
+                | Event::HotPlugged { .. }
+                | Event::Measured { .. }
                 | Event::AwaitingApplication { .. }
                 | Event::Connection { .. }
                 | Event::Svc { .. },

@@ -12,6 +12,7 @@ use profile_generic::program::{
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::state::{Action, Report};
+use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
 use profile_sercos::wire::idn::Idn;
 
 use super::captures::{self, CaptureMode, CaptureProgram};
@@ -222,6 +223,40 @@ impl Telegram {
         }
         captures::extend(&mut telegram, tables, dictionary, axis, facts);
         Ok(telegram)
+    }
+}
+
+impl Telegram {
+    /// Bytes with C-CON, even, of the longest telegrams that a drive for this axis can need, to it and from it: every
+    /// value that it may have, in four bytes where the dictionary does not say.
+    pub(super) fn room(
+        tables: &SercosTables,
+        dictionary: &SercosDictionary,
+        axis: &SercosAxis,
+    ) -> (u16, u16) {
+        let facts = DriveFacts::new();
+        let bytes = |idn| facts.width(idn, dictionary).map_or(4, |width| width.bytes());
+        let mut idns: [Vec<Idn>; 2] = Default::default();
+        for rule in tables.modes.iter().filter(|rule| axis.modes.contains(&rule.mode)) {
+            for (list, signals) in idns.iter_mut().zip([&rule.command, &rule.actual]) {
+                list.extend(signals.iter().filter_map(|signal| Some(tables.signal(*signal)?.idn)));
+            }
+        }
+        if axis.captures == super::captures::CaptureMode::Cyclic {
+            // In either direction: which, the drive says.
+            let captures = super::captures::idns(tables);
+            idns.iter_mut().for_each(|list| list.extend(&captures));
+        }
+        let [command, feedback] = idns.map(|mut list| {
+            list.sort_unstable();
+            list.dedup();
+            let values: usize = list.into_iter().map(bytes).sum();
+            let longest = profile_sercos::master::config::CONNECTION_LEN_MAX;
+            let len =
+                (CONNECTION_CONTROL_LEN + usize::from(WORD_BYTES) + values).next_multiple_of(2).min(longest);
+            u16::try_from(len).unwrap_or(u16::MAX)
+        });
+        (command, feedback)
     }
 }
 

@@ -31,6 +31,7 @@ use self::port::{PacketPort, UdpPort};
 use crate::capture::recorder::{Recorder, Settings, Tap};
 use crate::config::{Config, Link};
 use crate::engine::build::{BuildError, Built, Host, build};
+use crate::engine::commissioner::Commissioner;
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::SouthPort;
 use crate::host::HostPort;
@@ -45,6 +46,9 @@ use crate::status::BoxStatus;
 use crate::sys::clock::{SystemClock, TimeScale, monotonic_now};
 use crate::sys::packet_socket::OpenError;
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
+
+/// How often the commissioning of drives that come later goes on.
+const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
 
 /// How often notices are taken from the cycle thread.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
@@ -128,7 +132,7 @@ pub fn start(
         Link::InProcess { .. } => None,
     };
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
-    let Built { mut engine, mut adapters, notices, status } =
+    let Built { mut engine, mut adapters, notices, status, commissioner } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
     let sync = SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 };
@@ -218,11 +222,27 @@ pub fn start(
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_indicators(status.clone(), devices, axes, Arc::clone(&stop_notices)));
 
+    commission(commissioner)?;
     let setup = Setup { engine, north, south, realtime: config.sercos.realtime };
     let cycle = CycleThread::start(setup)
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
     Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
+}
+
+/// Runs the commissioning of drives that come later, until the cycle thread has gone.
+fn commission(mut commissioner: Commissioner) -> Result<(), StartError> {
+    let run = move || {
+        while !commissioner.is_abandoned() {
+            commissioner.poll();
+            std::thread::sleep(COMMISSION_INTERVAL);
+        }
+    };
+    std::thread::Builder::new()
+        .name("axisbridge-commission".to_owned())
+        .spawn(run)
+        .map(drop)
+        .map_err(|source| StartError::Thread { what: "the commissioning of drives that come later", source })
 }
 
 /// The clock of the devices: that of the host, which runs no PTP of its own. Clocks that the host's daemons discipline tick

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::axis_set::AxisSet;
 use super::failure::Failure;
 use super::format;
 use super::limits::AxisLimits;
@@ -243,6 +244,8 @@ pub struct ControllerConfig {
     pub class_attributes: Vec<AttributeSet>,
     /// The axes.
     pub axes: Vec<AxisSetup>,
+    /// Axes whose drives may come later: the program begins while they are still in Initializing.
+    pub late: AxisSet,
     /// Waiting times.
     pub time_outs: TimeOuts,
 }
@@ -275,6 +278,7 @@ impl ControllerConfig {
             time_data: TimeDataSet::UPDATE_DIAGNOSTICS,
             class_attributes: Vec::new(),
             axes,
+            late: AxisSet::NONE,
             time_outs: TimeOuts::default(),
         }
     }

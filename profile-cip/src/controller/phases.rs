@@ -244,7 +244,8 @@ impl Controller {
     fn await_axes(&mut self, now: MonotonicTime, waited: DurationNs) -> Result<(), Failure> {
         let initializing =
             |axis: &&Axis| axis.state().is_none_or(|state| state == AxisStateCode::INITIALIZING);
-        match self.axes.iter().find(initializing) {
+        let late = self.config.late;
+        match self.axes.iter().filter(|axis| !late.contains(axis.instance())).find(initializing) {
             None => {
                 self.phase = Phase::Program;
                 self.run_program(now)

@@ -24,6 +24,7 @@ use std::rc::Rc;
 use axisbridge::config::Config;
 use axisbridge::engine::Engine;
 use axisbridge::engine::build::{Built, Host, build};
+use axisbridge::engine::commissioner::Commissioner;
 use axisbridge::engine::notice::Notice;
 use axisbridge::latest::Reader;
 use axisbridge::mapping::Mapping;
@@ -164,6 +165,7 @@ pub struct Rig {
     now: MonotonicTime,
     clock: Rc<Cell<MonotonicTime>>,
     engine_due: MonotonicTime,
+    commissioner: Commissioner,
     link: AdapterEnd,
     notice_queue: rtrb::Consumer<Notice>,
     status: Reader<BoxStatus>,
@@ -188,7 +190,7 @@ impl Rig {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
-        let (engine, adapter, link, notice_queue, status) = assemble(&config);
+        let (engine, adapter, link, notice_queue, status, commissioner) = assemble(&config);
         let line = drives(settings.drives.iter().copied(), false);
         Self {
             controller: None,
@@ -211,6 +213,7 @@ impl Rig {
             now: START,
             clock: Rc::new(Cell::new(START)),
             engine_due: START,
+            commissioner,
             link,
             notice_queue,
             status,
@@ -387,8 +390,8 @@ impl Rig {
     /// as they are.
     pub fn restart_box(&mut self) {
         self.drop_stream();
-        let (engine, adapter, link, notice_queue, status) = assemble(&self.config);
-        (self.engine, self.adapter, self.link) = (engine, adapter, link);
+        let (engine, adapter, link, notice_queue, status, commissioner) = assemble(&self.config);
+        (self.engine, self.adapter, self.link, self.commissioner) = (engine, adapter, link, commissioner);
         (self.notice_queue, self.status) = (notice_queue, status);
         self.north = NorthQueue::default();
         self.south = SouthQueue::default();
@@ -535,6 +538,7 @@ impl Rig {
 
     /// The line answers, the network takes the device's datagrams, and the watchers look.
     fn after_cycle(&mut self) {
+        self.commissioner.poll();
         self.line.handle_time(self.now);
         while let Some(mut frame) = self.south.outbound.pop_front() {
             if !self.cable {
@@ -687,13 +691,13 @@ impl Drop for Rig {
     }
 }
 
-type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>);
+type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>, Commissioner);
 
 fn assemble(config: &Config) -> Assembled {
-    let Built { mut engine, adapters, notices, status } =
+    let Built { mut engine, adapters, notices, status, commissioner } =
         build(config, mapping(), HOST).expect("the configuration makes a box");
     engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });
     let (config, link) = adapters.into_iter().next().expect("one device");
     let adapter = Adapter::new(config).expect("the adapter's configuration is sound");
-    (engine, adapter, link, notices, status)
+    (engine, adapter, link, notices, status, commissioner)
 }

@@ -6,6 +6,7 @@ mod events;
 mod faults;
 mod fixed;
 mod hookup;
+mod hot_plug;
 mod indicators;
 mod loss;
 mod network;

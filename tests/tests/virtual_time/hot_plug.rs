@@ -1,0 +1,139 @@
+//! A drive is plugged in while another axis moves.
+
+use axisbridge::engine::notice::Notice;
+use axisbridge::simulate::drives::linear;
+use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, millis};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cip::controller::{AxisSet, Condition, ControllerConfig, Step};
+use profile_cip::target::axis_state::AxisState;
+use profile_cip::wire::motion::codes::AxisStateCode;
+use profile_generic::scaling::UnitKind;
+use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
+use profile_sercos::master::event::{Event, HotPlugRefusal};
+use profile_sercos::slave::drive::Drive;
+use profile_sercos::slave::{Config as SlaveConfig, Slave};
+use profile_sercos::wire::scp::{ScpClass, ScpEntry};
+
+const CLASSES: &[ScpEntry] = &[
+    ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
+    ScpEntry { class: ScpClass::SYNC, version: 1 },
+    ScpEntry { class: ScpClass::NRT, version: 1 },
+    ScpEntry { class: ScpClass::HOT_PLUG, version: 1 },
+];
+
+/// A slide with SCP_HP.
+fn slide(address: u16) -> Slave<Drive> {
+    let config = SlaveConfig { address, classes: CLASSES, ..SlaveConfig::default() };
+    Slave::new(&config, Drive::new(linear()).expect("the servo works"))
+}
+
+/// The turntable alone, and a place for the slide.
+fn settings() -> Settings {
+    Settings {
+        configuration: BOX.replace("address = 2", "address = 2\nhot_plug = true"),
+        drives: vec![(1, UnitKind::Rotary)],
+        ..Settings::default()
+    }
+}
+
+/// Puts the slide behind the turntable.
+fn plug(rig: &mut Rig, slave: Slave<Drive>) {
+    rig.line.append(slave);
+    rig.line.mend(1);
+}
+
+fn plugged(rig: &Rig) -> bool {
+    rig.notices.iter().any(|notice| matches!(notice, Notice::Sercos(Event::HotPlugged { address: 2, .. })))
+}
+
+/// The turntable goes a long way; meanwhile the slide is waited for, enabled and moved.
+fn program() -> Vec<Step> {
+    let slide = vec![
+        Step::Within {
+            time_out: DurationNs::from_secs(30),
+            step: Box::new(Step::Expect {
+                condition: Condition::State { axis: 2, state: AxisStateCode::STOPPED },
+                within: DurationNs::from_secs(30),
+            }),
+        },
+        Step::Enable(AxisSet::one(2)),
+        Step::MoveAbsolute { axis: 2, position: 60.0, limits: SLIDE },
+        Step::WaitInWindow { axis: 2, window: 0.02, seconds: 1.0 },
+    ];
+    vec![
+        Step::Enable(AxisSet::one(1)),
+        Step::Together(vec![
+            Step::MoveAbsolute { axis: 1, position: 60.0, limits: TURNTABLE },
+            Step::Sequence(slide),
+        ]),
+        Step::WaitInWindow { axis: 1, window: 0.001, seconds: 1.0 },
+        Step::Disable(AxisSet::first(2)),
+    ]
+}
+
+#[test]
+fn a_drive_that_is_plugged_in_while_another_axis_moves_is_enabled_and_moves() {
+    let mut rig = Rig::ready(settings());
+    assert!(!rig.told().contains("found none"), "nothing is missing: {}", rig.told());
+    let config = ControllerConfig { late: AxisSet::one(2), ..rig.controller_config() };
+    rig.connect_with(config, program());
+    rig.run_until(millis(5_000), "full speed", |rig| rig.velocity(0) > 49 * NANO / 10);
+    assert_eq!(rig.engine.axes()[1].state(), DriveState::NotReady);
+    let before = rig.status().counters;
+    plug(&mut rig, slide(2));
+    // The turntable does not lose a cycle, and never leaves its speed.
+    let mut slowest = i64::MAX;
+    let took = rig.run_until(millis(9_000), "the drive", |rig| {
+        slowest = slowest.min(rig.velocity(0));
+        plugged(rig)
+    });
+    assert!(slowest > 49 * NANO / 10, "{slowest} within {took}");
+    let report = rig.run(millis(60_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    let after = rig.status().counters;
+    assert_eq!(after.lost_telegrams, before.lost_telegrams, "no telegram was lost");
+    assert_eq!(rig.status().axes[0].lost_telegrams, 0);
+    let distance = [(0, 60 * NANO), (1, 60 * NANO)].map(|(at, end)| rig.position(at) - end);
+    assert!(distance[0].abs() < NANO / 1_000 && distance[1].abs() < NANO / 50, "{distance:?}");
+    assert!(rig.states(1).contains(&DriveState::Operating), "{:?}", rig.states(1));
+    assert!(rig.axis_states(1).contains(&AxisState::Running));
+    assert_eq!(rig.status().axes[0].faults + rig.status().axes[1].faults, 0);
+    assert!(rig.torque_free());
+}
+
+#[test]
+fn a_drive_that_is_pulled_out_in_motion_faults_its_axis_alone_and_can_be_plugged_in_again() {
+    let mut rig = Rig::ready(settings());
+    plug(&mut rig, slide(2));
+    rig.run_until(millis(9_000), "the drive", plugged);
+    rig.run_for(millis(50));
+    rig.connect(axisbridge_tests::rig::motion::long_moves());
+    rig.run_until(millis(5_000), "full speed", axisbridge_tests::rig::motion::at_full_speed);
+    rig.line.cut(1);
+    rig.run_until(millis(500), "the fault", |rig| rig.status().axes[1].faults == 1);
+    rig.run_until(millis(3_000), "rest", at_rest);
+    assert_eq!(rig.status().phase, 4, "the bus goes on");
+    assert_eq!(rig.status().axes[0].lost_telegrams, 0);
+    // Plugged in again it is commissioned again; nothing moves by itself.
+    rig.notices.clear();
+    let stands = rig.position(1);
+    rig.line.mend(1);
+    rig.run_until(millis(9_000), "the drive again", plugged);
+    rig.run_for(millis(500));
+    assert!((rig.position(1) - stands).abs() < NANO / 100);
+    assert!(rig.torque_free());
+    assert_eq!(rig.status().phase, 4);
+}
+
+#[test]
+fn a_drive_that_does_not_belong_there_is_told_of_and_stays_out() {
+    let mut rig = Rig::ready(settings());
+    plug(&mut rig, slide(9));
+    rig.run_for(millis(2_000));
+    let refused = Event::HotPlugRefused { address: Some(9), reason: HotPlugRefusal::Unknown };
+    let told = rig.notices.iter().filter(|notice| **notice == Notice::Sercos(refused.clone())).count();
+    assert_eq!(told, 1, "{}", rig.told());
+    assert_eq!(rig.engine.axes()[1].state(), DriveState::NotReady);
+    assert_eq!(rig.status().phase, 4);
+}
