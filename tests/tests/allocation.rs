@@ -5,19 +5,26 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use allocation_counter::measure;
+use axisbridge::engine::notice::Notice;
+use axisbridge::simulate::drives::linear;
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::sets::DataSets;
-use profile_cip::controller::{AxisSet, Event, Misbehaviour, Step};
+use profile_cip::controller::{AxisSet, ControllerConfig, Event, Misbehaviour, Step};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_generic::fault::FaultCause;
 use profile_generic::quantity::Position;
+use profile_generic::scaling::UnitKind;
 use profile_generic::servo::Marks;
+use profile_sercos::master::event::Event as SercosEvent;
+use profile_sercos::slave::drive::Drive;
+use profile_sercos::slave::{Config as SlaveConfig, Slave};
+use profile_sercos::wire::scp::{ScpClass, ScpEntry};
 
 /// Weighs so many cycles and returns their allocations; `between` acts on the rig before each.
 fn weigh(rig: &mut Rig, cycles: u32, mut between: impl FnMut(&mut Rig, u32)) -> Vec<(u32, u64)> {
@@ -55,6 +62,45 @@ fn neither_a_bad_network_nor_a_start_nor_a_stop_allocates() {
     assert_eq!(weigh(&mut rig, 3_000, |_, _| ()), []);
     assert_eq!(rig.report().failure, None);
     assert!(rig.report().steps_finished >= 2, "{}", rig.log());
+}
+
+#[test]
+fn a_drive_that_is_plugged_in_while_another_axis_moves_allocates_nothing() {
+    let classes: &'static [ScpEntry] = &[
+        ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
+        ScpEntry { class: ScpClass::SYNC, version: 1 },
+        ScpEntry { class: ScpClass::HOT_PLUG, version: 1 },
+    ];
+    let mut rig = Rig::ready(Settings {
+        configuration: BOX.replace("address = 2", "address = 2\nhot_plug = true"),
+        drives: vec![(1, UnitKind::Rotary)],
+        ..Settings::default()
+    });
+    let config = ControllerConfig { late: AxisSet::one(2), ..rig.controller_config() };
+    let limits = axisbridge_tests::rig::motion::TURNTABLE;
+    let program = vec![
+        Step::Enable(AxisSet::one(1)),
+        Step::MoveAbsolute { axis: 1, position: 60.0, limits },
+        Step::Disable(AxisSet::one(1)),
+    ];
+    rig.connect_with(config, program);
+    rig.run_until(millis(5_000), "full speed", |rig| rig.velocity(0) > 4_900_000_000);
+    let found = weigh(&mut rig, 4_000, |rig, number| match number {
+        100 => {
+            let config = SlaveConfig { address: 2, classes, ..SlaveConfig::default() };
+            rig.line.append(Slave::new(&config, Drive::new(linear()).expect("the servo works")));
+            rig.line.mend(1);
+        }
+        // Pulled out, and in again.
+        2_500 => rig.line.cut(1),
+        2_600 => rig.line.mend(1),
+        _ => {}
+    });
+    let came =
+        |notice: &&Notice| matches!(notice, Notice::Sercos(SercosEvent::HotPlugged { address: 2, .. }));
+    assert_eq!(rig.notices.iter().filter(came).count(), 2, "{}", rig.told());
+    assert_eq!(found, []);
+    assert_eq!(rig.report().failure, None);
 }
 
 #[test]

@@ -200,6 +200,19 @@ fn values_given_are_taken() {
 }
 
 #[test]
+fn one_drive_at_least_is_there_from_the_start() {
+    let both = GOOD
+        .replace("address = 1", "address = 1\nhot_plug = true")
+        .replace("address = 2", "address = 2\nhot_plug = true");
+    let error = Config::parse(&both, "box.toml").unwrap_err().to_string();
+    assert!(error.contains("every drive has `hot_plug = true`"), "{error}");
+    assert!(error.contains("expected at least one drive without it"), "{error}");
+    let one = both.replacen("hot_plug = true", "hot_plug = false", 1);
+    let drives = Config::parse(&one, "box.toml").unwrap().sercos.drives;
+    assert_eq!(drives.iter().map(|drive| drive.hot_plug).collect::<Vec<_>>(), [false, true]);
+}
+
+#[test]
 fn cycle_times_are_those_of_the_standard() {
     let accepts =
         |time: &str| Config::parse(&GOOD.replacen("\"2 ms\"", &format!("\"{time}\""), 1), "box.toml").is_ok();

@@ -82,7 +82,7 @@ pub struct VirtualBus<S> {
     pub log: Vec<Event>,
     /// Start and phase byte of each cycle.
     pub cycles: Vec<(MonotonicTime, u8)>,
-    /// Calls `proceed` where the master awaits its application.
+    /// Calls `proceed` and `proceed_hot_plug` where the master awaits its application.
     pub auto_proceed: bool,
 }
 
@@ -152,6 +152,12 @@ impl<S: Stations> VirtualBus<S> {
         }
         self.court.judge();
         while let Some(event) = self.master.poll_event() {
+            if let Event::HotPlugAwaits { slave, .. } = event
+                && self.auto_proceed
+            {
+                // Refused only when it has gone again.
+                let _ = self.master.proceed_hot_plug(slave);
+            }
             if self.auto_proceed && matches!(event, Event::AwaitingApplication { .. }) {
                 // Refused only when the target has changed meanwhile.
                 let _ = self.master.proceed();

@@ -12,6 +12,8 @@
 pub mod bus;
 pub mod court;
 mod hot_plug;
+#[cfg(test)]
+mod hot_plug_tests;
 mod learned;
 #[cfg(test)]
 pub(crate) mod light;
