@@ -226,6 +226,15 @@ impl Telegram {
     }
 }
 
+impl super::Mapping {
+    /// Bytes with C-CON, even, of the longest connections that a drive for this axis can need, whatever it tells: to the
+    /// drive and from it.
+    #[must_use]
+    pub fn telegram_room(&self, axis: &SercosAxis) -> (u16, u16) {
+        Telegram::room(&self.sercos, &self.dictionaries.sercos, axis)
+    }
+}
+
 impl Telegram {
     /// Bytes with C-CON, even, of the longest telegrams that a drive for this axis can need, to it and from it: every
     /// value that it may have, in four bytes where the dictionary does not say.

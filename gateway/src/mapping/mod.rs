@@ -236,13 +236,6 @@ impl Mapping {
         Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
     }
 
-    /// Bytes with C-CON, even, of the longest connections that a drive for this axis can need, whatever it tells: to the
-    /// drive and from it.
-    #[must_use]
-    pub fn telegram_room(&self, axis: &SercosAxis) -> (u16, u16) {
-        Telegram::room(&self.sercos, &self.dictionaries.sercos, axis)
-    }
-
     /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by
     /// then.
     ///
