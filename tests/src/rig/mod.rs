@@ -45,7 +45,6 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::police::court::{Court, Tried};
-use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
@@ -540,22 +539,10 @@ impl Rig {
     fn after_cycle(&mut self) {
         self.commissioner.poll();
         self.line.handle_time(self.now);
-        while let Some(mut frame) = self.south.outbound.pop_front() {
-            if !self.cable {
-                self.court.sent(self.now, Port::One, frame.as_slice());
-                continue;
-            }
-            let (tamper, inbound) = (&mut self.tamper_frame, &mut self.south.inbound);
-            let mut arrived = |port, frame: &mut [u8]| {
-                let mut frame = Bytes::of(frame);
-                if port == Port::One && tamper.as_mut().is_none_or(|tamper| tamper(&mut frame)) {
-                    inbound.push_back(frame);
-                }
-            };
-            let frame = frame.as_mut_slice();
-            self.court.send(self.now, Port::One, frame, &mut self.line, &mut |_, _, _| {}, &mut arrived);
-        }
-        self.court.judge();
+        let line = self.cable.then_some(&mut self.line);
+        let tamper = &mut self.tamper_frame;
+        let mut back = |frame: &mut Bytes| tamper.as_mut().is_none_or(|tamper| tamper(frame));
+        self.south.exchange(self.now, &mut self.court, line, &mut back);
         while let Some((mut datagram, _)) = self.north.outbound.pop_front() {
             if self.tamper_actual.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
                 self.actuals.send(self.now, &self.knobs, datagram);

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
 use axisbridge::engine::port::{FRAME_MAX, NorthPort, SouthPort};
+use axisbridge::simulate::drives::DriveNetwork;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
+use profile_sercos::police::court::Court;
 
 /// Frames or datagrams that a queue holds; more are lost.
 const QUEUE: usize = 64;
@@ -88,6 +90,37 @@ pub struct SouthQueue {
 impl Default for SouthQueue {
     fn default() -> Self {
         Self { inbound: VecDeque::with_capacity(QUEUE), outbound: VecDeque::with_capacity(QUEUE) }
+    }
+}
+
+impl SouthQueue {
+    /// Sends what the master has put out through the line, before the police. `back` may change or lose what comes
+    /// back; without a `line` there is no cable, and nothing does.
+    ///
+    /// # Panics
+    /// With station and rule when a telegram breaks one.
+    pub fn exchange(
+        &mut self,
+        now: MonotonicTime,
+        court: &mut Court,
+        mut line: Option<&mut DriveNetwork>,
+        back: &mut dyn FnMut(&mut Bytes) -> bool,
+    ) {
+        while let Some(mut frame) = self.outbound.pop_front() {
+            let Some(line) = line.as_deref_mut() else {
+                court.sent(now, Port::One, frame.as_slice());
+                continue;
+            };
+            let inbound = &mut self.inbound;
+            let mut arrived = |port, frame: &mut [u8]| {
+                let mut frame = Bytes::of(frame);
+                if port == Port::One && back(&mut frame) {
+                    inbound.push_back(frame);
+                }
+            };
+            court.send(now, Port::One, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
+        }
+        court.judge();
     }
 }
 
