@@ -208,6 +208,27 @@ fn slaves_come_in_on_both_sides_of_a_gap() {
 }
 
 #[test]
+fn one_address_on_both_sides_of_a_gap_comes_in_once() {
+    let mut network = Network::ring([1, 7, 7, 2].map(pluggable).into_iter().collect());
+    network.cut(2);
+    network.set_power(1, false);
+    network.set_power(2, false);
+    let mut rig = RingRig::new(plug_config(&[1, 2], &[7], Ports::Both), network);
+    rig.up();
+    rig.network.set_power(1, true);
+    rig.network.set_power(2, true);
+    rig.run_until("plugged in", plugged(7));
+    // The other one did not hear what was meant for this one.
+    let there = |rig: &RingRig| {
+        let state = |index: usize| rig.network.slaves()[index].state();
+        [1, 2].map(|index| state(index) == SlaveState::In(Phase::CP4))
+    };
+    assert_eq!(there(&rig), [true, false]);
+    rig.cycles(100);
+    assert_eq!((there(&rig), rig.gaps()[..2].to_vec()), ([true, false], vec![0, 0]));
+}
+
+#[test]
 fn the_gap_is_closed_by_a_slave_that_is_plugged_in_on_both_sides() {
     // Also where the slave was there before: in a ring it is lost alone, and the ring is whole again afterwards.
     for there_before in [false, true] {
