@@ -3,6 +3,8 @@
 //! The state machine itself is walked ([`BasicDrive`]): every event that a table or the box can bring, in every situation that
 //! they lead to.
 
+use std::collections::HashMap;
+
 use profile_generic::fault::Reaction;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::{BasicDrive, DriveState, Event, Report, Request};
@@ -93,6 +95,7 @@ struct Walk {
 impl Walk {
     fn new(happenings: &[Happening]) -> Self {
         let mut walk = Self { situations: vec![BasicDrive::new()], before: vec![Vec::new()] };
+        let mut known = HashMap::from([(BasicDrive::new(), 0)]);
         let mut at = 0;
         while at < walk.situations.len() && at < SITUATIONS_MAX {
             for happening in happenings {
@@ -112,12 +115,12 @@ impl Walk {
                         next.clear_faults();
                     }
                 }
-                let to = walk.situations.iter().position(|known| *known == next).unwrap_or_else(|| {
+                let to = *known.entry(next).or_insert_with(|| {
                     walk.situations.push(next);
                     walk.before.push(Vec::new());
                     walk.situations.len() - 1
                 });
-                if !walk.before[to].contains(&at) {
+                if walk.before[to].last() != Some(&at) {
                     walk.before[to].push(at);
                 }
             }

@@ -8,7 +8,7 @@ use crate::inhibit::Inhibits;
 ///
 /// It folds each event into the conditions before the transition and the latches of the transition after it,
 /// so that a shutdown, a pending reset or a fault of the drive cannot be forgotten between the two.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BasicDrive {
     state: DriveState,
     conditions: Conditions,
