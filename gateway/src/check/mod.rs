@@ -8,11 +8,14 @@ mod attributes;
 mod axes;
 mod bus;
 mod faults;
+mod page;
 mod rows;
 pub mod schema;
 mod states;
 
 use std::path::{Path, PathBuf};
+
+pub use page::page;
 
 use crate::config::{Config, Written};
 use crate::finding::registry as code;
@@ -31,6 +34,8 @@ pub struct Request<'a> {
 /// What was checked, and what was found.
 #[derive(Debug, Default)]
 pub struct Outcome {
+    /// The texts of the tables, where they could be read.
+    pub texts: Option<TableTexts>,
     /// The configuration, where there is one without errors.
     pub config: Option<Config>,
     /// The tables, where they could be resolved.
@@ -52,6 +57,7 @@ pub fn check(request: &Request<'_>) -> Outcome {
     if let Some(texts) = texts(request, written.as_ref(), findings) {
         outcome.overlays = texts.overlays.len();
         outcome.mapping = Mapping::resolve(&texts, findings);
+        outcome.texts = Some(texts);
     }
     if let Some(mapping) = &outcome.mapping {
         outcome.examples = mapping.run_examples(findings);

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use super::{CheckArguments, CheckFormat, CliError};
-use crate::check::{Outcome, Request, check, schema};
+use crate::check::{Outcome, Request, check, page, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Severity, json_report};
 use crate::mapping::Mapping;
@@ -40,6 +40,9 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         return Ok(ExitCode::from(USAGE));
     }
     let outcome = check(&Request { config: arguments.config.as_deref(), mappings: &arguments.mappings });
+    if let Some(path) = &arguments.report {
+        std::fs::write(path, page(&outcome)).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
     let findings = &outcome.findings;
     let bad = findings.has_errors() || findings.count(Severity::Warning) > 0;
     let text = match arguments.format {

@@ -99,6 +99,9 @@ struct CheckArguments {
     /// Show notes as well (JSON has them anyway).
     #[arg(long)]
     notes: bool,
+    /// Write the tables and what was found as a page for a browser.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Print the JSON Schema of a kind of file and check nothing; without NAME, the names of all.
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["config", "mappings", "notes", "list", "explain"])]
     schema: Option<String>,
