@@ -69,9 +69,19 @@ fn findings(page: &mut String, outcome: &Outcome) {
         list.count(Severity::Note),
         outcome.examples
     );
-    for finding in list.list() {
-        let _ =
-            writeln!(page, "<pre class=\"{:?}\">{}</pre>", finding.severity(), escaped(&finding.to_string()));
+    let mut each = |wanted: Severity| {
+        for finding in list.list().iter().filter(|finding| finding.severity() == wanted) {
+            let _ = writeln!(page, "<pre class=\"{wanted:?}\">{}</pre>", escaped(&finding.to_string()));
+        }
+    };
+    each(Severity::Error);
+    each(Severity::Warning);
+    if list.count(Severity::Note) > 0 {
+        page.push_str("<details><summary>notes</summary>\n");
+        for finding in list.list().iter().filter(|finding| finding.severity() == Severity::Note) {
+            let _ = writeln!(page, "<pre>{}</pre>", escaped(&finding.to_string()));
+        }
+        page.push_str("</details>\n");
     }
 }
 
