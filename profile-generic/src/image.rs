@@ -7,7 +7,7 @@
 use crate::code::named_enum;
 use crate::fault::Fault;
 use crate::inhibit::Inhibits;
-use crate::mode::{InterpolationSource, OperatingMode};
+use crate::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use crate::quantity::{Acceleration, Current, Position, Quantity, Temperature, Torque, Velocity, Voltage};
 use crate::state::{DriveState, Report, Request};
 use crate::time::SystemTime;
@@ -34,6 +34,14 @@ named_enum! {
         TorqueOffset = "torque_offset",
         /// Digital outputs the controller sets, bit 0 first.
         DigitalOutputs = "digital_outputs",
+        /// Where the drive is to go by itself.
+        TargetPosition = "target_position",
+        /// Highest speed on the way to the target.
+        ProfileVelocity = "profile_velocity",
+        /// Acceleration on the way to the target.
+        ProfileAcceleration = "profile_acceleration",
+        /// Deceleration on the way to the target.
+        ProfileDeceleration = "profile_deceleration",
         /// Actual position.
         PositionActual = "position_actual",
         /// Actual velocity.
@@ -59,13 +67,19 @@ impl Signal {
     /// What the signal measures.
     pub const fn quantity(self) -> Quantity {
         match self {
-            Self::PositionCommand | Self::PositionOffset | Self::PositionActual | Self::FollowingError => {
-                Quantity::Position
+            Self::PositionCommand
+            | Self::PositionOffset
+            | Self::TargetPosition
+            | Self::PositionActual
+            | Self::FollowingError => Quantity::Position,
+            Self::VelocityCommand | Self::VelocityOffset | Self::ProfileVelocity | Self::VelocityActual => {
+                Quantity::Velocity
             }
-            Self::VelocityCommand | Self::VelocityOffset | Self::VelocityActual => Quantity::Velocity,
-            Self::AccelerationCommand | Self::AccelerationOffset | Self::AccelerationActual => {
-                Quantity::Acceleration
-            }
+            Self::AccelerationCommand
+            | Self::AccelerationOffset
+            | Self::ProfileAcceleration
+            | Self::ProfileDeceleration
+            | Self::AccelerationActual => Quantity::Acceleration,
             Self::TorqueCommand | Self::TorqueOffset | Self::TorqueActual => Quantity::Torque,
             Self::CurrentActual => Quantity::Current,
             Self::BusVoltage => Quantity::Voltage,
@@ -87,6 +101,10 @@ impl Signal {
                 | Self::AccelerationOffset
                 | Self::TorqueOffset
                 | Self::DigitalOutputs
+                | Self::TargetPosition
+                | Self::ProfileVelocity
+                | Self::ProfileAcceleration
+                | Self::ProfileDeceleration
         )
     }
 }
@@ -126,6 +144,14 @@ bitflags! {
         const TORQUE_OFFSET = 1 << 7;
         /// [`AxisCommand::digital_outputs`].
         const DIGITAL_OUTPUTS = 1 << 8;
+        /// [`AxisCommand::target_position`].
+        const TARGET_POSITION = 1 << 9;
+        /// [`AxisCommand::profile_velocity`].
+        const PROFILE_VELOCITY = 1 << 10;
+        /// [`AxisCommand::profile_acceleration`].
+        const PROFILE_ACCELERATION = 1 << 11;
+        /// [`AxisCommand::profile_deceleration`].
+        const PROFILE_DECELERATION = 1 << 12;
     }
 }
 
@@ -200,6 +226,12 @@ bitflags! {
         const SAFETY_ACTIVE = 1 << 19;
         /// A set-point or actual value was clamped on its way.
         const SATURATED = 1 << 20;
+        /// A homing procedure has found its place: the controller that moves the axis has to stop it.
+        const HOME_FOUND = 1 << 21;
+        /// The homing procedure that was asked for has failed, or the drive refused it.
+        const HOMING_FAILED = 1 << 22;
+        /// The drive has come to the target that it went to by itself.
+        const TARGET_REACHED = 1 << 23;
 
         // Bits above are kept when they come from a newer table.
         const _ = !0;
@@ -230,6 +262,9 @@ impl StatusBits {
         (Self::BRAKE_RELEASED, "brake_released"),
         (Self::SAFETY_ACTIVE, "safety_active"),
         (Self::SATURATED, "saturated"),
+        (Self::HOME_FOUND, "home_found"),
+        (Self::HOMING_FAILED, "homing_failed"),
+        (Self::TARGET_REACHED, "target_reached"),
     ];
 
     /// The single bit with this exact name.
@@ -263,6 +298,14 @@ pub struct AxisCommand {
     pub torque_offset: Torque,
     /// Digital outputs, bit 0 first.
     pub digital_outputs: u32,
+    /// Where the drive is to go by itself.
+    pub target_position: Position,
+    /// Highest speed on the way there.
+    pub profile_velocity: Velocity,
+    /// Acceleration on the way there.
+    pub profile_acceleration: Acceleration,
+    /// Deceleration on the way there.
+    pub profile_deceleration: Acceleration,
     /// Which of the values above are valid.
     pub present: CommandSet,
     /// When the set-points shall be reached; as soon as possible when `None`.
@@ -274,6 +317,23 @@ pub struct AxisCommand {
 }
 
 impl AxisCommand {
+    /// What a way that the drive makes by itself needs.
+    pub const PROFILE: CommandSet = CommandSet::TARGET_POSITION
+        .union(CommandSet::PROFILE_VELOCITY)
+        .union(CommandSet::PROFILE_ACCELERATION)
+        .union(CommandSet::PROFILE_DECELERATION);
+
+    /// What the drive shall follow, and who makes the way.
+    pub const fn selection(&self) -> ModeSelection {
+        ModeSelection { mode: self.mode, interpolation: self.interpolation }
+    }
+
+    /// Chooses what the drive shall follow, and who makes the way.
+    pub const fn select(&mut self, selection: ModeSelection) {
+        self.mode = selection.mode;
+        self.interpolation = selection.interpolation;
+    }
+
     /// The value of a command signal, or `None` when it is absent or belongs to the feedback.
     pub fn get(&self, signal: Signal) -> Option<i64> {
         let (bit, value) = match signal {
@@ -286,6 +346,10 @@ impl AxisCommand {
             Signal::AccelerationOffset => (CommandSet::ACCELERATION_OFFSET, self.acceleration_offset.0),
             Signal::TorqueOffset => (CommandSet::TORQUE_OFFSET, self.torque_offset.0),
             Signal::DigitalOutputs => (CommandSet::DIGITAL_OUTPUTS, i64::from(self.digital_outputs)),
+            Signal::TargetPosition => (CommandSet::TARGET_POSITION, self.target_position.0),
+            Signal::ProfileVelocity => (CommandSet::PROFILE_VELOCITY, self.profile_velocity.0),
+            Signal::ProfileAcceleration => (CommandSet::PROFILE_ACCELERATION, self.profile_acceleration.0),
+            Signal::ProfileDeceleration => (CommandSet::PROFILE_DECELERATION, self.profile_deceleration.0),
             _ => return None,
         };
         self.present.contains(bit).then_some(value)
@@ -332,6 +396,22 @@ impl AxisCommand {
                 self.digital_outputs = bits;
                 CommandSet::DIGITAL_OUTPUTS
             }
+            Signal::TargetPosition => {
+                self.target_position = Position(value);
+                CommandSet::TARGET_POSITION
+            }
+            Signal::ProfileVelocity => {
+                self.profile_velocity = Velocity(value);
+                CommandSet::PROFILE_VELOCITY
+            }
+            Signal::ProfileAcceleration => {
+                self.profile_acceleration = Acceleration(value);
+                CommandSet::PROFILE_ACCELERATION
+            }
+            Signal::ProfileDeceleration => {
+                self.profile_deceleration = Acceleration(value);
+                CommandSet::PROFILE_DECELERATION
+            }
             _ => return false,
         };
         self.present |= bit;
@@ -362,6 +442,8 @@ pub struct AxisFeedback {
     pub report: Report,
     /// What the drive follows.
     pub mode: OperatingMode,
+    /// Who makes the way of what it follows.
+    pub interpolation: InterpolationSource,
     /// Actual position.
     pub position: Position,
     /// Actual velocity.
@@ -397,6 +479,11 @@ pub struct AxisFeedback {
 }
 
 impl AxisFeedback {
+    /// What the drive follows, and who makes the way.
+    pub const fn selection(&self) -> ModeSelection {
+        ModeSelection { mode: self.mode, interpolation: self.interpolation }
+    }
+
     /// The value of a feedback signal, or `None` when it is absent or belongs to the command.
     pub fn get(&self, signal: Signal) -> Option<i64> {
         let (bit, value) = match signal {

@@ -37,6 +37,40 @@ named_enum! {
     }
 }
 
+/// What the drive follows, and who makes the way there: together they choose an operation mode of a drive, or a
+/// procedure that it carries out. Homing with the [`InterpolationSource::Drive`] is done by the drive alone; with the
+/// [`InterpolationSource::Controller`] the controller moves the axis, and the drive looks for the place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct ModeSelection {
+    /// What the drive follows.
+    pub mode: OperatingMode,
+    /// Who makes the way.
+    pub interpolation: InterpolationSource,
+}
+
+impl ModeSelection {
+    /// The drive makes the way by itself.
+    pub const fn by_drive(mode: OperatingMode) -> Self {
+        Self { mode, interpolation: InterpolationSource::Drive }
+    }
+}
+
+impl From<OperatingMode> for ModeSelection {
+    /// The controller makes the way.
+    fn from(mode: OperatingMode) -> Self {
+        Self { mode, interpolation: InterpolationSource::Controller }
+    }
+}
+
+impl core::fmt::Display for ModeSelection {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.interpolation {
+            InterpolationSource::Controller => write!(f, "{}", self.mode),
+            InterpolationSource::Drive => write!(f, "{} by the drive", self.mode),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,5 +82,7 @@ mod tests {
         }
         assert_eq!(OperatingMode::default(), OperatingMode::None);
         assert_eq!(InterpolationSource::parse("drive"), Some(InterpolationSource::Drive));
+        assert_eq!(ModeSelection::from(OperatingMode::Torque).to_string(), "torque");
+        assert_eq!(ModeSelection::by_drive(OperatingMode::Homing).to_string(), "homing by the drive");
     }
 }

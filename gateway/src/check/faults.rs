@@ -92,13 +92,16 @@ fn sercos_faults(mapping: &Mapping, findings: &mut Findings) {
 fn sercos_reports(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let rules = mapping.sercos.reports();
-    for (at, ((pattern, report, drives), row)) in rules.iter().zip(&file.rows.report).enumerate() {
-        let hidden = rules[..at]
-            .iter()
-            .position(|(other, _, others)| hides(*other, *pattern) && (others.is_none() || others == drives));
+    for (at, (rule, row)) in rules.iter().zip(&file.rows.report).enumerate() {
+        let covers = |other: Option<bool>, own: Option<bool>| other.is_none() || other == own;
+        let hidden = rules[..at].iter().position(|other| {
+            hides(other.pattern, rule.pattern)
+                && covers(other.acknowledges, rule.acknowledges)
+                && covers(other.procedure, rule.procedure)
+        });
         if let Some(before) = hidden {
             let problem = Problem::new(code::NEVER_REACHED, row.report.span()).key("report");
-            let problem = problem.title(format!("the row of the report `{report}` never counts"));
+            let problem = problem.title(format!("the row of the report `{}` never counts", rule.report));
             let problem = problem.expected("whatever fits this row fits one before it");
             findings.push(&file.text, problem.related(file.rows.report[before].report.span(), "this one"));
         }

@@ -287,7 +287,7 @@ impl Names {
             LazyLock::new(|| list(CaptureSource::ALL, |source| source.name()));
         static EDGES: LazyLock<Vec<String>> = LazyLock::new(|| list(CaptureEdge::ALL, |edge| edge.name()));
         Some(match (row, key) {
-            ("CipModeRow" | "SercosModeRow" | "WhenRow" | "StatusRow", "mode") => &MODES,
+            ("CipModeRow" | "SercosModeRow" | "ProcedureRow" | "WhenRow" | "StatusRow", "mode") => &MODES,
             (_, "quantity") => &QUANTITIES,
             (_, "cause") => &CAUSES,
             (_, "reaction" | "abort") => &REACTIONS,

@@ -15,7 +15,7 @@ use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
 use profile_cip::wire::motion::Format;
 use profile_generic::fault::Reaction;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
@@ -208,9 +208,10 @@ pub fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
         modes: match axis.function {
             AxisFunction::Drive => [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
                 .into_iter()
+                .map(ModeSelection::from)
                 .collect(),
             AxisFunction::Encoder | AxisFunction::Converter => {
-                [OperatingMode::Position].into_iter().collect()
+                [OperatingMode::Position.into()].into_iter().collect()
             }
         },
         // Positions of a linear drive reach for hundreds of kilometres.

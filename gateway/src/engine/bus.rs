@@ -11,14 +11,16 @@ use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections,
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 use profile_sercos::master::event::{Event, HotPlugRefusal, SlaveId, Ticket};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOutcome, SvcRequest};
+use profile_sercos::wire::data_status::DataStatus;
 use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::scp::ScpClass;
 
 use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
+use super::axis::procedure::ProcedureAccess;
 use super::commissioner::{CommissionerEnd, Done, Job, Run};
-use super::commissioning::Commissioning;
+use super::commissioning::{Commissioning, StepFailure};
 use super::notice::Notice;
 use crate::mapping::{DriveFacts, Mapping, SercosAxis, SercosError};
 
@@ -80,6 +82,8 @@ pub enum Purpose {
     FaultReset,
     /// Capturing events, with the generation of the axis's captures.
     Capture(CaptureAccess, u8),
+    /// A procedure command, with the generation of the axis's procedures.
+    Procedure(ProcedureAccess, u8),
 }
 
 /// The drive of one axis.
@@ -96,6 +100,8 @@ struct Drive {
     hot_plug: bool,
     /// How often it has come by hot plug.
     runs: u32,
+    /// Steps that it did not take and need not, until they are told.
+    passed_over: Vec<StepFailure>,
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
 }
 
@@ -108,6 +114,8 @@ pub struct Answer {
     pub purpose: Purpose,
     /// The data block.
     pub idn: Idn,
+    /// The data status of the data block, or why there is none.
+    pub status: Result<DataStatus, SvcFailure>,
     /// The bytes, or why there are none.
     pub result: Result<SvcData, SvcFailure>,
 }
@@ -164,6 +172,7 @@ impl SercosBus {
             facts: DriveFacts::new(),
             hot_plug: later.contains(&address),
             runs: 0,
+            passed_over: Vec::new(),
             accesses: ArrayVec::new(),
         };
         Ok(Self {
@@ -279,6 +288,7 @@ impl SercosBus {
         self.let_join(now, system, axes, notice);
         self.diagnose(now, axes);
         self.capture(axes);
+        self.carry_out(now, axes);
         let alone =
             self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
         let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
@@ -433,6 +443,7 @@ impl SercosBus {
         let found = self.master.slave_by_address(drive.address);
         drive.slave = found.filter(|slave| !self.refused.contains(slave));
         drive.facts = DriveFacts::new();
+        drive.passed_over.clear();
         if drive.slave.is_some() {
             drive.plan(axis, mapping, Phase::CP2.0, notice);
         } else {
@@ -454,10 +465,13 @@ impl SercosBus {
                 continue;
             }
             let failure = work.failure();
-            for failure in work.passed_over() {
-                notice(Notice::PassedOver { axis: index(axis), failure: *failure });
-            }
+            drive.passed_over.append(&mut work.take_passed_over());
             drive.stage = Stage::Ready;
+            let last = failure.is_some() || phase != Phase::CP2;
+            if last && !drive.passed_over.is_empty() {
+                let failures = std::mem::take(&mut drive.passed_over);
+                notice(Notice::PassedOver { axis: index(axis), failures });
+            }
             let taken = match failure {
                 Some(failure) => {
                     notice(Notice::Commissioning { axis: index(axis), address: drive.address, failure });
@@ -630,6 +644,17 @@ impl SercosBus {
         }
     }
 
+    /// Carries on with procedures over the service channels: one access of each drive at a time.
+    fn carry_out(&mut self, now: MonotonicTime, axes: &mut [AxisChannel]) {
+        for (axis, channel) in axes.iter_mut().enumerate() {
+            if let Some((request, access, generation)) = channel.procedure_access(now)
+                && self.access(axis, request, Purpose::Procedure(access, generation))
+            {
+                channel.procedure_sent(access);
+            }
+        }
+    }
+
     fn outcome(
         &mut self,
         ticket: Ticket,
@@ -663,11 +688,9 @@ impl SercosBus {
         };
         let (_, purpose) = drive.accesses.remove(place);
         let idn = outcome.idn;
-        let result = match outcome.result {
-            Ok(_) => Ok(outcome.data),
-            Err(failure) => Err(failure),
-        };
-        answer(axes, Answer { axis, purpose, idn, result });
+        let status = outcome.result.map(|reply| reply.status);
+        let result = status.map(|_| outcome.data);
+        answer(axes, Answer { axis, purpose, idn, status, result });
     }
 }
 

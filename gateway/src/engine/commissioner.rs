@@ -15,7 +15,7 @@ use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 
 use super::bus::connections;
-use super::commissioning::Commissioning;
+use super::commissioning::{Commissioning, StepFailure};
 use super::notice::Notice;
 use crate::mapping::{DriveFacts, Mapping, SercosAxis, SercosProgram};
 
@@ -97,6 +97,8 @@ struct Work {
     run: Run,
     phase: Phase,
     plan: Option<Commissioning<u32>>,
+    /// Steps that the drive did not take and need not, until they are told.
+    passed_over: Vec<StepFailure>,
     serial: u32,
 }
 
@@ -129,6 +131,7 @@ impl Commissioner {
             run: Run { axis: 0, number: 0 },
             phase: Phase::CP2,
             plan: None,
+            passed_over: Vec::new(),
             serial: 0,
         };
         let drives = drives.into_iter().map(work).collect();
@@ -179,6 +182,7 @@ impl Commissioner {
         (work.run, work.phase) = (run, phase);
         if phase == Phase::CP2 {
             work.facts = DriveFacts::new();
+            work.passed_over.clear();
         }
         match self.mapping.commissioning(&work.needs, phase.0, &work.facts) {
             Ok(plan) => work.plan = Some(Commissioning::new(plan)),
@@ -203,11 +207,13 @@ impl Commissioner {
             if !plan.is_done() {
                 continue;
             }
-            for failure in plan.passed_over() {
-                waiting.push_back(Done::Told(Notice::PassedOver { axis: run.axis, failure: *failure }));
-            }
             let (axis, address) = (run.axis, work.address);
             let failed = plan.failure();
+            work.passed_over.append(&mut plan.take_passed_over());
+            if (failed.is_some() || work.phase != Phase::CP2) && !work.passed_over.is_empty() {
+                let failures = std::mem::take(&mut work.passed_over);
+                waiting.push_back(Done::Told(Notice::PassedOver { axis, failures }));
+            }
             work.plan = None;
             if let Some(failure) = failed {
                 waiting.push_back(Done::Failed(run, Notice::Commissioning { axis, address, failure }));

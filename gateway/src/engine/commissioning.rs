@@ -64,10 +64,10 @@ impl<T: Copy + PartialEq> Commissioning<T> {
         self.failure
     }
 
-    /// Steps that the drive refused and that it may refuse.
+    /// Takes the steps that the drive refused and that it may refuse.
     #[must_use]
-    pub fn passed_over(&self) -> &[StepFailure] {
-        &self.passed_over
+    pub fn take_passed_over(&mut self) -> Vec<StepFailure> {
+        std::mem::take(&mut self.passed_over)
     }
 
     /// Submits what is next, when nothing is under way.
@@ -126,6 +126,8 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             Err(failure) => {
                 if failure.is_absent() {
                     facts.note_missing(outcome.idn);
+                } else if outcome.operation == SvcOperation::Write(Element::Data) {
+                    facts.note_refused(outcome.idn);
                 }
                 self.failed(outcome.idn, *failure);
             }

@@ -119,6 +119,11 @@ impl Engine {
         &self.axes
     }
 
+    /// The axes, for a north side that speaks in the generic model: see [`AxisChannel::from_north`].
+    pub fn axes_mut(&mut self) -> &mut [AxisChannel] {
+        &mut self.axes
+    }
+
     /// The devices in the order of the configuration.
     #[must_use]
     pub fn devices(&self) -> &[DeviceChannel] {
@@ -257,6 +262,9 @@ impl Engine {
                     let result =
                         answer.result.as_ref().map(|data| data.as_slice()).map_err(|failure| *failure);
                     axes[answer.axis].capture_answer(access, generation, result);
+                }
+                Purpose::Procedure(access, generation) => {
+                    axes[answer.axis].procedure_answer(now, access, generation, answer.status);
                 }
                 // Whether it helped shows in the drive's status word.
                 Purpose::FaultReset => {}

@@ -47,12 +47,12 @@ pub enum Notice {
         /// What failed.
         failure: StepFailure,
     },
-    /// A step failed that may fail.
+    /// Steps failed that may fail.
     PassedOver {
         /// The axis.
         axis: u8,
-        /// What failed.
-        failure: StepFailure,
+        /// What failed, in the order of the plan.
+        failures: Vec<StepFailure>,
     },
     /// The drive does not fit the mapping tables; it is left out.
     Program {
@@ -191,7 +191,7 @@ impl fmt::Display for Notice {
                     "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
                 )
             }
-            Self::PassedOver { failure, .. } => write!(f, "commissioning goes on without: {failure}"),
+            Self::PassedOver { failures, .. } => passed_over(f, failures),
             Self::Program { address, error, .. } => {
                 write!(f, "the drive with SERCOS address {address} cannot be used: {error}; it is left out")
             }
@@ -213,6 +213,29 @@ impl fmt::Display for Notice {
     }
 }
 
+/// `commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; writing S-0-0079: ...`: what failed
+/// alike stands together.
+fn passed_over(f: &mut fmt::Formatter<'_>, failures: &[StepFailure]) -> fmt::Result {
+    f.write_str("commissioning goes on without ")?;
+    let alike =
+        |one: &StepFailure, other: &StepFailure| (one.what, one.failure) == (other.what, other.failure);
+    let mut between = "";
+    for (at, first) in failures.iter().enumerate() {
+        if failures[..at].iter().any(|earlier| alike(earlier, first)) {
+            continue;
+        }
+        write!(f, "{between}{}", first.what)?;
+        let mut comma = "";
+        for failure in failures[at..].iter().filter(|failure| alike(failure, first)) {
+            write!(f, "{comma} {}", failure.idn)?;
+            comma = ",";
+        }
+        write!(f, ": {}", first.failure)?;
+        between = "; ";
+    }
+    Ok(())
+}
+
 /// `Axis Fault 54 (excessive_position_error): Major Fault ...`.
 fn logged(f: &mut fmt::Formatter<'_>, entry: &LogEntry, cause: Option<FaultCause>) -> fmt::Result {
     match entry.kind {
@@ -232,4 +255,33 @@ fn logged(f: &mut fmt::Formatter<'_>, entry: &LogEntry, cause: Option<FaultCause
         write!(f, ", vendor code {:#010x}", entry.detail)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use profile_sercos::master::svc::request::SvcFailure;
+    use profile_sercos::wire::idn::Idn;
+    use profile_sercos::wire::svc::Element;
+    use profile_sercos::wire::svc_error::SvcError;
+
+    #[test]
+    fn what_a_drive_lacks_stands_in_one_line() {
+        let failure = |what, block, code| StepFailure {
+            what,
+            idn: Idn::standard(block),
+            failure: SvcFailure::Refused { element: Element::Idn, code: SvcError(code) },
+        };
+        let failures = vec![
+            failure("reading", 294, 0x1001),
+            failure("writing", 79, 0x7004),
+            failure("reading", 208, 0x1001),
+            failure("writing", 208, 0x1001),
+        ];
+        assert_eq!(
+            Notice::PassedOver { axis: 0, failures }.to_string(),
+            "commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; \
+             writing S-0-0079: IDN: operation data cannot be changed; writing S-0-0208: IDN: IDN not available"
+        );
+    }
 }

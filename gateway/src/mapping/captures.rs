@@ -101,7 +101,7 @@ fn usable<'t>(tables: &'t SercosTables, facts: &'t DriveFacts) -> impl Iterator<
 }
 
 /// Whether the drive lists an IDN as configurable.
-fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
+pub(super) fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
     let wide = facts.attribute(list).is_none_or(|attribute| attribute.item_length().bytes() == 4);
     let data = facts.data(list).unwrap_or_default();
     if wide {
@@ -356,7 +356,8 @@ impl Compiler<'_> {
         Some(())
     }
 
-    fn place(&self, idn: Idn, telegram: &[Idn]) -> Option<Place> {
+    /// Where a value is, and where in the telegram.
+    pub fn place(&self, idn: Idn, telegram: &[Idn]) -> Option<Place> {
         let width = self.facts.width(idn, self.dictionary)?;
         let mut offset = 0;
         for known in telegram {

@@ -89,7 +89,7 @@ fn applies(rule: &StepRule, axis: &SercosAxis) -> bool {
         && rule.modulo.is_none_or(|modulo| modulo == axis.modulo)
         && rule.set_scaling.is_none_or(|set| set == axis.set_scaling)
         && rule.captures.is_none_or(|captures| captures == (axis.captures != CaptureMode::Off))
-        && rule.mode.is_none_or(|mode| axis.modes.contains(&mode))
+        && rule.mode.is_none_or(|mode| axis.modes.iter().any(|known| known.mode == mode))
 }
 
 impl Compiler<'_> {
@@ -128,6 +128,7 @@ impl Compiler<'_> {
             StepKind::WriteModes => {
                 for (mode, slot) in mode_rules(self.tables, self.axis)?.iter().zip(&self.tables.slots) {
                     let candidates = mode.codes.iter().map(|code| code.to_le_bytes().to_vec()).collect();
+                    let refused = if mode.optional { Refused::Continue } else { refused };
                     steps.push(Step::Write { idn: slot.idn, candidates, refused });
                 }
             }
@@ -144,7 +145,12 @@ impl Compiler<'_> {
             }
             StepKind::ReadTelegram => {
                 let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
-                read(steps, telegram.command.into_iter().chain(telegram.feedback).collect(), &DESCRIPTION);
+                let mut idns = telegram.command;
+                idns.extend(telegram.feedback);
+                // Whether they come into it shows only now.
+                let words = self.tables.status_words();
+                idns.extend(words.into_iter().filter(|idn| !self.facts.is_missing(*idn)));
+                read(steps, idns, &DESCRIPTION);
             }
             StepKind::ReadParameters => {
                 // What is in a telegram was read for it.
@@ -154,6 +160,11 @@ impl Compiler<'_> {
                 read(steps, idns.collect(), &DESCRIPTION);
             }
             StepKind::ReadCaptures => read(steps, captures::idns(self.tables), &DESCRIPTION),
+            StepKind::ReadProcedures => {
+                let rules = self.axis.modes.iter().filter_map(|mode| self.tables.procedure(*mode));
+                let idns = rules.flat_map(|rule| rule.commands.iter().copied()).collect();
+                read(steps, idns, &[Element::Attribute]);
+            }
             StepKind::Command(idn) => steps.push(Step::Command { idn, refused }),
         }
         Ok(())

@@ -2,8 +2,8 @@
 
 use arrayvec::ArrayVec;
 use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
-use profile_generic::mode::OperatingMode;
+use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, Signal, StatusBits};
+use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
     ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
@@ -15,14 +15,22 @@ use profile_generic::state::{Action, Report};
 use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
 use profile_sercos::wire::idn::Idn;
 
-use super::captures::{self, CaptureMode, CaptureProgram};
+use super::captures::{self, CaptureMode, CaptureProgram, Place};
 use super::dictionary::{IdnUnit, SercosDictionary};
 use super::drive_facts::DriveFacts;
 use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
-use super::sercos_tables::{FaultRule, ModeRule, ParameterRule, Polarity, SercosTables};
+use super::sercos_tables::{
+    FaultRule, ModeRule, ParameterRule, Polarity, ReportRule, SercosTables, SlotRule,
+};
 
-/// Operating modes of one axis: the slots S-0-0032..35.
-pub const MAX_MODES: usize = 4;
+/// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
+pub const MAX_MODES: usize = 8;
+
+/// The most procedures that stand for modes of one axis.
+pub const PROCEDURES_MAX: usize = 4;
+
+/// The most procedure commands of one of them.
+pub const PROCEDURE_COMMANDS_MAX: usize = 4;
 
 /// Bytes of the control and of the status word.
 const WORD_BYTES: u16 = 2;
@@ -33,6 +41,9 @@ const FULL_RANGE: i64 = 1 << 32;
 /// The most rows for status bits.
 pub const MAX_STATUS_ROWS: usize = 32;
 
+/// The most words with status bits beside the status word.
+pub const STATUS_WORDS_MAX: usize = 2;
+
 /// The most rows for faults and warnings.
 pub const MAX_FAULT_ROWS: usize = 96;
 
@@ -41,8 +52,8 @@ pub const MAX_FAULT_ROWS: usize = 96;
 pub struct SercosAxis {
     /// Units.
     pub units: AxisUnits,
-    /// Operating modes in the order of their slots; the first is active at start.
-    pub modes: ArrayVec<OperatingMode, MAX_MODES>,
+    /// Modes in the order of their slots, with those among them that are procedures; the first is active at start.
+    pub modes: ArrayVec<ModeSelection, { MAX_MODES + PROCEDURES_MAX }>,
     /// Whether positions wrap.
     pub modulo: bool,
     /// Whether commissioning sets the scaling of the drive; it is left alone otherwise.
@@ -72,10 +83,18 @@ pub struct Telegram {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SercosError {
     /// An operating mode without a row.
-    #[error("no [[mode]] row for operating mode {0}")]
-    Mode(OperatingMode),
-    /// No operating mode at all.
-    #[error("expected at least one operating mode, got none")]
+    #[error("no [[mode]] or [[procedure]] row for operating mode {0}")]
+    Mode(ModeSelection),
+    /// A procedure that is led in a mode which the axis does not have.
+    #[error("{procedure} needs the operating mode {led_in}, which the axis does not have")]
+    LedIn {
+        /// The procedure.
+        procedure: ModeSelection,
+        /// The mode.
+        led_in: ModeSelection,
+    },
+    /// No operation mode at all.
+    #[error("expected at least one operation mode, got none")]
     NoMode,
     /// More modes than slots.
     #[error("expected at most {slots} operating modes, got {modes}")]
@@ -165,9 +184,32 @@ impl ParameterEntry {
 
 #[derive(Debug, Clone, Copy)]
 struct ModeEntry {
-    mode: OperatingMode,
+    selection: ModeSelection,
     control: BitPattern,
     status: BitPattern,
+    /// Its signals without which it must not be chosen.
+    needs: CommandSet,
+}
+
+/// A status bit in a word of the telegram.
+#[derive(Debug, Clone, Copy)]
+struct StatusRow {
+    /// The word beside the status word; `None` for the status word.
+    word: Option<Idn>,
+    pattern: BitPattern,
+    bit: StatusBits,
+}
+
+/// A mode that is carried out by procedure commands.
+#[derive(Debug, Clone)]
+pub struct Procedure {
+    /// What it stands for.
+    pub selection: ModeSelection,
+    /// The mode in which the controller moves the axis while the first command is in process; the drive moves it where
+    /// there is none.
+    pub led_in: Option<ModeSelection>,
+    /// The commands in their order.
+    pub commands: ArrayVec<Idn, PROCEDURE_COMMANDS_MAX>,
 }
 
 /// The program of one axis: flat, without names, hashes or allocation in use.
@@ -183,8 +225,12 @@ pub struct SercosProgram {
     pub actions: ActionTable,
     /// What a status word says.
     pub reports: StateTable,
+    /// What it says while the drive carries out a procedure.
+    led_reports: StateTable,
+    procedures: ArrayVec<Procedure, PROCEDURES_MAX>,
     modes: ArrayVec<ModeEntry, MAX_MODES>,
-    status: ArrayVec<(BitPattern, StatusBits), MAX_STATUS_ROWS>,
+    status: ArrayVec<StatusRow, MAX_STATUS_ROWS>,
+    status_words: ArrayVec<Place, STATUS_WORDS_MAX>,
     known_status: StatusBits,
     faults: ArrayVec<FaultRule, MAX_FAULT_ROWS>,
     commands: ArrayVec<(Action, Idn), { Action::ALL.len() }>,
@@ -221,6 +267,14 @@ impl Telegram {
                 *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
             }
         }
+        for idn in tables.status_words() {
+            let width = facts.width(idn, dictionary).and_then(|width| u16::try_from(width.bytes()).ok());
+            let listed = captures::is_listed(tables.configurable[0], idn, facts);
+            if let Some(width) = width.filter(|_| listed && !telegram.feedback.contains(&idn)) {
+                telegram.feedback.push(idn);
+                telegram.feedback_bytes += width;
+            }
+        }
         captures::extend(&mut telegram, tables, dictionary, axis, facts);
         Ok(telegram)
     }
@@ -246,11 +300,12 @@ impl Telegram {
         let facts = DriveFacts::new();
         let bytes = |idn| facts.width(idn, dictionary).map_or(4, |width| width.bytes());
         let mut idns: [Vec<Idn>; 2] = Default::default();
-        for rule in tables.modes.iter().filter(|rule| axis.modes.contains(&rule.mode)) {
+        for rule in tables.modes.iter().filter(|rule| axis.modes.contains(&rule.selection)) {
             for (list, signals) in idns.iter_mut().zip([&rule.command, &rule.actual]) {
                 list.extend(signals.iter().filter_map(|signal| Some(tables.signal(*signal)?.idn)));
             }
         }
+        idns[1].extend(tables.status_words());
         if axis.captures == super::captures::CaptureMode::Cyclic {
             // In either direction: which, the drive says.
             let captures = super::captures::idns(tables);
@@ -278,7 +333,10 @@ fn signals(
     facts: &DriveFacts,
 ) -> Result<(Signals, Signals), SercosError> {
     let (mut command, mut actual) = (Signals::new(), Signals::new());
-    for rule in mode_rules(tables, axis)? {
+    for (rule, slot) in mode_rules(tables, axis)?.iter().zip(&tables.slots) {
+        if !is_available(tables, rule, slot, facts) {
+            continue;
+        }
         for (wanted, list) in [(&rule.command, &mut command), (&rule.actual, &mut actual)] {
             for &signal in wanted {
                 let Some(row) = tables.signal(signal) else { continue };
@@ -297,21 +355,35 @@ fn signals(
     Ok((command, actual))
 }
 
-/// The rows of the modes of an axis.
+/// Whether the drive has an operation mode: one that the axis can do without may have been refused.
+fn is_available(tables: &SercosTables, rule: &ModeRule, slot: &SlotRule, facts: &DriveFacts) -> bool {
+    let lacks =
+        |signal: &Signal| tables.signal(*signal).is_some_and(|row| row.refuse && facts.is_missing(row.idn));
+    let signals = || rule.command.iter().chain(&rule.actual);
+    !rule.optional || !(facts.is_refused(slot.idn) || facts.is_missing(slot.idn) || signals().any(lacks))
+}
+
+/// The rows of the operation modes of an axis, in the order of their slots.
 pub(super) fn mode_rules<'t>(
     tables: &'t SercosTables,
     axis: &SercosAxis,
 ) -> Result<Vec<&'t ModeRule>, SercosError> {
-    if axis.modes.is_empty() {
+    let mut rules = Vec::with_capacity(axis.modes.len());
+    for selection in &axis.modes {
+        let rule = tables.modes.iter().find(|rule| rule.selection == *selection);
+        match (rule, tables.procedure(*selection)) {
+            (Some(rule), _) => rules.push(rule),
+            (None, Some(_)) => {}
+            (None, None) => return Err(SercosError::Mode(*selection)),
+        }
+    }
+    if rules.is_empty() {
         return Err(SercosError::NoMode);
     }
-    if axis.modes.len() > tables.slots.len() {
-        return Err(SercosError::Slots { slots: tables.slots.len(), modes: axis.modes.len() });
+    if rules.len() > tables.slots.len() {
+        return Err(SercosError::Slots { slots: tables.slots.len(), modes: rules.len() });
     }
-    let find = |mode: &OperatingMode| {
-        tables.modes.iter().find(|rule| rule.mode == *mode).ok_or(SercosError::Mode(*mode))
-    };
-    axis.modes.iter().map(find).collect()
+    Ok(rules)
 }
 
 /// What the values of an IDN measure, and generic units in one count.
@@ -405,8 +477,11 @@ impl SercosProgram {
             feedback: FeedbackProgram::new(),
             actions: ActionTable::new(),
             reports: StateTable::new(),
+            led_reports: StateTable::new(),
+            procedures: ArrayVec::new(),
             modes: ArrayVec::new(),
             status: ArrayVec::new(),
+            status_words: ArrayVec::new(),
             known_status: StatusBits::empty(),
             faults: ArrayVec::new(),
             commands: ArrayVec::new(),
@@ -432,18 +507,60 @@ impl SercosProgram {
             program.actions.set(*action, *pattern);
         }
         let fits = |wanted: &Option<bool>| wanted.is_none_or(|wanted| wanted != axis.silent);
-        for (pattern, report, _) in tables.reports.iter().filter(|(.., wanted)| fits(wanted)) {
-            if !program.reports.push(*pattern, *report) {
+        for rule in tables.reports.iter().filter(|rule| fits(&rule.acknowledges)) {
+            let ReportRule { pattern, report, procedure, .. } = *rule;
+            let fits = (procedure == Some(true) || program.reports.push(pattern, report))
+                && (procedure == Some(false) || program.led_reports.push(pattern, report));
+            if !fits {
                 return Err(SercosError::Full("the table of reports"));
             }
         }
-        for (mode, slot) in axis.modes.iter().zip(&tables.slots) {
-            program.modes.push(ModeEntry { mode: *mode, control: slot.control, status: slot.status });
+        for (rule, slot) in mode_rules(tables, axis)?.iter().zip(&tables.slots) {
+            if is_available(tables, rule, slot, facts) {
+                let SlotRule { control, status, .. } = *slot;
+                let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
+                let needs = rule.command.iter().filter(refuse).fold(CommandSet::empty(), |set, signal| {
+                    let mut probe = AxisCommand::default();
+                    probe.set(*signal, 0);
+                    set | probe.present
+                });
+                let entry = ModeEntry { selection: rule.selection, control, status, needs };
+                program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
+            }
         }
-        for (pattern, bit, _) in tables.status.iter().filter(|(.., wanted)| fits(wanted)) {
-            let row = (*pattern, *bit);
+        for rule in axis.modes.iter().filter_map(|mode| tables.procedure(*mode)) {
+            if let Some(led_in) = rule.led_in
+                && !axis.modes.contains(&led_in)
+            {
+                return Err(SercosError::LedIn { procedure: rule.selection, led_in });
+            }
+            if rule.commands.iter().any(|idn| facts.is_missing(*idn)) {
+                continue;
+            }
+            let procedure = Procedure {
+                selection: rule.selection,
+                led_in: rule.led_in,
+                commands: rule.commands.iter().copied().take(PROCEDURE_COMMANDS_MAX).collect(),
+            };
+            program
+                .procedures
+                .try_push(procedure)
+                .map_err(|_| SercosError::Full("the table of procedures"))?;
+        }
+        for idn in tables.status_words() {
+            let place =
+                compiler.place(idn, &program.telegram.feedback).filter(|place| place.offset.is_some());
+            // The builder has counted them.
+            place.map(|place| program.status_words.try_push(place));
+        }
+        for rule in tables.status.iter().filter(|rule| fits(&rule.acknowledges)) {
+            let word = Some(rule.word).filter(|word| *word != tables.status_word);
+            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.idn == word)) {
+                continue;
+            }
+            let row = StatusRow { word, pattern: rule.pattern, bit: rule.bit };
             program.status.try_push(row).map_err(|_| SercosError::Full("the table of status bits"))?;
-            program.known_status |= *bit;
+            program.known_status |= rule.bit;
         }
         for row in &tables.faults {
             program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
@@ -474,7 +591,7 @@ impl SercosProgram {
         telegram: &mut [u8],
         report: &mut ConversionReport,
     ) -> u16 {
-        let word = self.control_word(action, command.mode, word);
+        let word = self.control_word(action, command.selection(), word);
         if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
             bytes.copy_from_slice(&word.to_le_bytes());
         }
@@ -483,28 +600,32 @@ impl SercosProgram {
     }
 
     /// The control word after an action in a mode.
-    pub fn control_word(&self, action: Action, mode: OperatingMode, word: u16) -> u16 {
+    pub fn control_word(&self, action: Action, selection: ModeSelection, word: u16) -> u16 {
         let word = u32::from(word);
         let word = self.actions.apply(action, word).unwrap_or(word);
-        let slot = self.modes.iter().find(|entry| entry.mode == mode);
+        let slot = self.shown_in(selection).and_then(|shown| self.entry(shown));
         let word = slot.map_or(word, |entry| entry.control.apply(word));
         let bytes = word.to_le_bytes();
         u16::from_le_bytes([bytes[0], bytes[1]])
     }
 
-    /// Takes the drive's telegram apart into report, mode, status bits and actual values. Returns the
-    /// status word, or `None` when the telegram is too short to hold one.
+    /// Takes the drive's telegram apart into report, mode, status bits and actual values. `led` is whether the drive carries
+    /// out a procedure. Returns the status word, or `None` when the telegram is too short to hold one.
     pub fn decode(
         &self,
         telegram: &[u8],
+        led: bool,
         feedback: &mut AxisFeedback,
         trackers: &mut Trackers,
         report: &mut ConversionReport,
     ) -> Option<u16> {
         let word = telegram.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))?;
-        feedback.report = self.report(word);
-        feedback.mode = self.mode(word).unwrap_or_default();
-        feedback.status = feedback.status.difference(self.known_status).union(self.status_bits(word));
+        feedback.report = if led { self.led_report(word) } else { self.report(word) };
+        let ModeSelection { mode, interpolation } = self.mode(word).unwrap_or_default();
+        (feedback.mode, feedback.interpolation) = (mode, interpolation);
+        let words = self.status_words(telegram);
+        let known = feedback.status.difference(self.known_status);
+        feedback.status = known.union(self.status_bits(word, &words));
         self.feedback.decode(telegram, feedback, trackers, report);
         Some(word)
     }
@@ -514,20 +635,65 @@ impl SercosProgram {
         self.reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
     }
 
-    /// The operating mode that a status word reports.
-    pub fn mode(&self, status: u16) -> Option<OperatingMode> {
-        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.mode)
+    /// The same while the drive carries out a procedure: that it does not follow command values is right then.
+    pub fn led_report(&self, status: u16) -> Report {
+        self.led_reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
     }
 
-    /// Whether the drive was set up for this mode.
-    pub fn has_mode(&self, mode: OperatingMode) -> bool {
-        self.modes.iter().any(|entry| entry.mode == mode)
+    /// The operation mode that a status word reports.
+    pub fn mode(&self, status: u16) -> Option<ModeSelection> {
+        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.selection)
     }
 
-    /// The status bits in a status word.
-    pub fn status_bits(&self, status: u16) -> StatusBits {
-        let rows = self.status.iter().filter(|(pattern, _)| pattern.matches(u32::from(status)));
-        rows.fold(StatusBits::empty(), |bits, (_, bit)| bits | *bit)
+    fn entry(&self, selection: ModeSelection) -> Option<&ModeEntry> {
+        self.modes.iter().find(|entry| entry.selection == selection)
+    }
+
+    /// Whether the drive was set up for this mode, or has the procedure that stands for it.
+    pub fn has_mode(&self, selection: impl Into<ModeSelection>) -> bool {
+        let selection = selection.into();
+        self.entry(selection).is_some() || self.procedure(selection).is_some()
+    }
+
+    /// The procedure that stands for a mode.
+    pub fn procedure(&self, selection: ModeSelection) -> Option<&Procedure> {
+        self.procedures.iter().find(|procedure| procedure.selection == selection)
+    }
+
+    /// Every procedure.
+    pub fn procedures(&self) -> &[Procedure] {
+        &self.procedures
+    }
+
+    /// The operation mode that the drive is in while it is in a mode: another one during a procedure that the controller
+    /// leads, `None` where a procedure leaves it alone.
+    pub fn shown_in(&self, selection: ModeSelection) -> Option<ModeSelection> {
+        match self.procedure(selection) {
+            Some(procedure) => procedure.led_in,
+            None => Some(selection),
+        }
+    }
+
+    /// The command signals without which a mode must not be chosen.
+    pub fn needs(&self, selection: ModeSelection) -> CommandSet {
+        self.shown_in(selection)
+            .and_then(|shown| self.entry(shown))
+            .map_or(CommandSet::empty(), |entry| entry.needs)
+    }
+
+    /// The words with status bits that the drive's telegram has beside the status word.
+    pub fn status_words(&self, telegram: &[u8]) -> ArrayVec<(Idn, u32), STATUS_WORDS_MAX> {
+        let word = |place: &Place| Some((place.idn, place.read_word(telegram)?));
+        self.status_words.iter().filter_map(word).collect()
+    }
+
+    /// The status bits in a status word, and in the words beside it.
+    pub fn status_bits(&self, status: u16, words: &[(Idn, u32)]) -> StatusBits {
+        let shows = |row: &&StatusRow| match row.word {
+            None => row.pattern.matches(u32::from(status)),
+            Some(idn) => words.iter().any(|(known, word)| *known == idn && row.pattern.matches(*word)),
+        };
+        self.status.iter().filter(shows).fold(StatusBits::empty(), |bits, row| bits | row.bit)
     }
 
     /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.

@@ -23,6 +23,8 @@ struct Fact {
     limits: [Option<Vec<u8>>; 2],
     data: Option<Vec<u8>>,
     missing: bool,
+    /// The drive has refused what was written to it last.
+    refused: bool,
 }
 
 /// Something that a drive says of an IDN and the dictionary says otherwise. The drive is followed.
@@ -72,7 +74,19 @@ impl DriveFacts {
 
     /// The drive has given element 7 of an IDN, or has taken these bytes for it.
     pub fn note_data(&mut self, idn: Idn, data: &[u8]) {
-        self.facts.entry(idn).or_default().data = Some(data.to_vec());
+        let fact = self.facts.entry(idn).or_default();
+        fact.data = Some(data.to_vec());
+        fact.refused = false;
+    }
+
+    /// The drive has refused what was written to an IDN.
+    pub fn note_refused(&mut self, idn: Idn) {
+        self.facts.entry(idn).or_default().refused = true;
+    }
+
+    /// Whether the drive has refused what was written to an IDN last.
+    pub fn is_refused(&self, idn: Idn) -> bool {
+        self.facts.get(&idn).is_some_and(|fact| fact.refused)
     }
 
     /// The drive has no such IDN.
@@ -170,7 +184,7 @@ impl DriveFacts {
                 differences.push(Difference { idn: *idn, name, what, expected, found });
             };
             let length = attribute.item_length().bytes();
-            if let Some(expected) = row.length.filter(|expected| *expected != length) {
+            if let Some(expected) = row.length_on_sercos_3().filter(|expected| *expected != length) {
                 differ("length", expected.to_string(), length.to_string());
             }
             if row.length.is_some() && row.list != attribute.is_list() {

@@ -263,7 +263,7 @@ impl Mapping {
         let idn: Idn = example.idn.get_ref().parse().map_err(|error| wrong(format!("{error}")))?;
         let axis = SercosAxis {
             units,
-            modes: [OperatingMode::Position].into_iter().collect(),
+            modes: [OperatingMode::Position.into()].into_iter().collect(),
             ..SercosAxis::default()
         };
         let generic = *example.generic.get_ref();

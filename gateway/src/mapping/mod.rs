@@ -40,7 +40,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use profile_cip::target::attribute::AttributeDefinition;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::ModeSelection;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
 pub use captures::{
@@ -58,7 +58,9 @@ pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     CyclicValues, ELEMENTS, MissingValue,
 };
-pub use compile_sercos::{MAX_MODES, ParameterEntry, SercosAxis, SercosError, SercosProgram, Telegram};
+pub use compile_sercos::{
+    MAX_MODES, ParameterEntry, Procedure, SercosAxis, SercosError, SercosProgram, Telegram,
+};
 pub use dictionary::{
     Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup,
     CodeRange, CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries,
@@ -73,7 +75,7 @@ pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
-pub use sercos_tables::{FaultRule, SercosTables};
+pub use sercos_tables::{FaultRule, ReportRule, SercosTables};
 
 use crate::finding::Findings;
 use profile_cip::target::attribute::{DefaultValue, ElementRule};
@@ -174,12 +176,9 @@ impl Mapping {
         findings.into_result(Self { dictionaries, cip, sercos, tables })
     }
 
-    /// The operating modes that the drives have, each once, as many as a drive has places for.
-    pub fn drive_modes(&self) -> impl Iterator<Item = OperatingMode> + '_ {
-        let rules = self.sercos.modes.iter().enumerate();
-        let first =
-            rules.filter(|(at, rule)| !self.sercos.modes[..*at].iter().any(|other| other.mode == rule.mode));
-        first.map(|(_, rule)| rule.mode).take(MAX_MODES)
+    /// The operation modes that drives have, each once, as many as a drive has places for.
+    pub fn drive_modes(&self) -> impl Iterator<Item = ModeSelection> + '_ {
+        self.sercos.modes.iter().map(|rule| rule.selection).take(MAX_MODES)
     }
 
     /// The rows as they stand in the files, with their places.

@@ -4,7 +4,7 @@ use core::fmt;
 
 use profile_generic::fault::FaultCause;
 use profile_generic::image::Signal;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::state::{Action, DriveState};
 use profile_sercos::wire::idn::Idn;
@@ -111,9 +111,10 @@ impl Mapping {
 
     /// The `[[mode]]` row of an operating mode.
     #[must_use]
-    pub fn mode_row(&self, mode: OperatingMode) -> Option<Origin> {
+    pub fn mode_row(&self, selection: ModeSelection) -> Option<Origin> {
         let file = &self.tables.generic_sercos;
-        find(&file.text, "mode", &file.rows.mode, |row| &row.mode, mode.name())
+        let at = self.sercos.modes.iter().position(|rule| rule.selection == selection)?;
+        Some(origin(&file.text, "mode", &file.rows.mode.get(at)?.mode))
     }
 
     /// The `[[action]]` row of an action.
@@ -127,20 +128,26 @@ impl Mapping {
     #[must_use]
     pub fn report_row(&self, status: u16, silent: bool) -> Option<Origin> {
         let file = &self.tables.generic_sercos;
-        let at = self.sercos.reports.iter().position(|(pattern, _, acknowledges)| {
-            acknowledges.is_none_or(|wanted| wanted != silent) && pattern.matches(u32::from(status))
+        let at = self.sercos.reports.iter().position(|rule| {
+            rule.acknowledges.is_none_or(|wanted| wanted != silent)
+                && rule.procedure != Some(true)
+                && rule.pattern.matches(u32::from(status))
         })?;
         Some(origin(&file.text, "report", &file.rows.report.get(at)?.report))
     }
 
-    /// The `[[status]]` rows that a status word meets; `silent` as in [`super::SercosAxis`].
+    /// The `[[status]]` rows that a status word and the words beside it meet; `silent` as in [`super::SercosAxis`].
     #[must_use]
-    pub fn status_rows(&self, status: u16, silent: bool) -> Vec<Origin> {
+    pub fn status_rows(&self, status: u16, words: &[(Idn, u32)], silent: bool) -> Vec<Origin> {
         let file = &self.tables.generic_sercos;
-        let rows =
-            self.sercos.status.iter().zip(&file.rows.status).filter(|((pattern, _, acknowledges), _)| {
-                acknowledges.is_none_or(|wanted| wanted != silent) && pattern.matches(u32::from(status))
-            });
+        let value = |idn: Idn| match words.iter().find(|(known, _)| *known == idn) {
+            Some((_, word)) => Some(*word),
+            None => (idn == self.sercos.status_word).then_some(u32::from(status)),
+        };
+        let rows = self.sercos.status.iter().zip(&file.rows.status).filter(|(rule, _)| {
+            rule.acknowledges.is_none_or(|wanted| wanted != silent)
+                && value(rule.word).is_some_and(|word| rule.pattern.matches(word))
+        });
         rows.map(|(_, row)| origin(&file.text, "status", &row.status)).collect()
     }
 

@@ -5,7 +5,7 @@ mod builder;
 use arrayvec::ArrayVec;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
@@ -54,7 +54,9 @@ impl FixedUnit {
 
 #[derive(Debug, Clone)]
 pub(super) struct ModeRule {
-    pub mode: OperatingMode,
+    pub selection: ModeSelection,
+    /// Whether an axis can do without it.
+    pub optional: bool,
     pub codes: Vec<u16>,
     pub command: Vec<Signal>,
     pub actual: Vec<Signal>,
@@ -65,6 +67,38 @@ pub(super) struct SlotRule {
     pub control: BitPattern,
     pub status: BitPattern,
     pub idn: Idn,
+}
+
+/// A mode that is a sequence of procedure commands.
+#[derive(Debug, Clone)]
+pub(super) struct ProcedureRule {
+    pub selection: ModeSelection,
+    /// The mode in which the controller moves the axis meanwhile.
+    pub led_in: Option<ModeSelection>,
+    pub commands: Vec<Idn>,
+}
+
+/// What a status word says.
+#[derive(Debug, Clone, Copy)]
+pub struct ReportRule {
+    /// Bits of the status word.
+    pub pattern: BitPattern,
+    /// What they say.
+    pub report: Report,
+    /// For drives that acknowledge, or for those that do not.
+    pub acknowledges: Option<bool>,
+    /// While a procedure is carried out, or otherwise.
+    pub procedure: Option<bool>,
+}
+
+/// A status bit in a word of the drive's telegram.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StatusRule {
+    pub word: Idn,
+    pub pattern: BitPattern,
+    pub bit: StatusBits,
+    /// For drives that acknowledge, or for those that do not.
+    pub acknowledges: Option<bool>,
 }
 
 /// A fault or warning in a diagnostic word.
@@ -103,6 +137,7 @@ pub(super) enum StepKind {
     ReadTelegram,
     ReadParameters,
     ReadCaptures,
+    ReadProcedures,
     Command(Idn),
 }
 
@@ -134,10 +169,11 @@ pub struct SercosTables {
     pub(super) signals: Vec<SignalRule>,
     pub(super) modes: Vec<ModeRule>,
     pub(super) slots: Vec<SlotRule>,
+    pub(super) procedures: Vec<ProcedureRule>,
     pub(super) actions: Vec<(Action, BitPattern)>,
     pub(super) commands: Vec<(Action, Idn)>,
-    pub(super) reports: Vec<(BitPattern, Report, Option<bool>)>,
-    pub(super) status: Vec<(BitPattern, StatusBits, Option<bool>)>,
+    pub(super) reports: Vec<ReportRule>,
+    pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<FaultRule>,
     pub(super) parameters: Vec<ParameterRule>,
     pub(super) captures: Vec<CaptureRule>,
@@ -149,6 +185,21 @@ pub struct SercosTables {
 impl SercosTables {
     pub(super) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
         self.signals.iter().find(|rule| rule.signal == signal)
+    }
+
+    /// The words with status bits beside the status word, once.
+    pub(super) fn status_words(&self) -> Vec<Idn> {
+        let mut words: Vec<Idn> = Vec::new();
+        for rule in self.status.iter().filter(|rule| rule.word != self.status_word) {
+            if !words.contains(&rule.word) {
+                words.push(rule.word);
+            }
+        }
+        words
+    }
+
+    pub(super) fn procedure(&self, selection: ModeSelection) -> Option<&ProcedureRule> {
+        self.procedures.iter().find(|rule| rule.selection == selection)
     }
 
     /// Every polarity parameter, once.
@@ -190,8 +241,8 @@ impl SercosTables {
         &self.faults
     }
 
-    /// What a status word says, in the order of the rows: pattern, report, and whether it is for drives that acknowledge.
-    pub fn reports(&self) -> &[(BitPattern, Report, Option<bool>)] {
+    /// What a status word says, in the order of the rows.
+    pub fn reports(&self) -> &[ReportRule] {
         &self.reports
     }
 

@@ -10,6 +10,7 @@ mod sercos_dictionary;
 mod sercos_program;
 mod sercos_scaling;
 mod shipped_tables;
+mod simulated_drive;
 
 use std::fmt::Write as _;
 use std::sync::LazyLock;
@@ -21,7 +22,7 @@ use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{FaultSet, Origin};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::{CATALOGUE, Parameter};
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Torque, Velocity};
@@ -58,6 +59,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
         units: AxisUnits { kind: UnitKind::Rotary, ..AxisUnits::default() },
         modes: [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
             .into_iter()
+            .map(ModeSelection::from)
             .collect(),
         modulo,
         set_scaling: true,

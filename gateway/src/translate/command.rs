@@ -119,7 +119,9 @@ impl Translator {
         let mut telegram = axis.south.telegram.command.iter();
         if let Some(idn) = telegram.next() {
             let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(*idn), command.mode);
-            node.push(Node::new(text).by(mapping.action_row(action)).by(mapping.mode_row(command.mode)));
+            node.push(
+                Node::new(text).by(mapping.action_row(action)).by(mapping.mode_row(command.selection())),
+            );
         }
         for (field, idn) in axis.south.command.fields().zip(telegram) {
             let value = command.get(field.signal).unwrap_or_default();

@@ -44,7 +44,8 @@ impl Translator {
             Node::new(format!("AT of {}, connection 1, {} bytes: {}", axis.drive, bytes.len(), hex(bytes)));
         let mut report = ConversionReport::default();
         let needed = usize::from(axis.south.telegram.feedback_bytes);
-        let Some(word) = axis.south.decode(bytes, &mut state.feedback, &mut state.south, &mut report) else {
+        let Some(word) = axis.south.decode(bytes, false, &mut state.feedback, &mut state.south, &mut report)
+        else {
             node.push(Node::new(format!("expected {needed} bytes")));
             return node;
         };
@@ -63,9 +64,14 @@ impl Translator {
             let mut status = Node::new(format!("{} {word:#06x}: {told}, mode {shown}", self.named(*idn)))
                 .by(mapping.report_row(word, axis.silent))
                 .by(mode.and_then(|mode| mapping.mode_row(mode)));
-            let bits = axis.south.status_bits(word);
+            let words = axis.south.status_words(bytes);
+            for (idn, word) in &words {
+                status.push(Node::new(format!("{} {word:#06x}", self.named(*idn))));
+            }
+            let bits = axis.south.status_bits(word, &words);
             if !bits.is_empty() {
-                status.push(Node::new(format!("{bits:?}")).by(mapping.status_rows(word, axis.silent)));
+                let rows = mapping.status_rows(word, &words, axis.silent);
+                status.push(Node::new(format!("{bits:?}")).by(rows));
             }
             node.push(status);
         }

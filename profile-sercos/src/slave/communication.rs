@@ -111,17 +111,17 @@ mod attribute {
     pub const U16_LIST: u32 = 0x7015_0001;
     pub const BYTE_LIST: u32 = 0x7034_0001;
     /// ns, shown in microseconds.
-    pub const TIME: u32 = 0x7312_0001;
+    pub const TIME: u32 = 0x7012_0001;
     /// The same, written in CP2 and where the way of the telegrams has changed.
-    pub const TIME_ANY: u32 = 0x0312_0001;
+    pub const TIME_ANY: u32 = 0x0012_0001;
     pub const U16_CP2: u32 = 0x6011_0001;
     pub const U32_CP2: u32 = 0x6012_0001;
     pub const BITS_CP2: u32 = 0x6001_0001;
     pub const BITS32_CP2: u32 = 0x6002_0001;
     pub const HEX_CP2: u32 = 0x6031_0001;
-    pub const TIME_CP2: u32 = 0x6312_0001;
+    pub const TIME_CP2: u32 = 0x6012_0001;
     pub const U16_LIST_CP2: u32 = 0x6015_0001;
-    pub const TIME_LIST_CP2: u32 = 0x6316_0001;
+    pub const TIME_LIST_CP2: u32 = 0x6016_0001;
     pub const IDN_LIST_CP2: u32 = 0x6056_0001;
     pub const U16_LIST_ANY: u32 = 0x0015_0001;
     pub const COMMAND_ANY: u32 = 0x0009_0001;
@@ -147,7 +147,7 @@ pub fn define(store: &mut Store, config: &super::Config) {
     let s = Idn::standard;
     let number = Definition::value;
     let cycle_max = i64::from(CYCLE_NS_MAX);
-    let time = |idn, attribute, name, value| number(idn, attribute, name, value).unit("us");
+    let time = |idn, attribute, name, value| number(idn, attribute, name, value).unit("ns");
     let definitions = [
         number(idn::ERRORS, a::BITS, "Class 1 diagnostics", 0),
         number(idn::WARNINGS, a::BITS, "Class 2 diagnostics", 0),
@@ -176,7 +176,7 @@ pub fn define(store: &mut Store, config: &super::Config) {
         time(Idn::RING_DELAY, a::TIME_ANY, "Ring delay", 0),
         time(s(1016), a::TIME, "Slave delay", 600),
         Definition::list(Idn::UC_TIMES, a::TIME_LIST_CP2, "Unified channel times (t6, t7)", &[0; 8], 8)
-            .unit("us"),
+            .unit("ns"),
         Definition::list(s(1019), a::BYTE_LIST, "MAC address", mac, 6),
         time(Idn::SYNC_JITTER, a::TIME_CP2, "Synchronization jitter", 0),
         Definition::command(Idn::DELAY_MEASURING, a::COMMAND_ANY, "Ring delay measurement"),
@@ -187,7 +187,7 @@ pub fn define(store: &mut Store, config: &super::Config) {
         number(Idn::COMMUNICATION_CONTROL, a::BITS32_CP2, "Communication control", 0),
         Definition::list(idn::PORT_ERRORS, a::U16_LIST_ANY, "Error counters of ports 1 and 2", &[0; 4], 4),
         number(Idn::INTER_FRAME_GAP, a::U16_CP2, "Inter-frame gap", 37).unit("bytes").range(12, 0xFFFF),
-        time(Idn::SLAVE_JITTER, 0x7311_0001, "Slave jitter", 80),
+        time(Idn::SLAVE_JITTER, 0x7011_0001, "Slave jitter", 80),
         number(Idn::ADDRESS, a::U16_CP2, "SERCOS address", i64::from(address)).range(0, 511),
         number(Idn::DEVICE_CONTROL, a::BITS, "Device control", 0),
         number(Idn::DEVICE_STATUS, a::BITS, "Device status", 0),

@@ -67,11 +67,15 @@ impl Core {
         }
     }
 
-    /// Forgets commands: a phase start.
-    pub(super) fn clear_commands(&mut self) {
-        for handle in self.running.drain(..).chain(self.ended.drain(..)) {
+    /// Forgets commands: a phase start. What they have left behind in the application ends.
+    pub(super) fn clear_commands(&mut self, app: &mut impl Application) {
+        while let Some(handle) = self.running.pop().or_else(|| self.ended.pop()) {
             self.store.set_status(handle, DataStatus::empty());
             self.store.set_number(handle, 0);
+            let idn = self.store.get(handle).idn();
+            if !is_communication(idn) {
+                let _ = app.order(idn, Order::Cancel, &mut self.store);
+            }
         }
     }
 
@@ -184,15 +188,13 @@ impl Core {
         let word = i64::from(control.bits());
         match (control, state) {
             (ProcedureControl::CANCEL, _) => {
-                let communication =
-                    matches!(idn, Idn::CP3_CHECK | Idn::CP4_CHECK | Idn::DELAY_MEASURING | Idn::RESET_C1D);
                 match state {
                     CommandState::InProcess | CommandState::Interrupted => {
                         app.order(idn, Order::Cancel, &mut self.store)?;
                     }
                     CommandState::Idle | CommandState::Set => {}
                     // It has ended; what it has left behind ends too.
-                    _ if !communication => {
+                    _ if !is_communication(idn) => {
                         let _ = app.order(idn, Order::Cancel, &mut self.store);
                     }
                     _ => {}
@@ -280,4 +282,8 @@ impl<A: Application> Host for Access<'_, A> {
     fn control(&mut self, handle: Handle, word: u16) -> Result<(), SvcError> {
         self.core.order(handle, ProcedureControl::from_bits_retain(word), self.app)
     }
+}
+/// Whether a procedure command is the slave's own and not its application's.
+fn is_communication(idn: Idn) -> bool {
+    matches!(idn, Idn::CP3_CHECK | Idn::CP4_CHECK | Idn::DELAY_MEASURING | Idn::RESET_C1D)
 }

@@ -415,7 +415,7 @@ impl<A: Application> Slave<A> {
 
     fn enter_nrt(&mut self, heard: bool) {
         self.svc.reset();
-        self.core.clear_commands();
+        self.core.clear_commands(&mut self.app);
         self.core.configuration = None;
         self.ports.stop(heard);
         self.joining.forget();
@@ -427,7 +427,7 @@ impl<A: Application> Slave<A> {
         match phase {
             Phase::CP0 => {
                 self.svc.reset();
-                self.core.clear_commands();
+                self.core.clear_commands(&mut self.app);
                 self.core.configuration = None;
                 self.core.device_control = DeviceControl::empty();
                 self.topology_address = 0;

@@ -292,6 +292,15 @@ impl Store {
         self.position(idn).ok().map(|at| Handle(self.order[at]))
     }
 
+    /// Makes it a slave that does not have this parameter; whether it had it. Handles of it stay valid.
+    pub fn remove(&mut self, idn: Idn) -> bool {
+        let place = self.position(idn);
+        if let Ok(at) = place {
+            self.order.remove(at);
+        }
+        place.is_ok()
+    }
+
     /// A parameter by its handle.
     pub fn get(&self, handle: Handle) -> &Parameter {
         &self.parameters[handle.0]

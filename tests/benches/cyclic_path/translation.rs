@@ -128,7 +128,8 @@ impl Axis {
     /// Bytes of the drive become the generic feedback, and that the values of an answer.
     pub fn feedback(&mut self, telegram: &[u8]) -> CyclicValues {
         let mut report = ConversionReport::default();
-        let word = self.south.decode(telegram, &mut self.feedback, &mut self.south_trackers, &mut report);
+        let word =
+            self.south.decode(telegram, false, &mut self.feedback, &mut self.south_trackers, &mut report);
         assert!(word.is_some());
         let mut values = CyclicValues::default();
         self.north.encode(&self.feedback, WANTED, &mut values);

@@ -13,6 +13,7 @@
 //! prints the seed.
 
 pub mod explicit;
+pub mod generic;
 pub mod motion;
 pub mod network;
 pub mod ports;
@@ -74,7 +75,7 @@ const START: MonotonicTime = MonotonicTime(1_000_000_000);
 const SYSTEM_OFFSET: u64 = 1_700_000_000_000_000_000;
 
 /// Address of the box's Ethernet port.
-const HOST: Host = Host { mac: [0x02, 0x41, 0x42, 0, 0, 1], incarnation: 0x7A00 };
+pub const HOST: Host = Host { mac: [0x02, 0x41, 0x42, 0, 0, 1], incarnation: 0x7A00 };
 
 /// Longest step of the virtual clock, so that streams are looked at when nothing else is due.
 const STEP_MAX: DurationNs = DurationNs::from_millis(1);

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use axisbridge::engine::notice::Notice;
 use axisbridge_tests::rig::motion::{NANO, TURNTABLE, at_rest, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Limits, Step};
@@ -55,6 +56,23 @@ fn errors_are_understood_and_reset_in_both_layouts_of_the_status_word() {
             assert_eq!(report.failure, None, "{ready} {cause}: {}\n{}", rig.log(), rig.told());
         }
     }
+}
+
+/// The simulated drives are as the dictionary says, and what they lack is one line for each.
+#[test]
+fn a_start_tells_of_nothing_that_is_in_order() {
+    let rig = Rig::ready(Settings::default());
+    let warnings: Vec<_> =
+        rig.notices.iter().filter(|notice| matches!(notice, Notice::Difference { .. })).collect();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let lacking = |axis: u8| {
+        rig.notices
+            .iter()
+            .filter(move |notice| matches!(notice, Notice::PassedOver { .. }) && notice.axis() == Some(axis))
+    };
+    let told: Vec<String> = lacking(0).map(ToString::to_string).collect();
+    assert_eq!((told.len(), lacking(1).count()), (1, 1), "{told:?}");
+    assert!(told[0].starts_with("commissioning goes on without reading S-0-0294, "), "{told:?}");
 }
 
 /// What the controller's cyclic block of the turntable is changed to: another control mode, with its one set-point.

@@ -9,6 +9,7 @@ mod hookup;
 mod hot_plug;
 mod indicators;
 mod loss;
+mod modes;
 mod network;
 mod owner;
 mod planes;

@@ -1,10 +1,11 @@
 //! From the drive to the axis: feedback, limits that the box watches, faults and their causes.
 
 use super::diagnosis::CAUSE_TIME_OUT;
+use super::procedure::{ProcedureUnit, Surroundings};
 use super::{AxisChannel, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
-use profile_generic::image::FeedbackSet;
+use profile_generic::image::{FeedbackSet, StatusBits};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
@@ -40,8 +41,14 @@ impl AxisChannel {
             return;
         }
         let mut conversions = ConversionReport::default();
-        if program.decode(consumer.data, &mut self.feedback, trackers, &mut conversions).is_none() {
-            return;
+        let led = self.procedure.leads();
+        let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
+        let word = program.decode(consumer.data, led, &mut self.feedback, trackers, &mut conversions);
+        let Some(word) = word else { return };
+        self.shown = program.mode(word);
+        self.follows = program.report(word) == Report::Operating;
+        if referenced && !self.feedback.status.contains(StatusBits::REFERENCED) {
+            self.procedure.lose_reference();
         }
         self.feedback.fresh = true;
         self.feedback.age_cycles = 0;
@@ -63,7 +70,27 @@ impl AxisChannel {
         self.count_saturated(conversions.saturated);
         let report = self.feedback.report;
         self.report(now, system, report);
+        self.go_on_with_procedure(now);
         self.watch(system);
+    }
+
+    /// Begins, carries on with or ends the procedure that the chosen mode stands for.
+    fn go_on_with_procedure(&mut self, now: MonotonicTime) {
+        let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();
+        let around = Surroundings {
+            now,
+            operating: self.state() == DriveState::Operating && self.action == Action::Enable,
+            stands: self.feedback.velocity.get().unsigned_abs() <= zero_speed,
+            follows: self.follows,
+            shown: self.shown,
+        };
+        let mut unit = self.procedure;
+        unit.want(self.south().and_then(|program| program.procedure(self.command.selection())), &around);
+        self.procedure = unit;
+        if let Some(selection) = unit.selection() {
+            (self.feedback.mode, self.feedback.interpolation) = (selection.mode, selection.interpolation);
+        }
+        self.feedback.status = self.feedback.status.difference(ProcedureUnit::STATUS).union(unit.status());
     }
 
     pub(super) fn age_feedback(&mut self) {
@@ -119,6 +146,8 @@ impl AxisChannel {
     /// condition, and the controller has said what is to be done about it. It is over when the axis is not led any more.
     pub(super) fn watch(&mut self, system: SystemTime) {
         let operating = self.state() == DriveState::Operating;
+        // Before its homing is done nobody knows where the axis is.
+        let homing = self.command.mode == OperatingMode::Homing;
         let led = operating || self.state() == DriveState::Testing;
         let (position, velocity) = (self.feedback.position, self.feedback.velocity);
         let speed = velocity.get().unsigned_abs();
@@ -132,7 +161,7 @@ impl AxisChannel {
         let below =
             self.limits.position_min.is_some_and(|limit| position < limit) && velocity < Velocity::ZERO;
         let mut astray = false;
-        if operating && self.command.mode == OperatingMode::Position {
+        if operating && self.command.selection() == OperatingMode::Position.into() {
             let error = self.command.position.get().saturating_sub(position.get());
             if self.feedback.get(profile_generic::image::Signal::FollowingError).is_none() {
                 self.feedback.following_error = Position(error);
@@ -142,8 +171,8 @@ impl AxisChannel {
         }
         for (cause, there) in [
             (FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, too_fast),
-            (FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, above),
-            (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below),
+            (FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, above && !homing),
+            (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below && !homing),
             (FaultCause::EXCESSIVE_POSITION_ERROR, astray),
         ] {
             if led && there {

@@ -15,6 +15,8 @@ mod feedback;
 mod history;
 mod hookup;
 mod image;
+mod north;
+pub mod procedure;
 mod sequence;
 mod set_point;
 
@@ -28,14 +30,17 @@ use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
+use profile_generic::mode::ModeSelection;
 use profile_generic::program::Trackers;
 use profile_generic::quantity::{Position, Velocity};
 use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::svc::request::{SvcFailure, SvcRequest};
+use profile_sercos::wire::data_status::DataStatus;
 
 use self::capture::CaptureAccess;
+use self::procedure::{ProcedureAccess, ProcedureUnit};
 
 /// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
 pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
@@ -172,6 +177,12 @@ pub struct AxisChannel {
     started_for_test: bool,
     counters: AxisCounters,
     captures: capture::CaptureUnit,
+    procedure: ProcedureUnit,
+    /// The operation mode that the drive shows, and whether it follows command values, whatever it carries out.
+    shown: Option<ModeSelection>,
+    follows: bool,
+    /// A request of this number was taken from a north side that speaks in the generic model.
+    requested: Option<u32>,
 }
 
 /// The generic state machine and since when it is in its state.
@@ -227,6 +238,10 @@ impl AxisChannel {
             started_for_test: false,
             counters: AxisCounters::default(),
             captures: capture::CaptureUnit::default(),
+            procedure: ProcedureUnit::default(),
+            shown: None,
+            follows: false,
+            requested: None,
         }
     }
 
@@ -291,6 +306,7 @@ impl AxisChannel {
     /// The drive is commissioned and will be spoken to by this program.
     pub fn set_south(&mut self, program: SercosProgram) {
         let trackers = program.feedback.trackers();
+        self.procedure.restart(program.procedures());
         self.south = Some((program, trackers));
         self.captures.restart();
         self.action = Action::TorqueOff;
@@ -314,6 +330,10 @@ impl AxisChannel {
         self.report(now, system, report);
         self.south = None;
         self.captures.restart();
+        self.procedure.restart(&[]);
+        self.shown = None;
+        self.follows = false;
+        self.feedback.status.remove(ProcedureUnit::STATUS);
     }
 
     /// Tells what events need captured, in each cycle and after [`AxisChannel::poll_capture`] gives no more.
@@ -348,6 +368,34 @@ impl AxisChannel {
     ) {
         if let Some((program, _)) = &self.south {
             self.captures.answer(program.captures(), access, generation, result);
+        }
+    }
+
+    /// A service channel access that a procedure needs, with what [`AxisChannel::procedure_answer`] wants back.
+    #[must_use]
+    pub fn procedure_access(&self, now: MonotonicTime) -> Option<(SvcRequest, ProcedureAccess, u8)> {
+        // Procedure commands belong to CP4, in which the drive is heard.
+        let heard = self.feedback.fresh || self.procedure.selection().is_some();
+        self.procedure.access(self.south().filter(|_| heard)?.procedures(), now)
+    }
+
+    /// The access is on its way.
+    pub fn procedure_sent(&mut self, access: ProcedureAccess) {
+        self.procedure.sent(access);
+    }
+
+    /// The drive has answered such an access.
+    pub fn procedure_answer(
+        &mut self,
+        now: MonotonicTime,
+        access: ProcedureAccess,
+        generation: u8,
+        result: Result<DataStatus, SvcFailure>,
+    ) {
+        let Some((program, trackers)) = &mut self.south else { return };
+        if self.procedure.answer(program.procedures(), access, generation, result, now) {
+            // The drive has given its place another position: it is what the drive says, not so many turns more.
+            trackers.restart();
         }
     }
 

@@ -18,7 +18,7 @@ use profile_cip::target::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::FeedbackSet;
 use profile_generic::interpolation::SetPoints as FinePoints;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{InterpolationSource, OperatingMode};
 use profile_generic::quantity::{Acceleration, Torque, Velocity};
 use profile_generic::sequence::{Order, Sensed, SequenceStep, SequenceTimes, StopPlan, StopRamp};
 use profile_generic::state::{Action, DriveState, Report, Request};
@@ -74,12 +74,13 @@ impl AxisChannel {
             velocity.get().unsigned_abs() <= self.stop_settings.times.zero_speed.get().unsigned_abs();
         let catches = self.stop_settings.flying_start && !stands && !self.started_for_test;
         self.caught = catches.then_some(velocity);
-        self.command.mode = match catches {
+        let mode = match catches {
             // What a test is to find out is whether a position loop would hold at all.
             _ if self.started_for_test => OperatingMode::Torque,
             true => OperatingMode::Velocity,
             false => OperatingMode::Position,
         };
+        self.command.select(mode.into());
     }
 
     pub(super) fn begin_stop(&mut self, now: MonotonicTime, system: SystemTime, plan: StopPlan) {
@@ -119,6 +120,10 @@ impl AxisChannel {
     }
 
     fn begin_ramp(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.command.interpolation == InterpolationSource::Drive {
+            // A drive that makes its way by itself brakes by itself.
+            return self.brake(now, system);
+        }
         // From the last command, not from what the drive has made of it: the command does not step.
         let velocity = match self.command.mode {
             OperatingMode::Position | OperatingMode::Velocity => self.command.velocity,
@@ -130,12 +135,14 @@ impl AxisChannel {
         let deceleration = self.stop_settings.deceleration.unwrap_or_default();
         self.ramp = StopRamp::new(self.made_at, self.command.position, velocity, deceleration);
         if self.ramp.is_none() {
-            let plan = StopPlan {
-                method: profile_generic::sequence::StopMethod::Decelerate,
-                ..self.stop_settings.plan
-            };
-            self.begin_stop(now, system, plan);
+            self.brake(now, system);
         }
+    }
+
+    /// Stops by the drive's own deceleration instead of a ramp.
+    fn brake(&mut self, now: MonotonicTime, system: SystemTime) {
+        let method = profile_generic::sequence::StopMethod::Decelerate;
+        self.begin_stop(now, system, StopPlan { method, ..self.stop_settings.plan });
     }
 
     /// The command while no controller leads the axis.

@@ -6,7 +6,7 @@ use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Transition};
@@ -23,14 +23,16 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
             return;
         };
-        if first || self.command.mode != mode {
+        let mut fresh = self.command;
+        fresh.select(mode.into());
+        let same = self.command.selection() == fresh.selection();
+        if first || !same {
             // Where the drive is now is where the controller counts from: turns made without position commands do not
             // show in a command that wraps.
             self.trackers = self.north.trackers();
             let counts = self.north.counts(self.feedback.position.get()).value;
             self.trackers.start(counts, points.position_reference);
         }
-        let mut fresh = self.command;
         let values = CyclicValues::from(&points.values);
         let conversions =
             self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
@@ -46,16 +48,30 @@ impl AxisChannel {
         }
         let counted = points.values.unwind_count.is_some() && mode == OperatingMode::Position;
         let elapsed = system.since(std::mem::replace(&mut self.taken_at, system));
-        if counted && !first && self.command.mode == mode && self.leaps(&fresh, elapsed) {
+        if counted && !first && same && self.leaps(&fresh, elapsed) {
             // Position and count that do not belong together: one of them is of the cycle before or after.
             self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
             return;
         }
-        let other_mode = self.command.mode != mode;
-        let actual = self.actual_motion();
-        self.command.mode = mode;
-        self.counters.commands = self.counters.commands.saturating_add(1);
         let target_update = TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default();
+        self.interpolate(now, system, &fresh, first, target_update, points.target_time.map(SystemTime));
+    }
+
+    /// Hands set-points to the interpolator; `first` are those after a start.
+    pub(super) fn interpolate(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        fresh: &AxisCommand,
+        first: bool,
+        target_update: TargetUpdate,
+        target_time: Option<SystemTime>,
+    ) {
+        let other_mode = self.command.selection() != fresh.selection();
+        let actual = self.actual_motion();
+        let led = self.takes_set_points();
+        self.command.select(fresh.selection());
+        self.counters.commands = self.counters.commands.saturating_add(1);
         let Some(interpolator) = self.interpolator.as_mut() else {
             self.lose_command(now, system, Loss::NoPeriod);
             return;
@@ -67,16 +83,17 @@ impl AxisChannel {
                 None => interpolator
                     .start(self.feedback.present.contains(FeedbackSet::POSITION).then_some(actual.position)),
             }
+        } else if !led {
+            // The drive has led the axis by itself: what was sent before that leads nowhere.
+            interpolator.start_moving(self.acts_at, &actual);
         }
         if other_mode || interpolator.config().target_update != target_update {
             // On the move the new command begins where the old one has led the axis.
             interpolator.change(self.acts_at, target_update, &actual);
         }
-        let target = match points.target_time {
-            Some(target) => SystemTime(target),
-            None => target_update.target(system, interpolator.config().period),
-        };
-        match interpolator.update(target, &FinePoints::from(&fresh)) {
+        let period = interpolator.config().period;
+        let target = target_time.unwrap_or_else(|| target_update.target(system, period));
+        match interpolator.update(target, &FinePoints::from(fresh)) {
             Ok(()) => {}
             Err(UpdateError::Jump) => {
                 self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
@@ -178,7 +195,8 @@ impl AxisChannel {
     /// A drive that works modulo takes the short way to its next position: a longer one would lead it backward, so it is
     /// not sent.
     fn watch_step(&mut self, now: MonotonicTime, system: SystemTime, before: Position) {
-        let led = self.state() == DriveState::Operating && self.command.mode == OperatingMode::Position;
+        let position = self.command.selection() == OperatingMode::Position.into();
+        let led = self.state() == DriveState::Operating && position;
         let step = self.south.as_ref().and_then(|(program, _)| program.position_step());
         let far = |step: i64| self.command.position.get().abs_diff(before.get()) > step.unsigned_abs();
         if led && step.is_some_and(far) {
@@ -194,8 +212,9 @@ impl AxisChannel {
         self.made_at = now;
         let test_torque = self.run_test(now, system);
         let operating = self.state() == DriveState::Operating;
+        let counts = operating && self.sequence.is_some() && self.takes_set_points();
         let fine = match self.interpolator.as_mut() {
-            Some(interpolator) if operating && self.sequence.is_some() => Some(interpolator.at(acts_at)),
+            Some(interpolator) if counts => Some(interpolator.at(acts_at)),
             _ => None,
         };
         let points = match fine {
@@ -213,10 +232,14 @@ impl AxisChannel {
         self.watch_mode(now, system);
         let last = self.command;
         // Until the drive shows the new operating mode it goes on by the values of the old one.
-        let still = |mode| operating && self.feedback.mode == mode && last.mode != mode;
+        let still = |mode: OperatingMode| {
+            let mode = ModeSelection::from(mode);
+            operating && self.feedback.selection() == mode && last.selection() != mode
+        };
         // Where the axis stops by itself or is led by velocity or torque, the position of its last command would pull at it;
         // only a drive that knows no halt has nothing else to hold by.
-        let led = operating && last.mode == OperatingMode::Position && !self.drive_leads();
+        let position = last.selection() == OperatingMode::Position.into();
+        let led = operating && (position && !self.drive_leads() || self.stands_by_command());
         let velocity = points.velocity.unwrap_or(last.velocity);
         let rest = if still(OperatingMode::Position) {
             last.position.saturating_add(way(velocity, span))
@@ -226,11 +249,15 @@ impl AxisChannel {
             self.feedback.position
         };
         let kept = |mode, value: i64| if still(mode) { value } else { 0 };
+        // A position that goes on has its speed.
+        let speed = if still(OperatingMode::Position) {
+            last.velocity
+        } else {
+            Velocity(kept(OperatingMode::Velocity, last.velocity.0))
+        };
         let all = FinePoints {
             position: Some(points.position.unwrap_or(rest)),
-            velocity: Some(
-                points.velocity.unwrap_or(Velocity(kept(OperatingMode::Velocity, last.velocity.0))),
-            ),
+            velocity: Some(points.velocity.unwrap_or(speed)),
             acceleration: Some(points.acceleration.unwrap_or_default()),
             torque: Some(points.torque.unwrap_or(Torque(kept(OperatingMode::Torque, last.torque.0)))),
         };
@@ -240,7 +267,8 @@ impl AxisChannel {
     /// A drive that does not come to the operating mode that it is told follows values that are meant for no one.
     fn watch_mode(&mut self, now: MonotonicTime, system: SystemTime) {
         let led = self.state() == DriveState::Operating && self.action == Action::Enable;
-        if !led || self.feedback.mode == self.command.mode {
+        let expected = self.south().and_then(|program| program.shown_in(self.command.selection()));
+        if !led || expected.is_none_or(|mode| self.shown == Some(mode)) {
             self.other_mode_since = None;
             return;
         }
@@ -249,6 +277,23 @@ impl AxisChannel {
             self.other_mode_since = None;
             self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
         }
+    }
+
+    /// Whether set-points lead the axis in the chosen mode, and not the drive.
+    fn takes_set_points(&self) -> bool {
+        let selection = self.command.selection();
+        match self.south().and_then(|program| program.procedure(selection)) {
+            Some(procedure) => self.procedure.takes_set_points(procedure),
+            None => selection.interpolation == InterpolationSource::Controller,
+        }
+    }
+
+    /// Whether the drive holds by its last command beside a procedure: before it goes its own way and after it follows
+    /// again. In between it is shown its own position.
+    fn stands_by_command(&self) -> bool {
+        let Some(program) = self.south() else { return false };
+        let beside = !self.procedure.leads() || program.acknowledges() && self.follows;
+        program.procedure(self.command.selection()).is_some() && beside
     }
 
     /// Whether the drive is to halt and has no halt of its own: then its command stands still.

@@ -96,7 +96,7 @@ pub struct SercosIdn {
     pub clause: String,
     /// Function group or drive function, by the name; mostly empty.
     pub group: String,
-    /// Bytes of the value or of a list item; `None` when only the drive knows.
+    /// Bytes of the value or of a list item as the documents have it; `None` when only the drive knows.
     pub length: Option<u8>,
     /// Whether it is a list.
     pub list: bool,
@@ -127,6 +127,13 @@ pub struct SercosIdn {
 }
 
 impl SercosIdn {
+    /// Bytes of the value or of a list item on SERCOS III, where an IDN has four bytes; the manuals of SERCOS I/II drives
+    /// that most rows were read in show the two that it has there.
+    pub fn length_on_sercos_3(&self) -> Option<u8> {
+        const IDN_BYTES: u8 = 4;
+        if self.format == Some(IdnFormat::Idn) { Some(IDN_BYTES) } else { self.length }
+    }
+
     /// The number as the file has it.
     pub fn number(&self) -> String {
         let text = self.idn.to_string();

@@ -29,11 +29,13 @@ pub struct GenericSercosFile {
     pub mode: Vec<SercosModeRow>,
     /// Places where the drive keeps its operation modes.
     pub mode_slot: Vec<ModeSlotRow>,
+    /// Modes that a drive has as procedure commands.
+    pub procedure: Vec<ProcedureRow>,
     /// Control word of each action.
     pub action: Vec<ActionRow>,
     /// What a status word says.
     pub report: Vec<ReportRow>,
-    /// Status bits in the status word.
+    /// Status bits in the status word and in other words of the drive's telegram.
     pub status: Vec<SercosStatusRow>,
     /// Faults and warnings in the diagnostic words.
     pub fault: Vec<SercosFaultRow>,
@@ -257,14 +259,35 @@ pub struct SercosSignalRow {
 pub struct SercosModeRow {
     /// Operating mode.
     pub mode: Name,
-    /// Feedback that closes the position loop: `motor` or `load`.
-    pub feedback: Option<Name>,
+    /// Who makes the way, `controller` (default) or `drive`.
+    pub interpolation: Option<Name>,
+    /// What happens when the drive has none of the codes, or lacks a value of the mode: `refuse` the drive, or `omit` the
+    /// mode.
+    pub missing: Name,
     /// Operation mode codes, the preferred one first.
     pub codes: Vec<Name>,
     /// Signals in the master's telegram.
     pub command: Vec<Name>,
     /// Signals in the drive's telegram.
     pub actual: Vec<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// An operating mode that is no operation mode of the drive but a sequence of procedure commands. Each is executed after
+/// the one before is done; then all are cancelled, the last one first. Whatever fails cancels those before it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProcedureRow {
+    /// Operating mode.
+    pub mode: Name,
+    /// Who makes the way, `controller` or `drive`.
+    pub interpolation: Name,
+    /// Operating mode in which the controller moves the axis while the first command is in process; before the others the
+    /// axis has to stand. Absent where the drive moves it.
+    pub led_in: Option<Name>,
+    /// The procedure commands.
+    pub commands: Vec<Name>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -305,6 +328,8 @@ pub struct ReportRow {
     pub report: Name,
     /// Whether it is for drives that acknowledge (follow command values, halt), or for those that do not. Default: both.
     pub acknowledges: Option<bool>,
+    /// Whether it is for the time in which the drive carries out a procedure, or for all other. Default: both.
+    pub procedure: Option<bool>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -371,7 +396,8 @@ pub struct SercosParameterRow {
 pub struct CommissionRow {
     /// Communication phase, 2 to 4.
     pub phase: Spanned<u8>,
-    /// `write`, `read`, `command`, `read_scaling`, `read_telegram`, `read_parameters`, `read_captures` or `write_modes`.
+    /// `write`, `read`, `command`, `read_scaling`, `read_telegram`, `read_parameters`, `read_captures`, `read_procedures`
+    /// or `write_modes`.
     #[serde(rename = "do")]
     pub step: Name,
     /// IDN; none for the steps that know theirs.

@@ -3,6 +3,7 @@
 use profile_cip::target::exception::ExceptionAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
+use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
@@ -12,18 +13,19 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
 use super::{
-    Elements, FaultRule, FixedUnit, ModeRule, ParameterRule, Polarity, SercosTables, SignalRule, SlotRule,
-    StepKind, StepRule,
+    Elements, FaultRule, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule,
+    SercosTables, SignalRule, SlotRule, StatusRule, StepKind, StepRule,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
 use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
+use crate::mapping::compile_sercos::{PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::format::{
-    CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ScalingMethodRow, SercosCaptureRow,
-    SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
+    CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow, ScalingMethodRow,
+    SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
 };
 use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
@@ -54,6 +56,9 @@ impl SercosTables {
         }
         for row in &rows.mode {
             builder.mode(row);
+        }
+        for row in &rows.procedure {
+            builder.procedure(row);
         }
         builder.words(rows);
         for row in &rows.fault {
@@ -293,14 +298,69 @@ impl<'a> Builder<'a> {
                 "expected at least one operation mode",
             );
         }
+        let optional = self.resolver.word("missing", &row.missing, &[("refuse", false), ("omit", true)]);
         let command = self.mapped_signals("command", &row.command);
         let actual = self.mapped_signals("actual", &row.actual);
-        if let Some(mode) = mode {
-            if self.tables.modes.iter().any(|known| known.mode == mode) {
+        let interpolation = match &row.interpolation {
+            None => Some(InterpolationSource::Controller),
+            Some(name) => self.interpolation(name),
+        };
+        if let (Some(mode), Some(interpolation), Some(optional)) = (mode, interpolation, optional) {
+            let selection = ModeSelection { mode, interpolation };
+            if self.tables.modes.iter().any(|known| known.selection == selection) {
                 self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
             }
-            self.tables.modes.push(ModeRule { mode, codes, command, actual });
+            self.tables.modes.push(ModeRule { selection, optional, codes, command, actual });
         }
+    }
+
+    fn interpolation(&mut self, name: &Name) -> Option<InterpolationSource> {
+        let known = InterpolationSource::ALL.iter().map(|source| source.name());
+        let what = "who makes the way";
+        self.resolver.name("interpolation", name, what, InterpolationSource::parse, known)
+    }
+
+    fn procedure(&mut self, row: &ProcedureRow) {
+        let mode = operating_mode(&mut self.resolver, &row.mode);
+        let interpolation = self.interpolation(&row.interpolation);
+        let led_in = match &row.led_in {
+            None => None,
+            Some(name) => {
+                let Some(led_in) = operating_mode(&mut self.resolver, name) else { return };
+                let led_in = ModeSelection::from(led_in);
+                if !self.tables.modes.iter().any(|known| known.selection == led_in) {
+                    let message = format!("expected a mode with a [[mode]] row, {led_in} has none");
+                    self.resolver.error(code::ROW_MISSING, name.span(), "led_in", message);
+                }
+                Some(led_in)
+            }
+        };
+        let mut commands = Vec::with_capacity(row.commands.len());
+        for name in &row.commands {
+            let Some(idn) = self.idn("commands", name) else { continue };
+            if !idn.command {
+                let message = format!("expected a procedure command, {} is none", idn.idn);
+                self.resolver.error(code::NOT_A_COMMAND, name.span(), "commands", message);
+            }
+            commands.push(idn.idn);
+        }
+        if commands.is_empty() || commands.len() > PROCEDURE_COMMANDS_MAX {
+            let message =
+                format!("expected 1 to {PROCEDURE_COMMANDS_MAX} procedure commands, got {}", commands.len());
+            self.resolver.error(code::TOO_MANY, row.mode.span(), "commands", message);
+        }
+        let (Some(mode), Some(interpolation)) = (mode, interpolation) else { return };
+        let selection = ModeSelection { mode, interpolation };
+        if led_in.is_some() != (interpolation == InterpolationSource::Controller) {
+            let message = "expected `led_in` where the controller makes the way, and nowhere else";
+            self.resolver.error(code::CONTRADICTION, row.interpolation.span(), "led_in", message);
+        }
+        let modes = self.tables.modes.iter().map(|known| known.selection);
+        if modes.chain(self.tables.procedures.iter().map(|known| known.selection)).any(|one| one == selection)
+        {
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+        }
+        self.tables.procedures.push(ProcedureRule { selection, led_in, commands });
     }
 
     fn mapped_signals(&mut self, key: &str, names: &[Name]) -> Vec<Signal> {
@@ -379,7 +439,8 @@ impl<'a> Builder<'a> {
             let report =
                 self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
-                self.tables.reports.push((pattern, report, row.acknowledges));
+                let (acknowledges, procedure) = (row.acknowledges, row.procedure);
+                self.tables.reports.push(ReportRule { pattern, report, acknowledges, procedure });
             }
         }
         if self.tables.reports.len() > MAX_STATE_ROWS {
@@ -391,13 +452,16 @@ impl<'a> Builder<'a> {
             let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
             let bit = self.resolver.name("status", &row.status, "a status bit", StatusBits::parse, known);
             let Some((idn, word)) = self.word("word", &row.word) else { continue };
-            if idn != self.tables.status_word {
-                let message = format!("expected the status word of the telegram, got {idn}");
-                self.resolver.error(code::OUT_OF_RANGE, row.word.span(), "word", message);
-            }
             if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
-                self.tables.status.push((pattern, bit, row.acknowledges));
+                let acknowledges = row.acknowledges;
+                self.tables.status.push(StatusRule { word: idn, pattern, bit, acknowledges });
             }
+        }
+        let words = self.tables.status_words().len();
+        if words > STATUS_WORDS_MAX {
+            let message =
+                format!("expected at most {STATUS_WORDS_MAX} words beside the status word, got {words}");
+            self.resolver.error(code::TOO_MANY, rows.mapping.span(), "status", message);
         }
     }
 
@@ -577,6 +641,7 @@ impl<'a> Builder<'a> {
             ("read_telegram", Verb::ReadTelegram),
             ("read_parameters", Verb::ReadParameters),
             ("read_captures", Verb::ReadCaptures),
+            ("read_procedures", Verb::ReadProcedures),
             ("write_modes", Verb::WriteModes),
         ];
         let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
@@ -653,6 +718,7 @@ impl<'a> Builder<'a> {
             (Verb::ReadTelegram, None, None, None) => Some(StepKind::ReadTelegram),
             (Verb::ReadParameters, None, None, None) => Some(StepKind::ReadParameters),
             (Verb::ReadCaptures, None, None, None) => Some(StepKind::ReadCaptures),
+            (Verb::ReadProcedures, None, None, None) => Some(StepKind::ReadProcedures),
             (Verb::WriteModes, None, None, None) => Some(StepKind::WriteModes),
             _ => {
                 let message = "expected `write` with idn and value or with parameter, `read` with idn, \
@@ -673,5 +739,6 @@ enum Verb {
     ReadTelegram,
     ReadParameters,
     ReadCaptures,
+    ReadProcedures,
     WriteModes,
 }

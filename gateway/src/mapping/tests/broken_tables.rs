@@ -55,6 +55,37 @@ const CASES: &[Case] = &[
     ("manufacturer bit 0", |t| &mut t.cip_generic, "manufacturer = 1\n", "manufacturer = 0\n"),
     ("field value too large", |t| &mut t.generic_sercos, "\"Drive on\", is = 0", "\"Drive on\", is = 2"),
     ("unknown field", |t| &mut t.generic_sercos, "field = \"Drive on\"", "field = \"Drive off\""),
+    (
+        "who makes the way",
+        |t| &mut t.generic_sercos,
+        "interpolation = \"drive\"",
+        "interpolation = \"drives\"",
+    ),
+    (
+        "neither refused nor omitted",
+        |t| &mut t.generic_sercos,
+        "missing = \"omit\"\ncodes",
+        "missing = \"no\"\ncodes",
+    ),
+    (
+        "procedure without command",
+        |t| &mut t.generic_sercos,
+        "commands = [\"S-0-0148\"]",
+        "commands = [\"S-0-0147\"]",
+    ),
+    ("procedure led by nobody", |t| &mut t.generic_sercos, "led_in = \"position\"\n", ""),
+    (
+        "procedure led in no mode",
+        |t| &mut t.generic_sercos,
+        "led_in = \"position\"",
+        "led_in = \"acceleration\"",
+    ),
+    (
+        "procedure and mode",
+        |t| &mut t.generic_sercos,
+        "mode = \"homing\"\ninterpolation = \"drive\"",
+        "mode = \"position\"\ninterpolation = \"drive\"",
+    ),
     ("wrong direction", |t| &mut t.generic_sercos, "direction = \"to_drive\"", "direction = \"from_drive\""),
     (
         "read only",

@@ -109,7 +109,7 @@ impl Chain {
         // S-0-0047 follows the control word, S-0-0051 the status word.
         let mut back = [0; 12];
         back[2..6].copy_from_slice(&telegram[2..6]);
-        self.south.decode(&back, &mut self.feedback, &mut self.south_trackers, &mut report).unwrap();
+        self.south.decode(&back, false, &mut self.feedback, &mut self.south_trackers, &mut report).unwrap();
         let mut image = DriveImage::default();
         self.north.drive_image(&self.feedback, &FaultSet::new(), &mut image);
         seen(&image)

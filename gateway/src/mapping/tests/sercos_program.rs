@@ -102,7 +102,7 @@ fn telegrams_of_the_drive_become_feedback() {
         AxisFeedback { status: StatusBits::IN_POSITION | StatusBits::FAULT, ..AxisFeedback::default() };
     // In operation, following, second mode; 1843199999 counts, then 1: one step over the end of 512 turns and on.
     let mut telegram = [0x08, 0xC1, 0xFF, 0xFF, 0xDC, 0x6D, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
-    assert_eq!(program.decode(&telegram, &mut feedback, &mut trackers, &mut report), Some(0xC108));
+    assert_eq!(program.decode(&telegram, false, &mut feedback, &mut trackers, &mut report), Some(0xC108));
     assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
     assert_eq!(
         feedback.status,
@@ -113,9 +113,9 @@ fn telegrams_of_the_drive_become_feedback() {
     // 0.0001 1/min backward are -1666.67 nanounits a second.
     assert_eq!(feedback.velocity, Velocity(-1_667));
     telegram[2..6].copy_from_slice(&1_i32.to_le_bytes());
-    program.decode(&telegram, &mut feedback, &mut trackers, &mut report);
+    program.decode(&telegram, false, &mut feedback, &mut trackers, &mut report);
     assert_eq!((feedback.position.0, report.is_clean()), (512_000_000_278, true));
-    assert_eq!(program.decode(&[0], &mut feedback, &mut trackers, &mut report), None);
+    assert_eq!(program.decode(&[0], false, &mut feedback, &mut trackers, &mut report), None);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn status_words_say_what_the_drive_does() {
     for word in (0..=0xFFFF_u16).filter(|word| word & !0xF018 == 0) {
         let status: Vec<_> = StatusBits::NAMED
             .iter()
-            .filter(|(bit, _)| program.status_bits(word).contains(*bit))
+            .filter(|(bit, _)| program.status_bits(word, &[]).contains(*bit))
             .map(|(_, name)| *name)
             .collect();
         writeln!(text, "{word:04X} {:<15}{}", program.report(word).name(), status.join(" ")).unwrap();
@@ -198,8 +198,11 @@ fn scalings_that_cannot_be_used_say_why() {
     }
     let none = mapping.sercos_program(&axis, &DriveFacts::new()).unwrap_err();
     writeln!(text, "nothing read: {none}").unwrap();
-    let homing = SercosAxis { modes: [OperatingMode::Homing].into_iter().collect(), ..rotary_axis(false) };
-    writeln!(text, "{}", mapping.telegram(&homing, &DriveFacts::new()).unwrap_err()).unwrap();
+    let unknown = SercosAxis {
+        modes: [OperatingMode::Acceleration.into()].into_iter().collect(),
+        ..rotary_axis(false)
+    };
+    writeln!(text, "{}", mapping.telegram(&unknown, &DriveFacts::new()).unwrap_err()).unwrap();
     let idle = SercosAxis { modes: [].into_iter().collect(), ..rotary_axis(false) };
     writeln!(text, "{}", mapping.telegram(&idle, &DriveFacts::new()).unwrap_err()).unwrap();
     insta::assert_snapshot!(text, @r"
@@ -210,8 +213,8 @@ fn scalings_that_cannot_be_used_say_why() {
     0086 = [02, 00]: S-0-0086 = 0x0002: the drive gives torque in absolute units, and the axis has no rated torque
     0086 = [42, 00]: S-0-0122 is needed for the scaling and was not read from the drive
     nothing read: S-0-0076 is needed for the scaling and was not read from the drive
-    no [[mode]] row for operating mode homing
-    expected at least one operating mode, got none
+    no [[mode]] or [[procedure]] row for operating mode acceleration
+    expected at least one operation mode, got none
     ");
 }
 
@@ -258,10 +261,156 @@ proptest! {
         let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
         program.encode(&command, Action::None, 0, &mut telegram, &mut report);
         let mut feedback = AxisFeedback::default();
-        program.decode(&telegram, &mut feedback, &mut program.feedback.trackers(), &mut report);
+        program.decode(&telegram, false, &mut feedback, &mut program.feedback.trackers(), &mut report);
         let count = 1_000_000_000_u64.div_ceil(u64::from(resolution)).max(1);
         let lost = feedback.position.0.abs_diff(position);
         // The fraction may lead one count over the range of 32 bits, where the drive's value is held.
         prop_assert!(lost <= count || report.saturated > 0 && lost <= 2 * count + 1_000, "{lost} of {count}");
+    }
+}
+
+/// Every mode of the tables, and the slots it is in behind seven others: what is written to the drive, which bits choose it
+/// and show it, and what a command for it has to have.
+#[test]
+fn modes_and_slots() {
+    let mapping = shipped();
+    let rows = mapping.sercos.modes.iter().map(|rule| rule.selection);
+    let all: Vec<_> = rows.chain(mapping.sercos.procedures.iter().map(|rule| rule.selection)).collect();
+    let axis = SercosAxis { modes: all.iter().copied().collect(), ..rotary_axis(false) };
+    let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+    let mut text = String::new();
+    for selection in &all {
+        write!(text, "{selection}: ").unwrap();
+        match program.procedure(*selection) {
+            Some(procedure) => {
+                let commands: Vec<_> = procedure.commands.iter().map(ToString::to_string).collect();
+                write!(text, "{}", commands.join(", ")).unwrap();
+                if let Some(mode) = procedure.led_in {
+                    write!(text, ", led in {mode}").unwrap();
+                }
+            }
+            None => write!(text, "mode {}", program.control_word(Action::None, *selection, 0) >> 8).unwrap(),
+        }
+        writeln!(text, ", needs {:?}", program.needs(*selection)).unwrap();
+    }
+    let telegram = &program.telegram.command;
+    writeln!(text, "{}", telegram.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")).unwrap();
+    for slots in 1..=8 {
+        let mut modes = vec![ModeSelection::from(OperatingMode::Position); slots - 1];
+        modes.push(ModeSelection::by_drive(OperatingMode::Position));
+        let axis = SercosAxis { modes: modes.into_iter().collect(), ..rotary_axis(false) };
+        let steps = mapping.commissioning(&axis, 2, &DriveFacts::new()).unwrap().steps;
+        let codes = |candidates: &[Vec<u8>]| candidates == [vec![0x1B, 0], vec![0x13, 0]];
+        let written = steps.iter().find_map(|step| match step {
+            Step::Write { idn, candidates, refused } if codes(candidates) => Some((*idn, *refused)),
+            _ => None,
+        });
+        let (idn, refused) = written.unwrap();
+        let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+        let selection = ModeSelection::by_drive(OperatingMode::Position);
+        let word = program.control_word(Action::Enable, selection, 0x0100);
+        assert_eq!(program.mode(word), Some(selection), "the status word has the same bits");
+        writeln!(text, "slot {}: {idn} {refused:?} {word:04X}", slots - 1).unwrap();
+    }
+    insta::assert_snapshot!(text);
+    let nine = SercosAxis {
+        modes: [ModeSelection::from(OperatingMode::Torque); 9].into_iter().collect(),
+        ..rotary_axis(false)
+    };
+    assert_eq!(
+        mapping.telegram(&nine, &DriveFacts::new()).unwrap_err().to_string(),
+        "expected at most 8 operating modes, got 9"
+    );
+}
+
+/// A mode that an axis can do without is left out when the drive refuses its codes, or lacks its target; a mode that it
+/// needs is not.
+#[test]
+fn modes_that_the_drive_refuses() {
+    let mapping = shipped();
+    let target = ModeSelection::by_drive(OperatingMode::Position);
+    let axis = SercosAxis {
+        modes: [ModeSelection::from(OperatingMode::Position), target].into_iter().collect(),
+        ..rotary_axis(false)
+    };
+    let has = |change: &dyn Fn(&mut DriveFacts)| {
+        let mut facts = obedient(mapping, &axis);
+        change(&mut facts);
+        let program = mapping.sercos_program(&axis, &facts).unwrap();
+        let carried = program.telegram.command.contains(&Idn::standard(258));
+        assert_eq!(carried, program.has_mode(target), "its values are in the telegram when it is there");
+        program.has_mode(target)
+    };
+    assert!(has(&|_| ()));
+    assert!(!has(&|facts| facts.note_refused(Idn::standard(33))));
+    assert!(!has(&|facts| facts.note_missing(Idn::standard(33))));
+    assert!(!has(&|facts| facts.note_missing(Idn::standard(258))));
+    assert!(has(&|facts| facts.note_missing(Idn::standard(359))), "the deceleration is no must");
+    assert!(has(&|facts| {
+        facts.note_refused(Idn::standard(33));
+        facts.note_data(Idn::standard(33), &[0x13, 0]);
+    }));
+    // A drive led by the controller while it homes has to have the mode for it.
+    let homing = ModeSelection::from(OperatingMode::Homing);
+    let alone = SercosAxis {
+        modes: [ModeSelection::from(OperatingMode::Torque), homing].into_iter().collect(),
+        ..rotary_axis(false)
+    };
+    assert_eq!(
+        mapping.sercos_program(&alone, &obedient(mapping, &alone)).unwrap_err().to_string(),
+        "homing needs the operating mode position, which the axis does not have"
+    );
+}
+
+/// Bits of class 3 count where the drive lets the word into its telegram.
+#[test]
+fn class_3_bits_become_status() {
+    let mapping = shipped();
+    let axis = rotary_axis(false);
+    let mut facts = obedient(mapping, &axis);
+    facts.note_data(Idn::standard(187), &[13, 0, 0, 0, 84, 0, 0, 0]);
+    let program = mapping.sercos_program(&axis, &facts).unwrap();
+    assert_eq!(program.telegram.feedback.last(), Some(&Idn::standard(13)));
+    let (mut trackers, mut report) = (program.feedback.trackers(), ConversionReport::default());
+    let mut feedback = AxisFeedback::default();
+    let mut text = String::new();
+    for bit in 0..16 {
+        let mut telegram = [0; 14];
+        telegram[12..].copy_from_slice(&(1_u16 << bit).to_le_bytes());
+        program.decode(&telegram, false, &mut feedback, &mut trackers, &mut report).unwrap();
+        let names: Vec<_> = StatusBits::NAMED
+            .iter()
+            .filter(|(status, _)| feedback.status.contains(*status))
+            .map(|(_, name)| *name)
+            .collect();
+        writeln!(text, "{bit:>2} {}", names.join(" ")).unwrap();
+    }
+    insta::assert_snapshot!(text);
+    assert_eq!(
+        mapping.telegram(&axis, &obedient(mapping, &axis)).unwrap().feedback.last(),
+        Some(&Idn::standard(84))
+    );
+}
+
+proptest! {
+    /// Whatever is asked for, only the bits of the mode and of the three switches change, and the mode is the one chosen.
+    #[test]
+    fn control_words_hold_the_mode(word in any::<u16>(), mode in 0..5_usize, action in 0..Action::ALL.len()) {
+        let mapping = shipped();
+        let modes = [
+            ModeSelection::from(OperatingMode::Position),
+            ModeSelection::from(OperatingMode::Velocity),
+            ModeSelection::from(OperatingMode::Torque),
+            ModeSelection::by_drive(OperatingMode::Position),
+            ModeSelection::by_drive(OperatingMode::Homing),
+        ];
+        let axis = SercosAxis { modes: modes.into_iter().collect(), ..rotary_axis(false) };
+        let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
+        let after = program.control_word(Action::ALL[action], modes[mode], word);
+        prop_assert_eq!((after ^ word) & 0x18FF, 0);
+        match program.procedure(modes[mode]) {
+            Some(_) => prop_assert_eq!((after ^ word) & 0x0700, 0, "homing by the drive leaves the mode alone"),
+            None => prop_assert_eq!(program.mode(after), Some(modes[mode])),
+        }
     }
 }

@@ -89,8 +89,9 @@ pub struct Drive {
     /// Time from the selection of an operation mode to the mode, and how long one has been selected.
     mode_delay: DurationNs,
     mode_selected: DurationNs,
-    /// The set-point that the drive makes up by itself.
+    /// The set-point that the drive makes up by itself, and whether it has come to S-0-0258.
     motion: Motion,
+    attained: bool,
     homing: Homing,
     /// Set-points that count from the next cycle on.
     next: ServoCommand,
@@ -128,6 +129,7 @@ impl Drive {
             mode_delay: DurationNs::ZERO,
             mode_selected: DurationNs::ZERO,
             motion: Motion::default(),
+            attained: false,
             homing: Homing::default(),
         })
     }
@@ -355,6 +357,7 @@ impl Drive {
             scales.fold(if inverted { -counts } else { counts })
         };
         self.homing.watch(&senses, store, counts);
+        self.attained = false;
         if self.homing.leads() {
             let shift = self.homing.advance(&mut self.motion, &senses, store, &scales, counts);
             if let Some(shift) = shift {
@@ -381,7 +384,7 @@ impl Drive {
             self.motion.advance(cycle.elapsed.0, 0, Pace { velocity: 1, acceleration, deceleration });
         } else {
             let pace = Pace { velocity: velocity.min(limit), acceleration, deceleration };
-            self.motion.advance_to(cycle.elapsed.0, target, pace);
+            self.attained = self.motion.advance_to(cycle.elapsed.0, target, pace);
         }
         Some(self.motion.position)
     }
@@ -519,7 +522,7 @@ impl Drive {
             .set_number_of(idn::VELOCITY_FEEDBACK, polarity * self.scales.velocity.counts(actual.velocity.0));
         let polarity = sign(store, idn::TORQUE_POLARITY, 2);
         store.set_number_of(idn::TORQUE_FEEDBACK, polarity * self.scales.torque.counts(actual.torque.0));
-        store.set_number_of(idn::BUS_VOLTAGE, actual.bus_voltage.0 / 100_000);
+        store.set_number_of(idn::BUS_VOLTAGE, actual.bus_voltage.0 / 1_000_000);
         let motor = scaling::temperature(store, actual.temperature.0);
         store.set_number_of(idn::MOTOR_TEMPERATURE, motor);
         // The amplifier warms half as much as the motor; it is always in the unit of element 4.
@@ -564,7 +567,9 @@ impl Drive {
             status.contains(StatusBits::VELOCITY_LIMIT),
             status.contains(StatusBits::IN_POSITION),
         ];
-        bits.iter().rev().fold(0, |word, &bit| word << 1 | u16::from(bit))
+        const ATTAINED: u32 = 12;
+        let attained = u16::from(self.attained) << ATTAINED;
+        bits.iter().rev().fold(0, |word, &bit| word << 1 | u16::from(bit)) | attained
     }
 
     /// S-0-0135.

@@ -124,9 +124,8 @@ mod attribute {
     pub const VELOCITY_UNSIGNED: u32 = 0x0312_0001;
     pub const VELOCITY_READ: u32 = 0x7322_0001;
     pub const POSITION: u32 = 0x0422_0001;
-    pub const POSITION_UNSIGNED: u32 = 0x0412_0001;
     pub const POSITION_READ: u32 = 0x7422_0001;
-    pub const MODULO: u32 = 0x4412_0001;
+    pub const MODULO: u32 = 0x4422_0001;
     pub const TORQUE: u32 = 0x0121_0001;
     pub const TORQUE_UNSIGNED: u32 = 0x0111_0001;
     pub const TORQUE_READ: u32 = 0x7121_0001;
@@ -135,7 +134,7 @@ mod attribute {
     pub const CURRENT_READ: u32 = 0x7312_0001;
     pub const SPEED_READ: u32 = 0x7412_0001;
     pub const U16_READ: u32 = 0x7011_0001;
-    pub const VOLTAGE_READ: u32 = 0x7111_0001;
+    pub const VOLTAGE_READ: u32 = 0x7011_0001;
     pub const MODE_LIST: u32 = 0x7035_0001;
 }
 
@@ -260,10 +259,14 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
             .unit("A"),
         Definition::value(Idn::standard(112), a::CURRENT_READ, "Amplifier rated current", rated).unit("A"),
         Definition::value(Idn::FSP_TYPE, a::U16_READ, "FSP type and version", FSP_DRIVE),
-        Definition::value(Idn::standard(113), a::SPEED_READ, "Maximum motor speed", fastest).unit(speed),
     ];
     for definition in data {
         store.define(definition);
+    }
+    if servo.kind == UnitKind::Rotary {
+        // In revolutions a minute, which a linear motor does not make.
+        let name = "Maximum motor speed";
+        store.define(Definition::value(Idn::standard(113), a::SPEED_READ, name, fastest).unit(speed));
     }
 }
 
@@ -276,7 +279,7 @@ fn define_settings(store: &mut Store) {
         Definition::list(idn::MODES, a::MODE_LIST, "List of supported operation modes", &codes, codes.len()),
         value(idn::POSITION_LIMIT_POSITIVE, a::POSITION, "Positive position limit value", 0),
         value(idn::POSITION_LIMIT_NEGATIVE, a::POSITION, "Negative position limit value", 0),
-        value(idn::POSITION_WINDOW, a::POSITION_UNSIGNED, "Position window", 1).range(1, double),
+        value(idn::POSITION_WINDOW, a::POSITION, "Position window", 1).range(1, double),
         value(idn::VELOCITY_LIMIT, a::VELOCITY_UNSIGNED, "Bipolar velocity limit value", 1).range(1, double),
         value(idn::TORQUE_LIMIT, a::TORQUE_UNSIGNED, "Bipolar torque/force limit value", 1).range(1, word),
         value(idn::TORQUE_LIMIT_POSITIVE, a::TORQUE_UNSIGNED, "Positive torque/force limit value", 1)
@@ -284,16 +287,15 @@ fn define_settings(store: &mut Store) {
         value(idn::TORQUE_LIMIT_NEGATIVE, a::TORQUE_UNSIGNED, "Negative torque/force limit value", 1)
             .range(1, word),
         value(idn::POSITION_GAIN, a::GAIN, "Position loop Kv-factor", 1).unit("1000/min").range(1, word),
-        value(idn::STANDSTILL_WINDOW, a::VELOCITY_UNSIGNED, "Standstill window", 1).range(1, double),
-        value(idn::VELOCITY_THRESHOLD, a::VELOCITY_UNSIGNED, "Velocity threshold n_x", 0).range(0, double),
+        value(idn::STANDSTILL_WINDOW, a::VELOCITY, "Standstill window", 1).range(1, double),
+        value(idn::VELOCITY_THRESHOLD, a::VELOCITY, "Velocity threshold n_x", 0).range(0, double),
         value(idn::TORQUE_THRESHOLD, a::TORQUE_UNSIGNED, "Torque/force threshold T_x", 0).range(0, word),
-        value(idn::ACCELERATION_LIMIT, a::VELOCITY_UNSIGNED, "Bipolar acceleration limit value", 1)
-            .range(1, double),
+        value(idn::ACCELERATION_LIMIT, a::VELOCITY, "Bipolar acceleration limit value", 1).range(1, double),
         value(idn::ACCELERATION_LIMIT_POSITIVE, a::VELOCITY_UNSIGNED, "Positive acceleration limit value", 1)
             .range(1, double),
         value(idn::ACCELERATION_LIMIT_NEGATIVE, a::VELOCITY_UNSIGNED, "Negative acceleration limit value", 1)
             .range(1, double),
-        value(idn::MONITORING_WINDOW, a::POSITION_UNSIGNED, "Monitoring window", 0).range(0, double),
+        value(idn::MONITORING_WINDOW, a::POSITION, "Monitoring window", 0).range(0, double),
         value(idn::ON_DELAY, a::DELAY, "Drive on delay time", 0).unit("ms").range(0, word),
         value(idn::OFF_DELAY, a::DELAY, "Drive off delay time", 0).unit("ms").range(0, word),
     ];

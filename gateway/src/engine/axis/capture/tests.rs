@@ -22,7 +22,7 @@ const COMMAND: Attribute = Attribute(0x3009_0001);
 fn program(words: &[u16], places: &[u16], listed: bool) -> SercosProgram {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let axis = SercosAxis {
-        modes: [OperatingMode::Position].into_iter().collect(),
+        modes: [OperatingMode::Position.into()].into_iter().collect(),
         captures: if listed { CaptureMode::Cyclic } else { CaptureMode::ServiceChannel },
         ..SercosAxis::default()
     };

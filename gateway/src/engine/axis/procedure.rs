@@ -1,0 +1,305 @@
+//! Modes that a drive carries out as procedure commands: homing.
+//!
+//! ```text
+//! wanted --> Clear(0) --> Start(0) --> Process(0) --> Stand(1) --> Clear(1) ... --> Process(last)
+//!              write 0      write 3      data status               |                     |
+//!                                                          refused, error            all done
+//!                                                                  v                     v
+//!              Failed, Done <-- Settling <-- last one cancelled -- Cancel(n) ... Cancel(0)
+//! ```
+//!
+//! A command stays set until all are through, then they are cancelled, the last one first: only then the drive follows
+//! command values again. No longer wanting it, or losing the operation of the drive, cancels on the way. A drive that comes
+//! (back) to the bus may still have commands set, and would not follow: they are cancelled before anything else. Everything
+//! goes over the service channel, one access at a time, beside the cycle.
+
+use profile_generic::image::StatusBits;
+use profile_generic::mode::ModeSelection;
+use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcRequest};
+use profile_sercos::wire::data_status::{CommandState, DataStatus};
+use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::procedure::ProcedureControl;
+
+use crate::mapping::Procedure;
+
+/// How often the drive is asked how far a command is.
+const ASK_EVERY: DurationNs = DurationNs::from_millis(10);
+
+/// How long the drive may take, after the last command was cancelled, until it follows command values again.
+const FOLLOW_TIME_OUT: DurationNs = DurationNs::from_millis(500);
+
+/// Accesses of a cancellation that the drive does not answer before it is given up.
+const CANCEL_ATTEMPTS: u8 = 3;
+
+/// What comes of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Done,
+    Failed,
+    /// Nobody wants it any longer.
+    Dropped,
+}
+
+/// Where it stands; the numbers are places among the commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Stage {
+    #[default]
+    Idle,
+    Clear(usize),
+    Start(usize),
+    Process(usize),
+    /// The command before this one is done: the controller has to stop the axis.
+    Stand(usize),
+    Cancel(usize, End),
+    /// Through with the commands; the drive has to follow command values again.
+    Settling(End),
+    Ended(End),
+}
+
+/// An access to the service channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProcedureAccess {
+    /// Cancels what may be left of a command since before the drive came to the bus.
+    Sweep(usize),
+    /// Takes back what may be left of a command.
+    Clear(usize),
+    /// Sets and starts a command.
+    Start(usize),
+    /// Asks how far it is.
+    Ask(usize),
+    /// Cancels it.
+    Cancel(usize),
+}
+
+/// What the unit has to know of the axis in each cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings {
+    /// Now.
+    pub now: MonotonicTime,
+    /// The axis is in operation.
+    pub operating: bool,
+    /// It stands.
+    pub stands: bool,
+    /// It follows command values.
+    pub follows: bool,
+    /// The operation mode that it shows.
+    pub shown: Option<ModeSelection>,
+}
+
+/// The procedures of one axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ProcedureUnit {
+    stage: Stage,
+    /// Commands of all procedures that may still be left to be cancelled.
+    left_over: usize,
+    /// What is being carried out.
+    selection: ModeSelection,
+    outstanding: Option<ProcedureAccess>,
+    /// Counts restarts: answers of an earlier one do not count.
+    generation: u8,
+    ask_at: MonotonicTime,
+    since: MonotonicTime,
+    attempts: u8,
+    homed: bool,
+}
+
+impl ProcedureUnit {
+    /// The drive was lost or is new: nothing is under way, and all that it has of these procedures is cancelled.
+    pub fn restart(&mut self, procedures: &[Procedure]) {
+        let left_over = procedures.iter().map(|procedure| procedure.commands.len()).sum();
+        *self = Self { generation: self.generation.wrapping_add(1), left_over, ..Self::default() };
+    }
+
+    /// Tells what is wanted, in every cycle in which the drive was heard.
+    pub fn want(&mut self, wanted: Option<&Procedure>, around: &Surroundings) {
+        let same = wanted.filter(|procedure| procedure.selection == self.selection);
+        match self.stage {
+            Stage::Idle | Stage::Ended(_) => {
+                let Some(procedure) = wanted else {
+                    self.stage = Stage::Idle;
+                    return;
+                };
+                if matches!(self.stage, Stage::Idle | Stage::Ended(End::Dropped)) || same.is_none() {
+                    self.begin(procedure, around);
+                }
+            }
+            Stage::Settling(end) => {
+                if around.follows || !around.operating || around.now.since(self.since) > FOLLOW_TIME_OUT {
+                    self.stage = Stage::Ended(end);
+                    self.homed |= end == End::Done;
+                }
+            }
+            Stage::Cancel(..) => {}
+            Stage::Clear(at) | Stage::Start(at) | Stage::Process(at) | Stage::Stand(at) => {
+                match (same, self.stage) {
+                    (None, _) => self.end(at, End::Dropped),
+                    (Some(_), _) if !around.operating => self.end(at, End::Failed),
+                    (Some(_), Stage::Stand(_)) if around.stands => self.stage = Stage::Clear(at),
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    fn begin(&mut self, procedure: &Procedure, around: &Surroundings) {
+        let there = procedure.led_in.is_none_or(|mode| around.shown == Some(mode));
+        if around.operating && around.follows && there && self.left_over == 0 {
+            self.selection = procedure.selection;
+            self.stage = Stage::Clear(0);
+            self.homed = false;
+        }
+    }
+
+    /// On to the end by cancelling what was set, from this place on.
+    fn end(&mut self, at: usize, end: End) {
+        self.stage = Stage::Cancel(at, end);
+        self.attempts = 0;
+    }
+
+    /// What is carried out, or was and is still chosen.
+    pub fn selection(&self) -> Option<ModeSelection> {
+        (self.stage != Stage::Idle).then_some(self.selection)
+    }
+
+    /// Whether the drive need not follow command values: from the start of the first command until it follows again
+    /// after the last.
+    pub fn leads(&self) -> bool {
+        !matches!(self.stage, Stage::Idle | Stage::Ended(_) | Stage::Clear(0))
+    }
+
+    /// Whether set-points of a controller that moves the axis meanwhile count: until it stands at the place.
+    pub fn takes_set_points(&self, procedure: &Procedure) -> bool {
+        procedure.led_in.is_some()
+            && matches!(
+                self.stage,
+                Stage::Idle | Stage::Clear(0) | Stage::Start(0) | Stage::Process(0) | Stage::Stand(_)
+            )
+    }
+
+    /// The bits that say how it went.
+    pub fn status(&self) -> StatusBits {
+        let mut status = StatusBits::empty();
+        status.set(StatusBits::HOMED, self.homed);
+        let found = matches!(
+            self.stage,
+            Stage::Stand(_) | Stage::Clear(1..) | Stage::Start(1..) | Stage::Process(1..)
+        );
+        status.set(StatusBits::HOME_FOUND, found);
+        status.set(StatusBits::HOMING_FAILED, self.stage == Stage::Ended(End::Failed));
+        status
+    }
+
+    /// Bits that [`ProcedureUnit::status`] tells about.
+    pub const STATUS: StatusBits =
+        StatusBits::HOMED.union(StatusBits::HOME_FOUND).union(StatusBits::HOMING_FAILED);
+
+    /// The place of the axis has no reference any more.
+    pub fn lose_reference(&mut self) {
+        self.homed = false;
+    }
+
+    /// The next access to the drive's service channel, if one is due and none under way.
+    pub fn access(
+        &self,
+        procedures: &[Procedure],
+        now: MonotonicTime,
+    ) -> Option<(SvcRequest, ProcedureAccess, u8)> {
+        if self.outstanding.is_some() {
+            return None;
+        }
+        if let Some(at) = self.left_over.checked_sub(1) {
+            // The last one first.
+            let idn = *procedures.iter().flat_map(|procedure| &procedure.commands).nth(at)?;
+            return Some((
+                write(idn, ProcedureControl::CANCEL)?,
+                ProcedureAccess::Sweep(at),
+                self.generation,
+            ));
+        }
+        let procedure = self.of(procedures)?;
+        let (at, access, control) = match self.stage {
+            Stage::Clear(at) => (at, ProcedureAccess::Clear(at), Some(ProcedureControl::CANCEL)),
+            Stage::Start(at) => (at, ProcedureAccess::Start(at), Some(ProcedureControl::EXECUTE)),
+            Stage::Process(at) if now >= self.ask_at => (at, ProcedureAccess::Ask(at), None),
+            Stage::Cancel(at, _) => (at, ProcedureAccess::Cancel(at), Some(ProcedureControl::CANCEL)),
+            _ => return None,
+        };
+        let idn = *procedure.commands.get(at)?;
+        let request = match control {
+            Some(control) => write(idn, control)?,
+            None => SvcRequest::new(idn, SvcOperation::Status).urgent(),
+        };
+        Some((request, access, self.generation))
+    }
+
+    /// The procedure that is carried out.
+    fn of<'p>(&self, procedures: &'p [Procedure]) -> Option<&'p Procedure> {
+        let selection = self.selection()?;
+        procedures.iter().find(|procedure| procedure.selection == selection)
+    }
+
+    /// The access was handed to the service channel.
+    pub fn sent(&mut self, access: ProcedureAccess) {
+        self.outstanding = Some(access);
+    }
+
+    /// Takes the answer to an access. Whether positions may have another reference now.
+    pub fn answer(
+        &mut self,
+        procedures: &[Procedure],
+        access: ProcedureAccess,
+        generation: u8,
+        result: Result<DataStatus, SvcFailure>,
+        now: MonotonicTime,
+    ) -> bool {
+        if generation != self.generation || self.outstanding != Some(access) {
+            return false;
+        }
+        self.outstanding = None;
+        let commands = self.of(procedures).map_or(0, |procedure| procedure.commands.len());
+        match (self.stage, access, result) {
+            // A drive that does not let it be cancelled has none that is set.
+            (_, ProcedureAccess::Sweep(at), _) => self.left_over = at,
+            (Stage::Clear(at), ProcedureAccess::Clear(_), Ok(_)) => self.stage = Stage::Start(at),
+            (Stage::Start(at), ProcedureAccess::Start(_), Ok(_)) => {
+                self.stage = Stage::Process(at);
+                self.ask_at = now + ASK_EVERY;
+            }
+            (Stage::Process(at), ProcedureAccess::Ask(_), Ok(status)) => match status.command_state() {
+                CommandState::InProcess | CommandState::Interrupted => self.ask_at = now + ASK_EVERY,
+                CommandState::Done if at + 1 < commands => self.stage = Stage::Stand(at + 1),
+                CommandState::Done => {
+                    self.end(at, End::Done);
+                    return true;
+                }
+                _ => self.end(at, End::Failed),
+            },
+            (Stage::Clear(at) | Stage::Start(at) | Stage::Process(at), _, Err(_)) => {
+                self.end(at, End::Failed)
+            }
+            (Stage::Cancel(at, end), ProcedureAccess::Cancel(_), result) => {
+                let again = result.is_err() && self.attempts < CANCEL_ATTEMPTS;
+                self.attempts += u8::from(again);
+                if !again {
+                    self.attempts = 0;
+                    self.stage = match at.checked_sub(1) {
+                        Some(before) => Stage::Cancel(before, end),
+                        None => Stage::Settling(end),
+                    };
+                    self.since = now;
+                }
+            }
+            // An answer to what was asked before the cancellation.
+            _ => {}
+        }
+        false
+    }
+}
+
+fn write(idn: Idn, control: ProcedureControl) -> Option<SvcRequest> {
+    Some(SvcRequest::write(idn, SvcData::inline(&control.bits().to_le_bytes())?).urgent())
+}
+
+#[cfg(test)]
+mod tests;
