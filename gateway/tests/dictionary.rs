@@ -112,7 +112,7 @@ fn every_part_of_every_profile_says_the_same_in_csv_and_json() {
         ("sercos", "communication", 91),
         ("sercos", "bits", sercos_bits(&dictionaries())),
         ("sercos", "codes", sercos_codes(&dictionaries())),
-        ("generic", "instance", 18 + dictionaries().generic.parameters().len()),
+        ("generic", "instance", 22 + dictionaries().generic.parameters().len()),
     ];
     for (profile, part, count) in parts {
         let (columns, records) = records(&[profile, "--format", "csv", "--part", part]);
