@@ -46,7 +46,7 @@ fn told(node: &serde_json::Value, found: &mut Vec<String>) {
 fn translated_updates_are_what_the_box_sent() {
     in_real_time("translated_updates_are_what_the_box_sent", || {
         let capture = folder("translate-demo").join("demo.pcapng");
-        let demo = run(&["demo", "--seconds", "2", "--listen", LISTEN, "--capture", path(&capture)]);
+        let demo = run(&["demo", "--seconds", "1", "--listen", LISTEN, "--capture", path(&capture)]);
         assert!(demo.status.success(), "{}", text(&demo.stderr));
         let output = run(&["translate", path(&capture), "--json"]);
         assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));

@@ -6,7 +6,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::Outcome;
 use crate::finding::Severity;
-use crate::mapping::{Mapping, TableText, TableTexts};
+use crate::mapping::{IdnPart, Mapping, TableText, TableTexts};
 
 /// The page needs nothing beside itself.
 const STYLE: &str = "body{font:14px/1.45 system-ui,sans-serif;margin:2em;max-width:110em;color:#222}\
@@ -89,9 +89,12 @@ fn findings(page: &mut String, outcome: &Outcome) {
 fn coverage(page: &mut String, mapping: &Mapping) {
     let all = mapping.dictionaries.cip.attributes().len();
     let (served, rejected) = (mapping.cip.attributes.len(), mapping.cip.rejected.len());
+    let idns = mapping.dictionaries.sercos.idns().iter().filter(|row| row.part == IdnPart::Profile).count();
+    let unbound = mapping.sercos.unbound.len();
     let _ = writeln!(
         page,
-        "<h2>Coverage</h2>\n<p>Of {all} attributes of an axis {served} are served and {rejected} rejected with a reason.</p>"
+        "<h2>Coverage</h2>\n<p>Of {all} attributes of an axis {served} are served and {rejected} rejected with a reason. \
+         Of {idns} IDNs of the drive profile {unbound} are bound by no row, with a reason.</p>"
     );
 }
 

@@ -22,6 +22,11 @@ impl<'a> Resolver<'a> {
         Self { file, errors }
     }
 
+    /// Whether something is wrong already, here or in another file.
+    pub fn has_errors(&self) -> bool {
+        self.errors.has_errors()
+    }
+
     /// Notes that the value at `span` is wrong.
     pub fn error(&mut self, code: Code, span: Range<usize>, key: &str, message: impl Into<String>) {
         self.errors.push(self.file, Problem::new(code, span).key(key).expected(message));

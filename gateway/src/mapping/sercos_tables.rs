@@ -180,6 +180,8 @@ pub struct SercosTables {
     /// The drive's lists of what its telegram, and the master's, may carry.
     pub(super) configurable: [Idn; 2],
     pub(super) steps: Vec<StepRule>,
+    /// IDNs of the drive profile that no row binds, and why.
+    pub unbound: Vec<(Idn, String)>,
 }
 
 impl SercosTables {

@@ -47,6 +47,18 @@ pub struct GenericSercosFile {
     pub capture: Vec<SercosCaptureRow>,
     /// What is written and read at start.
     pub commission: Vec<CommissionRow>,
+    /// What none of them binds.
+    pub unbound: Vec<UnboundRow>,
+}
+
+/// IDNs of the drive profile that no other row binds.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnboundRow {
+    /// Why.
+    pub reason: Name,
+    /// The IDNs.
+    pub idns: Vec<Name>,
 }
 
 /// The drive's lists of the values that it takes in telegrams.

@@ -94,6 +94,7 @@ const GENERIC_SERCOS: &[Section] = &[
     section("parameter", &["parameter"]),
     section("capture", &["capture", "edge"]),
     section("commission", &["do", "phase", "idn", "parameter", "value", "when"]),
+    section("unbound", &["reason"]),
 ];
 
 /// The lists of a table by its name; everything else in it is a table of single keys.

@@ -1,5 +1,7 @@
 //! Generic <-> SERCOS: from rows to the resolved mapping.
 
+use std::collections::BTreeSet;
+
 use profile_cip::target::exception::ExceptionAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
@@ -26,6 +28,7 @@ use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantit
 use crate::mapping::format::{
     CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow, ScalingMethodRow,
     SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
+    UnboundRow,
 };
 use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
@@ -43,6 +46,7 @@ impl SercosTables {
             resolver: Resolver::new(&file.text, errors),
             dictionaries,
             exceptions: &cip.exceptions,
+            bound: BTreeSet::new(),
             tables: Self::default(),
         };
         builder.resolver.head(&rows.format, "mapping", &rows.mapping, "generic to sercos");
@@ -71,6 +75,10 @@ impl SercosTables {
         for row in &rows.commission {
             builder.step(row);
         }
+        // What is wrong with a row, or with the dictionary, need not be told twice.
+        if !builder.resolver.has_errors() {
+            builder.unbound(&rows.unbound);
+        }
         builder.tables
     }
 }
@@ -79,12 +87,48 @@ struct Builder<'a> {
     resolver: Resolver<'a>,
     dictionaries: &'a Dictionaries,
     exceptions: &'a [ExceptionRow],
+    /// IDNs that a row names, by themselves or by their word.
+    bound: BTreeSet<Idn>,
     tables: SercosTables,
 }
 
 impl<'a> Builder<'a> {
     fn idn(&mut self, key: &str, name: &Name) -> Option<&'a SercosIdn> {
-        self.dictionaries.sercos.idn_or_error(key, name, &mut self.resolver)
+        let row = self.dictionaries.sercos.idn_or_error(key, name, &mut self.resolver)?;
+        self.bound.insert(row.idn);
+        Some(row)
+    }
+
+    /// What no row binds has a reason, once.
+    fn unbound(&mut self, rows: &[UnboundRow]) {
+        let mut known = BTreeSet::new();
+        for row in rows {
+            if row.reason.get_ref().trim().is_empty() {
+                self.resolver.error(
+                    code::MISSING_KEY,
+                    row.reason.span(),
+                    "reason",
+                    "expected a reason, got none",
+                );
+            }
+            for name in &row.idns {
+                let sercos = &self.dictionaries.sercos;
+                let Some(idn) = sercos.idn_or_error("idns", name, &mut self.resolver) else { continue };
+                let idn = idn.idn;
+                if self.bound.contains(&idn) {
+                    self.resolver.error(
+                        code::CONTRADICTION,
+                        name.span(),
+                        "idns",
+                        format!("a row binds {idn}"),
+                    );
+                }
+                if !known.insert(idn) {
+                    self.resolver.error(code::TWICE, name.span(), "idns", format!("{idn} is there twice"));
+                }
+                self.tables.unbound.push((idn, row.reason.get_ref().clone()));
+            }
+        }
     }
 
     /// The word with this name and the one IDN that holds it.
@@ -94,6 +138,7 @@ impl<'a> Builder<'a> {
         let find = |text: &str| sercos.word(text);
         let word = self.resolver.name(key, name, "a word of the dictionary", find, known)?;
         if let [idn] = word.idns.as_slice() {
+            self.bound.insert(*idn);
             return Some((*idn, word));
         }
         let message = format!("expected a word of one IDN, `{}` has {}", word.name, word.idns.len());

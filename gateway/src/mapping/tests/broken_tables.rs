@@ -86,6 +86,9 @@ const CASES: &[Case] = &[
         "mode = \"homing\"\ninterpolation = \"drive\"",
         "mode = \"position\"\ninterpolation = \"drive\"",
     ),
+    ("bound and unbound", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0047\", "),
+    ("unbound twice", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0026\", "),
+    ("unbound for no reason", |t| &mut t.generic_sercos, "reason = \"one bit", "reason = \"\" # one bit"),
     ("wrong direction", |t| &mut t.generic_sercos, "direction = \"to_drive\"", "direction = \"from_drive\""),
     (
         "read only",
@@ -417,7 +420,7 @@ fn errors_of_the_sercos_dictionary_carry_their_exact_place() {
         (
             |t| &mut t.sercos_idns,
             "idn = \"S-0-0058\"",
-            "idn = \"S-0-0031\"",
+            "idn = \"S-0-0031\", name = \"Reversal\", clause = \"0\", source = \"list\", confidence = \"unknown\" },\n  { idn = \"S-0-0058\"",
             "\"S-0-0031\", name = \"Rev",
             "idn",
         ),

@@ -139,3 +139,35 @@ fn let_a_drive_that_only_warns_go_on() {
         assert!(!trips, "{}: a cause of its own tells a warning from an error", row.cause);
     }
 }
+
+/// Every IDN of the drive profile is named by a row, or by a word of one, or stands among the unbound with a reason.
+#[test]
+fn every_idn_of_the_profile_is_bound_or_has_a_reason() {
+    fn names<'v>(value: &'v toml::Value, found: &mut Vec<&'v str>) {
+        match value {
+            toml::Value::String(text) => found.push(text),
+            toml::Value::Array(values) => values.iter().for_each(|value| names(value, found)),
+            toml::Value::Table(rows) => rows.values().for_each(|value| names(value, found)),
+            _ => {}
+        }
+    }
+    let sercos = &shipped().dictionaries.sercos;
+    let file: toml::Table = TableTexts::embedded().generic_sercos.text.parse().unwrap();
+    let (mut bound, mut unbound) = (Vec::new(), Vec::new());
+    for (section, value) in &file {
+        names(value, if section == "unbound" { &mut unbound } else { &mut bound });
+    }
+    let of_words = bound.iter().filter_map(|name| sercos.word(name)).flat_map(|word| word.idns.clone());
+    let bound: Vec<Idn> = of_words.chain(bound.iter().filter_map(|name| name.parse().ok())).collect();
+    let unbound: Vec<Idn> = unbound.iter().filter_map(|name| name.parse().ok()).collect();
+    let profile = sercos.idns().iter().filter(|row| row.part == IdnPart::Profile);
+    let (mut all, mut neither) = (0, Vec::new());
+    for row in profile {
+        all += 1;
+        if bound.contains(&row.idn) == unbound.contains(&row.idn) {
+            neither.push(format!("{} {}", row.idn, row.name));
+        }
+    }
+    assert_eq!((all, unbound.len()), (395, 295));
+    assert_eq!(neither, Vec::<String>::new());
+}
