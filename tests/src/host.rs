@@ -54,14 +54,20 @@ impl Watch {
 /// # Panics
 /// As `run` does.
 pub fn in_real_time(test: &str, run: impl Fn()) {
-    watched(test, run, || {
+    let tell = |paused: Duration| {
+        // Past the test harness's capture.
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), "AGAIN {test}: the host paused for {paused:?} meanwhile");
+    };
+    let watch = || {
         let watch = Watch::start();
         || watch.longest_pause()
-    });
+    };
+    watched(run, watch, tell);
 }
 
-/// `watch` starts to watch the host; what it returns tells the longest pause since.
-fn watched<W: FnOnce() -> Duration>(test: &str, run: impl Fn(), watch: impl Fn() -> W) {
+/// `watch` starts to watch the host; what it returns tells the longest pause since. `tell` gets to know why a run is repeated.
+fn watched<W: FnOnce() -> Duration>(run: impl Fn(), watch: impl Fn() -> W, tell: impl Fn(Duration)) {
     for attempt in 1.. {
         let longest_pause = watch();
         let result = catch_unwind(AssertUnwindSafe(&run));
@@ -70,9 +76,7 @@ fn watched<W: FnOnce() -> Duration>(test: &str, run: impl Fn(), watch: impl Fn()
         if paused < PAUSE || attempt == ATTEMPTS {
             resume_unwind(panic);
         }
-        // Past the test harness's capture.
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), "AGAIN {test}: the host paused for {paused:?} meanwhile");
+        tell(paused);
     }
 }
 
@@ -89,7 +93,7 @@ mod tests {
             runs.set(runs.get() + 1);
             assert!(runs.get() > failures, "on purpose");
         };
-        let result = catch_unwind(AssertUnwindSafe(|| watched("this test", run, || || pause)));
+        let result = catch_unwind(AssertUnwindSafe(|| watched(run, || || pause, |_| {})));
         (runs.get(), result.is_err())
     }
 

@@ -24,7 +24,14 @@ r.hidden=!r.textContent.toLowerCase().includes(t)});";
 /// The page of what was checked.
 #[must_use]
 pub fn page(outcome: &Outcome) -> String {
-    let texts = outcome.texts.clone().unwrap_or_else(TableTexts::embedded);
+    let embedded;
+    let texts = match &outcome.texts {
+        Some(texts) => texts,
+        None => {
+            embedded = TableTexts::embedded();
+            &embedded
+        }
+    };
     let files: Vec<&TableText> = vec![&texts.cip_generic, &texts.generic_sercos];
     let mut page = String::from(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>Axisbridge mapping tables</title>\n",

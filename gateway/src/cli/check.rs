@@ -1,10 +1,9 @@
 //! `axisbridge check`: reads tables, overlays and a configuration as a lawyer would.
 
 use std::fmt::Write as _;
-use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use super::{CheckArguments, CheckFormat, CliError};
+use super::{CheckArguments, CheckFormat, CliError, print};
 use crate::check::{Outcome, Request, check, page, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Severity, json_report};
@@ -20,7 +19,7 @@ const USAGE: u8 = 2;
 pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     if let Some(text) = &arguments.explain {
         return match Code::parse(text) {
-            Some(code) => print(&format!("{}\n", code.entry()), ExitCode::SUCCESS),
+            Some(code) => print(format!("{}\n", code.entry()), ExitCode::SUCCESS),
             None => {
                 eprintln!(
                     "error: there is no code `{text}`: expected AX and four digits; --list has all of them"
@@ -33,7 +32,7 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         return schema(name);
     }
     if arguments.list {
-        return print(&list(arguments.format), ExitCode::SUCCESS);
+        return print(list(arguments.format), ExitCode::SUCCESS);
     }
     if arguments.format == CheckFormat::Markdown {
         eprintln!("error: --format markdown is for --list");
@@ -49,34 +48,21 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         CheckFormat::Json => format!("{:#}\n", json_report(findings)),
         CheckFormat::Text | CheckFormat::Markdown => text(arguments, &outcome),
     };
-    print(&text, if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    print(text, if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// A schema, or the names of all.
 fn schema(name: &str) -> Result<ExitCode, CliError> {
     if name.is_empty() {
-        return print(
-            &schema::names().map(|name| format!("{name}\n")).collect::<String>(),
-            ExitCode::SUCCESS,
-        );
+        return print(schema::names().map(|name| format!("{name}\n")).collect::<String>(), ExitCode::SUCCESS);
     }
     match schema::schema(name, &Mapping::embedded()?) {
-        Some(schema) => print(&format!("{schema:#}\n"), ExitCode::SUCCESS),
+        Some(schema) => print(format!("{schema:#}\n"), ExitCode::SUCCESS),
         None => {
             let names: Vec<&str> = schema::names().collect();
             eprintln!("error: there is no schema `{name}`: expected one of {}", names.join(", "));
             Ok(ExitCode::from(USAGE))
         }
-    }
-}
-
-fn print(text: &str, code: ExitCode) -> Result<ExitCode, CliError> {
-    let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Ok(()) => Ok(code),
-        // Whoever reads has seen enough, as `head` has.
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(code),
-        Err(error) => Err(format!("cannot write: {error}").into()),
     }
 }
 

@@ -1,9 +1,8 @@
 //! `axisbridge eds`: the electronic data sheets of the devices.
 
-use std::io::{self, Write};
 use std::process::ExitCode;
 
-use super::{CliError, EdsArguments};
+use super::{CliError, EdsArguments, print};
 use crate::config::Config;
 use crate::engine::build::{Host, adapter_config};
 
@@ -37,12 +36,7 @@ pub fn run(arguments: &EdsArguments) -> Result<ExitCode, CliError> {
                 "there are several devices, {names}; name one with --device, or give --output"
             )));
         };
-        return match io::stdout().lock().write_all(sheet) {
-            // Whoever reads has seen enough, as `head` has.
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
-            Err(error) => Err(format!("cannot write: {error}").into()),
-            Ok(()) => Ok(ExitCode::SUCCESS),
-        };
+        return print(sheet, ExitCode::SUCCESS);
     };
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     for (name, sheet) in sheets {

@@ -17,6 +17,7 @@ mod simulate;
 mod snapshot;
 mod translate;
 
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -398,3 +399,14 @@ pub fn main() -> ExitCode {
 
 /// An error as the person at the terminal reads it.
 type CliError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Prints data; the command then ends with `code`.
+fn print(data: impl AsRef<[u8]>, code: ExitCode) -> Result<ExitCode, CliError> {
+    let mut out = io::stdout().lock();
+    match out.write_all(data.as_ref()).and_then(|()| out.flush()) {
+        Ok(()) => Ok(code),
+        // Whoever reads has seen enough, as `head` has.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(code),
+        Err(error) => Err(format!("cannot write: {error}").into()),
+    }
+}

@@ -1,6 +1,5 @@
 //! `axisbridge scan`: what is on the south bus, and a configuration to begin with.
 
-use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
@@ -8,7 +7,7 @@ use profile_generic::time::DurationNs;
 use profile_sercos::master::config::{MasterConfig, Ports};
 
 use super::progress::Progress;
-use super::{CliError, ScanArguments, signal};
+use super::{CliError, ScanArguments, print, signal};
 use crate::config::{Config, Link};
 use crate::engine::build::{Host, master_config};
 use crate::engine::port::SouthPort;
@@ -83,15 +82,9 @@ pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
     } else {
         report(&bus, &mapping, &link, interface, config.as_ref())
     };
-    match io::stdout().lock().write_all(output.as_bytes()) {
-        // Whoever reads has seen enough, as `head` has.
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
-        Err(error) => return Err(format!("cannot write: {error}").into()),
-        Ok(()) => {}
-    }
     let good =
         bus.findings.is_empty() && !bus.slaves.is_empty() && !bus.slaves.iter().any(|slave| slave.lost);
-    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    print(output, if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// What was found as remarks, and behind it a configuration: the whole is a file that `axisbridge run` takes.

@@ -96,7 +96,7 @@ fn finish(tally: &Tally, accept: bool) -> ExitCode {
         println!("accepted");
         return ExitCode::SUCCESS;
     }
-    println!("with --accept this is how it shall be");
+    println!("if this is meant: run again with --accept");
     ExitCode::FAILURE
 }
 

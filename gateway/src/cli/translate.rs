@@ -1,7 +1,7 @@
 //! `axisbridge translate`: what the mapping tables make of frames.
 
 use std::fs::File;
-use std::io::{self, BufReader, Write};
+use std::io::{self, BufReader};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::decode::DictionaryNames;
-use super::{CliError, TranslateArguments};
+use super::{CliError, TranslateArguments, print};
 use crate::capture::reader::Reader;
 use crate::config::Config;
 use crate::mapping::Mapping;
@@ -54,14 +54,7 @@ pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
     } else {
         text(&list, RowNames::Lines)
     };
-    match io::stdout().lock().write_all(text.as_bytes()) {
-        // Whoever reads has seen enough, as `head` has.
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("cannot write: {error}").into())
-        }
-        _ if list.failed > 0 => Ok(ExitCode::FAILURE),
-        _ => Ok(ExitCode::SUCCESS),
-    }
+    print(text, if list.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// The configuration, or that of the demonstration.

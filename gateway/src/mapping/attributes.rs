@@ -185,9 +185,8 @@ impl AttributeEntry {
             return Err(ValueError::NotConvertible);
         };
         let width = self.number_width()?;
-        if bytes.len() != width.bytes() {
-            return Err(ValueError::Length { expected: width.bytes(), got: bytes.len() });
-        }
+        let length = ValueError::Length { expected: width.bytes(), got: bytes.len() };
+        let integer = width.integer(bytes).ok_or(length)?;
         let outcome = match (width, bytes) {
             (Width::F32, &[a, b, c, d]) => {
                 let value = f64::from(f32::from_le_bytes([a, b, c, d]));
@@ -197,7 +196,7 @@ impl AttributeEntry {
                 let value = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
                 to_generic.convert_f64(value).ok_or(ValueError::NotFinite)?
             }
-            _ => to_generic.convert(integer(bytes, width)),
+            _ => to_generic.convert(integer),
         };
         if outcome.saturated { Err(ValueError::Range) } else { Ok(outcome.value) }
     }
@@ -268,14 +267,4 @@ impl AttributeEntry {
     fn number_width(&self) -> Result<Width, ValueError> {
         self.data_type.width().filter(|_| self.length.is_none()).ok_or(ValueError::NotConvertible)
     }
-}
-
-/// The integer in little endian bytes of this width.
-fn integer(bytes: &[u8], width: Width) -> i64 {
-    let negative = width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
-    let mut all = [if negative { 0xFF } else { 0 }; 8];
-    for (to, from) in all.iter_mut().zip(bytes) {
-        *to = *from;
-    }
-    i64::from_le_bytes(all)
 }

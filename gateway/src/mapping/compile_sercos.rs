@@ -171,14 +171,7 @@ impl ParameterEntry {
     /// The generic value of the bytes of element 7. `None` when the parameter cannot be read or has another
     /// length.
     pub fn decode(&self, data: &[u8]) -> Option<i64> {
-        let conversion = self.from_drive?;
-        if data.len() != self.width.bytes() {
-            return None;
-        }
-        let negative = self.width.range().0 < 0 && data.last().is_some_and(|byte| byte & 0x80 != 0);
-        let mut bytes = [if negative { 0xFF } else { 0 }; 8];
-        bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(conversion.convert(i64::from_le_bytes(bytes)).value)
+        Some(self.from_drive?.convert(self.width.integer(data)?).value)
     }
 }
 

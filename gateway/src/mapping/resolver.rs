@@ -28,6 +28,13 @@ impl<'a> Resolver<'a> {
     }
 
     /// Notes that the value at `span` is wrong.
+    /// A reason is more than nothing.
+    pub fn reason(&mut self, reason: &Name) {
+        if reason.get_ref().trim().is_empty() {
+            self.error(code::MISSING_KEY, reason.span(), "reason", "expected a reason, got none");
+        }
+    }
+
     pub fn error(&mut self, code: Code, span: Range<usize>, key: &str, message: impl Into<String>) {
         self.errors.push(self.file, Problem::new(code, span).key(key).expected(message));
     }

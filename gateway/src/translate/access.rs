@@ -49,8 +49,9 @@ impl Translator {
                         return Ok(node);
                     }
                 };
-                let measured =
-                    parameter.row().map_or_else(|| value.to_string(), |row| quantity(row.quantity, value));
+                let measured = parameter
+                    .row()
+                    .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
                 node.push(Node::new(format!("{parameter} {measured}")).by(row));
                 match axis.south.parameter(parameter) {
                     Some(place) => node.push(self.written(place, value)),
@@ -115,8 +116,10 @@ impl Translator {
                 );
                 return Err(TranslateError::Value(text));
             };
-            let measured =
-                place.parameter.row().map_or_else(|| value.to_string(), |row| quantity(row.quantity, value));
+            let measured = place
+                .parameter
+                .row()
+                .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
             let mut read = Node::new(format!("{} {measured}", place.parameter))
                 .by(mapping.parameter_row(place.parameter));
             for entry in axis.attributes.entries() {

@@ -42,7 +42,7 @@ impl Translator {
         let report = axis.north.decode(&values, 0, &mut state.north, &mut command);
         for (text, signal) in elements(&block.values) {
             let came =
-                command.get(signal).map_or_else(|| "left out".to_owned(), |value| shown(signal, value));
+                command.get(signal).map_or_else(|| "left out".to_owned(), |value| shown(axis, signal, value));
             node.push(Node::new(format!("{text} -> {signal} {came}")).by(mapping.cyclic_row(signal)));
         }
         if let Some(count) = block.values.unwind_count {
@@ -130,7 +130,7 @@ impl Translator {
                 self.named(*idn),
                 raw(field, &bytes),
                 field.signal,
-                shown(field.signal, value)
+                shown(axis, field.signal, value)
             );
             node.push(Node::new(text).by(mapping.signal_row(field.signal)));
         }
@@ -155,7 +155,7 @@ impl Translator {
         for (field, idn) in axis.south.command.fields().zip(telegram) {
             let back = field.conversion.inverse().zip(integer(field, bytes));
             let value = back.map_or_else(String::new, |(conversion, raw)| {
-                shown(field.signal, conversion.convert(raw).value)
+                shown(axis, field.signal, conversion.convert(raw).value)
             });
             let text = format!("{}: {} = {} {value}", self.named(*idn), raw(field, bytes), field.signal);
             node.push(Node::new(text).by(self.stage.mapping.signal_row(field.signal)));
@@ -219,10 +219,5 @@ pub(super) fn raw(field: &Field, telegram: &[u8]) -> String {
 fn integer(field: &Field, telegram: &[u8]) -> Option<i64> {
     let start = usize::from(field.offset);
     let bytes = telegram.get(start..start + field.width.bytes()).filter(|_| !field.width.is_float())?;
-    let negative = field.width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
-    let mut all = [if negative { 0xFF } else { 0 }; 8];
-    for (to, from) in all.iter_mut().zip(bytes) {
-        *to = *from;
-    }
-    Some(i64::from_le_bytes(all))
+    field.width.integer(bytes)
 }

@@ -10,7 +10,7 @@ use profile_generic::state::{Action, BasicDrive, Report, Request};
 
 use super::command::raw;
 use super::tree::hex;
-use super::{AxisState, Node, Translator, shown};
+use super::{AxisState, Node, Translator, flags, shown};
 use crate::mapping::{CipValue, CyclicValues};
 
 /// Octets of the longest cyclic actual block that is made here.
@@ -71,7 +71,7 @@ impl Translator {
             let bits = axis.south.status_bits(word, &words);
             if !bits.is_empty() {
                 let rows = mapping.status_rows(word, &words, axis.silent);
-                status.push(Node::new(format!("{bits:?}")).by(rows));
+                status.push(Node::new(format!("status: {}", flags(bits.iter_names()))).by(rows));
             }
             node.push(status);
         }
@@ -82,7 +82,7 @@ impl Translator {
                 self.named(*idn),
                 raw(field, bytes),
                 field.signal,
-                shown(field.signal, value)
+                shown(axis, field.signal, value)
             );
             node.push(Node::new(text).by(mapping.signal_row(field.signal)));
         }
@@ -150,8 +150,10 @@ impl Translator {
             hex(&bytes[..len])
         ));
         let text = format!(
-            "Axis State {} from drive state {}: {:?}",
-            block.axis_state, feedback.state, seen.conditions
+            "Axis State {} from drive state {}: {}",
+            block.axis_state,
+            feedback.state,
+            flags(seen.conditions.iter_names())
         );
         node.push(Node::new(text).by(mapping.state_row(feedback.state)));
         for (bit, name, signal) in ELEMENTS {
@@ -163,7 +165,8 @@ impl Translator {
             };
             node.push(Node::new(format!("{name} {value}")).by(mapping.cyclic_row(signal)));
         }
-        node.push(Node::new(format!("Axis Status {:?}", AxisStatus::from_bits_retain(axis_status))));
+        let bits = AxisStatus::from_bits_retain(axis_status);
+        node.push(Node::new(format!("Axis Status {axis_status:#010x}: {}", flags(bits.iter_names()))));
         if report.saturated > 0 {
             node.push(Node::new(format!("{} values are clamped", report.saturated)));
         }

@@ -29,6 +29,7 @@ use profile_generic::program::Trackers;
 use profile_generic::quantity::{
     Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
 };
+use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, BasicDrive};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
@@ -256,17 +257,28 @@ fn decoded(title: &str, text: &str) -> Node {
     node
 }
 
-/// A value of a signal with its unit, and the integer behind it.
-fn shown(signal: Signal, value: i64) -> String {
-    quantity(signal.quantity(), value)
+/// Flags by their names, or that there are none.
+fn flags<T>(names: impl Iterator<Item = (&'static str, T)>) -> String {
+    let names: Vec<_> = names.map(|(name, _)| name.to_lowercase().replace('_', " ")).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// A value of a signal with its unit.
+fn shown(axis: &StageAxis, signal: Signal, value: i64) -> String {
+    quantity(axis, signal.quantity(), value)
 }
 
 /// A value in a quantity with its unit.
-fn quantity(quantity: Quantity, value: i64) -> String {
+fn quantity(axis: &StageAxis, quantity: Quantity, value: i64) -> String {
+    // The generic model counts in units of the axis, whatever they are.
+    let of_axis = |text: String| match axis.scaling.kind {
+        UnitKind::Rotary => text.replace(" u", " rev"),
+        UnitKind::Linear => text.replace(" u", " mm"),
+    };
     match quantity {
-        Quantity::Position => Position(value).to_string(),
-        Quantity::Velocity => Velocity(value).to_string(),
-        Quantity::Acceleration => Acceleration(value).to_string(),
+        Quantity::Position => of_axis(Position(value).to_string()),
+        Quantity::Velocity => of_axis(Velocity(value).to_string()),
+        Quantity::Acceleration => of_axis(Acceleration(value).to_string()),
         Quantity::Torque => Torque(value).to_string(),
         Quantity::TorqueAbsolute => TorqueAbsolute(value).to_string(),
         Quantity::Current => Current(value).to_string(),

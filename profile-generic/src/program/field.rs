@@ -75,6 +75,18 @@ impl Width {
             Self::I64 | Self::F32 | Self::F64 => (i64::MIN, i64::MAX),
         }
     }
+
+    /// The integer in these bytes, with its sign where the width has one; the bits of a floating point number, or of an
+    /// unsigned one of 64 bits, as they are. `None` for another number of bytes.
+    pub fn integer(self, bytes: &[u8]) -> Option<i64> {
+        if bytes.len() != self.bytes() {
+            return None;
+        }
+        let negative = self.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
+        let mut all = [if negative { 0xFF } else { 0 }; 8];
+        all.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(i64::from_le_bytes(all))
+    }
 }
 
 /// One signal at one place in a telegram.

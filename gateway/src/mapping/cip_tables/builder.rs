@@ -634,14 +634,7 @@ impl Builder<'_> {
     }
 
     fn reject(&mut self, row: &RejectRow) {
-        if row.reason.get_ref().trim().is_empty() {
-            self.resolver.error(
-                code::MISSING_KEY,
-                row.reason.span(),
-                "reason",
-                "expected a reason, got none",
-            );
-        }
+        self.resolver.reason(&row.reason);
         for name in &row.attributes {
             let dictionaries = self.dictionaries;
             let found = dictionaries.cip.attribute_or_error("attributes", name, &mut self.resolver);

@@ -103,14 +103,7 @@ impl<'a> Builder<'a> {
     fn unbound(&mut self, rows: &[UnboundRow]) {
         let mut known = BTreeSet::new();
         for row in rows {
-            if row.reason.get_ref().trim().is_empty() {
-                self.resolver.error(
-                    code::MISSING_KEY,
-                    row.reason.span(),
-                    "reason",
-                    "expected a reason, got none",
-                );
-            }
+            self.resolver.reason(&row.reason);
             for name in &row.idns {
                 let sercos = &self.dictionaries.sercos;
                 let Some(idn) = sercos.idn_or_error("idns", name, &mut self.resolver) else { continue };
