@@ -152,6 +152,7 @@ pub fn master_config(config: &Config, host: Host) -> MasterConfig {
     master.slaves = sercos.drives.iter().map(slave).collect();
     master.slaves_max =
         u16::try_from(sercos.drives.len()).unwrap_or(SLAVES_MAX).saturating_add(SPARE_SLAVES).min(SLAVES_MAX);
+    master.setup_cycle_ns = master.setup_cycle_ns.max(master.setup_cycle_min_ns());
     master
 }
 

@@ -32,9 +32,6 @@ use crate::engine::port::{FRAME_MAX, SouthPort};
 /// Slaves up to which two telegrams are enough in CP1 and CP2; more need four and longer cycles.
 const SLAVES_FEW: u16 = 255;
 
-/// Cycle time of CP0 to CP2 with four telegrams, ns.
-const SETUP_CYCLE_MANY_NS: u32 = 2_000_000;
-
 /// Longest list or text that is read: a list of every IDN there is.
 const ANSWER_LEN_MAX: usize = 8192;
 
@@ -282,11 +279,9 @@ impl Scanner {
         if !std::mem::take(&mut self.crowded) {
             return;
         }
-        let config = MasterConfig {
-            slaves_max: u16::try_from(profile_sercos::wire::cp0::SLAVES_MAX).unwrap_or(SLAVES_FEW),
-            setup_cycle_ns: self.master.config().setup_cycle_ns.max(SETUP_CYCLE_MANY_NS),
-            ..self.master.config().clone()
-        };
+        let mut config = self.master.config().clone();
+        config.slaves_max = u16::try_from(profile_sercos::wire::cp0::SLAVES_MAX).unwrap_or(SLAVES_FEW);
+        config.setup_cycle_ns = config.setup_cycle_ns.max(config.setup_cycle_min_ns());
         match up(config) {
             Ok(master) => (self.master, self.stage) = (master, Stage::Up),
             Err(error) => self.bus.findings.push(error.to_string()),

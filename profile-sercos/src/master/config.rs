@@ -23,6 +23,9 @@ pub const CONNECTION_LEN_MAX: usize = 256;
 /// Largest SERCOS cycle time in nanoseconds.
 pub const CYCLE_NS_MAX: u32 = 65_000_000;
 
+/// Shortest cycle of CP0 to CP2 in nanoseconds, with two telegrams of each kind in CP1 and CP2.
+const SETUP_CYCLE_NS_MIN: u32 = 1_000_000;
+
 /// One cyclic connection of a slave.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConnectionConfig {
@@ -127,7 +130,8 @@ pub struct MasterConfig {
     /// 65 ms.
     pub cycle_ns: u32,
     /// Cycle time of CP0, CP1 and CP2 in nanoseconds: a multiple of 250000, 1 ms (2 ms with more than 255
-    /// slaves) to 65 ms.
+    /// slaves) to 65 ms. A network that does not hold a shorter cycle in CP4 does not hold it here either: `cycle_ns` by
+    /// default, where that is longer.
     pub setup_cycle_ns: u32,
     /// Deviation of the master's own cycle start in nanoseconds, S-0-1023 follows from it. Above 1000 the master
     /// declares itself a soft master in S-0-1032.
@@ -169,7 +173,8 @@ pub struct MasterConfig {
 }
 
 impl MasterConfig {
-    /// A configuration for a line on port 1 with the usual times: 1 ms in CP0 to CP2, 120 ms pauses, 200 ms waits, 100 stable
+    /// A configuration for a line on port 1 with the usual times: in CP0 to CP2 the cycle time, and 1 ms at least,
+    /// 120 ms pauses, 200 ms waits, 100 stable
     /// cycles, 45 us jitter of a soft master, room for 64 slaves.
     #[must_use]
     pub fn new(mac: MacAddress, cycle_ns: u32) -> MasterConfig {
@@ -178,7 +183,7 @@ impl MasterConfig {
             ports: Ports::One,
             close_cycles: 100,
             cycle_ns,
-            setup_cycle_ns: 1_000_000,
+            setup_cycle_ns: cycle_ns.max(SETUP_CYCLE_NS_MIN),
             mst_jitter_ns: 45_000,
             slave_jitter_ns: 80,
             slave_delay_ns: 900,
@@ -205,6 +210,12 @@ impl MasterConfig {
         if self.slaves_max > 255 { 4 } else { 2 }
     }
 
+    /// The shortest cycle of CP0 to CP2 in nanoseconds: 1 ms, or 2 ms for more than 255 slaves.
+    #[must_use]
+    pub fn setup_cycle_min_ns(&self) -> u32 {
+        if self.setup_telegrams() == 4 { 2 * SETUP_CYCLE_NS_MIN } else { SETUP_CYCLE_NS_MIN }
+    }
+
     /// Checks every value against its range.
     pub fn check(&self) -> Result<(), ConfigError> {
         let cycle = self.cycle_ns;
@@ -214,7 +225,7 @@ impl MasterConfig {
             return Err(ConfigError::CycleTime { nanoseconds: cycle });
         }
         let setup = self.setup_cycle_ns;
-        let minimum = if self.setup_telegrams() == 4 { 2_000_000 } else { 1_000_000 };
+        let minimum = self.setup_cycle_min_ns();
         if setup < minimum || setup > CYCLE_NS_MAX || !setup.is_multiple_of(250_000) {
             return Err(ConfigError::SetupCycleTime { nanoseconds: setup, minimum });
         }
@@ -391,6 +402,19 @@ mod tests {
             wide.check(),
             Err(ConfigError::SetupCycleTime { nanoseconds: 1_000_000, minimum: 2_000_000 })
         );
+    }
+
+    #[test]
+    fn the_phases_before_cp3_go_no_faster_than_the_cycle_asked_for() {
+        let setup = |cycle| MasterConfig::new(MAC, cycle).setup_cycle_ns;
+        assert_eq!(
+            [31_250, 1_000_000, 1_250_000, 4_000_000].map(setup),
+            [1_000_000, 1_000_000, 1_250_000, 4_000_000]
+        );
+        let min = |slaves_max| {
+            MasterConfig { slaves_max, ..MasterConfig::new(MAC, 1_000_000) }.setup_cycle_min_ns()
+        };
+        assert_eq!((min(255), min(256)), (1_000_000, 2_000_000));
     }
 
     #[test]
