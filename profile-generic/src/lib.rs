@@ -23,6 +23,7 @@
 //! | [`mode`] | IEC 61800-7-202, 4.2 |
 //! | [`capture`] | CIP Volume 9, the events of the Motion Device Axis Object |
 //! | [`hookup`] | CIP Volume 9, the motor and feedback test of 5-2.5.1.9; how it moves is our own |
+//! | [`can`] | ISO 11898-1; no part of the drive model |
 //! | [`quantity`], [`ratio`], [`scaling`], [`program`], [`parameter`], [`servo`] | our own design |
 //!
 //! # Functional elements and their modules
@@ -47,6 +48,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod can;
 pub mod capture;
 pub mod cast;
 pub mod code;

@@ -1,0 +1,1 @@
+//! Words, states and modes of CiA 402, for both roles.

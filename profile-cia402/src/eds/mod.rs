@@ -1,0 +1,1 @@
+//! Electronic data sheets and device configuration files (CiA 306).

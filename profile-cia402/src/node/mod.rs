@@ -1,0 +1,1 @@
+//! A CANopen device with a simulated drive behind it.

@@ -1,0 +1,1 @@
+//! Service data objects: both ends of a channel (CiA 301).

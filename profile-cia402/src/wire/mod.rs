@@ -1,0 +1,1 @@
+//! The bytes of CANopen: one file per kind of frame.

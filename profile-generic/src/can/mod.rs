@@ -1,0 +1,8 @@
+//! CAN frames, as the two profiles that run on CAN hand them to their transport and take them from it.
+//!
+//! This is no part of IEC 61800-7-1. It stands here because CANopen and DeviceNet both need it and profiles do not know each
+//! other.
+
+mod frame;
+
+pub use self::frame::{Frame, FrameError, Id};
