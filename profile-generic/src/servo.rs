@@ -21,6 +21,7 @@ mod captures;
 mod control;
 mod drive;
 mod marks;
+pub mod motion;
 mod plant;
 
 pub use drive::Servo;

@@ -19,10 +19,10 @@
 //! 0175 and 0408 beyond their names is told by no public source.
 
 use profile_generic::quantity::Position;
+use profile_generic::servo::motion::{Motion, Pace};
 
 use super::super::application::Progress;
 use super::super::parameter::{Definition, Store};
-use super::motion::{Motion, Pace};
 use super::scaling::Scales;
 
 /// IDNs of homing.

@@ -17,7 +17,6 @@
 
 mod fault;
 pub mod homing;
-pub mod motion;
 pub mod parameters;
 pub mod probe;
 pub mod scaling;
@@ -26,6 +25,7 @@ use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
+use profile_generic::servo::motion::{Motion, Pace};
 use profile_generic::servo::{
     Servo, ServoActual, ServoCommand, ServoControl, ServoError, ServoParameters, input,
 };
@@ -33,7 +33,6 @@ use profile_generic::state::Report;
 use profile_generic::time::DurationNs;
 
 use self::homing::{Homing, Senses};
-use self::motion::{Motion, Pace};
 use self::parameters::{MODES, idn};
 use self::probe::Probe;
 use self::scaling::Scales;
