@@ -134,6 +134,13 @@ impl Frame {
         usize::from(self.len)
     }
 
+    /// Its data length code, 0 to 15: the length up to 8 bytes, behind that the place in the list of FD lengths.
+    #[must_use]
+    pub fn length_code(&self) -> u8 {
+        let longer = FD_LENGTHS.iter().position(|&len| len == self.len());
+        longer.and_then(|place| u8::try_from(place).ok()).map_or(self.len, |place| place + 9)
+    }
+
     /// Whether it has no data.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -193,6 +200,10 @@ mod tests {
         assert_eq!(classic.collect::<Vec<_>>(), (0..=8).collect::<Vec<_>>());
         let fd = (0..=64).filter(|&len| Frame::fd(id, &[0; 64][..len], true).is_ok());
         assert_eq!(fd.collect::<Vec<_>>(), (0..=8).chain(FD_LENGTHS).collect::<Vec<_>>());
+        let codes = [8, 12, 16, 20, 24, 32, 48, 64]
+            .map(|len| Frame::fd(id, &[0; 64][..len], true).unwrap().length_code());
+        assert_eq!(codes, [8, 9, 10, 11, 12, 13, 14, 15]);
+        assert_eq!(Frame::remote(id, 5).unwrap().length_code(), 5);
         assert_eq!(Frame::new(id, &[0; 9]), Err(FrameError::Length(9)));
         assert_eq!(Frame::remote(id, 9), Err(FrameError::Length(9)));
     }

@@ -4,5 +4,6 @@
 //! other.
 
 mod frame;
+pub mod timing;
 
 pub use self::frame::{Frame, FrameError, Id};
