@@ -41,7 +41,7 @@ const FD_LONG_CRC: u32 = 4 + 21 + 7;
 /// Equal bits in a row behind which a stuff bit comes.
 const RUN: u32 = 5;
 
-/// Bits from the start to the end of the CRC of the longest classic frame, with room: 1 + 31 + 6 + 64 + 15.
+/// Flags of all stations laid over each other.
 const ERROR_FLAG_MAX: u32 = 12;
 
 /// Bits that an error frame takes at most: the flags of all stations laid over each other, delimiter, intermission.
@@ -400,7 +400,7 @@ mod tests {
         assert_eq!(Shape::of(&fast).most().total(), Shape::of(&frame).most().total());
     }
 
-    /// By hand. SYNC: 0 00010000000 000 0000 has 0000[1]1... see the lines.
+    /// Counted by hand, see the lines.
     #[test]
     fn stuff_bits_are_counted_exactly() {
         // 0 000 0000 0000 0 0 0 0000 and a CRC of zeroes: 34 zeroes. The first stuff bit stands behind five zeroes, the
@@ -431,11 +431,9 @@ mod tests {
         assert_eq!(line.crc, 0x059E);
     }
 
-    /// The worst case that the formula has is met: 0 11110000111 1 0000 ... with bits that change behind every fourth, once
-    /// the stuff bits are in.
+    /// Bits that change behind every fourth.
     #[test]
     fn worst_case_data_need_nearly_all_the_stuff_bits_there_could_be() {
-        // Five equal bits, then four of the other value each time.
         let frame = classic(0x078, &[0x3C, 0x3C, 0x3C, 0x3C, 0x3C, 0x3C, 0x3C, 0x3C]);
         let most = Shape::of(&frame).most().total();
         assert!(exact(&frame).total() > Shape::of(&frame).fewest().total() + 14, "{:?}", exact(&frame));
