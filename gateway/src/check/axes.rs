@@ -9,7 +9,7 @@ use crate::engine::build::{needs, scaling};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::mapping::{
-    AxisUnits, CipScaling, DriveFacts, Mapping, RowNumbers, SercosAxis, SercosError, SercosProgram,
+    AxisUnits, CipScaling, DriveFacts, DriveProgram, Mapping, RowNumbers, SercosAxis, SercosError,
 };
 
 /// Nanounits, and parts per million, in the unit in which a configuration has its limits.
@@ -58,14 +58,14 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
 }
 
 /// The program behind a drive that takes all that is written to it.
-fn programs(mapping: &Mapping, needs: &SercosAxis) -> Result<SercosProgram, SercosError> {
+fn programs(mapping: &Mapping, needs: &SercosAxis) -> Result<DriveProgram, SercosError> {
     let facts = mapping.facts_of_obedient(needs)?;
     mapping.sercos_program(needs, &facts)
 }
 
 /// What the box writes into the drive at start fits there.
 fn limits(
-    program: &SercosProgram,
+    program: &DriveProgram,
     needs: &SercosAxis,
     table: &AxisTable,
     text: &Source,
@@ -97,7 +97,7 @@ fn limits(
                 let count = conversion.within(i64::MIN, i64::MAX).convert(*generic).value;
                 let message = format!(
                     "{} holds {} to {}, and this would be {count}",
-                    row.idn, conversion.min, conversion.max
+                    row.item, conversion.min, conversion.max
                 );
                 findings.push(text, Problem::new(code::LIMIT_UNFIT, value.span()).key(key).expected(message));
             }
@@ -113,11 +113,11 @@ fn numbers(rows: &[RowNumbers], table: &AxisTable, text: &Source, findings: &mut
         findings.push(
             text,
             Problem::new(code::ROW_NUMBERS, table.name.span())
-                .title(format!("{what} in {}", row.idn))
+                .title(format!("{what} in {}", row.item))
                 .expected(describe(row)),
         );
         if let Some(lost) = row.lost {
-            let title = format!("{what} loses precision in {}", row.idn);
+            let title = format!("{what} loses precision in {}", row.item);
             let message = format!(
                 "one count of the drive is {} of {}: {} comes back as {}, and values are off by up to {}",
                 short(row.step),
@@ -151,7 +151,7 @@ fn numbers(rows: &[RowNumbers], table: &AxisTable, text: &Source, findings: &mut
             profile_generic::cast::f64_from_i64(high) / scale,
         );
         if !(low..=high).contains(value.get_ref()) {
-            let title = format!("`{key}` is beyond what the drive can hold in {}", row.idn);
+            let title = format!("`{key}` is beyond what the drive can hold in {}", row.item);
             let message = format!(
                 "the drive ends at {} and {}: commands beyond are held there",
                 short(low),
@@ -236,7 +236,8 @@ pub(super) fn tables(mapping: &Mapping, findings: &mut Findings) {
                 continue;
             };
             let unit = if kind == UnitKind::Rotary { "revolution" } else { "millimetre" };
-            let title = format!("`{}` in {} on a {kind} axis of 10000 counts in a {unit}", row.name, row.idn);
+            let title =
+                format!("`{}` in {} on a {kind} axis of 10000 counts in a {unit}", row.name, row.item);
             findings.push(
                 &file.text,
                 Problem::new(code::ROW_NUMBERS, span.clone())
@@ -247,7 +248,7 @@ pub(super) fn tables(mapping: &Mapping, findings: &mut Findings) {
             if let Some(lost) = row.lost.filter(|lost| lost.most > 0.5) {
                 let title = format!(
                     "`{}` loses precision in {} on a {kind} axis of 10000 counts in a {unit}",
-                    row.name, row.idn
+                    row.name, row.item
                 );
                 let message = format!(
                     "one count of the drive is {} of {}: {} comes back as {}",

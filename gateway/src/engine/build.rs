@@ -23,8 +23,8 @@ use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConf
 use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
-use super::bus::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
-use super::commissioner::Commissioner;
+use super::bus::commissioner::Commissioner;
+use super::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
 use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};

@@ -22,10 +22,11 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Acceleration, Velocity};
 use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
-use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
 
+use super::access::{Access, AccessFailure, Refusal};
 use super::axis::{AxisChannel, StopSettings};
-use super::bus::{Answer, Purpose, SercosBus};
+use super::bus::sercos::SercosBus;
+use super::bus::{Answer, Purpose};
 use super::notice::Notice;
 use super::port::{FRAME_MAX, NorthPort};
 use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping, SequenceAttributes};
@@ -443,7 +444,7 @@ impl DeviceChannel {
                     return self.shadow(access, place);
                 }
                 let (request, write) = match &access.operation {
-                    AccessOperation::Read(_) => (SvcRequest::read(held.idn), false),
+                    AccessOperation::Read(_) => (Access::read(held.item), false),
                     AccessOperation::Write(bytes) => {
                         let generic =
                             entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?;
@@ -452,8 +453,8 @@ impl DeviceChannel {
                         if clamped {
                             return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
                         }
-                        let data = SvcData::inline(&bytes[..len]).ok_or(GeneralStatus::TOO_MUCH_DATA)?;
-                        (SvcRequest::write(held.idn, data), true)
+                        let write = Access::write(held.item, &bytes[..len]);
+                        (write.ok_or(GeneralStatus::TOO_MUCH_DATA)?, true)
                     }
                 };
                 let purpose = Purpose::Attribute {
@@ -462,7 +463,7 @@ impl DeviceChannel {
                     attribute: access.id,
                     write,
                 };
-                if bus.access(member.axis, request, purpose) {
+                if bus.access(member.axis, &request, purpose) {
                     member.note_write(access, sequence);
                     Ok(())
                 } else {
@@ -512,7 +513,7 @@ impl DeviceChannel {
         let result = match (&answer.result, member) {
             (Err(failure), _) => Err(refusal(*failure)),
             (Ok(_), _) if write => Ok(0),
-            (Ok(data), Some(member)) => {
+            (Ok((data, _)), Some(member)) => {
                 let entry = member.attributes.get(attribute);
                 let held = entry.and_then(|entry| match entry.backing {
                     mapping::Backing::Parameter { parameter, .. } => {
@@ -520,7 +521,7 @@ impl DeviceChannel {
                     }
                     _ => None,
                 });
-                let generic = held.and_then(|held| held.decode(data.as_slice()));
+                let generic = held.and_then(|held| held.decode(data));
                 match (generic, entry) {
                     (Some(generic), Some(entry)) => entry
                         .from_generic(generic, &mut bytes)
@@ -741,15 +742,14 @@ fn signal_value(axis: &AxisChannel, signal: Signal) -> Option<i64> {
     if signal.is_command() { axis.command().get(signal) } else { axis.feedback().get(signal) }
 }
 
-/// What a refusal of the drive's service channel means to the controller.
-fn refusal(failure: SvcFailure) -> GeneralStatus {
+/// What a refusal of the drive means to the controller.
+fn refusal(failure: AccessFailure) -> GeneralStatus {
     match failure {
-        SvcFailure::Refused { code, .. } => match code.0 & 0x0FFF {
-            0x001 => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
-            0x004 => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
-            0x006..=0x008 | 0x00D => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
-            _ => GeneralStatus::DEVICE_STATE_CONFLICT,
-        },
-        _ => GeneralStatus::DEVICE_STATE_CONFLICT,
+        AccessFailure::Refused(Refusal::Unknown) => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+        AccessFailure::Refused(Refusal::ReadOnly) => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+        AccessFailure::Refused(Refusal::Value) => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+        AccessFailure::Refused(Refusal::Other) | AccessFailure::Unanswered => {
+            GeneralStatus::DEVICE_STATE_CONFLICT
+        }
     }
 }

@@ -9,13 +9,12 @@
 //! virtual time. After start it neither allocates, locks, logs nor waits: what people should know leaves as a
 //! [`Notice`] through a bounded queue. Commissioning is start: it compiles the programs of the drives and allocates
 //! before their cyclic operation begins. Drives that come later are commissioned beside it, by the
-//! [`commissioner`].
+//! [`bus::commissioner`].
 
+pub mod access;
 pub mod axis;
 pub mod build;
 pub mod bus;
-pub mod commissioner;
-pub mod commissioning;
 pub mod device;
 pub mod notice;
 pub mod port;
@@ -25,7 +24,8 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::event::{Output, Refusal};
 
 use self::axis::AxisChannel;
-use self::bus::{Purpose, SercosBus};
+use self::bus::Purpose;
+use self::bus::sercos::SercosBus;
 use self::device::DeviceChannel;
 use self::notice::Notice;
 use self::port::{FRAME_MAX, NorthPort, SouthPort};
@@ -254,17 +254,20 @@ impl Engine {
                     }
                 }
                 Purpose::Diagnosis => {
-                    let word = answer.result.as_ref().ok().and_then(|data| data.unsigned());
-                    let word = word.and_then(|word| u32::try_from(word).ok());
-                    axes[answer.axis].diagnostic_word(now, system, answer.idn, word);
+                    let word = answer.result.as_ref().ok().and_then(|(data, _)| unsigned(data));
+                    axes[answer.axis].diagnostic_word(now, system, answer.item, word);
                 }
                 Purpose::Capture(access, generation) => {
-                    let result =
-                        answer.result.as_ref().map(|data| data.as_slice()).map_err(|failure| *failure);
-                    axes[answer.axis].capture_answer(access, generation, result);
+                    let result = answer.result.as_ref().map(|(data, _)| data.as_slice());
+                    axes[answer.axis].capture_answer(access, generation, result.map_err(|failure| *failure));
                 }
                 Purpose::Procedure(access, generation) => {
-                    axes[answer.axis].procedure_answer(now, access, generation, answer.status);
+                    axes[answer.axis].procedure_answer(
+                        now,
+                        access,
+                        generation,
+                        answer.result.map(|(_, progress)| progress),
+                    );
                 }
                 // Whether it helped shows in the drive's status word.
                 Purpose::FaultReset => {}
@@ -370,6 +373,16 @@ fn fill(entry: &mut AxisStatus, axis: &AxisChannel) {
 fn low_word(counts: i64) -> i32 {
     let [a, b, c, d, ..] = counts.to_le_bytes();
     i32::from_le_bytes([a, b, c, d])
+}
+
+/// A word of one, two or four bytes.
+fn unsigned(data: &[u8]) -> Option<u32> {
+    if !matches!(data.len(), 1 | 2 | 4) {
+        return None;
+    }
+    let mut bytes = [0; 4];
+    bytes[..data.len()].copy_from_slice(data);
+    Some(u32::from_le_bytes(bytes))
 }
 
 fn tell(notices: &mut rtrb::Producer<Notice>, notice: Notice) {

@@ -11,7 +11,7 @@ use profile_sercos::master::event::Event;
 use profile_sercos::master::topology::Topology;
 
 use super::axis::Loss;
-use super::commissioning::StepFailure;
+use super::bus::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
 
 /// How much a notice matters.

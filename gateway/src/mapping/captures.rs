@@ -4,37 +4,24 @@
 //! channel. A capture is there only if the drive has answered for every IDN that it needs.
 
 use arrayvec::ArrayVec;
-use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSet, CaptureSource};
+use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::image::Signal;
-use profile_generic::program::{BitPattern, Conversion, Width};
+use profile_generic::program::{BitPattern, Conversion};
 use profile_generic::quantity::Quantity;
 use profile_sercos::wire::idn::Idn;
 
-use super::compile_sercos::{Compiler, SercosAxis, Telegram};
+use super::capture_program::{
+    CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored, WORDS_MAX,
+};
+use super::compile_sercos::{Compiler, SercosAxis};
 use super::dictionary::{SercosDictionary, SercosIdn};
 use super::drive_facts::DriveFacts;
+use super::drive_program::Telegram;
+use super::item::Item;
 use super::sercos_tables::SercosTables;
-
-/// Latches, counters and inputs of a drive, each.
-pub const CAPTURES_MAX: usize = 8;
-
-/// IDNs that let edges through, and words that say that they have come.
-pub const WORDS_MAX: usize = 4;
 
 /// Values that a telegram of the master has room for.
 const CONNECTION_IDNS_MAX: usize = profile_sercos::master::config::CONNECTION_IDNS_MAX;
-
-/// How the drive's captures are used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum CaptureMode {
-    /// Not at all.
-    #[default]
-    Off,
-    /// Over the service channel: nothing more in the telegrams.
-    ServiceChannel,
-    /// In the telegrams, as far as the drive allows.
-    Cyclic,
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CaptureBy {
@@ -140,166 +127,18 @@ pub(super) fn extend(
                 (&mut telegram.feedback, &mut telegram.feedback_bytes)
             };
             let width = facts.width(idn, dictionary).and_then(|width| u16::try_from(width.bytes()).ok());
-            let fits = idns.len() < CONNECTION_IDNS_MAX && !idns.contains(&idn);
+            let fits = idns.len() < CONNECTION_IDNS_MAX && !idns.contains(&idn.into());
             if let Some(width) = width.filter(|_| fits && is_listed(list, idn, facts)) {
-                idns.push(idn);
+                idns.push(idn.into());
                 *bytes += width;
             }
         }
     }
 }
 
-/// Where a value is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    /// IDN, for the service channel.
-    pub idn: Idn,
-    /// How it lies there and in the telegram.
-    pub width: Width,
-    /// Its place in the telegram; `None` when it is not there.
-    pub offset: Option<u16>,
-}
-
-impl Place {
-    /// The raw value of bytes that hold nothing else.
-    #[must_use]
-    pub fn decode(&self, bytes: &[u8]) -> Option<i64> {
-        if bytes.len() != self.width.bytes() {
-            return None;
-        }
-        let negative = self.width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
-        let mut wide = [if negative { 0xFF } else { 0 }; 8];
-        wide.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(i64::from_le_bytes(wide))
-    }
-
-    /// The raw value in the drive's telegram.
-    #[must_use]
-    pub fn read(&self, telegram: &[u8]) -> Option<i64> {
-        let from = usize::from(self.offset?);
-        self.decode(telegram.get(from..from + self.width.bytes())?)
-    }
-
-    /// The low bits of the raw value in the drive's telegram.
-    #[must_use]
-    pub fn read_word(&self, telegram: &[u8]) -> Option<u32> {
-        let [a, b, c, d, ..] = self.read(telegram)?.to_le_bytes();
-        Some(u32::from_le_bytes([a, b, c, d]))
-    }
-
-    /// Writes 0 or 1 into the master's telegram.
-    pub fn write_bit(&self, telegram: &mut [u8], on: bool) {
-        let Some(from) = self.offset.map(usize::from) else { return };
-        if let Some(place) = telegram.get_mut(from..from + self.width.bytes()) {
-            place.fill(0);
-            place[0] = u8::from(on);
-        }
-    }
-}
-
-/// A position that the drive has stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stored {
-    /// Where it is.
-    pub place: Place,
-    to_generic: Conversion,
-    to_drive: Conversion,
-    modulo: i64,
-}
-
-impl Stored {
-    /// The generic position of a raw value: of all that it may stand for, the one closest to `near`, a generic position.
-    #[must_use]
-    pub fn position(&self, raw: i64, near: i64) -> i64 {
-        let near = self.to_drive.convert(near).value;
-        let gap = raw.wrapping_sub(near).rem_euclid(self.modulo);
-        let gap = if gap > self.modulo / 2 { gap - self.modulo } else { gap };
-        self.to_generic.convert(near.saturating_add(gap)).value
-    }
-}
-
-/// A latch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Latch {
-    /// What it captures.
-    pub kind: CaptureKind,
-    /// Place of its enable in [`CaptureProgram::enables`].
-    pub enable: usize,
-    /// Place of its status word in [`CaptureProgram::words`].
-    pub word: usize,
-    /// What the word shows when the edge has come.
-    pub pattern: BitPattern,
-    /// The position.
-    pub value: Stored,
-}
-
-/// A counter of edges with the position of the last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counter {
-    /// What it captures.
-    pub kind: CaptureKind,
-    /// The counter.
-    pub counter: Place,
-    /// The position.
-    pub value: Stored,
-}
-
-/// An input in the drive's telegram.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Input {
-    /// What it captures.
-    pub kind: CaptureKind,
-    /// The word.
-    pub word: Place,
-    /// What the word shows after the edge.
-    pub pattern: BitPattern,
-}
-
-/// A marker after the home switch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sequence {
-    /// What it captures.
-    pub kind: CaptureKind,
-    /// Place of the edge of the switch in [`CaptureProgram::inputs`].
-    pub switch: usize,
-    /// Place of the marker in [`CaptureProgram::counters`].
-    pub marker: usize,
-}
-
-/// The captures of one drive.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct CaptureProgram {
-    /// Latches.
-    pub latches: ArrayVec<Latch, CAPTURES_MAX>,
-    /// What lets the edges of the latches through.
-    pub enables: ArrayVec<Place, WORDS_MAX>,
-    /// What says that the edges have come.
-    pub words: ArrayVec<Place, WORDS_MAX>,
-    /// The procedure command that has to be in process.
-    pub command: Option<Idn>,
-    /// Counters.
-    pub counters: ArrayVec<Counter, CAPTURES_MAX>,
-    /// Inputs.
-    pub inputs: ArrayVec<Input, CAPTURES_MAX>,
-    /// Sequences of an input and a counter.
-    pub sequences: ArrayVec<Sequence, WORDS_MAX>,
-}
-
-impl CaptureProgram {
-    /// What the drive captures.
-    #[must_use]
-    pub fn kinds(&self) -> CaptureSet {
-        let latches = self.latches.iter().map(|latch| latch.kind);
-        let counters = self.counters.iter().map(|counter| counter.kind);
-        let inputs = self.inputs.iter().map(|input| input.kind);
-        let sequences = self.sequences.iter().map(|sequence| sequence.kind);
-        latches.chain(counters).chain(inputs).chain(sequences).collect()
-    }
-}
-
 /// The place of an IDN among others, at the end when it is new; `None` when it has no room.
 fn index_of(places: &mut ArrayVec<Place, WORDS_MAX>, place: Place) -> Option<usize> {
-    let known = places.iter().position(|known| known.idn == place.idn);
+    let known = places.iter().position(|known| known.item == place.item);
     known.or_else(|| places.try_push(place).ok().map(|()| places.len() - 1))
 }
 
@@ -331,13 +170,13 @@ impl Compiler<'_> {
                 let value = self.stored(value, telegram)?;
                 let word = self.place(word, &telegram.feedback)?;
                 let enable = self.place(enable, &telegram.command)?;
-                if program.command.is_some() && program.command != command {
+                if program.command.is_some() && program.command != command.map(Item::from) {
                     return None;
                 }
                 let word = index_of(&mut program.words, word)?;
                 let enable = index_of(&mut program.enables, enable)?;
                 program.latches.try_push(Latch { kind, enable, word, pattern, value }).ok()?;
-                program.command = command;
+                program.command = command.map(Item::from);
             }
             CaptureBy::Counter { value, counter } => {
                 let value = self.stored(value, telegram)?;
@@ -357,16 +196,17 @@ impl Compiler<'_> {
     }
 
     /// Where a value is, and where in the telegram.
-    pub fn place(&self, idn: Idn, telegram: &[Idn]) -> Option<Place> {
+    pub fn place(&self, idn: Idn, telegram: &[Item]) -> Option<Place> {
         let width = self.facts.width(idn, self.dictionary)?;
         let mut offset = 0;
+        let item = Item::from(idn);
         for known in telegram {
-            if *known == idn {
-                return Some(Place { idn, width, offset: Some(offset) });
+            if *known == item {
+                return Some(Place { item, width, offset: Some(offset) });
             }
-            offset += u16::try_from(self.facts.width(*known, self.dictionary)?.bytes()).ok()?;
+            offset += u16::try_from(self.facts.width(known.idn()?, self.dictionary)?.bytes()).ok()?;
         }
-        Some(Place { idn, width, offset: None })
+        Some(Place { item, width, offset: None })
     }
 
     fn stored(&self, idn: Idn, telegram: &Telegram) -> Option<Stored> {

@@ -4,10 +4,13 @@ use profile_generic::program::Width;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
-use super::captures::{self, CaptureMode};
-use super::compile_sercos::{Compiler, SercosAxis, SercosError, Telegram, mode_rules};
+use super::capture_program::CaptureMode;
+use super::captures;
+use super::compile_sercos::{Compiler, SercosAxis, SercosError, mode_rules};
 use super::dictionary::SercosDictionary;
 use super::drive_facts::DriveFacts;
+use super::drive_program::Telegram;
+use super::item::Item;
 use super::sercos_tables::{Elements, SercosTables, StepKind, StepRule};
 
 /// Elements that say what a value means.
@@ -116,13 +119,13 @@ impl Compiler<'_> {
                     if outcome.saturated {
                         let unlimited = conversion.within(i64::MIN, i64::MAX).convert(*generic).value;
                         return Err(SercosError::Limit {
-                            idn: entry.idn,
+                            idn: rule.idn,
                             value: unlimited,
                             limits: (conversion.min, conversion.max),
                         });
                     }
-                    let candidates = vec![encode(entry.idn, outcome.value, entry.width)?];
-                    steps.push(Step::Write { idn: entry.idn, candidates, refused });
+                    let candidates = vec![encode(rule.idn, outcome.value, entry.width)?];
+                    steps.push(Step::Write { idn: rule.idn, candidates, refused });
                 }
             }
             StepKind::WriteModes => {
@@ -145,8 +148,8 @@ impl Compiler<'_> {
             }
             StepKind::ReadTelegram => {
                 let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
-                let mut idns = telegram.command;
-                idns.extend(telegram.feedback);
+                let both = telegram.command.into_iter().chain(telegram.feedback);
+                let mut idns: Vec<Idn> = both.filter_map(Item::idn).collect();
                 // Whether they come into it shows only now.
                 let words = self.tables.status_words();
                 idns.extend(words.into_iter().filter(|idn| !self.facts.is_missing(*idn)));
@@ -155,7 +158,10 @@ impl Compiler<'_> {
             StepKind::ReadParameters => {
                 // What is in a telegram was read for it.
                 let telegram = Telegram::compile(self.tables, self.dictionary, self.axis, self.facts)?;
-                let cyclic = |idn: &Idn| telegram.command.contains(idn) || telegram.feedback.contains(idn);
+                let cyclic = |idn: &Idn| {
+                    let item = Item::from(*idn);
+                    telegram.command.contains(&item) || telegram.feedback.contains(&item)
+                };
                 let idns = self.tables.parameters.iter().map(|rule| rule.idn).filter(|idn| !cyclic(idn));
                 read(steps, idns.collect(), &DESCRIPTION);
             }

@@ -1,51 +1,29 @@
 //! Generic <-> SERCOS: the telegram and the program of one axis.
 
 use arrayvec::ArrayVec;
-use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, Signal, StatusBits};
+use profile_generic::image::{AxisCommand, CommandSet, Signal};
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
-use profile_generic::program::{
-    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
-    StateTable, Trackers, Width,
-};
+use profile_generic::program::{Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::{Ratio, Rounding};
-use profile_generic::state::{Action, Report};
 use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
 use profile_sercos::wire::idn::Idn;
 
-use super::captures::{self, CaptureMode, CaptureProgram, Place};
+use super::capture_program::CaptureMode;
+use super::captures;
 use super::dictionary::{IdnUnit, SercosDictionary};
 use super::drive_facts::DriveFacts;
-use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
-use super::sercos_tables::{
-    FaultRule, ModeRule, ParameterRule, Polarity, ReportRule, SercosTables, SlotRule,
+use super::drive_program::{
+    DriveProgram, MAX_MODES, ModeEntry, PROCEDURE_COMMANDS_MAX, PROCEDURES_MAX, ParameterEntry, Procedure,
+    StatusRow, Telegram, WORD_BYTES,
 };
-
-/// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
-pub const MAX_MODES: usize = 8;
-
-/// The most procedures that stand for modes of one axis.
-pub const PROCEDURES_MAX: usize = 4;
-
-/// The most procedure commands of one of them.
-pub const PROCEDURE_COMMANDS_MAX: usize = 4;
-
-/// Bytes of the control and of the status word.
-const WORD_BYTES: u16 = 2;
+use super::item::Item;
+use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
+use super::sercos_tables::{ModeRule, ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
 
 /// Wraps of a position that does not work modulo: the range of its 32 bits.
 const FULL_RANGE: i64 = 1 << 32;
-
-/// The most rows for status bits.
-pub const MAX_STATUS_ROWS: usize = 32;
-
-/// The most words with status bits beside the status word.
-pub const STATUS_WORDS_MAX: usize = 2;
-
-/// The most rows for faults and warnings.
-pub const MAX_FAULT_ROWS: usize = 96;
 
 /// What must be known of an axis to work with its SERCOS drive.
 #[derive(Debug, Clone, Default)]
@@ -64,19 +42,6 @@ pub struct SercosAxis {
     pub captures: CaptureMode,
     /// The drive's status word does not tell whether it follows command values and whether it is halted.
     pub silent: bool,
-}
-
-/// The IDNs in the two telegrams of an axis, in order. The control and the status word come first.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Telegram {
-    /// From the master.
-    pub command: Vec<Idn>,
-    /// From the drive.
-    pub feedback: Vec<Idn>,
-    /// Bytes of the master's values, without the connection control word.
-    pub command_bytes: u16,
-    /// Bytes of the drive's values, without the connection control word.
-    pub feedback_bytes: u16,
 }
 
 /// Why no program can be made for an axis.
@@ -143,97 +108,6 @@ pub enum SercosError {
     },
 }
 
-/// A parameter that the drive holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ParameterEntry {
-    /// The parameter.
-    pub parameter: Parameter,
-    /// Where the drive keeps it.
-    pub idn: Idn,
-    /// How it lies there.
-    pub width: Width,
-    /// From the generic unit, when it can be written.
-    pub to_drive: Option<Conversion>,
-    /// To the generic unit, when it can be read.
-    pub from_drive: Option<Conversion>,
-}
-
-impl ParameterEntry {
-    /// The bytes for element 7; the bytes that count, and whether the value was clamped. `None` when the
-    /// parameter cannot be written.
-    pub fn encode(&self, generic: i64) -> Option<([u8; 8], usize, bool)> {
-        let outcome = self.to_drive?.convert(generic);
-        let (min, max) = self.width.range();
-        let value = outcome.value.clamp(min, max);
-        Some((value.to_le_bytes(), self.width.bytes(), outcome.saturated || value != outcome.value))
-    }
-
-    /// The generic value of the bytes of element 7. `None` when the parameter cannot be read or has another
-    /// length.
-    pub fn decode(&self, data: &[u8]) -> Option<i64> {
-        Some(self.from_drive?.convert(self.width.integer(data)?).value)
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-struct ModeEntry {
-    selection: ModeSelection,
-    control: BitPattern,
-    status: BitPattern,
-    /// Its signals without which it must not be chosen.
-    needs: CommandSet,
-}
-
-/// A status bit in a word of the telegram.
-#[derive(Debug, Clone, Copy)]
-struct StatusRow {
-    /// The word beside the status word; `None` for the status word.
-    word: Option<Idn>,
-    pattern: BitPattern,
-    bit: StatusBits,
-}
-
-/// A mode that is carried out by procedure commands.
-#[derive(Debug, Clone)]
-pub struct Procedure {
-    /// What it stands for.
-    pub selection: ModeSelection,
-    /// The mode in which the controller moves the axis while the first command is in process; the drive moves it where
-    /// there is none.
-    pub led_in: Option<ModeSelection>,
-    /// The commands in their order.
-    pub commands: ArrayVec<Idn, PROCEDURE_COMMANDS_MAX>,
-}
-
-/// The program of one axis: flat, without names, hashes or allocation in use.
-#[derive(Debug, Clone)]
-pub struct SercosProgram {
-    /// What the telegrams carry.
-    pub telegram: Telegram,
-    /// Values from the master, behind the control word.
-    pub command: CommandProgram,
-    /// Values from the drive, behind the status word.
-    pub feedback: FeedbackProgram,
-    /// The bits of the control word for each action.
-    pub actions: ActionTable,
-    /// What a status word says.
-    pub reports: StateTable,
-    /// What it says while the drive carries out a procedure.
-    led_reports: StateTable,
-    procedures: ArrayVec<Procedure, PROCEDURES_MAX>,
-    modes: ArrayVec<ModeEntry, MAX_MODES>,
-    status: ArrayVec<StatusRow, MAX_STATUS_ROWS>,
-    status_words: ArrayVec<Place, STATUS_WORDS_MAX>,
-    known_status: StatusBits,
-    faults: ArrayVec<FaultRule, MAX_FAULT_ROWS>,
-    commands: ArrayVec<(Action, Idn), { Action::ALL.len() }>,
-    captures: CaptureProgram,
-    parameters: Vec<ParameterEntry>,
-    rejected: Vec<Parameter>,
-    position_step: Option<i64>,
-    acknowledges: bool,
-}
-
 impl Telegram {
     /// The telegrams of an axis. Values that the drive is known to lack and that the table lets go are left
     /// out.
@@ -252,19 +126,19 @@ impl Telegram {
             (tables.control, command, &mut telegram.command, &mut telegram.command_bytes),
             (tables.status_word, actual, &mut telegram.feedback, &mut telegram.feedback_bytes),
         ] {
-            idns.push(word);
+            idns.push(word.into());
             *bytes = WORD_BYTES;
             for (_, idn) in signals {
                 let width = facts.width(idn, dictionary).ok_or(SercosError::Length(idn))?;
-                idns.push(idn);
+                idns.push(idn.into());
                 *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
             }
         }
         for idn in tables.status_words() {
             let width = facts.width(idn, dictionary).and_then(|width| u16::try_from(width.bytes()).ok());
             let listed = captures::is_listed(tables.configurable[0], idn, facts);
-            if let Some(width) = width.filter(|_| listed && !telegram.feedback.contains(&idn)) {
-                telegram.feedback.push(idn);
+            if let Some(width) = width.filter(|_| listed && !telegram.feedback.contains(&idn.into())) {
+                telegram.feedback.push(idn.into());
                 telegram.feedback_bytes += width;
             }
         }
@@ -299,7 +173,7 @@ impl Telegram {
             }
         }
         idns[1].extend(tables.status_words());
-        if axis.captures == super::captures::CaptureMode::Cyclic {
+        if axis.captures == CaptureMode::Cyclic {
             // In either direction: which, the drive says.
             let captures = super::captures::idns(tables);
             idns.iter_mut().for_each(|list| list.extend(&captures));
@@ -452,7 +326,7 @@ fn feed_constant(
     value.then(unit).ok_or(ScalingError::Overflow(idn))
 }
 
-impl SercosProgram {
+impl DriveProgram {
     /// The program of an axis whose drive has told its scaling.
     ///
     /// # Errors
@@ -464,26 +338,8 @@ impl SercosProgram {
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
         let (command_signals, actual_signals) = signals(tables, axis, facts)?;
-        let mut program = Self {
-            telegram: Telegram::compile(tables, dictionary, axis, facts)?,
-            command: CommandProgram::new(),
-            feedback: FeedbackProgram::new(),
-            actions: ActionTable::new(),
-            reports: StateTable::new(),
-            led_reports: StateTable::new(),
-            procedures: ArrayVec::new(),
-            modes: ArrayVec::new(),
-            status: ArrayVec::new(),
-            status_words: ArrayVec::new(),
-            known_status: StatusBits::empty(),
-            faults: ArrayVec::new(),
-            commands: ArrayVec::new(),
-            captures: CaptureProgram::default(),
-            parameters: Vec::new(),
-            rejected: Vec::new(),
-            position_step: None,
-            acknowledges: !axis.silent,
-        };
+        let telegram = Telegram::compile(tables, dictionary, axis, facts)?;
+        let mut program = Self::new(telegram, !axis.silent);
         let compiler = Compiler { tables, dictionary, axis, facts };
         program.position_step = compiler.position_step()?;
         let mut offset = WORD_BYTES;
@@ -533,7 +389,13 @@ impl SercosProgram {
             let procedure = Procedure {
                 selection: rule.selection,
                 led_in: rule.led_in,
-                commands: rule.commands.iter().copied().take(PROCEDURE_COMMANDS_MAX).collect(),
+                commands: rule
+                    .commands
+                    .iter()
+                    .copied()
+                    .map(Item::from)
+                    .take(PROCEDURE_COMMANDS_MAX)
+                    .collect(),
             };
             program
                 .procedures
@@ -547,8 +409,8 @@ impl SercosProgram {
             place.map(|place| program.status_words.try_push(place));
         }
         for rule in tables.status.iter().filter(|rule| fits(&rule.acknowledges)) {
-            let word = Some(rule.word).filter(|word| *word != tables.status_word);
-            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.idn == word)) {
+            let word = Some(rule.word).filter(|word| *word != tables.status_word).map(Item::from);
+            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.item == word)) {
                 continue;
             }
             let row = StatusRow { word, pattern: rule.pattern, bit: rule.bit };
@@ -558,8 +420,11 @@ impl SercosProgram {
         for row in &tables.faults {
             program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
         }
-        for row in &tables.commands {
-            program.commands.try_push(*row).map_err(|_| SercosError::Full("the table of commands"))?;
+        for (action, idn) in &tables.commands {
+            program
+                .commands
+                .try_push((*action, Item::from(*idn)))
+                .map_err(|_| SercosError::Full("the table of commands"))?;
         }
         for rule in &tables.parameters {
             match compiler.parameter(rule)? {
@@ -571,180 +436,6 @@ impl SercosProgram {
         program.parameters.sort_by_key(|entry| entry.parameter);
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
-    }
-
-    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last;
-    /// the new one comes back. An action without bits leaves the word alone, and so does a mode without a
-    /// slot.
-    pub fn encode(
-        &self,
-        command: &AxisCommand,
-        action: Action,
-        word: u16,
-        telegram: &mut [u8],
-        report: &mut ConversionReport,
-    ) -> u16 {
-        let word = self.control_word(action, command.selection(), word);
-        if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
-            bytes.copy_from_slice(&word.to_le_bytes());
-        }
-        self.command.encode(command, telegram, report);
-        word
-    }
-
-    /// The control word after an action in a mode.
-    pub fn control_word(&self, action: Action, selection: ModeSelection, word: u16) -> u16 {
-        let word = u32::from(word);
-        let word = self.actions.apply(action, word).unwrap_or(word);
-        let slot = self.shown_in(selection).and_then(|shown| self.entry(shown));
-        let word = slot.map_or(word, |entry| entry.control.apply(word));
-        let bytes = word.to_le_bytes();
-        u16::from_le_bytes([bytes[0], bytes[1]])
-    }
-
-    /// Takes the drive's telegram apart into report, mode, status bits and actual values. `led` is whether the drive carries
-    /// out a procedure. Returns the status word, or `None` when the telegram is too short to hold one.
-    pub fn decode(
-        &self,
-        telegram: &[u8],
-        led: bool,
-        feedback: &mut AxisFeedback,
-        trackers: &mut Trackers,
-        report: &mut ConversionReport,
-    ) -> Option<u16> {
-        let word = telegram.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))?;
-        feedback.report = if led { self.led_report(word) } else { self.report(word) };
-        let ModeSelection { mode, interpolation } = self.mode(word).unwrap_or_default();
-        (feedback.mode, feedback.interpolation) = (mode, interpolation);
-        let words = self.status_words(telegram);
-        let known = feedback.status.difference(self.known_status);
-        feedback.status = known.union(self.status_bits(word, &words));
-        self.feedback.decode(telegram, feedback, trackers, report);
-        Some(word)
-    }
-
-    /// What a status word says; a word that no row matches says that the drive is not ready.
-    pub fn report(&self, status: u16) -> Report {
-        self.reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
-    }
-
-    /// The same while the drive carries out a procedure: that it does not follow command values is right then.
-    pub fn led_report(&self, status: u16) -> Report {
-        self.led_reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
-    }
-
-    /// The operation mode that a status word reports.
-    pub fn mode(&self, status: u16) -> Option<ModeSelection> {
-        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.selection)
-    }
-
-    fn entry(&self, selection: ModeSelection) -> Option<&ModeEntry> {
-        self.modes.iter().find(|entry| entry.selection == selection)
-    }
-
-    /// Whether the drive was set up for this mode, or has the procedure that stands for it.
-    pub fn has_mode(&self, selection: impl Into<ModeSelection>) -> bool {
-        let selection = selection.into();
-        self.entry(selection).is_some() || self.procedure(selection).is_some()
-    }
-
-    /// The procedure that stands for a mode.
-    pub fn procedure(&self, selection: ModeSelection) -> Option<&Procedure> {
-        self.procedures.iter().find(|procedure| procedure.selection == selection)
-    }
-
-    /// Every procedure.
-    pub fn procedures(&self) -> &[Procedure] {
-        &self.procedures
-    }
-
-    /// The operation mode that the drive is in while it is in a mode: another one during a procedure that the controller
-    /// leads, `None` where a procedure leaves it alone.
-    pub fn shown_in(&self, selection: ModeSelection) -> Option<ModeSelection> {
-        match self.procedure(selection) {
-            Some(procedure) => procedure.led_in,
-            None => Some(selection),
-        }
-    }
-
-    /// The command signals without which a mode must not be chosen.
-    pub fn needs(&self, selection: ModeSelection) -> CommandSet {
-        self.shown_in(selection)
-            .and_then(|shown| self.entry(shown))
-            .map_or(CommandSet::empty(), |entry| entry.needs)
-    }
-
-    /// The words with status bits that the drive's telegram has beside the status word.
-    pub fn status_words(&self, telegram: &[u8]) -> ArrayVec<(Idn, u32), STATUS_WORDS_MAX> {
-        let word = |place: &Place| Some((place.idn, place.read_word(telegram)?));
-        self.status_words.iter().filter_map(word).collect()
-    }
-
-    /// The status bits in a status word, and in the words beside it.
-    pub fn status_bits(&self, status: u16, words: &[(Idn, u32)]) -> StatusBits {
-        let shows = |row: &&StatusRow| match row.word {
-            None => row.pattern.matches(u32::from(status)),
-            Some(idn) => words.iter().any(|(known, word)| *known == idn && row.pattern.matches(*word)),
-        };
-        self.status.iter().filter(shows).fold(StatusBits::empty(), |bits, row| bits | row.bit)
-    }
-
-    /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.
-    pub fn faults(&self, idn: Idn, word: u32) -> impl Iterator<Item = (FaultCause, Reaction)> + '_ {
-        let mut used = 0;
-        let rows = self.faults.iter().filter(move |row| row.word == idn && row.pattern.matches(word));
-        rows.filter_map(move |row| {
-            let free = row.pattern.mask & used == 0;
-            used |= row.pattern.mask;
-            free.then_some((row.cause, row.reaction))
-        })
-    }
-
-    /// The diagnostic words that can show a fault, or a warning, in the order in which they should be read.
-    pub fn diagnostic_words(&self, stops: bool) -> impl Iterator<Item = Idn> + '_ {
-        let counts = move |row: &FaultRule| row.reaction.stops() == stops;
-        let first =
-            move |at: usize, idn: Idn| !self.faults[..at].iter().any(|row| counts(row) && row.word == idn);
-        let rows =
-            self.faults.iter().enumerate().filter(move |(at, row)| counts(row) && first(*at, row.word));
-        rows.map(|(_, row)| row.word)
-    }
-
-    /// The procedure command that belongs to an action.
-    pub fn command_of(&self, action: Action) -> Option<Idn> {
-        self.commands.iter().find(|(known, _)| *known == action).map(|(_, idn)| *idn)
-    }
-
-    /// Where the drive keeps a parameter; `None` when it has none.
-    pub fn parameter(&self, parameter: Parameter) -> Option<&ParameterEntry> {
-        let at = self.parameters.binary_search_by_key(&parameter, |entry| entry.parameter).ok()?;
-        self.parameters.get(at)
-    }
-
-    /// Whether access to a parameter that this drive lacks must be refused; it is a shadow otherwise.
-    pub fn rejects(&self, parameter: Parameter) -> bool {
-        self.rejected.contains(&parameter)
-    }
-
-    /// The longest way from one position command to the next: in a drive that works modulo a longer one would lead the
-    /// other way round. Nanounits.
-    pub fn position_step(&self) -> Option<i64> {
-        self.position_step
-    }
-
-    /// Whether the drive's status word tells that it follows command values, and that it is halted.
-    pub fn acknowledges(&self) -> bool {
-        self.acknowledges
-    }
-
-    /// The drive's captures.
-    pub fn captures(&self) -> &CaptureProgram {
-        &self.captures
-    }
-
-    /// Everything the drive keeps, by parameter.
-    pub fn parameters(&self) -> &[ParameterEntry] {
-        &self.parameters
     }
 }
 
@@ -841,7 +532,7 @@ impl Compiler<'_> {
         let inward = from_drive(rule.idn, ratio, lsb.zero)?;
         Ok(Some(ParameterEntry {
             parameter: rule.parameter,
-            idn: rule.idn,
+            item: rule.idn.into(),
             width,
             to_drive: rule.to_drive.then_some(outward),
             from_drive: rule.from_drive.then_some(inward),

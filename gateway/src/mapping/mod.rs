@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
-//!  format                dictionary,              Telegram, CommissioningPlan, SercosProgram
+//!  format                dictionary,              Telegram, CommissioningPlan, DriveProgram
 //!                        cip_tables, sercos_tables
 //! ```
 //!
@@ -12,6 +12,7 @@
 //! fault is code.
 
 mod attributes;
+mod capture_program;
 mod captures;
 mod cip_events;
 mod cip_scaling;
@@ -23,8 +24,10 @@ mod definitions;
 mod device_link;
 mod dictionary;
 mod drive_facts;
+mod drive_program;
 mod examples;
 pub mod format;
+mod item;
 mod load;
 mod numbers;
 mod origin;
@@ -43,7 +46,7 @@ use profile_cip::target::attribute::AttributeDefinition;
 use profile_generic::mode::ModeSelection;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
-pub use captures::{
+pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
@@ -58,9 +61,7 @@ pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     CyclicValues, ELEMENTS, MissingValue,
 };
-pub use compile_sercos::{
-    MAX_MODES, ParameterEntry, Procedure, SercosAxis, SercosError, SercosProgram, Telegram,
-};
+pub use compile_sercos::{SercosAxis, SercosError};
 pub use dictionary::{
     Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup,
     CodeRange, CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries,
@@ -70,12 +71,14 @@ pub use dictionary::{
     networks,
 };
 pub use drive_facts::{Difference, DriveFacts};
+pub use drive_program::{DriveProgram, FaultRow, MAX_MODES, ParameterEntry, Procedure, Telegram};
+pub use item::Item;
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
-pub use sercos_tables::{FaultRule, ReportRule, SercosTables};
+pub use sercos_tables::{ReportRule, SercosTables};
 
 use crate::finding::Findings;
 use profile_cip::target::attribute::{DefaultValue, ElementRule};
@@ -253,12 +256,8 @@ impl Mapping {
     ///
     /// # Errors
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
-    pub fn sercos_program(
-        &self,
-        axis: &SercosAxis,
-        facts: &DriveFacts,
-    ) -> Result<SercosProgram, SercosError> {
-        SercosProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<DriveProgram, SercosError> {
+        DriveProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
     }
 
     /// Runs every worked example of the tables.

@@ -6,11 +6,10 @@ use profile_generic::image::Signal;
 use profile_generic::program::{Conversion, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
-use profile_sercos::wire::idn::Idn;
 
 use super::attributes::Backing;
 use super::commissioning::Step;
-use super::{CipScaling, DriveFacts, Mapping, SercosAxis, SercosError, SercosProgram};
+use super::{CipScaling, DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError};
 
 /// Whole numbers that a single and a double can tell apart.
 const SINGLE: i64 = 1 << 24;
@@ -38,7 +37,7 @@ pub struct RowNumbers {
     /// Whether it is a signal.
     pub is_signal: bool,
     /// Where the drive has it.
-    pub idn: Idn,
+    pub item: Item,
     /// The controller's unit, as the standard names it.
     pub unit: String,
     /// What the drive can hold, in the controller's unit; `None` where it wraps.
@@ -57,7 +56,7 @@ pub struct RowNumbers {
 
 /// The drive's end of a row.
 struct South {
-    idn: Idn,
+    item: Item,
     width: Width,
     /// To counts.
     outward: Conversion,
@@ -96,7 +95,7 @@ impl Mapping {
     }
 
     /// What every signal and parameter can hold that has a row on both sides, on an axis with this scaling and this program.
-    pub fn row_numbers(&self, scaling: &CipScaling, program: &SercosProgram) -> Vec<RowNumbers> {
+    pub fn row_numbers(&self, scaling: &CipScaling, program: &DriveProgram) -> Vec<RowNumbers> {
         let mut numbers = Vec::new();
         let fields = program.command.fields().chain(program.feedback.fields());
         for field in fields {
@@ -107,7 +106,7 @@ impl Mapping {
                 if is_command { (field.conversion, back) } else { (back, field.conversion) };
             let Some(rule) = self.sercos.signal(field.signal) else { continue };
             let south = South {
-                idn: rule.idn,
+                item: rule.idn.into(),
                 width: field.width,
                 outward,
                 inward,
@@ -133,10 +132,10 @@ impl Mapping {
                 is_whole: !width.is_float(),
                 mantissa: if width == Width::F32 { SINGLE } else { DOUBLE },
             };
-            let south = South { idn: row.idn, width: row.width, outward, inward, wraps: false };
+            let south = South { item: row.item, width: row.width, outward, inward, wraps: false };
             numbers.extend(end_to_end(parameter.name().unwrap_or_default(), false, &north, &south));
         }
-        numbers.sort_by_key(|row| (!row.is_signal, row.idn.0, row.name));
+        numbers.sort_by_key(|row| (!row.is_signal, row.item, row.name));
         numbers.dedup();
         numbers
     }
@@ -170,7 +169,7 @@ fn end_to_end(name: &'static str, is_signal: bool, north: &North, south: &South)
     Some(RowNumbers {
         name,
         is_signal,
-        idn: south.idn,
+        item: south.item,
         unit: north.unit.clone(),
         range: (!south.wraps).then(|| (to_north.to_f64(ends.0), to_north.to_f64(ends.1))),
         generic_range: (!south.wraps).then_some(ends),

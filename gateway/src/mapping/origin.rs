@@ -10,8 +10,8 @@ use profile_generic::state::{Action, DriveState};
 use profile_sercos::wire::idn::Idn;
 use serde::Serialize;
 
-use super::Mapping;
 use super::format::Name;
+use super::{Item, Mapping};
 use crate::finding::Source;
 
 /// Where a row stands.
@@ -138,9 +138,9 @@ impl Mapping {
 
     /// The `[[status]]` rows that a status word and the words beside it meet; `silent` as in [`super::SercosAxis`].
     #[must_use]
-    pub fn status_rows(&self, status: u16, words: &[(Idn, u32)], silent: bool) -> Vec<Origin> {
+    pub fn status_rows(&self, status: u16, words: &[(Item, u32)], silent: bool) -> Vec<Origin> {
         let file = &self.tables.generic_sercos;
-        let value = |idn: Idn| match words.iter().find(|(known, _)| *known == idn) {
+        let value = |idn: Idn| match words.iter().find(|(known, _)| *known == idn.into()) {
             Some((_, word)) => Some(*word),
             None => (idn == self.sercos.status_word).then_some(u32::from(status)),
         };
@@ -159,7 +159,7 @@ impl Mapping {
             .sercos
             .faults
             .iter()
-            .position(|row| row.word == idn && row.cause == cause && row.pattern.matches(word))?;
+            .position(|row| row.word == idn.into() && row.cause == cause && row.pattern.matches(word))?;
         Some(origin(&file.text, "fault", &file.rows.fault.get(at)?.cause))
     }
 

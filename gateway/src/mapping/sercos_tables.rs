@@ -3,7 +3,6 @@
 mod builder;
 
 use arrayvec::ArrayVec;
-use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
@@ -17,6 +16,7 @@ use profile_sercos::wire::svc::Element;
 
 use super::captures::CaptureRule;
 use super::dictionary::{Dictionaries, IdnUnit};
+use super::drive_program::FaultRow;
 use super::scaling::ScalingRule;
 
 #[derive(Debug, Clone)]
@@ -101,19 +101,6 @@ pub(super) struct StatusRule {
     pub acknowledges: Option<bool>,
 }
 
-/// A fault or warning in a diagnostic word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FaultRule {
-    /// IDN of the word.
-    pub word: Idn,
-    /// Bits of the word.
-    pub pattern: BitPattern,
-    /// What they mean.
-    pub cause: FaultCause,
-    /// What happens then.
-    pub reaction: Reaction,
-}
-
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ParameterRule {
     pub parameter: Parameter,
@@ -174,7 +161,7 @@ pub struct SercosTables {
     pub(super) commands: Vec<(Action, Idn)>,
     pub(super) reports: Vec<ReportRule>,
     pub(super) status: Vec<StatusRule>,
-    pub(super) faults: Vec<FaultRule>,
+    pub(super) faults: Vec<FaultRow>,
     pub(super) parameters: Vec<ParameterRule>,
     pub(super) captures: Vec<CaptureRule>,
     /// The drive's lists of what its telegram, and the master's, may carry.
@@ -235,11 +222,11 @@ impl SercosTables {
 
     /// Whether a row looks for faults in this word.
     pub fn is_diagnostic(&self, idn: Idn) -> bool {
-        self.faults.iter().any(|row| row.word == idn)
+        self.faults.iter().any(|row| row.word == idn.into())
     }
 
     /// The faults and warnings in the diagnostic words, in the order of the rows.
-    pub fn faults(&self) -> &[FaultRule] {
+    pub fn faults(&self) -> &[FaultRow] {
         &self.faults
     }
 

@@ -31,7 +31,7 @@ use self::port::{PacketPort, UdpPort};
 use crate::capture::recorder::{Recorder, Settings, Tap};
 use crate::config::{Config, Link};
 use crate::engine::build::{BuildError, Built, Host, build};
-use crate::engine::commissioner::Commissioner;
+use crate::engine::bus::commissioner::Commissioner;
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::SouthPort;
 use crate::host::HostPort;

@@ -65,7 +65,7 @@ impl Translator {
 
     fn written(&self, place: &ParameterEntry, value: i64) -> Node {
         let row = self.stage.mapping.parameter_row(place.parameter);
-        let name = self.named(place.idn);
+        let name = self.named(place.item);
         match place.encode(value) {
             None => Node::new(format!("{name}: can only be read")).by(row),
             Some((bytes, len, clamped)) => {
@@ -79,14 +79,14 @@ impl Translator {
     pub(super) fn idn(&mut self, number: usize, idn: Idn, bytes: &[u8]) -> Result<Node, TranslateError> {
         let axis = &self.stage.axes[number];
         let mapping = &self.stage.mapping;
-        let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(idn), hex(bytes)));
+        let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(idn.into()), hex(bytes)));
         let word = match *bytes {
             [a, b] => Some(u32::from(u16::from_le_bytes([a, b]))),
             [a, b, c, d] => Some(u32::from_le_bytes([a, b, c, d])),
             _ => None,
         };
         if let Some(word) = word.filter(|_| mapping.sercos.is_diagnostic(idn)) {
-            for (cause, reaction) in axis.south.faults(idn, word) {
+            for (cause, reaction) in axis.south.faults(idn.into(), word) {
                 let mut fault = Node::new(format!("{cause}, reaction {reaction}"))
                     .by(mapping.fault_row(idn, word, cause));
                 let seen = match axis.north.fault(cause) {
@@ -106,11 +106,11 @@ impl Translator {
             }
             return Ok(node);
         }
-        for place in axis.south.parameters().iter().filter(|place| place.idn == idn) {
+        for place in axis.south.parameters().iter().filter(|place| place.item == idn.into()) {
             let Some(value) = place.decode(bytes) else {
                 let text = format!(
                     "{}: expected {} bytes, got {}",
-                    self.named(idn),
+                    self.named(idn.into()),
                     place.width.bytes(),
                     bytes.len()
                 );

@@ -5,11 +5,10 @@ use profile_generic::image::{AxisCommand, Signal};
 use profile_generic::program::{ConversionReport, Field};
 use profile_generic::quantity::Position;
 use profile_generic::state::{Action, DriveState};
-use profile_sercos::wire::idn::Idn;
 
 use super::tree::hex;
 use super::{Node, Translator, shown};
-use crate::mapping::CyclicValues;
+use crate::mapping::{CyclicValues, Item};
 
 /// The longest telegram of a drive.
 const TELEGRAM_MAX: usize = 256;
@@ -164,10 +163,10 @@ impl Translator {
     }
 
     /// An IDN with its name.
-    pub(super) fn named(&self, idn: Idn) -> String {
-        match self.stage.mapping.dictionaries.sercos.idn(idn) {
-            Some(row) => format!("{idn} {}", row.name),
-            None => idn.to_string(),
+    pub(super) fn named(&self, item: Item) -> String {
+        match item.idn().and_then(|idn| self.stage.mapping.dictionaries.sercos.idn(idn)) {
+            Some(row) => format!("{item} {}", row.name),
+            None => item.to_string(),
         }
     }
 }

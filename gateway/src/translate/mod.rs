@@ -1,10 +1,10 @@
 //! Frames through the mapping tables: what the box makes of them, and which row of which file made each value.
 //!
 //! ```text
-//! C-to-D update --CipProgram--> generic command  --SercosProgram--> MDT
-//! D-to-C update <--CipProgram-- generic feedback <--SercosProgram-- AT
-//! Set attribute --AttributeTable--> generic parameter --SercosProgram--> element 7 of an IDN, and back
-//! diagnostic word --SercosProgram--> faults --CipProgram--> exceptions
+//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT
+//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT
+//! Set attribute --AttributeTable--> generic parameter --DriveProgram--> element 7 of an IDN, and back
+//! diagnostic word --DriveProgram--> faults --CipProgram--> exceptions
 //! ```
 //!
 //! The programs are the ones that run in the cycle, made by [`Stage::rehearse`]. What depends on time is left out: a command
@@ -43,7 +43,7 @@ pub use stage::{Stage, StageAxis, StageError};
 pub use tree::{Node, RowNames};
 
 /// Connection of a drive with its command values, and with its actual values.
-use crate::engine::bus::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
+use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
 
 /// What is kept of an axis from frame to frame.
 #[derive(Debug)]

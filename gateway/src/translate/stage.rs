@@ -11,9 +11,7 @@ use profile_sercos::wire::layout::Layout;
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
 use crate::engine::port::NorthPort;
-use crate::mapping::{
-    AttributeTable, CipProgram, CipScaling, DriveFacts, Mapping, SercosAxis, SercosProgram,
-};
+use crate::mapping::{AttributeTable, CipProgram, CipScaling, DriveFacts, DriveProgram, Mapping, SercosAxis};
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 
 /// Virtual time in which the drives must be ready: 511 of them take less.
@@ -50,7 +48,7 @@ pub struct StageAxis {
     /// The program of the CIP side.
     pub north: CipProgram,
     /// The program of the drive.
-    pub south: SercosProgram,
+    pub south: DriveProgram,
 }
 
 /// All axes of a configuration, and where each drive has its place in the telegrams.

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, SercosProgram};
+use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram};
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
@@ -32,7 +32,7 @@ const CYCLE: DurationNs = DurationNs::from_millis(2);
 pub struct Axis {
     north: CipProgram,
     trackers: CipTrackers,
-    south: SercosProgram,
+    south: DriveProgram,
     south_trackers: Trackers,
     interpolator: FineInterpolator,
     period: DurationNs,

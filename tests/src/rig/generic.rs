@@ -5,8 +5,8 @@
 use axisbridge::config::Config;
 use axisbridge::engine::axis::{AxisChannel, Limits};
 use axisbridge::engine::build::master_config;
-use axisbridge::engine::bus::SercosBus;
-use axisbridge::engine::commissioner::Commissioner;
+use axisbridge::engine::bus::commissioner::Commissioner;
+use axisbridge::engine::bus::sercos::SercosBus;
 use axisbridge::engine::notice::Notice;
 use axisbridge::engine::{Engine, Parts};
 use axisbridge::latest;

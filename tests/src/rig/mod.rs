@@ -25,7 +25,7 @@ use std::rc::Rc;
 use axisbridge::config::Config;
 use axisbridge::engine::Engine;
 use axisbridge::engine::build::{Built, Host, build};
-use axisbridge::engine::commissioner::Commissioner;
+use axisbridge::engine::bus::commissioner::Commissioner;
 use axisbridge::engine::notice::Notice;
 use axisbridge::latest::Reader;
 use axisbridge::mapping::Mapping;

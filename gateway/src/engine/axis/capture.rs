@@ -14,11 +14,11 @@
 //! that was latched and the next that can be lie three bus cycles with everything in the telegrams; over the service channel
 //! two writes and one or two reads, of which each takes some cycles.
 
+use crate::engine::access::{Access, AccessFailure, Operation};
 use arrayvec::ArrayVec;
 use profile_generic::capture::{CaptureKind, CaptureResult, CaptureSet, CaptureStatus};
 use profile_generic::quantity::Position;
 use profile_generic::time::SystemTime;
-use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcRequest};
 
 use super::history::History;
 use crate::mapping::{CaptureProgram, Latch};
@@ -28,9 +28,6 @@ const RESULTS_MAX: usize = CaptureKind::COUNT;
 
 /// Fresh telegrams after which a changed enable has certainly been seen by the drive.
 const SEEN_AFTER: u8 = 2;
-
-/// Set and start a procedure command.
-const START: [u8; 2] = [3, 0];
 
 /// What a service channel access of a capture does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -326,20 +323,20 @@ impl CaptureUnit {
     // ---- over the service channel ------------------------------------------------------------------------------
 
     /// The next access to the drive's service channel, if one is due and none under way.
-    pub fn access(&self, program: &CaptureProgram) -> Option<(SvcRequest, CaptureAccess, u8)> {
+    pub fn access(&self, program: &CaptureProgram) -> Option<(Access, CaptureAccess, u8)> {
         if self.outstanding.is_some() {
             return None;
         }
         let next = self.next_access(program)?;
         let request = match next {
-            CaptureAccess::Start => SvcRequest::write(program.command?, SvcData::inline(&START)?),
+            CaptureAccess::Start => Access::new(program.command?, Operation::Start),
             CaptureAccess::Enable(place, on) => {
                 let enable = program.enables.get(place)?;
                 let value = u64::from(on).to_le_bytes();
-                SvcRequest::write(enable.idn, SvcData::inline(&value[..enable.width.bytes()])?)
+                Access::write(enable.item, &value[..enable.width.bytes()])?
             }
-            CaptureAccess::Word(place) => SvcRequest::read(program.words.get(place)?.idn),
-            CaptureAccess::Value(place) => SvcRequest::read(program.latches.get(place)?.value.place.idn),
+            CaptureAccess::Word(place) => Access::read(program.words.get(place)?.item),
+            CaptureAccess::Value(place) => Access::read(program.latches.get(place)?.value.place.item),
         };
         Some((request, next, self.generation))
     }
@@ -378,7 +375,7 @@ impl CaptureUnit {
         program: &CaptureProgram,
         access: CaptureAccess,
         generation: u8,
-        result: Result<&[u8], SvcFailure>,
+        result: Result<&[u8], AccessFailure>,
     ) {
         if generation != self.generation || self.outstanding != Some(access) {
             return;

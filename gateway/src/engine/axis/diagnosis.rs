@@ -10,7 +10,8 @@ use profile_generic::fault_set::{FAULT_SET_MAX, Origin};
 use profile_generic::image::StatusBits;
 use profile_generic::state::Report;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
-use profile_sercos::wire::idn::Idn;
+
+use crate::mapping::Item;
 
 use super::{AxisChannel, caused_by_controller};
 
@@ -27,7 +28,7 @@ const ANSWER_TIME_OUT: DurationNs = DurationNs::from_secs(2);
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Diagnosis {
     /// The word under way.
-    asked: Option<(Idn, bool, MonotonicTime)>,
+    asked: Option<(Item, bool, MonotonicTime)>,
     /// Place of the next word with errors, and when it may be read.
     errors: Round,
     /// Place of the next word with warnings, and when it may be read.
@@ -54,7 +55,7 @@ impl AxisChannel {
 
     /// The diagnostic word that should be read now.
     #[must_use]
-    pub fn wants_word(&self, now: MonotonicTime) -> Option<Idn> {
+    pub fn wants_word(&self, now: MonotonicTime) -> Option<Item> {
         let (program, _) = self.south.as_ref()?;
         if self.diagnosis.asked.is_some_and(|(.., since)| now.since(since) < ANSWER_TIME_OUT) {
             return None;
@@ -70,19 +71,19 @@ impl AxisChannel {
     }
 
     /// The word that was wanted is on its way.
-    pub fn word_asked(&mut self, now: MonotonicTime, idn: Idn) {
+    pub fn word_asked(&mut self, now: MonotonicTime, item: Item) {
         let errors = self.shows_error() && now >= self.diagnosis.errors.not_before;
-        self.diagnosis.asked = Some((idn, errors, now));
+        self.diagnosis.asked = Some((item, errors, now));
     }
 
     /// A diagnostic word of the drive has been read, or could not be.
-    pub fn diagnostic_word(&mut self, now: MonotonicTime, system: SystemTime, idn: Idn, word: Option<u32>) {
-        let Some((_, errors, _)) = self.diagnosis.asked.take_if(|(asked, ..)| *asked == idn) else { return };
+    pub fn diagnostic_word(&mut self, now: MonotonicTime, system: SystemTime, item: Item, word: Option<u32>) {
+        let Some((_, errors, _)) = self.diagnosis.asked.take_if(|(asked, ..)| *asked == item) else { return };
         let mut shown: ArrayVec<(FaultCause, Reaction), FAULT_SET_MAX> = ArrayVec::new();
         let mut last = true;
         if let Some((program, _)) = &self.south {
             let of = |(_, reaction): &(FaultCause, Reaction)| reaction.stops() == errors;
-            shown.extend(program.faults(idn, word.unwrap_or(0)).filter(of).take(FAULT_SET_MAX));
+            shown.extend(program.faults(item, word.unwrap_or(0)).filter(of).take(FAULT_SET_MAX));
             let round = if errors { &self.diagnosis.errors } else { &self.diagnosis.warnings };
             last = program.diagnostic_words(errors).nth(round.place + 1).is_none();
         }

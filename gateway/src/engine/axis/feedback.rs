@@ -11,7 +11,8 @@ use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
 use profile_generic::state::{Action, DriveState, Event, Report};
 use profile_generic::time::{MonotonicTime, SystemTime};
-use profile_sercos::master::connection::{Consumer, ConsumerState};
+
+use crate::engine::bus::Received;
 
 impl AxisChannel {
     /// Takes what the drive's connection brought in this cycle; its values were captured at `sampled`.
@@ -20,21 +21,19 @@ impl AxisChannel {
         now: MonotonicTime,
         system: SystemTime,
         sampled: SystemTime,
-        consumer: Option<Consumer<'_>>,
+        received: Option<Received<'_>>,
     ) {
         let Some((program, trackers)) = self.south.as_mut() else {
             self.tick(now, system);
             return;
         };
-        let consumer = consumer
-            .filter(|consumer| matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning));
-        let Some(consumer) = consumer else {
+        let Some(received) = received.filter(|received| received.alive) else {
             // Not connected yet, or more losses in a row than the connection bears.
             self.age_feedback();
             self.report(now, system, Report::Silent);
             return;
         };
-        if !consumer.fresh {
+        if !received.fresh {
             self.age_feedback();
             self.counters.lost_telegrams = self.counters.lost_telegrams.saturating_add(1);
             self.tick(now, system);
@@ -43,7 +42,7 @@ impl AxisChannel {
         let mut conversions = ConversionReport::default();
         let led = self.procedure.leads();
         let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
-        let word = program.decode(consumer.data, led, &mut self.feedback, trackers, &mut conversions);
+        let word = program.decode(received.data, led, &mut self.feedback, trackers, &mut conversions);
         let Some(word) = word else { return };
         self.shown = program.mode(word);
         self.follows = program.report(word) == Report::Operating;
@@ -55,7 +54,7 @@ impl AxisChannel {
         self.feedback.at = sampled;
         if self.feedback.present.contains(FeedbackSet::POSITION) {
             let position = self.feedback.position;
-            self.captures.sample(program.captures(), consumer.data, position, sampled);
+            self.captures.sample(program.captures(), received.data, position, sampled);
         }
         let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();
         let stands = self.feedback.velocity.get().unsigned_abs() <= zero_speed;

@@ -2,8 +2,8 @@
 //! bottom, and the same way back.
 //!
 //! ```text
-//! AxisCommandImage --CipProgram--> AxisCommand --BasicDrive, FineInterpolator--> AxisCommand --SercosProgram--> MDT
-//! DriveImage     <--CipProgram-- AxisFeedback <--BasicDrive------------------ AxisFeedback <--SercosProgram-- AT
+//! AxisCommandImage --CipProgram--> AxisCommand --BasicDrive, FineInterpolator--> AxisCommand --DriveProgram--> bus
+//! DriveImage     <--CipProgram-- AxisFeedback <--BasicDrive------------------ AxisFeedback <--DriveProgram-- bus
 //! ```
 //!
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
@@ -23,7 +23,7 @@ mod set_point;
 pub use self::hookup::HookupSettings;
 
 use self::hookup::TestRun;
-use crate::mapping::{CipProgram, CipTrackers, SercosProgram};
+use crate::mapping::{CipProgram, CipTrackers, DriveProgram};
 use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -36,8 +36,8 @@ use profile_generic::quantity::{Position, Velocity};
 use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
-use profile_sercos::master::svc::request::{SvcFailure, SvcRequest};
-use profile_sercos::wire::data_status::DataStatus;
+
+use crate::engine::access::{Access, AccessFailure, Progress};
 
 use self::capture::CaptureAccess;
 use self::procedure::{ProcedureAccess, ProcedureUnit};
@@ -125,7 +125,7 @@ pub struct AxisChannel {
     /// Counts the programs that were taken.
     scaling_id: u32,
     trackers: CipTrackers,
-    south: Option<(SercosProgram, Trackers)>,
+    south: Option<(DriveProgram, Trackers)>,
     limits: Limits,
     command_loss: Reaction,
     /// It may be switched on.
@@ -282,7 +282,7 @@ impl AxisChannel {
 
     /// The program of the drive, once it is commissioned.
     #[must_use]
-    pub fn south(&self) -> Option<&SercosProgram> {
+    pub fn south(&self) -> Option<&DriveProgram> {
         self.south.as_ref().map(|(program, _)| program)
     }
 
@@ -304,7 +304,7 @@ impl AxisChannel {
     }
 
     /// The drive is commissioned and will be spoken to by this program.
-    pub fn set_south(&mut self, program: SercosProgram) {
+    pub fn set_south(&mut self, program: DriveProgram) {
         let trackers = program.feedback.trackers();
         self.procedure.restart(program.procedures());
         self.south = Some((program, trackers));
@@ -350,7 +350,7 @@ impl AxisChannel {
 
     /// A service channel access that the captures need, with what [`AxisChannel::capture_answer`] wants back.
     #[must_use]
-    pub fn capture_access(&self) -> Option<(SvcRequest, CaptureAccess, u8)> {
+    pub fn capture_access(&self) -> Option<(Access, CaptureAccess, u8)> {
         self.captures.access(self.south()?.captures())
     }
 
@@ -364,7 +364,7 @@ impl AxisChannel {
         &mut self,
         access: CaptureAccess,
         generation: u8,
-        result: Result<&[u8], SvcFailure>,
+        result: Result<&[u8], AccessFailure>,
     ) {
         if let Some((program, _)) = &self.south {
             self.captures.answer(program.captures(), access, generation, result);
@@ -373,7 +373,7 @@ impl AxisChannel {
 
     /// A service channel access that a procedure needs, with what [`AxisChannel::procedure_answer`] wants back.
     #[must_use]
-    pub fn procedure_access(&self, now: MonotonicTime) -> Option<(SvcRequest, ProcedureAccess, u8)> {
+    pub fn procedure_access(&self, now: MonotonicTime) -> Option<(Access, ProcedureAccess, u8)> {
         // Procedure commands belong to CP4, in which the drive is heard.
         let heard = self.feedback.fresh || self.procedure.selection().is_some();
         self.procedure.access(self.south().filter(|_| heard)?.procedures(), now)
@@ -390,7 +390,7 @@ impl AxisChannel {
         now: MonotonicTime,
         access: ProcedureAccess,
         generation: u8,
-        result: Result<DataStatus, SvcFailure>,
+        result: Result<Progress, AccessFailure>,
     ) {
         let Some((program, trackers)) = &mut self.south else { return };
         if self.procedure.answer(program.procedures(), access, generation, result, now) {

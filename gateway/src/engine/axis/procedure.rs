@@ -16,11 +16,8 @@
 use profile_generic::image::StatusBits;
 use profile_generic::mode::ModeSelection;
 use profile_generic::time::{DurationNs, MonotonicTime};
-use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcRequest};
-use profile_sercos::wire::data_status::{CommandState, DataStatus};
-use profile_sercos::wire::idn::Idn;
-use profile_sercos::wire::procedure::ProcedureControl;
 
+use crate::engine::access::{Access, AccessFailure, Operation, Progress};
 use crate::mapping::Procedure;
 
 /// How often the drive is asked how far a command is.
@@ -204,33 +201,26 @@ impl ProcedureUnit {
         &self,
         procedures: &[Procedure],
         now: MonotonicTime,
-    ) -> Option<(SvcRequest, ProcedureAccess, u8)> {
+    ) -> Option<(Access, ProcedureAccess, u8)> {
         if self.outstanding.is_some() {
             return None;
         }
         if let Some(at) = self.left_over.checked_sub(1) {
             // The last one first.
-            let idn = *procedures.iter().flat_map(|procedure| &procedure.commands).nth(at)?;
-            return Some((
-                write(idn, ProcedureControl::CANCEL)?,
-                ProcedureAccess::Sweep(at),
-                self.generation,
-            ));
+            let item = *procedures.iter().flat_map(|procedure| &procedure.commands).nth(at)?;
+            let cancel = Access::new(item, Operation::Cancel).urgent();
+            return Some((cancel, ProcedureAccess::Sweep(at), self.generation));
         }
         let procedure = self.of(procedures)?;
-        let (at, access, control) = match self.stage {
-            Stage::Clear(at) => (at, ProcedureAccess::Clear(at), Some(ProcedureControl::CANCEL)),
-            Stage::Start(at) => (at, ProcedureAccess::Start(at), Some(ProcedureControl::EXECUTE)),
-            Stage::Process(at) if now >= self.ask_at => (at, ProcedureAccess::Ask(at), None),
-            Stage::Cancel(at, _) => (at, ProcedureAccess::Cancel(at), Some(ProcedureControl::CANCEL)),
+        let (at, access, operation) = match self.stage {
+            Stage::Clear(at) => (at, ProcedureAccess::Clear(at), Operation::Cancel),
+            Stage::Start(at) => (at, ProcedureAccess::Start(at), Operation::Start),
+            Stage::Process(at) if now >= self.ask_at => (at, ProcedureAccess::Ask(at), Operation::Progress),
+            Stage::Cancel(at, _) => (at, ProcedureAccess::Cancel(at), Operation::Cancel),
             _ => return None,
         };
-        let idn = *procedure.commands.get(at)?;
-        let request = match control {
-            Some(control) => write(idn, control)?,
-            None => SvcRequest::new(idn, SvcOperation::Status).urgent(),
-        };
-        Some((request, access, self.generation))
+        let item = *procedure.commands.get(at)?;
+        Some((Access::new(item, operation).urgent(), access, self.generation))
     }
 
     /// The procedure that is carried out.
@@ -250,7 +240,7 @@ impl ProcedureUnit {
         procedures: &[Procedure],
         access: ProcedureAccess,
         generation: u8,
-        result: Result<DataStatus, SvcFailure>,
+        result: Result<Progress, AccessFailure>,
         now: MonotonicTime,
     ) -> bool {
         if generation != self.generation || self.outstanding != Some(access) {
@@ -266,14 +256,14 @@ impl ProcedureUnit {
                 self.stage = Stage::Process(at);
                 self.ask_at = now + ASK_EVERY;
             }
-            (Stage::Process(at), ProcedureAccess::Ask(_), Ok(status)) => match status.command_state() {
-                CommandState::InProcess | CommandState::Interrupted => self.ask_at = now + ASK_EVERY,
-                CommandState::Done if at + 1 < commands => self.stage = Stage::Stand(at + 1),
-                CommandState::Done => {
+            (Stage::Process(at), ProcedureAccess::Ask(_), Ok(progress)) => match progress {
+                Progress::InProcess => self.ask_at = now + ASK_EVERY,
+                Progress::Done if at + 1 < commands => self.stage = Stage::Stand(at + 1),
+                Progress::Done => {
                     self.end(at, End::Done);
                     return true;
                 }
-                _ => self.end(at, End::Failed),
+                Progress::None | Progress::Failed => self.end(at, End::Failed),
             },
             (Stage::Clear(at) | Stage::Start(at) | Stage::Process(at), _, Err(_)) => {
                 self.end(at, End::Failed)
@@ -295,10 +285,6 @@ impl ProcedureUnit {
         }
         false
     }
-}
-
-fn write(idn: Idn, control: ProcedureControl) -> Option<SvcRequest> {
-    Some(SvcRequest::write(idn, SvcData::inline(&control.bits().to_le_bytes())?).urgent())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! From the controller's set-points to the telegram of the drive.
 
 use super::{AxisChannel, Loss, MODE_TIME_OUT};
-use crate::mapping::{CyclicValues, SercosProgram};
+use crate::mapping::{CyclicValues, DriveProgram};
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, FeedbackSet};
@@ -298,7 +298,7 @@ impl AxisChannel {
 
     /// Whether the drive is to halt and has no halt of its own: then its command stands still.
     fn halts_by_command(&self) -> bool {
-        let knows = |(program, _): &(SercosProgram, _)| program.acknowledges();
+        let knows = |(program, _): &(DriveProgram, _)| program.acknowledges();
         self.action == Action::Halt && !self.south.as_ref().is_none_or(knows)
     }
 

@@ -15,16 +15,16 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
 use super::{
-    Elements, FaultRule, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule,
-    SercosTables, SignalRule, SlotRule, StatusRule, StepKind, StepRule,
+    Elements, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule, SercosTables,
+    SignalRule, SlotRule, StatusRule, StepKind, StepRule,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
 use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
-use crate::mapping::compile_sercos::{PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
+use crate::mapping::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::mapping::format::{
     CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow, ScalingMethodRow,
     SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
@@ -524,7 +524,7 @@ impl<'a> Builder<'a> {
                     "the drive only warns: expected a cause whose exception has default = \"Alarm\"";
                 self.resolver.error(code::WARNING_STOPS, row.cause.span(), "cause", message);
             }
-            self.tables.faults.push(FaultRule { word: idn, pattern, cause, reaction });
+            self.tables.faults.push(FaultRow { word: idn.into(), pattern, cause, reaction });
         }
     }
 

@@ -75,7 +75,7 @@ fn seen(image: &DriveImage) -> (i64, i64) {
 struct Chain {
     north: CipProgram,
     trackers: CipTrackers,
-    south: SercosProgram,
+    south: DriveProgram,
     south_trackers: profile_generic::program::Trackers,
     feedback: AxisFeedback,
 }

@@ -33,7 +33,7 @@ fn the_example_of_the_documentation_does_what_it_says() {
     assert!(findings.is_empty(), "{findings}");
     let mapping = mapping.unwrap();
     let brake = mapping.sercos.faults().iter().find(|row| row.pattern.mask == 1 << 4).unwrap();
-    assert_eq!((brake.word, brake.reaction), (Idn::standard(12), Reaction::Alarm));
+    assert_eq!((brake.word, brake.reaction), (Idn::standard(12).into(), Reaction::Alarm));
     assert_eq!(brake.cause.to_string(), "drive_warning");
     // The row stands in front of those that are there: the first that fits wins.
     assert_eq!(mapping.sercos.faults().first(), Some(brake));
@@ -84,7 +84,7 @@ fn rows_go_and_keys_of_rows_go() {
         .sercos
         .faults()
         .iter()
-        .find(|row| row.word == Idn::standard(12) && row.pattern.mask == 8)
+        .find(|row| row.word == Idn::standard(12).into() && row.pattern.mask == 8)
         .unwrap();
     assert!(row.reaction.stops(), "the usual reaction of the cause");
 }

@@ -37,7 +37,7 @@ fn commissioning_of_a_rotary_modulo_axis() {
 fn telegrams_carry_the_values_of_every_mode_once() {
     let mapping = shipped();
     let telegram = mapping.telegram(&rotary_axis(false), &DriveFacts::new()).unwrap();
-    let idns = |list: &[Idn]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let idns = |list: &[Item]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0036 S-0-0080");
     assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040 S-0-0084");
     assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (12, 12));
@@ -88,7 +88,7 @@ fn commands_and_actions_become_a_telegram() {
     assert_eq!(program.encode(&command, Action::TorqueOff, word, &mut telegram, &mut report), 0x0200);
     assert_eq!(program.encode(&command, Action::None, 0xE200, &mut telegram, &mut report), 0xE200);
     assert_eq!(program.encode(&command, Action::Reject, 0xE200, &mut telegram, &mut report), 0xE200);
-    assert_eq!(program.command_of(Action::ResetFault), Some(Idn::RESET_C1D));
+    assert_eq!(program.command_of(Action::ResetFault), Some(Idn::RESET_C1D.into()));
     assert_eq!(program.command_of(Action::Enable), None);
 }
 
@@ -142,9 +142,9 @@ fn diagnostic_words_tell_causes() {
     let axis = rotary_axis(true);
     let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
     let words: Vec<_> = program.diagnostic_words(true).collect();
-    assert_eq!(words, [Idn::standard(11), Idn::standard(390)]);
-    assert_eq!(program.diagnostic_words(false).collect::<Vec<_>>(), [Idn::standard(12)]);
-    let causes = |idn, word| program.faults(Idn::standard(idn), word).collect::<Vec<_>>();
+    assert_eq!(words, [11, 390].map(|block| Idn::standard(block).into()));
+    assert_eq!(program.diagnostic_words(false).collect::<Vec<_>>(), [Idn::standard(12).into()]);
+    let causes = |idn, word| program.faults(Idn::standard(idn).into(), word).collect::<Vec<_>>();
     assert_eq!(causes(11, 1 << 11), [(FaultCause::EXCESSIVE_POSITION_ERROR, Reaction::DecelerateAndDisable)]);
     let both = [
         (FaultCause::OVER_CURRENT, Reaction::CoastAndDisable),
@@ -337,7 +337,7 @@ fn modes_that_the_drive_refuses() {
         let mut facts = obedient(mapping, &axis);
         change(&mut facts);
         let program = mapping.sercos_program(&axis, &facts).unwrap();
-        let carried = program.telegram.command.contains(&Idn::standard(258));
+        let carried = program.telegram.command.contains(&Idn::standard(258).into());
         assert_eq!(carried, program.has_mode(target), "its values are in the telegram when it is there");
         program.has_mode(target)
     };
@@ -370,7 +370,7 @@ fn class_3_bits_become_status() {
     let mut facts = obedient(mapping, &axis);
     facts.note_data(Idn::standard(187), &[13, 0, 0, 0, 84, 0, 0, 0]);
     let program = mapping.sercos_program(&axis, &facts).unwrap();
-    assert_eq!(program.telegram.feedback.last(), Some(&Idn::standard(13)));
+    assert_eq!(program.telegram.feedback.last(), Some(&Idn::standard(13).into()));
     let (mut trackers, mut report) = (program.feedback.trackers(), ConversionReport::default());
     let mut feedback = AxisFeedback::default();
     let mut text = String::new();
@@ -388,7 +388,7 @@ fn class_3_bits_become_status() {
     insta::assert_snapshot!(text);
     assert_eq!(
         mapping.telegram(&axis, &obedient(mapping, &axis)).unwrap().feedback.last(),
-        Some(&Idn::standard(84))
+        Some(&Idn::standard(84).into())
     );
 }
 

@@ -1,12 +1,11 @@
 use profile_generic::capture::{CaptureEdge as Edge, CaptureSource as Source};
 use profile_generic::mode::OperatingMode;
-use profile_sercos::master::svc::request::SvcOperation;
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
-use profile_sercos::wire::svc_error::SvcError;
 
 use super::*;
-use crate::mapping::{CaptureMode, DriveFacts, Mapping, SercosAxis, SercosProgram};
+use crate::engine::access::Refusal;
+use crate::mapping::{CaptureMode, DriveFacts, DriveProgram, Mapping, SercosAxis};
 
 const REGISTRATION: CaptureKind = CaptureKind::new(Source::Registration1, Edge::Positive);
 const OTHER_EDGE: CaptureKind = CaptureKind::new(Source::Registration1, Edge::Negative);
@@ -19,7 +18,7 @@ const PLACE: Attribute = Attribute(0x7422_0001);
 const COMMAND: Attribute = Attribute(0x3009_0001);
 
 /// A drive of 3 600 000 counts a turn that has answered for these IDNs, and lists them as configurable or not.
-fn program(words: &[u16], places: &[u16], listed: bool) -> SercosProgram {
+fn program(words: &[u16], places: &[u16], listed: bool) -> DriveProgram {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let axis = SercosAxis {
         modes: [OperatingMode::Position.into()].into_iter().collect(),
@@ -47,20 +46,20 @@ fn program(words: &[u16], places: &[u16], listed: bool) -> SercosProgram {
     mapping.sercos_program(&axis, &facts).expect("a program")
 }
 
-fn probe(listed: bool) -> SercosProgram {
+fn probe(listed: bool) -> DriveProgram {
     program(&[179, 405], &[130, 131], listed)
 }
 
 /// The unit with its drive, a cycle of a millisecond at a time.
 struct Rig {
     unit: CaptureUnit,
-    program: SercosProgram,
+    program: DriveProgram,
     feedback: Vec<u8>,
     at: u64,
 }
 
 impl Rig {
-    fn new(program: SercosProgram) -> Self {
+    fn new(program: DriveProgram) -> Self {
         let feedback = vec![0; usize::from(program.telegram.feedback_bytes)];
         Self { unit: CaptureUnit::default(), program, feedback, at: 1_000_000 }
     }
@@ -68,10 +67,10 @@ impl Rig {
     /// Puts a value where the telegram has it.
     fn set(&mut self, block: u16, value: i32) {
         let mut offset = 0;
-        for idn in &self.program.telegram.feedback {
+        for idn in self.program.telegram.feedback.iter().filter_map(|item| item.idn()) {
             let wide = matches!(idn.block(), 51 | 40 | 130..=133 | 440);
             let len = if wide { 4 } else { 2 };
-            if *idn == Idn::standard(block) {
+            if idn == Idn::standard(block) {
                 self.feedback[offset..offset + len].copy_from_slice(&value.to_le_bytes()[..len]);
                 return;
             }
@@ -94,7 +93,7 @@ impl Rig {
     }
 
     /// The drive answers the next access.
-    fn answer(&mut self, result: Result<&[u8], SvcFailure>) -> Option<CaptureAccess> {
+    fn answer(&mut self, result: Result<&[u8], AccessFailure>) -> Option<CaptureAccess> {
         let program = self.program.captures();
         let (_, access, generation) = self.unit.access(program)?;
         self.unit.sent(access);
@@ -108,9 +107,8 @@ impl Rig {
     }
 }
 
-fn refused() -> SvcFailure {
-    let refused = |code| SvcFailure::Refused { code, element: profile_sercos::wire::svc::Element::Data };
-    refused(SvcError::NOT_EXECUTABLE)
+fn refused() -> AccessFailure {
+    AccessFailure::Refused(Refusal::Other)
 }
 
 #[test]
@@ -118,10 +116,7 @@ fn a_latch_in_the_telegrams_rises_once_the_command_works_and_rises_again_after_a
     let mut rig = Rig::new(probe(true));
     assert!(!rig.cycle(0, &[REGISTRATION]).1, "S-0-0170 is not in process");
     let access = rig.unit.access(rig.program.captures()).expect("an access");
-    assert_eq!(
-        (access.0.idn, access.0.operation),
-        (Idn::standard(170), SvcOperation::Write(profile_sercos::wire::svc::Element::Data))
-    );
+    assert_eq!((access.0.item, access.0.operation), (Idn::standard(170).into(), Operation::Start));
     assert_eq!(rig.answer(Ok(&[])), Some(CaptureAccess::Start));
     let mut log = Vec::new();
     for counts in 1..12 {
@@ -259,7 +254,7 @@ fn answers_of_before_a_loss_do_not_count() {
 
 #[test]
 fn a_drive_has_what_it_answers_for() {
-    let kinds = |program: &SercosProgram| program.captures().kinds();
+    let kinds = |program: &DriveProgram| program.captures().kinds();
     assert!(kinds(&program(&[], &[], true)).is_empty());
     assert!(kinds(&program(&[179, 405], &[130], true)).contains(REGISTRATION));
     assert!(!kinds(&program(&[179, 405], &[130], true)).contains(OTHER_EDGE));

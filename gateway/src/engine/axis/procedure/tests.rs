@@ -1,14 +1,16 @@
 use super::*;
 use profile_generic::mode::OperatingMode;
-use profile_sercos::wire::svc::Element;
-use profile_sercos::wire::svc_error::SvcError;
+use profile_sercos::wire::idn::Idn;
 use std::fmt::Write as _;
+
+use crate::engine::access::Refusal;
+use crate::mapping::Item;
 
 const BY_DRIVE: ModeSelection = ModeSelection::by_drive(OperatingMode::Homing);
 
 fn procedures() -> Vec<Procedure> {
     let position = ModeSelection::from(OperatingMode::Position);
-    let commands = |blocks: &[u16]| blocks.iter().map(|block| Idn::standard(*block)).collect();
+    let commands = |blocks: &[u16]| blocks.iter().map(|block| Item::from(Idn::standard(*block))).collect();
     vec![
         Procedure { selection: BY_DRIVE, led_in: None, commands: commands(&[148]) },
         Procedure {
@@ -43,21 +45,20 @@ enum Reply {
     Refused,
 }
 
-fn reply(unit: &mut ProcedureUnit, reply: Reply, now: MonotonicTime) -> Option<(Idn, String, bool)> {
+fn reply(unit: &mut ProcedureUnit, reply: Reply, now: MonotonicTime) -> Option<(Item, String, bool)> {
     let all = procedures();
     let (request, access, generation) = unit.access(&all, now)?;
     unit.sent(access);
     assert_eq!(unit.access(&all, now), None, "one at a time");
-    let code = SvcError(0x7012);
     let result = match reply {
-        Reply::Well => Ok(DataStatus::SET | DataStatus::STARTED),
-        Reply::Busy => Ok(DataStatus::SET | DataStatus::STARTED | DataStatus::BUSY),
-        Reply::Error => Ok(DataStatus::SET | DataStatus::STARTED | DataStatus::ERROR),
-        Reply::Refused => Err(SvcFailure::Refused { element: Element::Data, code }),
+        Reply::Well => Ok(Progress::Done),
+        Reply::Busy => Ok(Progress::InProcess),
+        Reply::Error => Ok(Progress::Failed),
+        Reply::Refused => Err(AccessFailure::Refused(Refusal::Other)),
     };
     assert!(!unit.answer(&all, access, generation.wrapping_add(1), result, now), "of another life");
     let shifted = unit.answer(&all, access, generation, result, now);
-    Some((request.idn, format!("{access:?}"), shifted))
+    Some((request.item, format!("{access:?}"), shifted))
 }
 
 /// Replies to each access in turn, the last one for ever; what was asked, and how it ended.
@@ -136,7 +137,7 @@ fn it_can_be_ended_at_any_point() {
                     unit.want(Some(procedure), &Surroundings { now, ..GOOD });
                     reply(&mut unit, Reply::Well, now);
                 }
-                let mut set: Vec<Idn> = Vec::new();
+                let mut set: Vec<Item> = Vec::new();
                 for _ in 0..20 {
                     now = now + FOLLOW_TIME_OUT;
                     let around = Surroundings { now, operating: dropped, follows: dropped, ..GOOD };

@@ -10,19 +10,20 @@ use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 use profile_sercos::master::event::{Event, HotPlugRefusal, SlaveId, Ticket};
-use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOutcome, SvcRequest};
-use profile_sercos::wire::data_status::DataStatus;
+use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
+use profile_sercos::wire::data_status::{CommandState, DataStatus};
 use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use super::axis::AxisChannel;
-use super::axis::capture::CaptureAccess;
-use super::axis::procedure::ProcedureAccess;
 use super::commissioner::{CommissionerEnd, Done, Job, Run};
 use super::commissioning::{Commissioning, StepFailure};
-use super::notice::Notice;
-use crate::mapping::{DriveFacts, Mapping, SercosAxis, SercosError};
+use super::{Answer, Purpose, Received};
+use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
+use crate::engine::axis::AxisChannel;
+use crate::engine::notice::Notice;
+use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -62,30 +63,6 @@ enum Stage {
     Ready,
 }
 
-/// What a service channel request of the engine was for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
-    /// A controller's access to an attribute that lives in the drive.
-    Attribute {
-        /// The motion device's ticket.
-        ticket: u32,
-        /// Index of the axis's device.
-        device: u8,
-        /// The attribute.
-        attribute: u16,
-        /// Whether it writes.
-        write: bool,
-    },
-    /// A diagnostic word, to find the cause of a fault or a warning.
-    Diagnosis,
-    /// The drive's fault reset.
-    FaultReset,
-    /// Capturing events, with the generation of the axis's captures.
-    Capture(CaptureAccess, u8),
-    /// A procedure command, with the generation of the axis's procedures.
-    Procedure(ProcedureAccess, u8),
-}
-
 /// The drive of one axis.
 #[derive(Debug)]
 struct Drive {
@@ -103,21 +80,6 @@ struct Drive {
     /// Steps that it did not take and need not, until they are told.
     passed_over: Vec<StepFailure>,
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
-}
-
-/// An answer to an access.
-#[derive(Debug)]
-pub struct Answer {
-    /// The axis.
-    pub axis: usize,
-    /// What it was for.
-    pub purpose: Purpose,
-    /// The data block.
-    pub idn: Idn,
-    /// The data status of the data block, or why there is none.
-    pub status: Result<DataStatus, SvcFailure>,
-    /// The bytes, or why there are none.
-    pub result: Result<SvcData, SvcFailure>,
 }
 
 /// The bus.
@@ -227,14 +189,18 @@ impl SercosBus {
 
     /// What the drive of an axis sent in the cycle that has just ended; `None` before CP4 and without a drive.
     #[must_use]
-    pub fn feedback(&self, axis: usize) -> Option<Consumer<'_>> {
+    pub fn feedback(&self, axis: usize) -> Option<Received<'_>> {
         let drive = self.drives.get(axis)?;
         if self.master.phase() != Some(Phase::CP4) {
             return None;
         }
         let consumer = self.master.consumer(drive.there()?, FEEDBACK_CONNECTION)?;
         // Without the ATs of this cycle what is there is that of the last one.
-        Some(Consumer { fresh: consumer.fresh && self.master.cycle_complete(), ..consumer })
+        Some(Received {
+            data: consumer.data,
+            fresh: consumer.fresh && self.master.cycle_complete(),
+            alive: matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning),
+        })
     }
 
     /// Lets an axis fill its values for the next cycle.
@@ -252,7 +218,8 @@ impl SercosBus {
     }
 
     /// Sends a request over the drive's service channel; `false` when the drive is not there or too many wait.
-    pub fn access(&mut self, axis: usize, request: SvcRequest, purpose: Purpose) -> bool {
+    pub fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
+        let Some(request) = request(access) else { return false };
         let Some(drive) = self.drives.get_mut(axis) else { return false };
         let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
         match self.master.svc_submit(slave, request) {
@@ -617,7 +584,10 @@ impl SercosBus {
             if channel.wants_drive_reset() {
                 let command = profile_generic::state::Action::ResetFault;
                 let sent = match channel.south().and_then(|program| program.command_of(command)) {
-                    Some(idn) => self.access(axis, SvcRequest::command(idn).urgent(), Purpose::FaultReset),
+                    Some(item) => {
+                        let access = Access::new(item, Operation::Command).urgent();
+                        self.access(axis, &access, Purpose::FaultReset)
+                    }
                     None => true,
                 };
                 // Else too many accesses wait, and the next cycle tries again.
@@ -625,10 +595,10 @@ impl SercosBus {
                     channel.drive_reset_sent();
                 }
             }
-            if let Some(idn) = channel.wants_word(now)
-                && self.access(axis, SvcRequest::read(idn).urgent(), Purpose::Diagnosis)
+            if let Some(item) = channel.wants_word(now)
+                && self.access(axis, &Access::read(item).urgent(), Purpose::Diagnosis)
             {
-                channel.word_asked(now, idn);
+                channel.word_asked(now, item);
             }
         }
     }
@@ -636,8 +606,8 @@ impl SercosBus {
     /// Carries on with captures over the service channels: one access of each drive at a time.
     fn capture(&mut self, axes: &mut [AxisChannel]) {
         for (axis, channel) in axes.iter_mut().enumerate() {
-            if let Some((request, access, generation)) = channel.capture_access()
-                && self.access(axis, request, Purpose::Capture(access, generation))
+            if let Some((wanted, access, generation)) = channel.capture_access()
+                && self.access(axis, &wanted, Purpose::Capture(access, generation))
             {
                 channel.capture_sent(access);
             }
@@ -647,8 +617,8 @@ impl SercosBus {
     /// Carries on with procedures over the service channels: one access of each drive at a time.
     fn carry_out(&mut self, now: MonotonicTime, axes: &mut [AxisChannel]) {
         for (axis, channel) in axes.iter_mut().enumerate() {
-            if let Some((request, access, generation)) = channel.procedure_access(now)
-                && self.access(axis, request, Purpose::Procedure(access, generation))
+            if let Some((wanted, access, generation)) = channel.procedure_access(now)
+                && self.access(axis, &wanted, Purpose::Procedure(access, generation))
             {
                 channel.procedure_sent(access);
             }
@@ -687,10 +657,7 @@ impl SercosBus {
             return;
         };
         let (_, purpose) = drive.accesses.remove(place);
-        let idn = outcome.idn;
-        let status = outcome.result.map(|reply| reply.status);
-        let result = status.map(|_| outcome.data);
-        answer(axes, Answer { axis, purpose, idn, status, result });
+        answer(axes, Answer { axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
     }
 }
 
@@ -776,14 +743,106 @@ pub(super) fn connections(
     let mut connections = Connections::new();
     let both =
         [(COMMAND_CONNECTION, false, &telegram.command), (FEEDBACK_CONNECTION, true, &telegram.feedback)];
-    for (instance, slave_produces, idns) in both {
-        let connection = ConnectionConfig::new(instance, slave_produces, idns);
+    for (instance, slave_produces, items) in both {
+        let idns: Vec<Idn> = items.iter().copied().filter_map(Item::idn).collect();
+        let connection = ConnectionConfig::new(instance, slave_produces, &idns);
         let connection = connection.ok_or(SercosError::Full("a connection"))?;
         connections.push(ConnectionConfig { allowed_losses, ..connection });
     }
     Ok(connections)
 }
 
+/// The request that an access is on the service channel; `None` for what no SERCOS drive has.
+fn request(access: &Access) -> Option<SvcRequest> {
+    let idn = access.item.idn()?;
+    let set = |control: ProcedureControl| {
+        Some(SvcRequest::write(idn, SvcData::inline(&control.bits().to_le_bytes())?))
+    };
+    let request = match &access.operation {
+        Operation::Read => SvcRequest::read(idn),
+        Operation::Write(data) => SvcRequest::write(idn, SvcData::inline(data)?),
+        Operation::Command => SvcRequest::command(idn),
+        Operation::Start => set(ProcedureControl::EXECUTE)?,
+        Operation::Progress => SvcRequest::new(idn, SvcOperation::Status),
+        Operation::Cancel => set(ProcedureControl::CANCEL)?,
+    };
+    Some(if access.urgent { request.urgent() } else { request })
+}
+
+/// What a request came to.
+fn reply(outcome: &SvcOutcome) -> Result<(Data, Progress), AccessFailure> {
+    let reply = outcome.result.map_err(failure)?;
+    let data = Data::try_from(outcome.data.as_slice()).map_err(|_| AccessFailure::Unanswered)?;
+    Ok((data, progress(reply.status)))
+}
+
+fn progress(status: DataStatus) -> Progress {
+    match status.command_state() {
+        CommandState::InProcess | CommandState::Interrupted => Progress::InProcess,
+        CommandState::Done => Progress::Done,
+        CommandState::Failed => Progress::Failed,
+        CommandState::Idle | CommandState::Set | CommandState::Undefined(_) => Progress::None,
+    }
+}
+
+/// What a failure of the service channel is to those who do not know it. The low twelve bits of the error code are the same
+/// for every element.
+fn failure(failure: SvcFailure) -> AccessFailure {
+    let SvcFailure::Refused { code, .. } = failure else { return AccessFailure::Unanswered };
+    AccessFailure::Refused(match code.0 & 0x0FFF {
+        0x001 => Refusal::Unknown,
+        0x004 => Refusal::ReadOnly,
+        0x006..=0x008 | 0x00D => Refusal::Value,
+        _ => Refusal::Other,
+    })
+}
+
 fn index(axis: usize) -> u8 {
     u8::try_from(axis).unwrap_or(u8::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use profile_sercos::wire::svc::Element;
+    use profile_sercos::wire::svc_error::SvcError;
+
+    use super::*;
+
+    #[test]
+    fn accesses_are_requests_of_the_service_channel() {
+        let item = Item::from(Idn::RESET_C1D);
+        let made = |operation| request(&Access::new(item, operation)).map(|made| (made.operation, made.data));
+        let write = |bytes| Some((SvcOperation::Write(Element::Data), SvcData::inline(bytes).unwrap()));
+        let plain = |operation| Some((operation, SvcData::default()));
+        assert_eq!(made(Operation::Read), plain(SvcOperation::Read(Element::Data)));
+        assert_eq!(made(Operation::Write(Data::try_from(&[1, 2][..]).unwrap())), write(&[1, 2]));
+        assert_eq!(made(Operation::Command), plain(SvcOperation::Command));
+        assert_eq!(made(Operation::Start), write(&[3, 0]));
+        assert_eq!(made(Operation::Progress), plain(SvcOperation::Status));
+        assert_eq!(made(Operation::Cancel), write(&[0, 0]));
+        let urgent = |access: Access| request(&access).map(|made| made.priority);
+        use profile_sercos::master::svc::request::Priority;
+        assert_eq!(urgent(Access::read(item)), Some(Priority::Normal));
+        assert_eq!(urgent(Access::read(item).urgent()), Some(Priority::Urgent));
+        assert_eq!(request(&Access::read(Item::object(0x6041, 0))), None, "not on this bus");
+    }
+
+    #[test]
+    fn what_the_service_channel_says_is_told_in_general_terms() {
+        let states = [0x0, 0x1, 0x3, 0x5, 0x6, 0x7, 0xB, 0xF].map(DataStatus::from_bits_retain).map(progress);
+        use Progress::{Done, Failed, InProcess, None};
+        assert_eq!(states, [None, None, Done, InProcess, InProcess, InProcess, Failed, Failed]);
+        let refused = |code| failure(SvcFailure::Refused { element: Element::Data, code: SvcError(code) });
+        for (codes, refusal) in [
+            (&[0x1001, 0x2001, 0x7001][..], Refusal::Unknown),
+            (&[0x7004], Refusal::ReadOnly),
+            (&[0x7006, 0x7007, 0x7008, 0x700D], Refusal::Value),
+            (&[0x7002, 0x7003, 0x7005, 0x7009, 0x7012], Refusal::Other),
+        ] {
+            for code in codes {
+                assert_eq!(refused(*code), AccessFailure::Refused(refusal), "{code:04X}");
+            }
+        }
+        assert_eq!(failure(SvcFailure::HandshakeTimeout { cycles: 10 }), AccessFailure::Unanswered);
+    }
 }

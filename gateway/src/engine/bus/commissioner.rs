@@ -14,10 +14,10 @@ use profile_sercos::master::config::Connections;
 use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 
-use super::bus::connections;
 use super::commissioning::{Commissioning, StepFailure};
-use super::notice::Notice;
-use crate::mapping::{DriveFacts, Mapping, SercosAxis, SercosProgram};
+use super::sercos::connections;
+use crate::engine::notice::Notice;
+use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis};
 
 /// Messages under way in each direction.
 const QUEUE: usize = 64;
@@ -56,7 +56,7 @@ pub enum Done {
     /// The connections of the drive: it is through with CP2.
     Connect(Run, Connections),
     /// The program of the drive: it is through with CP3.
-    Program(Run, SercosProgram),
+    Program(Run, DriveProgram),
     /// The drive cannot be used.
     Failed(Run, Notice),
     /// Something that people should know.

@@ -1,0 +1,354 @@
+//! The program of one drive: how its telegrams are made and read, whatever its profile. Compiled from the tables before the
+//! cycle starts; in use it knows no names, looks nothing up and allocates nothing.
+
+use arrayvec::ArrayVec;
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, StatusBits};
+use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{
+    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, StateTable,
+    Trackers, Width,
+};
+use profile_generic::state::{Action, Report};
+
+use super::capture_program::{CaptureProgram, Place};
+use super::item::Item;
+
+/// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
+pub const MAX_MODES: usize = 8;
+
+/// The most procedures that stand for modes of one axis.
+pub const PROCEDURES_MAX: usize = 4;
+
+/// The most procedure commands of one of them.
+pub const PROCEDURE_COMMANDS_MAX: usize = 4;
+
+/// Bytes of the control and of the status word.
+pub(super) const WORD_BYTES: u16 = 2;
+
+/// The most rows for status bits.
+pub const MAX_STATUS_ROWS: usize = 32;
+
+/// The most words with status bits beside the status word.
+pub const STATUS_WORDS_MAX: usize = 2;
+
+/// The most rows for faults and warnings.
+pub const MAX_FAULT_ROWS: usize = 96;
+
+/// What stands in the two telegrams of an axis, in order. The control and the status word come first.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Telegram {
+    /// From the master.
+    pub command: Vec<Item>,
+    /// From the drive.
+    pub feedback: Vec<Item>,
+    /// Bytes of the master's values, without the connection control word.
+    pub command_bytes: u16,
+    /// Bytes of the drive's values, without the connection control word.
+    pub feedback_bytes: u16,
+}
+
+/// A parameter that the drive holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParameterEntry {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Where the drive keeps it.
+    pub item: Item,
+    /// How it lies there.
+    pub width: Width,
+    /// From the generic unit, when it can be written.
+    pub to_drive: Option<Conversion>,
+    /// To the generic unit, when it can be read.
+    pub from_drive: Option<Conversion>,
+}
+
+impl ParameterEntry {
+    /// The bytes as the drive keeps them; those that count, and whether the value was clamped. `None` when the
+    /// parameter cannot be written.
+    pub fn encode(&self, generic: i64) -> Option<([u8; 8], usize, bool)> {
+        let outcome = self.to_drive?.convert(generic);
+        let (min, max) = self.width.range();
+        let value = outcome.value.clamp(min, max);
+        Some((value.to_le_bytes(), self.width.bytes(), outcome.saturated || value != outcome.value))
+    }
+
+    /// The generic value of the bytes that the drive keeps. `None` when the parameter cannot be read or has another
+    /// length.
+    pub fn decode(&self, data: &[u8]) -> Option<i64> {
+        Some(self.from_drive?.convert(self.width.integer(data)?).value)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ModeEntry {
+    pub selection: ModeSelection,
+    pub control: BitPattern,
+    pub status: BitPattern,
+    /// Its signals without which it must not be chosen.
+    pub needs: CommandSet,
+}
+
+/// A status bit in a word of the telegram.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StatusRow {
+    /// The word beside the status word; `None` for the status word.
+    pub word: Option<Item>,
+    pub pattern: BitPattern,
+    pub bit: StatusBits,
+}
+
+/// A mode that is carried out by procedure commands.
+#[derive(Debug, Clone)]
+pub struct Procedure {
+    /// What it stands for.
+    pub selection: ModeSelection,
+    /// The mode in which the controller moves the axis while the first command is in process; the drive moves it where
+    /// there is none.
+    pub led_in: Option<ModeSelection>,
+    /// The commands in their order.
+    pub commands: ArrayVec<Item, PROCEDURE_COMMANDS_MAX>,
+}
+
+/// The program of one axis: flat, without names, hashes or allocation in use.
+#[derive(Debug, Clone)]
+pub struct DriveProgram {
+    /// What the telegrams carry.
+    pub telegram: Telegram,
+    /// Values from the master, behind the control word.
+    pub command: CommandProgram,
+    /// Values from the drive, behind the status word.
+    pub feedback: FeedbackProgram,
+    /// The bits of the control word for each action.
+    pub actions: ActionTable,
+    /// What a status word says.
+    pub reports: StateTable,
+    /// What it says while the drive carries out a procedure.
+    pub(super) led_reports: StateTable,
+    pub(super) procedures: ArrayVec<Procedure, PROCEDURES_MAX>,
+    pub(super) modes: ArrayVec<ModeEntry, MAX_MODES>,
+    pub(super) status: ArrayVec<StatusRow, MAX_STATUS_ROWS>,
+    pub(super) status_words: ArrayVec<Place, STATUS_WORDS_MAX>,
+    pub(super) known_status: StatusBits,
+    pub(super) faults: ArrayVec<FaultRow, MAX_FAULT_ROWS>,
+    pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
+    pub(super) captures: CaptureProgram,
+    pub(super) parameters: Vec<ParameterEntry>,
+    pub(super) rejected: Vec<Parameter>,
+    pub(super) position_step: Option<i64>,
+    pub(super) acknowledges: bool,
+}
+
+/// A fault or warning in a diagnostic word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FaultRow {
+    /// The word.
+    pub word: Item,
+    /// Bits of the word.
+    pub pattern: BitPattern,
+    /// What they mean.
+    pub cause: FaultCause,
+    /// What happens then.
+    pub reaction: Reaction,
+}
+
+impl DriveProgram {
+    /// A program for these telegrams that knows nothing yet.
+    pub(super) fn new(telegram: Telegram, acknowledges: bool) -> Self {
+        Self {
+            telegram,
+            command: CommandProgram::new(),
+            feedback: FeedbackProgram::new(),
+            actions: ActionTable::new(),
+            reports: StateTable::new(),
+            led_reports: StateTable::new(),
+            procedures: ArrayVec::new(),
+            modes: ArrayVec::new(),
+            status: ArrayVec::new(),
+            status_words: ArrayVec::new(),
+            known_status: StatusBits::empty(),
+            faults: ArrayVec::new(),
+            commands: ArrayVec::new(),
+            captures: CaptureProgram::default(),
+            parameters: Vec::new(),
+            rejected: Vec::new(),
+            position_step: None,
+            acknowledges,
+        }
+    }
+
+    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last;
+    /// the new one comes back. An action without bits leaves the word alone, and so does a mode without a
+    /// slot.
+    pub fn encode(
+        &self,
+        command: &AxisCommand,
+        action: Action,
+        word: u16,
+        telegram: &mut [u8],
+        report: &mut ConversionReport,
+    ) -> u16 {
+        let word = self.control_word(action, command.selection(), word);
+        if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
+        self.command.encode(command, telegram, report);
+        word
+    }
+
+    /// The control word after an action in a mode.
+    pub fn control_word(&self, action: Action, selection: ModeSelection, word: u16) -> u16 {
+        let word = u32::from(word);
+        let word = self.actions.apply(action, word).unwrap_or(word);
+        let slot = self.shown_in(selection).and_then(|shown| self.entry(shown));
+        let word = slot.map_or(word, |entry| entry.control.apply(word));
+        let bytes = word.to_le_bytes();
+        u16::from_le_bytes([bytes[0], bytes[1]])
+    }
+
+    /// Takes the drive's telegram apart into report, mode, status bits and actual values. `led` is whether the drive carries
+    /// out a procedure. Returns the status word, or `None` when the telegram is too short to hold one.
+    pub fn decode(
+        &self,
+        telegram: &[u8],
+        led: bool,
+        feedback: &mut AxisFeedback,
+        trackers: &mut Trackers,
+        report: &mut ConversionReport,
+    ) -> Option<u16> {
+        let word = telegram.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))?;
+        feedback.report = if led { self.led_report(word) } else { self.report(word) };
+        let ModeSelection { mode, interpolation } = self.mode(word).unwrap_or_default();
+        (feedback.mode, feedback.interpolation) = (mode, interpolation);
+        let words = self.status_words(telegram);
+        let known = feedback.status.difference(self.known_status);
+        feedback.status = known.union(self.status_bits(word, &words));
+        self.feedback.decode(telegram, feedback, trackers, report);
+        Some(word)
+    }
+
+    /// What a status word says; a word that no row matches says that the drive is not ready.
+    pub fn report(&self, status: u16) -> Report {
+        self.reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
+    }
+
+    /// The same while the drive carries out a procedure: that it does not follow command values is right then.
+    pub fn led_report(&self, status: u16) -> Report {
+        self.led_reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
+    }
+
+    /// The operation mode that a status word reports.
+    pub fn mode(&self, status: u16) -> Option<ModeSelection> {
+        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.selection)
+    }
+
+    fn entry(&self, selection: ModeSelection) -> Option<&ModeEntry> {
+        self.modes.iter().find(|entry| entry.selection == selection)
+    }
+
+    /// Whether the drive was set up for this mode, or has the procedure that stands for it.
+    pub fn has_mode(&self, selection: impl Into<ModeSelection>) -> bool {
+        let selection = selection.into();
+        self.entry(selection).is_some() || self.procedure(selection).is_some()
+    }
+
+    /// The procedure that stands for a mode.
+    pub fn procedure(&self, selection: ModeSelection) -> Option<&Procedure> {
+        self.procedures.iter().find(|procedure| procedure.selection == selection)
+    }
+
+    /// Every procedure.
+    pub fn procedures(&self) -> &[Procedure] {
+        &self.procedures
+    }
+
+    /// The operation mode that the drive is in while it is in a mode: another one during a procedure that the controller
+    /// leads, `None` where a procedure leaves it alone.
+    pub fn shown_in(&self, selection: ModeSelection) -> Option<ModeSelection> {
+        match self.procedure(selection) {
+            Some(procedure) => procedure.led_in,
+            None => Some(selection),
+        }
+    }
+
+    /// The command signals without which a mode must not be chosen.
+    pub fn needs(&self, selection: ModeSelection) -> CommandSet {
+        self.shown_in(selection)
+            .and_then(|shown| self.entry(shown))
+            .map_or(CommandSet::empty(), |entry| entry.needs)
+    }
+
+    /// The words with status bits that the drive's telegram has beside the status word.
+    pub fn status_words(&self, telegram: &[u8]) -> ArrayVec<(Item, u32), STATUS_WORDS_MAX> {
+        let word = |place: &Place| Some((place.item, place.read_word(telegram)?));
+        self.status_words.iter().filter_map(word).collect()
+    }
+
+    /// The status bits in a status word, and in the words beside it.
+    pub fn status_bits(&self, status: u16, words: &[(Item, u32)]) -> StatusBits {
+        let shows = |row: &&StatusRow| match row.word {
+            None => row.pattern.matches(u32::from(status)),
+            Some(item) => words.iter().any(|(known, word)| *known == item && row.pattern.matches(*word)),
+        };
+        self.status.iter().filter(shows).fold(StatusBits::empty(), |bits, row| bits | row.bit)
+    }
+
+    /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.
+    pub fn faults(&self, item: Item, word: u32) -> impl Iterator<Item = (FaultCause, Reaction)> + '_ {
+        let mut used = 0;
+        let rows = self.faults.iter().filter(move |row| row.word == item && row.pattern.matches(word));
+        rows.filter_map(move |row| {
+            let free = row.pattern.mask & used == 0;
+            used |= row.pattern.mask;
+            free.then_some((row.cause, row.reaction))
+        })
+    }
+
+    /// The diagnostic words that can show a fault, or a warning, in the order in which they should be read.
+    pub fn diagnostic_words(&self, stops: bool) -> impl Iterator<Item = Item> + '_ {
+        let counts = move |row: &FaultRow| row.reaction.stops() == stops;
+        let first =
+            move |at: usize, item: Item| !self.faults[..at].iter().any(|row| counts(row) && row.word == item);
+        let rows =
+            self.faults.iter().enumerate().filter(move |(at, row)| counts(row) && first(*at, row.word));
+        rows.map(|(_, row)| row.word)
+    }
+
+    /// The procedure command that belongs to an action.
+    pub fn command_of(&self, action: Action) -> Option<Item> {
+        self.commands.iter().find(|(known, _)| *known == action).map(|(_, item)| *item)
+    }
+
+    /// Where the drive keeps a parameter; `None` when it has none.
+    pub fn parameter(&self, parameter: Parameter) -> Option<&ParameterEntry> {
+        let at = self.parameters.binary_search_by_key(&parameter, |entry| entry.parameter).ok()?;
+        self.parameters.get(at)
+    }
+
+    /// Whether access to a parameter that this drive lacks must be refused; it is a shadow otherwise.
+    pub fn rejects(&self, parameter: Parameter) -> bool {
+        self.rejected.contains(&parameter)
+    }
+
+    /// The longest way from one position command to the next: in a drive that works modulo a longer one would lead the
+    /// other way round. Nanounits.
+    pub fn position_step(&self) -> Option<i64> {
+        self.position_step
+    }
+
+    /// Whether the drive's status word tells that it follows command values, and that it is halted.
+    pub fn acknowledges(&self) -> bool {
+        self.acknowledges
+    }
+
+    /// The drive's captures.
+    pub fn captures(&self) -> &CaptureProgram {
+        &self.captures
+    }
+
+    /// Everything the drive keeps, by parameter.
+    pub fn parameters(&self) -> &[ParameterEntry] {
+        &self.parameters
+    }
+}

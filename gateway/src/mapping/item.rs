@@ -1,0 +1,64 @@
+//! What a drive of any profile keeps: a parameter, a command or a word, by its number there.
+
+use core::fmt;
+
+use profile_sercos::wire::idn::Idn;
+
+/// The number of something that a drive keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Item {
+    /// An IDN of a SERCOS drive.
+    Idn(Idn),
+    /// An object of a CANopen drive.
+    Object {
+        /// Its index.
+        index: u16,
+        /// Its sub-index.
+        sub: u8,
+    },
+}
+
+impl Item {
+    /// An object of a CANopen drive.
+    #[must_use]
+    pub const fn object(index: u16, sub: u8) -> Self {
+        Self::Object { index, sub }
+    }
+
+    /// The IDN, where it is one.
+    #[must_use]
+    pub const fn idn(self) -> Option<Idn> {
+        match self {
+            Self::Idn(idn) => Some(idn),
+            Self::Object { .. } => None,
+        }
+    }
+}
+
+impl From<Idn> for Item {
+    fn from(idn: Idn) -> Self {
+        Self::Idn(idn)
+    }
+}
+
+/// As the tables write it: `S-0-0047`, `607A:00`.
+impl fmt::Display for Item {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Idn(idn) => write!(f, "{idn}"),
+            Self::Object { index, sub } => write!(f, "{index:04X}:{sub:02X}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn items_print_as_the_tables_write_them() {
+        let texts = [Item::from(Idn::standard(47)), Item::object(0x607A, 0), Item::object(0x60C2, 1)];
+        assert_eq!(texts.map(|item| item.to_string()), ["S-0-0047", "607A:00", "60C2:01"]);
+        assert_eq!(texts.map(Item::idn), [Some(Idn::standard(47)), None, None]);
+    }
+}
