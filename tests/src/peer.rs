@@ -40,6 +40,16 @@ pub fn namespaces_or_skip(test: &str) -> bool {
     here
 }
 
+/// Whether a kernel with CAN can be started (User-Mode Linux); if not, `test` is skipped visibly (or fails in CI).
+#[must_use]
+pub fn can_kernel_or_skip(test: &str) -> bool {
+    let here = crate::can_kernel::available();
+    if !here {
+        skip(test, "a kernel with CAN (Debian package user-mode-linux)");
+    }
+    here
+}
+
 /// A Python that has `module`; without one `test` is skipped visibly (or fails in CI).
 ///
 /// Asked in this order: `AXISBRIDGE_PYTHON`, the environment that `.ci/run` makes, and `python3`.

@@ -17,7 +17,8 @@ use crate::capture::recorder::Tap;
 use crate::config::{AxisKind, Config};
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::sys::clock;
-use crate::sys::packet_socket::{self, LinkState, PacketSocket};
+use crate::sys::link::LinkState;
+use crate::sys::packet_socket::{self, PacketSocket};
 
 /// Ethernet address of the master on drives in the same process: locally administered.
 pub const SIMULATED_MAC: [u8; 6] = [0x02, 0x41, 0x42, 0x00, 0x00, 0x01];

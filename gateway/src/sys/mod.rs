@@ -6,8 +6,12 @@
 //!
 //! Linux only: packet sockets, kernel time stamps and absolute sleeps are taken as Linux has them.
 
+pub mod can_error;
+pub mod can_interface;
+pub mod can_socket;
 pub mod clock;
 pub mod interfaces;
+pub mod link;
 pub mod packet_socket;
 pub mod realtime;
 pub mod udp;

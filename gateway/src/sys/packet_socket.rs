@@ -4,7 +4,6 @@
 //! stamp; frames sent by this host are not seen. Sending and receiving never wait and never allocate.
 #![allow(unsafe_code)]
 
-use std::ffi::CString;
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
 use std::time::Duration;
@@ -13,13 +12,11 @@ use arrayvec::ArrayVec;
 use thiserror::Error;
 
 use super::clock::KernelTime;
-use super::receive::{PlainAddress, enable_time_stamps, receive, set_option};
+use super::link::{self, LinkError, LinkState};
+use super::receive::{PlainAddress, enable_time_stamps, receive, set_option, wait_for_input};
 
 /// EtherType of SERCOS III.
 pub const ETHER_TYPE_SERCOS: u16 = 0x88CD;
-
-/// Longest name of an interface on Linux, without the closing zero.
-const NAME_LEN_MAX: usize = libc::IFNAMSIZ - 1;
 
 /// Frames of our own that one [`PacketSocket::recv`] passes over before it gives the caller its time back.
 const OUTGOING_SKIPPED_MAX: usize = 32;
@@ -76,52 +73,6 @@ pub enum OpenError {
     },
 }
 
-/// Why a frame was not sent or nothing can be received.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum LinkError {
-    /// The interface has been switched off (`ENETDOWN`).
-    #[error("the network interface is down")]
-    Down,
-    /// The interface has been removed (`ENXIO`, `ENODEV`).
-    #[error("the network interface is gone")]
-    Gone,
-    /// The transmit queue is full or the link has no carrier (`ENOBUFS`, `EAGAIN`).
-    #[error("the transmit queue is full or there is no carrier")]
-    Full,
-    /// The frame is longer than the interface takes (`EMSGSIZE`), or shorter than an Ethernet header
-    /// (`EINVAL`).
-    #[error("the frame's length does not suit the interface")]
-    Length,
-    /// Another error of the system.
-    #[error("system error {0}")]
-    System(i32),
-}
-
-impl LinkError {
-    fn from_io(error: &io::Error) -> Self {
-        match error.raw_os_error().unwrap_or(libc::EIO) {
-            libc::ENETDOWN => Self::Down,
-            libc::ENXIO | libc::ENODEV => Self::Gone,
-            libc::ENOBUFS | libc::EAGAIN => Self::Full,
-            libc::EMSGSIZE | libc::EINVAL => Self::Length,
-            other => Self::System(other),
-        }
-    }
-}
-
-/// State of an interface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LinkState {
-    /// Switched on, with carrier.
-    Up,
-    /// Switched on; no cable, or the other end is off.
-    NoCarrier,
-    /// Switched off.
-    Down,
-    /// No longer there.
-    Gone,
-}
-
 /// A received frame; its bytes are in the caller's buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Received {
@@ -150,16 +101,11 @@ impl PacketSocket {
         let owned = || name.to_owned();
         let system =
             |step: &'static str, source: io::Error| OpenError::System { name: owned(), step, source };
-        let c_name = CString::new(name).map_err(|_| OpenError::BadName { name: owned() })?;
-        if name.is_empty() || name.len() > NAME_LEN_MAX {
-            return Err(OpenError::BadName { name: owned() });
-        }
-        // SAFETY: `c_name` ends in a zero and outlives the call.
-        let index = unsafe { libc::if_nametoindex(c_name.as_ptr()) };
-        let index = i32::try_from(index).unwrap_or(0);
-        if index == 0 {
-            return Err(OpenError::NoSuchInterface { name: owned() });
-        }
+        let index = match link::index(name) {
+            Ok(index) => index,
+            Err(link::NoIndex::BadName) => return Err(OpenError::BadName { name: owned() }),
+            Err(link::NoIndex::NoSuchInterface) => return Err(OpenError::NoSuchInterface { name: owned() }),
+        };
 
         // Protocol 0 receives nothing: no frame of another interface can slip in before the bind below.
         // SAFETY: socket() takes integers only.
@@ -176,13 +122,13 @@ impl PacketSocket {
         // SAFETY: the descriptor has just been made and belongs to nobody else.
         let socket = unsafe { OwnedFd::from_raw_fd(descriptor) };
 
-        match link_state(socket.as_fd(), index, name) {
+        match link::state(socket.as_fd(), index, name) {
             LinkState::Up | LinkState::NoCarrier => {}
             LinkState::Down => return Err(OpenError::InterfaceDown { name: owned() }),
             LinkState::Gone => return Err(OpenError::NoSuchInterface { name: owned() }),
         }
         let (hardware_type, mac) =
-            hardware_address(socket.as_fd(), name).map_err(|error| system("SIOCGIFHWADDR", error))?;
+            link::hardware_address(socket.as_fd(), name).map_err(|error| system("SIOCGIFHWADDR", error))?;
         if hardware_type != libc::ARPHRD_ETHER {
             return Err(OpenError::NotEthernet { name: owned(), hardware_type });
         }
@@ -237,7 +183,7 @@ impl PacketSocket {
     /// State of the interface now.
     #[must_use]
     pub fn link_state(&self) -> LinkState {
-        link_state(self.socket.as_fd(), self.index, &self.name)
+        link::state(self.socket.as_fd(), self.index, &self.name)
     }
 
     /// Sends one whole frame, from the destination address on, at once or not at all.
@@ -303,77 +249,15 @@ impl PacketSocket {
 /// # Errors
 /// What `poll` refuses.
 pub fn wait(sockets: &[PacketSocket], timeout: Duration) -> io::Result<bool> {
-    let entry = |socket: &PacketSocket| libc::pollfd {
-        fd: socket.socket.as_raw_fd(),
-        events: libc::POLLIN,
-        revents: 0,
-    };
-    let mut entries: ArrayVec<_, 2> = sockets.iter().take(2).map(entry).collect();
-    let count = libc::nfds_t::try_from(entries.len()).unwrap_or(0);
-    let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: `entries` are `count` valid, writable `pollfd`s that outlive the call.
-    let ready = unsafe { libc::poll(entries.as_mut_ptr(), count, milliseconds) };
-    if ready < 0 {
-        let error = io::Error::last_os_error();
-        return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
-    }
-    Ok(ready > 0)
+    let descriptors: ArrayVec<_, 2> =
+        sockets.iter().take(2).map(|socket| socket.socket.as_raw_fd()).collect();
+    wait_for_input(&descriptors, timeout)
 }
 
 impl AsFd for PacketSocket {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
-}
-
-/// `struct ifreq` of Linux, as far as it is used here: `SIOCGIFFLAGS` and `SIOCGIFHWADDR` fill at most 16
-/// bytes after the name; the kernel copies 40 bytes in and out.
-#[repr(C, align(8))]
-struct InterfaceRequest {
-    name: [u8; libc::IFNAMSIZ],
-    value: [u8; 24],
-}
-
-const SIOCGIFFLAGS: libc::c_ulong = 0x8913;
-const SIOCGIFHWADDR: libc::c_ulong = 0x8927;
-
-impl InterfaceRequest {
-    fn ask(socket: BorrowedFd<'_>, name: &str, question: libc::c_ulong) -> io::Result<[u8; 24]> {
-        let mut request = Self { name: [0; libc::IFNAMSIZ], value: [0; 24] };
-        for (slot, byte) in request.name[..NAME_LEN_MAX].iter_mut().zip(name.bytes()) {
-            *slot = byte;
-        }
-        // SAFETY: both questions read and write a `struct ifreq`, which `request` is, alive through the call.
-        let result = unsafe { libc::ioctl(socket.as_raw_fd(), question as _, &raw mut request) };
-        if result < 0 { Err(io::Error::last_os_error()) } else { Ok(request.value) }
-    }
-}
-
-fn link_state(socket: BorrowedFd<'_>, index: i32, name: &str) -> LinkState {
-    let Ok(value) = InterfaceRequest::ask(socket, name, SIOCGIFFLAGS) else { return LinkState::Gone };
-    // The name may have passed to another interface since.
-    let same = CString::new(name).is_ok_and(|c_name| {
-        // SAFETY: `c_name` ends in a zero and outlives the call.
-        i32::try_from(unsafe { libc::if_nametoindex(c_name.as_ptr()) }) == Ok(index)
-    });
-    let flags = i32::from(u16::from_ne_bytes([value[0], value[1]]));
-    if !same {
-        LinkState::Gone
-    } else if flags & libc::IFF_UP == 0 {
-        LinkState::Down
-    } else if flags & libc::IFF_RUNNING == 0 {
-        LinkState::NoCarrier
-    } else {
-        LinkState::Up
-    }
-}
-
-fn hardware_address(socket: BorrowedFd<'_>, name: &str) -> io::Result<(u16, [u8; 6])> {
-    let value = InterfaceRequest::ask(socket, name, SIOCGIFHWADDR)?;
-    let hardware_type = u16::from_ne_bytes([value[0], value[1]]);
-    let mut mac = [0; 6];
-    mac.copy_from_slice(&value[2..8]);
-    Ok((hardware_type, mac))
 }
 
 #[cfg(test)]

@@ -3,7 +3,10 @@
 #![allow(unsafe_code)]
 
 use std::io;
-use std::os::fd::{AsRawFd, BorrowedFd};
+use std::os::fd::{AsRawFd, BorrowedFd, RawFd};
+use std::time::Duration;
+
+use arrayvec::ArrayVec;
 
 use super::clock::{KernelTime, nanoseconds};
 
@@ -18,9 +21,13 @@ pub(super) struct Message {
     pub at: Option<KernelTime>,
     /// Type of service octet of an IPv4 datagram: code point and congestion bits.
     pub tos: Option<u8>,
+    /// Messages that this socket has lost so far because they were not fetched in time, where that was asked for.
+    pub dropped: Option<u32>,
+    /// Whether this socket has sent the message itself (CAN).
+    pub own: bool,
 }
 
-/// Space for one `SCM_TIMESTAMPNS` and one `IP_TOS` control message, aligned as `cmsghdr` asks.
+/// Space for one `SCM_TIMESTAMPNS` and one `IP_TOS` or `SO_RXQ_OVFL` control message, aligned as `cmsghdr` asks.
 #[repr(C, align(8))]
 struct Control([u8; 64]);
 
@@ -40,6 +47,8 @@ pub(super) unsafe trait PlainAddress: Sized {
 unsafe impl PlainAddress for libc::sockaddr_in {}
 // SAFETY: as above.
 unsafe impl PlainAddress for libc::sockaddr_ll {}
+// SAFETY: a family, an index and a union of structures of integers.
+unsafe impl PlainAddress for libc::sockaddr_can {}
 
 /// Receives one message without waiting; `Ok(None)` when there is none.
 pub(super) fn receive<Address: PlainAddress>(
@@ -69,7 +78,7 @@ pub(super) fn receive<Address: PlainAddress>(
         };
     };
 
-    let (mut at, mut tos) = (None, None);
+    let (mut at, mut tos, mut dropped) = (None, None, None);
     // SAFETY: the kernel has filled `message`; the macros walk only within `msg_controllen` bytes of
     // `control`.
     let mut header = unsafe { libc::CMSG_FIRSTHDR(&raw const message) };
@@ -85,10 +94,32 @@ pub(super) fn receive<Address: PlainAddress>(
             // SAFETY: this message carries one octet.
             tos = Some(unsafe { libc::CMSG_DATA(header).read() });
         }
+        if level == libc::SOL_SOCKET && kind == libc::SO_RXQ_OVFL {
+            // SAFETY: this message carries one integer of 32 bits; it need not be aligned for it.
+            dropped = Some(unsafe { libc::CMSG_DATA(header).cast::<u32>().read_unaligned() });
+        }
         // SAFETY: as for CMSG_FIRSTHDR; `header` came from it.
         header = unsafe { libc::CMSG_NXTHDR(&raw const message, header) };
     }
-    Ok(Some(Message { len, truncated: message.msg_flags & libc::MSG_TRUNC != 0, at, tos }))
+    let flag = |flag: libc::c_int| message.msg_flags & flag != 0;
+    let (truncated, own) = (flag(libc::MSG_TRUNC), flag(libc::MSG_CONFIRM));
+    Ok(Some(Message { len, truncated, at, tos, dropped, own }))
+}
+
+/// Waits until something can be received from one of the descriptors (two at most) or `timeout` is over; `true` when something
+/// can.
+pub(super) fn wait_for_input(descriptors: &[RawFd], timeout: Duration) -> io::Result<bool> {
+    let entry = |descriptor: &RawFd| libc::pollfd { fd: *descriptor, events: libc::POLLIN, revents: 0 };
+    let mut entries: ArrayVec<_, 2> = descriptors.iter().take(2).map(entry).collect();
+    let count = libc::nfds_t::try_from(entries.len()).unwrap_or(0);
+    let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: `entries` are `count` valid, writable `pollfd`s that outlive the call.
+    let ready = unsafe { libc::poll(entries.as_mut_ptr(), count, milliseconds) };
+    if ready < 0 {
+        let error = io::Error::last_os_error();
+        return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
+    }
+    Ok(ready > 0)
 }
 
 /// Asks the kernel to stamp received messages; `false` when it will not.
