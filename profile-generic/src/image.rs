@@ -88,6 +88,28 @@ impl Signal {
         }
     }
 
+    /// What is added to set-points.
+    pub const OFFSETS: [Self; 4] =
+        [Self::PositionOffset, Self::VelocityOffset, Self::AccelerationOffset, Self::TorqueOffset];
+
+    /// Its bit in a [`CommandSet`]; none of a signal of the feedback.
+    pub fn command_bit(self) -> CommandSet {
+        let mut probe = AxisCommand::default();
+        probe.set(self, 0);
+        probe.present
+    }
+
+    /// The set-point that leads in an operating mode, with the offset that is added to it; `None` for a mode without one.
+    pub const fn leading(mode: OperatingMode) -> Option<(Self, Self)> {
+        match mode {
+            OperatingMode::Position => Some((Self::PositionCommand, Self::PositionOffset)),
+            OperatingMode::Velocity => Some((Self::VelocityCommand, Self::VelocityOffset)),
+            OperatingMode::Acceleration => Some((Self::AccelerationCommand, Self::AccelerationOffset)),
+            OperatingMode::Torque => Some((Self::TorqueCommand, Self::TorqueOffset)),
+            OperatingMode::None | OperatingMode::Homing => None,
+        }
+    }
+
     /// Whether the signal belongs to the [`AxisCommand`]; otherwise it belongs to the [`AxisFeedback`].
     pub const fn is_command(self) -> bool {
         matches!(
@@ -332,6 +354,14 @@ impl AxisCommand {
     pub const fn select(&mut self, selection: ModeSelection) {
         self.mode = selection.mode;
         self.interpolation = selection.interpolation;
+    }
+
+    /// Puts the offset of the set-point that leads in this mode into that set-point: what comes behind sees one value, and
+    /// the offset is zero. Returns `false`, and changes nothing, when the sum does not fit.
+    pub fn add_own_offset(&mut self) -> bool {
+        let Some((command, offset)) = Signal::leading(self.mode) else { return true };
+        let (Some(value), Some(added)) = (self.get(command), self.get(offset)) else { return true };
+        value.checked_add(added).is_some_and(|sum| self.set(command, sum) && self.set(offset, 0))
     }
 
     /// The value of a command signal, or `None` when it is absent or belongs to the feedback.
@@ -589,6 +619,34 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn an_offset_goes_into_the_set_point_of_its_own_mode_only() {
+        for mode in OperatingMode::ALL.iter().copied() {
+            let mut command = AxisCommand { mode, ..AxisCommand::default() };
+            for (signal, value) in Signal::ALL.iter().copied().filter(|signal| signal.is_command()).zip(1..) {
+                command.set(signal, value);
+            }
+            let mut expected = command;
+            if let Some((set_point, offset)) = Signal::leading(mode) {
+                let sum = command.get(set_point).zip(command.get(offset)).map(|(a, b)| a + b);
+                expected.set(set_point, sum.expect("both are there"));
+                expected.set(offset, 0);
+            }
+            assert!(command.add_own_offset());
+            assert_eq!(command, expected, "{mode}");
+        }
+        let mut absent = AxisCommand { mode: OperatingMode::Velocity, ..AxisCommand::default() };
+        absent.set(Signal::VelocityCommand, 5);
+        assert!(absent.add_own_offset());
+        assert_eq!(absent.get(Signal::VelocityCommand), Some(5));
+        let mut huge = AxisCommand { mode: OperatingMode::Torque, ..AxisCommand::default() };
+        huge.set(Signal::TorqueCommand, i64::MAX);
+        huge.set(Signal::TorqueOffset, 1);
+        let before = huge;
+        assert!(!huge.add_own_offset());
+        assert_eq!(huge, before);
     }
 
     #[test]

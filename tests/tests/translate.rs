@@ -85,7 +85,7 @@ fn a_frame_by_hand_names_the_rows() {
     let found = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{found}{}", text(&output.stderr));
     assert!(found.contains("Command Position 250000 (DINT) -> position_command 0.250000000 rev"), "{found}");
-    assert!(found.contains("MDT of drive-a, connection 0, 16 bytes: 00 e0 a0 bb 0d 00"), "{found}");
+    assert!(found.contains("MDT of drive-a, connection 0, 22 bytes: 00 e0 a0 bb 0d 00"), "{found}");
     assert!(
         found.contains("generic-sercos.toml:") && found.contains("[[signal]] position_command"),
         "{found}"

@@ -15,7 +15,6 @@ use profile_cip::wire::motion::codes::{EventChecking, NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::capture::{CaptureKind, CaptureResult};
 use profile_generic::fault::Reaction;
-use profile_generic::image::Signal;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::OperatingMode;
@@ -734,12 +733,8 @@ fn signal_octets(
 ) -> Option<usize> {
     let entry = attributes.get(id)?;
     let mapping::Backing::Signal { signal, .. } = entry.backing else { return None };
-    let generic = signal_value(axis, signal)?;
+    let generic = axis.signal(signal)?;
     entry.from_signal(generic, view, octets).ok()
-}
-
-fn signal_value(axis: &AxisChannel, signal: Signal) -> Option<i64> {
-    if signal.is_command() { axis.command().get(signal) } else { axis.feedback().get(signal) }
 }
 
 /// What a refusal of the drive means to the controller.

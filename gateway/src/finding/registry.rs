@@ -239,7 +239,7 @@ registry! {
         "Use `direction = \"from_drive\"`.";
     NO_LENGTH = 33 Error "nobody knows the length":
         "A value in a telegram has a place and a length before the drive is there; lists, and IDNs of which nothing is known, have none.",
-        "[[generic-sercos.signal]]\nsignal = \"position_offset\"\nidn = \"S-0-0017\"",
+        "[[generic-sercos.signal]]\nsignal = \"torque_offset\"\nidn = \"S-0-0017\"",
         "Use an IDN of known length, or add what is known of it to the dictionary.";
     PHASE = 34 Error "it cannot be written in this phase":
         "By the dictionary the IDN is write protected in the communication phase of the step.",

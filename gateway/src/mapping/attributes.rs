@@ -116,7 +116,11 @@ impl AttributeTable {
 
 /// What stands behind an attribute, and whether its sign is turned: an inverted Motion Polarity turns the sign of signals
 /// and exchanges the limits of the two directions (clause 5-2.3.2.1.2, Tables 5-2.14 and 5-2.15).
-fn behind<'t>(tables: &'t CipTables, row: &'t ServedAttribute, scaling: &CipScaling) -> (&'t Served, bool) {
+pub(super) fn behind<'t>(
+    tables: &'t CipTables,
+    row: &'t ServedAttribute,
+    scaling: &CipScaling,
+) -> (&'t Served, bool) {
     if !scaling.inverted {
         return (&row.served, false);
     }

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 use bitflags::bitflags;
-use profile_cip::target::drive_link::DriveAction;
+use profile_cip::target::drive_link::{DriveAction, TRIMS_MAX, Trims};
 use profile_cip::target::fault_log::LogKind;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
@@ -14,11 +14,12 @@ use profile_generic::scaling::{WrapTracker, fold};
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{DriveState, Request};
 
+use super::attributes::behind;
 use super::cip_events::EventProgram;
 use super::cip_scaling::CipScaling;
-use super::cip_tables::CipTables;
+use super::cip_tables::{CipTables, Served};
 use super::device_link::DRIVE_ACTIONS;
-use super::dictionary::CipType;
+use super::dictionary::{Access, CipType};
 
 /// Elements of a data set: one per bit.
 pub const ELEMENTS: usize = 8;
@@ -263,6 +264,8 @@ impl CipTrackers {
 #[derive(Debug, Clone)]
 pub struct CipProgram {
     commands: [Option<Element>; ELEMENTS],
+    /// Attributes that are trims, their signals, and what turns them into these.
+    trims: ArrayVec<(u16, Signal, Conversion), TRIMS_MAX>,
     actuals: [Option<Element>; ELEMENTS],
     /// Counts after which positions wrap; `None` for the range of a DINT.
     unwind: Option<i64>,
@@ -287,6 +290,7 @@ impl CipProgram {
         let position_counts = scaling.nanounits_per_count().inverse()?;
         let mut program = Self {
             commands: [None; ELEMENTS],
+            trims: ArrayVec::new(),
             actuals: [None; ELEMENTS],
             unwind: scaling.unwind,
             tracker: match scaling.unwind {
@@ -305,6 +309,12 @@ impl CipProgram {
             drive_actions: tables.drive_actions,
             events: EventProgram::compile(&tables.events, scaling)?,
         };
+        for row in tables.attributes.iter().filter(|row| row.attribute.access == Access::SetCyclic) {
+            if let (Served::Signal { signal, unit }, turns) = behind(tables, row, scaling) {
+                let to_generic = Conversion::new(scaling.convert(*unit, turns)?);
+                program.trims.try_push((row.attribute.id, *signal, to_generic)).ok()?;
+            }
+        }
         for row in &tables.cyclic {
             let to_generic = scaling.convert(row.unit, row.turns)?;
             let conversion = if row.to_generic { to_generic } else { to_generic.inverse()? };
@@ -362,6 +372,26 @@ impl CipProgram {
             };
             if !command.set(element.signal, outcome.value) || outcome.saturated {
                 report.saturated(element.signal);
+            }
+        }
+        report
+    }
+
+    /// Puts the trims of an update into a command, behind [`CipProgram::decode`]: those that are not there stay absent.
+    pub fn decode_trims(&self, trims: &Trims, command: &mut AxisCommand) -> CipReport {
+        let mut report = CipReport::default();
+        for (attribute, value) in trims.iter() {
+            let Some((_, signal, to_generic)) = self.trims.iter().find(|(known, ..)| *known == attribute)
+            else {
+                report.unmapped += 1;
+                continue;
+            };
+            let Some(outcome) = to_generic.convert_f64(value) else {
+                report.not_finite += 1;
+                continue;
+            };
+            if !command.set(*signal, outcome.value) || outcome.saturated {
+                report.saturated(*signal);
             }
         }
         report

@@ -1,7 +1,7 @@
 //! Generic <-> SERCOS: the telegram and the program of one axis.
 
 use arrayvec::ArrayVec;
-use profile_generic::image::{AxisCommand, CommandSet, Signal};
+use profile_generic::image::Signal;
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Field, Width};
@@ -368,12 +368,11 @@ impl DriveProgram {
             if is_available(tables, rule, slot, facts) {
                 let SlotRule { control, status, .. } = *slot;
                 let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
-                let needs = rule.command.iter().filter(refuse).fold(CommandSet::empty(), |set, signal| {
-                    let mut probe = AxisCommand::default();
-                    probe.set(*signal, 0);
-                    set | probe.present
-                });
-                let entry = ModeEntry { selection: rule.selection, control, status, needs };
+                let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
+                let fields = || program.command.fields().map(|field| field.signal);
+                let there = |signal: &&Signal| fields().any(|known| known == **signal);
+                let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
+                let entry = ModeEntry { selection: rule.selection, control, status, needs, carried };
                 program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
             }
         }

@@ -88,6 +88,8 @@ pub(super) struct ModeEntry {
     pub status: BitPattern,
     /// Its signals without which it must not be chosen.
     pub needs: CommandSet,
+    /// Its signals that the telegram carries.
+    pub carried: CommandSet,
 }
 
 /// A status bit in a word of the telegram.
@@ -277,6 +279,11 @@ impl DriveProgram {
         self.shown_in(selection)
             .and_then(|shown| self.entry(shown))
             .map_or(CommandSet::empty(), |entry| entry.needs)
+    }
+
+    /// The command signals that reach the drive in a mode, and that it makes use of there.
+    pub fn carries(&self, selection: ModeSelection) -> CommandSet {
+        self.entry(selection).map_or(CommandSet::empty(), |entry| entry.carried)
     }
 
     /// The words with status bits that the drive's telegram has beside the status word.

@@ -4,7 +4,7 @@ use profile_sercos::wire::idn::Idn;
 
 use super::tree::hex;
 use super::{Node, TranslateError, Translator, quantity};
-use crate::mapping::{Backing, CipFault, ParameterEntry, ValueError};
+use crate::mapping::{Access, Backing, CipFault, ParameterEntry, ValueError};
 
 impl Translator {
     /// The controller sets an attribute of an axis.
@@ -35,6 +35,10 @@ impl Translator {
                 node.push(Node::new("stored and given back, without effect on the drive").by(row))
             }
             Backing::Constant(value) => node.push(Node::new(format!("always {value}")).by(row)),
+            Backing::Signal { signal, .. } if entry.access == Access::SetCyclic => {
+                let text = format!("shows {signal}, set by cyclic write data only: refused");
+                node.push(Node::new(text).by(row));
+            }
             Backing::Signal { signal, .. } => {
                 node.push(Node::new(format!("shows {signal}, cannot be set")).by(row));
             }

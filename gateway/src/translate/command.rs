@@ -1,5 +1,6 @@
 //! From the controller to the drive.
 
+use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
 use profile_generic::image::{AxisCommand, Signal};
 use profile_generic::program::{ConversionReport, Field};
@@ -14,12 +15,9 @@ use crate::mapping::{CyclicValues, Item};
 const TELEGRAM_MAX: usize = 256;
 
 impl Translator {
-    /// Takes the cyclic command block of an instance.
-    pub(super) fn command(&mut self, instance: u8, block: &CommandBlock) -> Node {
-        let device = self.device;
-        let found =
-            self.stage.axes.iter().position(|axis| axis.device == device && axis.instance == instance);
-        let Some(number) = found else {
+    /// Takes the cyclic command block of an instance, and what its cyclic write data add to it.
+    pub(super) fn command(&mut self, instance: u8, block: &CommandBlock, trims: &Trims) -> Node {
+        let Some(number) = self.axis_of_instance(instance) else {
             return Node::new(format!("instance {instance}: no axis of the configuration"));
         };
         let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
@@ -47,13 +45,20 @@ impl Translator {
         if let Some(count) = block.values.unwind_count {
             node.push(Node::new(format!("Unwind Cycle Count {count}")));
         }
-        if report.saturated > 0 || report.not_finite > 0 {
+        let added = axis.north.decode_trims(trims, &mut command);
+        let doubts = report.saturated + report.not_finite + added.saturated + added.not_finite;
+        let refused = !command.add_own_offset() || doubts > 0;
+        // The loops of the mode are all that an offset can go to.
+        let carried = axis.south.carries(command.selection());
+        for signal in Signal::OFFSETS.into_iter().filter(|signal| !carried.contains(signal.command_bit())) {
+            command.set(signal, 0);
+        }
+        if refused {
             node.push(Node::new(
                 "half understood: the axis faults with position_command_limit, nothing is led by it",
             ));
         }
         self.request(number, block, &mut node);
-        let refused = report.saturated > 0 || report.not_finite > 0;
         node.push(self.telegram_of(number, command, refused));
         node
     }
@@ -176,7 +181,8 @@ fn fill(command: &mut AxisCommand, actual: Position) {
     if command.get(Signal::PositionCommand).is_none() {
         command.set(Signal::PositionCommand, actual.0);
     }
-    for signal in [Signal::VelocityCommand, Signal::AccelerationCommand, Signal::TorqueCommand] {
+    let set_points = [Signal::VelocityCommand, Signal::AccelerationCommand, Signal::TorqueCommand];
+    for signal in set_points.into_iter().chain(Signal::OFFSETS) {
         if command.get(signal).is_none() {
             command.set(signal, 0);
         }

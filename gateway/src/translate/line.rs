@@ -6,6 +6,7 @@
 //! at drive-a 08 c0 00 00 ...        what a drive sent in a cycle, without C-CON
 //! idn drive-a S-0-0011 04 00        element 7 of a parameter, as the drive gives it
 //! set turntable 473 00 00 20 41     the controller sets an attribute
+//! writes turntable 431 491          the attributes of the controller's cyclic write data
 //! restart                           forgets what the frames before have told
 //! ```
 
@@ -37,6 +38,13 @@ pub enum Line<'t> {
     },
     /// What the frames before have told is forgotten.
     Restart,
+    /// The list of an axis's cyclic write data.
+    Writes {
+        /// Name of the axis.
+        axis: &'t str,
+        /// Numbers of the attributes.
+        attributes: Vec<u16>,
+    },
     /// An attribute of an axis.
     Set {
         /// Name of the axis.
@@ -84,6 +92,17 @@ impl<'t> Line<'t> {
                 let attribute =
                     word.parse().map_err(|_| words.error(word, "the number of an attribute, 0 to 65535"))?;
                 Self::Set { axis, attribute, bytes: words.bytes()? }
+            }
+            "writes" => {
+                let axis = words.expect("the name of an axis")?;
+                let mut attributes = Vec::new();
+                while let Some(word) = words.next() {
+                    let number = word.parse();
+                    attributes.push(
+                        number.map_err(|_| words.error(word, "the number of an attribute, 0 to 65535"))?,
+                    );
+                }
+                Self::Writes { axis, attributes }
             }
             "restart" => match words.next() {
                 None => Self::Restart,
@@ -161,6 +180,11 @@ mod tests {
         assert_eq!(parse("idn d S-0-0011 04 00"), Some(Line::Idn { drive: "d", idn, bytes: vec![4, 0] }));
         let set = Line::Set { axis: "a", attribute: 473, bytes: vec![0, 0, 0x20, 0x41] };
         assert_eq!(parse("set a 473 0x00002041"), Some(set));
+        assert_eq!(
+            parse("writes a 431 491 # two"),
+            Some(Line::Writes { axis: "a", attributes: vec![431, 491] })
+        );
+        assert_eq!(parse("writes a"), Some(Line::Writes { axis: "a", attributes: vec![] }));
         assert_eq!(parse("restart # anew"), Some(Line::Restart));
     }
 
@@ -171,6 +195,8 @@ mod tests {
             ("at", 3, "expected the name of a drive, got the end of the line"),
             ("idn d 11 00", 7, "expected a parameter, as S-0-0011, got `11`"),
             ("set a 65536 00", 7, "expected the number of an attribute, 0 to 65535, got `65536`"),
+            ("writes a 431 x", 14, "expected the number of an attribute, 0 to 65535, got `x`"),
+            ("writes", 7, "expected the name of an axis, got the end of the line"),
             ("restart now", 9, "expected the end of the line, got `now`"),
             ("06 021", 4, "expected pairs of hexadecimal digits, got `021`"),
         ];

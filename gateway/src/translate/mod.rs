@@ -20,9 +20,11 @@ mod line;
 mod list;
 mod stage;
 mod tree;
+mod written;
 
 use std::sync::Arc;
 
+use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::program::Trackers;
@@ -56,6 +58,8 @@ struct AxisState {
     south: Trackers,
     command: AxisCommand,
     feedback: AxisFeedback,
+    /// Attributes of the cyclic write data, in their order.
+    writes: Vec<u16>,
 }
 
 /// Translates frame after frame.
@@ -105,6 +109,7 @@ impl Translator {
             south: axis.south.feedback.trackers(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
+            writes: Vec::new(),
         });
         states.collect()
     }
@@ -139,6 +144,10 @@ impl Translator {
                 self.states = Self::unheard(&self.stage);
                 Ok(Node::new("restart"))
             }
+            Line::Writes { axis, attributes } => {
+                let axis = self.axis(axis)?;
+                Ok(self.list_writes(axis, attributes))
+            }
             Line::Set { axis, attribute, bytes } => {
                 let axis = self.axis(axis)?;
                 self.set(axis, *attribute, bytes)
@@ -165,7 +174,7 @@ impl Translator {
                 node.push(decoded("as it came", &update.to_string()));
                 // The format has neither Control Status nor Command Control: the device assumes these (clause 6-2.7).
                 let block = update.block(ControlStatus::empty(), CommandTarget::default());
-                node.push(self.command(1, &block));
+                node.push(self.command(1, &block, &Trims::default()));
                 node
             }
             Recognised::Actual(frame) => decoded("D-to-C update", &frame.to_string()),
@@ -177,13 +186,13 @@ impl Translator {
     }
 
     fn instance(&mut self, instance: &profile_cip::wire::motion::CommandInstance<'_>) -> Node {
+        let written = instance.write.as_ref().map(|block| self.written_cyclically(instance.number, block));
+        let (written, trims) = written.unzip();
         let mut node = match &instance.cyclic {
-            Some(block) => self.command(instance.number, block),
+            Some(block) => self.command(instance.number, block, &trims.unwrap_or_default()),
             None => Node::new(format!("instance {} without cyclic data", instance.number)),
         };
-        if let Some(write) = &instance.write {
-            node.push(Node::new(format!("cyclic write block: {}", write.to_string().trim())));
-        }
+        written.into_iter().for_each(|written| node.push(written));
         if let Some(service) = &instance.service {
             node.push(Node::new(format!("service request: {}", service.to_string().trim())));
         }
@@ -232,6 +241,12 @@ impl Translator {
             });
         }
         Ok(node)
+    }
+
+    /// The axis with this instance in the device that is spoken to.
+    fn axis_of_instance(&self, instance: u8) -> Option<usize> {
+        let is = |axis: &StageAxis| axis.device == self.device && axis.instance == instance;
+        self.stage.axes.iter().position(is)
     }
 
     fn axis(&self, name: &str) -> Result<usize, TranslateError> {

@@ -668,15 +668,35 @@ impl Entry {
         Ok(start..start + usize::from(part.count) * size)
     }
 
+    /// Whether the attribute is a trim: a value of the drive's process image that updates carry beside their set-points. It
+    /// counts for the set-points that it came with, and for no others.
+    #[must_use]
+    pub fn is_trim(&self) -> bool {
+        self.definition.access == Access::Cyclic && self.definition.backing == Backing::Signal
+    }
+
     /// Checks a value for a part without writing it.
     ///
     /// # Errors
     /// The general status and the index of the element that caused it.
     pub fn check_set(&self, part: Part, value: &[u8], running: bool) -> Result<(), (GeneralStatus, u16)> {
-        let definition = &self.definition;
-        if definition.access != Access::Set {
+        if self.definition.access != Access::Set {
             return Err((GeneralStatus::ATTRIBUTE_NOT_SETTABLE, 0));
         }
+        self.check_value(part, value, running)
+    }
+
+    /// The same without a look at the access: for what an update carries.
+    ///
+    /// # Errors
+    /// The general status and the index of the element that caused it.
+    pub(super) fn check_value(
+        &self,
+        part: Part,
+        value: &[u8],
+        running: bool,
+    ) -> Result<(), (GeneralStatus, u16)> {
+        let definition = &self.definition;
         let range = self.range(part).map_err(|status| (status, part.start))?;
         let is_string = definition.data_type == DataType::ShortString;
         if is_string {

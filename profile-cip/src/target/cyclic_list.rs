@@ -9,10 +9,14 @@
 //! ([`CyclicLists::publish`]). A parameter of the drive, which only the service channel reaches, cannot; it is refused
 //! with its own status ("attribute not gettable", "attribute not settable") instead of being served from a copy of
 //! unknown age. Neither can a string, whose length would move what stands behind it.
+//!
+//! A trim ([`Entry::is_trim`]) is written by a list only. It goes with the set-points of its own update and is stored nowhere:
+//! an update that does not carry it means zero.
 
 use arrayvec::ArrayVec;
 
 use super::attribute::{Access, AttributeStore, AttributeTable, Backing, DataType, Entry};
+use super::drive_link::Trims;
 use crate::wire::motion::id_list::{IdList, IdStatus, IdStatusList};
 use crate::wire::status::GeneralStatus;
 
@@ -71,9 +75,10 @@ impl CyclicLists {
         match (table.find(id), direction) {
             (None, _) => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
             (Some(e), Direction::Write)
-                if e.definition.access != Access::Set
-                    || e.definition.backing != Backing::Stored
-                    || e.definition.data_type == DataType::ShortString =>
+                if !e.is_trim()
+                    && (e.definition.access != Access::Set
+                        || e.definition.backing != Backing::Stored
+                        || e.definition.data_type == DataType::ShortString) =>
             {
                 GeneralStatus::ATTRIBUTE_NOT_SETTABLE
             }
@@ -121,7 +126,10 @@ impl CyclicLists {
             .map_or((GeneralStatus::REPLY_DATA_TOO_LARGE, 0), |len| (status, len))
     }
 
-    /// Applies cyclic write data; all of it or nothing.
+    /// Applies cyclic write data, all of it or nothing, and gives the trims among them, which are not kept.
+    ///
+    /// # Errors
+    /// There is no list with this ID, or the data do not fit it.
     pub fn write(
         &mut self,
         table: &AttributeTable,
@@ -129,33 +137,41 @@ impl CyclicLists {
         id: u8,
         data: &[u8],
         running: bool,
-    ) -> GeneralStatus {
+    ) -> Result<Trims, GeneralStatus> {
+        let mut trims = Trims::default();
         if id == 0 {
-            return if data.is_empty() { GeneralStatus::SUCCESS } else { GeneralStatus::TOO_MUCH_DATA };
+            return if data.is_empty() { Ok(trims) } else { Err(GeneralStatus::TOO_MUCH_DATA) };
         }
-        let Some(layout) = self.take_up(id) else { return GeneralStatus::INVALID_PARAMETER };
+        let layout = self.take_up(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
         for apply in [false, true] {
             let mut at = 0;
             for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
                 at = align(at, entry);
                 let Some(value) = data.get(at..at + entry.definition.size()) else {
-                    return GeneralStatus::NOT_ENOUGH_DATA;
+                    return Err(GeneralStatus::NOT_ENOUGH_DATA);
                 };
-                let checked = if apply {
-                    store.put(entry, entry.whole(), value)
-                } else {
-                    entry.check_set(entry.whole(), value, running).map_err(|(status, _)| status)
-                };
-                if let Err(status) = checked {
-                    return status;
+                match (apply, entry.is_trim()) {
+                    (false, true) => {
+                        entry.check_value(entry.whole(), value, false).map_err(|(status, _)| status)?;
+                        let number = entry.definition.data_type.to_f64(value);
+                        let kept = number.is_some_and(|number| trims.set(entry.definition.id, number));
+                        if !kept {
+                            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+                        }
+                    }
+                    (true, true) => {}
+                    (false, false) => {
+                        entry.check_set(entry.whole(), value, running).map_err(|(status, _)| status)?;
+                    }
+                    (true, false) => store.put(entry, entry.whole(), value)?,
                 }
                 at += value.len();
             }
             if data.len() != at.next_multiple_of(4) {
-                return GeneralStatus::TOO_MUCH_DATA;
+                return Err(GeneralStatus::TOO_MUCH_DATA);
             }
         }
-        GeneralStatus::SUCCESS
+        Ok(trims)
     }
 
     /// Puts the signals of the lists into the store. `value` writes the octets of a signal and returns how many they are;
@@ -225,6 +241,9 @@ mod tests {
             new(5, DataType::Udint, Access::Set, Backing::Drive),
             new(6, DataType::Real, Access::Get, Backing::Signal),
             new(7, DataType::ShortString, Access::Set, Backing::Stored),
+            new(18, DataType::Dint, Access::Cyclic, Backing::Signal),
+            new(19, DataType::Real, Access::Cyclic, Backing::Signal),
+            new(20, DataType::Real, Access::Cyclic, Backing::Stored),
         ];
         AttributeTable::new(Scope::Instance, &definitions).expect("a table")
     }
@@ -244,7 +263,7 @@ mod tests {
         let answer = configure(&mut lists, Direction::Write, &[1, 2, 3]);
         assert_eq!(answer, (GeneralStatus::SUCCESS, vec![3, 0, 1, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0]));
         let data = [1, 1, 1, 1, 2, 2, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0x80];
-        assert_eq!(lists.write(&table, &mut store, 1, &data, false), GeneralStatus::SUCCESS);
+        assert_eq!(lists.write(&table, &mut store, 1, &data, false), Ok(Trims::default()));
         assert_eq!(store.unsigned(&table, 2), Some(0x0202));
         assert_eq!(store.unsigned(&table, 3), Some(0x8000_0000_0000_0003));
         assert_eq!(lists.read(&table, &store, 1).as_deref(), Ok(&data[..]));
@@ -257,13 +276,40 @@ mod tests {
         let mut lists = CyclicLists::default();
         configure(&mut lists, Direction::Write, &[1, 2]);
         let mut write = |id, data: &[u8], running| lists.write(&table, &mut store, id, data, running);
-        assert_eq!(write(1, &[1; 4], false), GeneralStatus::NOT_ENOUGH_DATA);
-        assert_eq!(write(1, &[1; 12], false), GeneralStatus::TOO_MUCH_DATA);
-        assert_eq!(write(2, &[1; 8], false), GeneralStatus::INVALID_PARAMETER);
-        assert_eq!(write(1, &[1; 8], true), GeneralStatus::OBJECT_STATE_CONFLICT);
-        assert_eq!(write(0, &[], false), GeneralStatus::SUCCESS);
-        assert_eq!(write(0, &[0; 4], false), GeneralStatus::TOO_MUCH_DATA);
+        assert_eq!(write(1, &[1; 4], false), Err(GeneralStatus::NOT_ENOUGH_DATA));
+        assert_eq!(write(1, &[1; 12], false), Err(GeneralStatus::TOO_MUCH_DATA));
+        assert_eq!(write(2, &[1; 8], false), Err(GeneralStatus::INVALID_PARAMETER));
+        assert_eq!(write(1, &[1; 8], true), Err(GeneralStatus::OBJECT_STATE_CONFLICT));
+        assert_eq!(write(0, &[], false), Ok(Trims::default()));
+        assert_eq!(write(0, &[0; 4], false), Err(GeneralStatus::TOO_MUCH_DATA));
         assert_eq!(store.unsigned(&table, 1), Some(0));
+    }
+
+    #[test]
+    fn trims_are_given_with_the_update_and_never_kept() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let mut lists = CyclicLists::default();
+        let (status, body) = configure(&mut lists, Direction::Write, &[20]);
+        assert_eq!((status, body[6]), (GeneralStatus::ATTRIBUTE_LIST_ERROR, 0x0E), "no trim");
+        assert_eq!(configure(&mut lists, Direction::Write, &[18, 1, 19]).0, GeneralStatus::SUCCESS);
+        let data = |position: i32, torque: f32| {
+            let values = [position.to_le_bytes(), 7_u32.to_le_bytes(), torque.to_le_bytes()];
+            values.concat()
+        };
+        let trims = lists.write(&table, &mut store, 1, &data(-5, 2.5), false).expect("good data");
+        assert_eq!(trims.iter().collect::<Vec<_>>(), [(18, -5.0), (19, 2.5)]);
+        assert_eq!(store.unsigned(&table, 1), Some(7));
+        assert_eq!((store.unsigned(&table, 18), store.unsigned(&table, 19)), (Some(0), Some(0)), "not kept");
+        let infinite = lists.write(&table, &mut store, 1, &data(1, f32::INFINITY), false);
+        assert_eq!(infinite, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
+        // Attribute 1 is not on the list of Table 5-2.110, the trims need not be.
+        let running = lists.write(&table, &mut store, 1, &data(1, 1.0), true);
+        assert_eq!(running, Err(GeneralStatus::OBJECT_STATE_CONFLICT));
+        assert_eq!(configure(&mut lists, Direction::Write, &[19, 18, 19]).0, GeneralStatus::SUCCESS);
+        let trims = lists.write(&table, &mut store, 2, &data(0, 1.5), true).expect("trims while running");
+        assert_eq!(trims.iter().collect::<Vec<_>>(), [(19, 1.5), (18, 7.0)], "the last value of one counts");
+        assert_eq!(lists.write(&table, &mut store, 0, &[], true), Ok(Trims::default()), "none is zero");
     }
 
     #[test]

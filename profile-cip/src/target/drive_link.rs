@@ -58,6 +58,27 @@ pub enum Withheld {
     NoSetPoint,
 }
 
+/// The most trims of an update: Position, Velocity, Acceleration and Torque Trim.
+pub const TRIMS_MAX: usize = 4;
+
+/// What the cyclic write data of an update add to its set-points, by attribute and in the unit of the attribute. What is
+/// not there is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Trims([Option<(u16, f64)>; TRIMS_MAX]);
+
+impl Trims {
+    /// Sets the trim with this attribute number; `false` when there is no room for one more.
+    pub fn set(&mut self, attribute: u16, value: f64) -> bool {
+        let place = self.0.iter_mut().find(|place| place.is_none_or(|(known, _)| known == attribute));
+        place.map(|place| *place = Some((attribute, value))).is_some()
+    }
+
+    /// Attribute numbers and values.
+    pub fn iter(&self) -> impl Iterator<Item = (u16, f64)> + '_ {
+        self.0.iter().copied().flatten()
+    }
+}
+
 /// Set-points of the newest good update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SetPoints {
@@ -67,6 +88,8 @@ pub struct SetPoints {
     pub feedback_mode: FeedbackMode,
     /// The values as they came; the one that `control_mode` needs is present.
     pub values: CommandValues,
+    /// What the same update adds to them.
+    pub trims: Trims,
     /// Whether the set-points are to be applied at once, extrapolated or interpolated.
     pub target: CommandTarget,
     /// Controller Time Stamp in this device's system time, ns; `None` in asynchronous operation.

@@ -23,7 +23,7 @@ use super::attribute_worker::{AttributeAccess, AttributeSpace};
 use super::axis_object::{Axis, AxisConfig, Context, FaultWords, PositionView};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
-use super::drive_link::{AxisCommandImage, DriveImage};
+use super::drive_link::{AxisCommandImage, DriveImage, Trims};
 use super::event_channel::EventCounters;
 use super::exception::ExceptionActions;
 use super::explicit_queue::ExplicitQueue;
@@ -655,18 +655,26 @@ impl MotionDevice {
 }
 
 impl Slot {
-    /// Applies cyclic write data and says what to tell about it.
+    /// Applies cyclic write data and says what to tell about it. What they add to the set-points goes into `trims`.
     pub(super) fn cyclic_write(
         &mut self,
         table: &AttributeTable,
         block: &WriteBlock<'_>,
         refused: bool,
+        trims: &mut Trims,
     ) -> (u8, u8, GeneralStatus) {
-        let status = if refused {
-            GeneralStatus::OBJECT_STATE_CONFLICT
+        let written = if refused {
+            Err(GeneralStatus::OBJECT_STATE_CONFLICT)
         } else {
             let running = self.axis.is_running();
             self.write_lists.write(table, &mut self.store, block.write_block_id, block.data, running)
+        };
+        let status = match written {
+            Ok(written) => {
+                *trims = written;
+                GeneralStatus::SUCCESS
+            }
+            Err(status) => status,
         };
         (block.write_block_id, block.read_block_id, status)
     }

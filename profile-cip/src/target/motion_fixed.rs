@@ -20,6 +20,7 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::{Access, AttributeDefinition, DataType, DefaultValue, Scope, id};
 use super::config::MOTION_SIZE_FIXED;
+use super::drive_link::Trims;
 use super::motion_device::{Echo, MotionDevice};
 use super::motion_link::{OpenParameters, OpenRefusal};
 use super::motion_receive::Verdict;
@@ -88,7 +89,7 @@ impl MotionDevice {
         let held = slot.axis.block();
         let block = command.block(held.control_status, held.target);
         match verdict {
-            Verdict::Fresh(times) => slot.axis.handle_block(&block, *times, now, &context),
+            Verdict::Fresh(times) => slot.axis.handle_block(&block, Trims::default(), *times, now, &context),
             Verdict::CommandsRefused => slot.axis.handle_status_request(&block),
         }
     }

@@ -5,6 +5,7 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::id;
 use super::axis_object::UpdateTimes;
+use super::drive_link::Trims;
 use super::io_connection::{Age, Mode, Packet, Update};
 use super::motion_device::{Echo, INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
 use super::time_offset::Offsets;
@@ -304,12 +305,16 @@ impl MotionDevice {
                 // Without remote control the device acts on nothing in the cyclic and service channels.
                 if context.remote {
                     let refused = context.node_fault || matches!(verdict, Verdict::CommandsRefused);
-                    echo.lists =
-                        instance.write.map(|block| slot.cyclic_write(&self.axis_table, &block, refused));
+                    let mut trims = Trims::default();
+                    echo.lists = instance
+                        .write
+                        .map(|block| slot.cyclic_write(&self.axis_table, &block, refused, &mut trims));
                     slot.axis.events.handle(instance.events.as_ref());
                     if let Some(block) = &instance.cyclic {
                         match verdict {
-                            Verdict::Fresh(times) => slot.axis.handle_block(block, *times, now, &context),
+                            Verdict::Fresh(times) => {
+                                slot.axis.handle_block(block, trims, *times, now, &context)
+                            }
                             Verdict::CommandsRefused => slot.axis.handle_status_request(block),
                         }
                     }

@@ -8,7 +8,7 @@ use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram};
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
-use profile_generic::image::{AxisCommand, AxisFeedback};
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::interpolation::{
     FineInterpolator, InterpolatorConfig, Quality, SetPoints, TargetUpdate,
 };
@@ -121,6 +121,9 @@ impl Axis {
                 ..points
             };
             all.write_to(&mut self.command);
+            for offset in Signal::OFFSETS {
+                self.command.set(offset, 0);
+            }
             self.encode();
         }
     }

@@ -19,3 +19,4 @@ mod scripts;
 mod stalled;
 mod stopping;
 mod torque;
+mod trims;

@@ -19,6 +19,7 @@ mod north;
 pub mod procedure;
 mod sequence;
 mod set_point;
+mod trim;
 
 pub use self::hookup::HookupSettings;
 
@@ -144,6 +145,7 @@ pub struct AxisChannel {
     /// Since when the drive in operation shows another operating mode than it is told.
     other_mode_since: Option<MonotonicTime>,
     command: AxisCommand,
+    trims: trim::Trims,
     feedback: AxisFeedback,
     /// The action whose bits stand in the control word.
     action: Action,
@@ -216,6 +218,7 @@ impl AxisChannel {
             made_at: MonotonicTime::default(),
             other_mode_since: None,
             command: AxisCommand::default(),
+            trims: trim::Trims::default(),
             feedback: AxisFeedback::default(),
             action: Action::TorqueOff,
             control_word: 0,

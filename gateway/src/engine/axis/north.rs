@@ -35,7 +35,11 @@ impl AxisChannel {
         }
         let first = self.sequence.is_none();
         self.sequence = Some(command.sequence);
-        if let Some(cause) = self.refusal(command) {
+        let mut command = *command;
+        let fits = self.take_trims(&mut command, first).is_some();
+        let command = &command;
+        let refusal = if fits { self.refusal(command) } else { Some(FaultCause::POSITION_COMMAND_LIMIT) };
+        if let Some(cause) = refusal {
             self.raise(now, system, Fault::new(cause, system));
             return;
         }

@@ -36,8 +36,11 @@ impl AxisChannel {
         let values = CyclicValues::from(&points.values);
         let conversions =
             self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
-        self.count_saturated(conversions.saturated);
-        if conversions.not_finite > 0 || conversions.saturated > 0 {
+        let trims = self.north.decode_trims(&points.trims, &mut fresh);
+        let trimmed = self.take_trims(&mut fresh, first || !same);
+        let saturated = conversions.saturated + trims.saturated + u32::from(trimmed.is_none());
+        self.count_saturated(saturated);
+        if conversions.not_finite + trims.not_finite + trims.unmapped + saturated > 0 {
             // Half understood is not understood.
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
             return;
@@ -47,9 +50,13 @@ impl AxisChannel {
             return;
         }
         let counted = points.values.unwind_count.is_some() && mode == OperatingMode::Position;
+        let trimmed = trimmed == Some(true) && mode == OperatingMode::Position;
         let elapsed = system.since(std::mem::replace(&mut self.taken_at, system));
-        if counted && !first && same && self.leaps(&fresh, elapsed) {
-            // Position and count that do not belong together: one of them is of the cycle before or after.
+        let elapsed = if first { DurationNs::ZERO } else { elapsed };
+        let watched = if first || !same { trimmed } else { counted || trimmed };
+        if watched && self.leaps(&fresh, elapsed) {
+            // Position and count that do not belong together: one of them is of the cycle before or after. Or a trim that
+            // would throw the axis aside.
             self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
             return;
         }
@@ -262,6 +269,7 @@ impl AxisChannel {
             torque: Some(points.torque.unwrap_or(Torque(kept(OperatingMode::Torque, last.torque.0)))),
         };
         all.write_to(&mut self.command);
+        self.write_trims(fine.is_some_and(|fine| fine.quality != Quality::Lost));
     }
 
     /// A drive that does not come to the operating mode that it is told follows values that are meant for no one.

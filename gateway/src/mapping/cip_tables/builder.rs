@@ -3,7 +3,7 @@
 use profile_cip::target::exception::ExceptionAction;
 use profile_generic::capture::CaptureStatus;
 use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::StatusBits;
+use profile_generic::image::{Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::parameter::ParameterType;
 use profile_generic::quantity::Quantity;
@@ -23,7 +23,7 @@ use crate::mapping::compile_cip::{
     MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
 };
 use crate::mapping::device_link::DRIVE_ACTIONS;
-use crate::mapping::dictionary::{CipAttribute, Dictionaries, quantity};
+use crate::mapping::dictionary::{Access, CipAttribute, Dictionaries, quantity};
 use crate::mapping::format::{
     CipAttributeRow, CipEventRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
     RejectRow,
@@ -677,6 +677,11 @@ impl Builder<'_> {
 
     fn signal_attribute(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {
         let signal = signal(&mut self.resolver, "signal", name)?;
+        if attribute.access == Access::SetCyclic && !Signal::OFFSETS.contains(&signal) {
+            let message = format!("expected an offset, as {} is added to a set-point", attribute.name);
+            self.resolver.error(code::DIRECTION, name.span(), "signal", message);
+            return None;
+        }
         let Some(unit) = self.tables.unit(&attribute.unit, signal.quantity()) else {
             self.resolver.error(code::UNIT, name.span(), "signal", no_unit(attribute, signal.quantity()));
             return None;

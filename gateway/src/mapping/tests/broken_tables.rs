@@ -45,6 +45,7 @@ const CASES: &[Case] = &[
     ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\"\ndirection", "idn = \"S-47\"\ndirection"),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
     ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),
+    ("trim that is no offset", |t| &mut t.cip_generic, "\"torque_offset\"", "\"torque_command\""),
     ("unknown exception", |t| &mut t.cip_generic, "exception = \"Brake Slip\"", "exception = \"Brake Slap\""),
     (
         "two answers",

@@ -1,6 +1,7 @@
 //! Telegrams, commissioning and programs of the SERCOS side.
 
 use super::*;
+use profile_generic::image::CommandSet;
 
 #[test]
 fn commissioning_of_a_rotary_modulo_axis() {
@@ -38,9 +39,32 @@ fn telegrams_carry_the_values_of_every_mode_once() {
     let mapping = shipped();
     let telegram = mapping.telegram(&rotary_axis(false), &DriveFacts::new()).unwrap();
     let idns = |list: &[Item]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-    assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0036 S-0-0080");
+    assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0037 S-0-0081 S-0-0036 S-0-0080");
     assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040 S-0-0084");
-    assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (12, 12));
+    assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (18, 12));
+}
+
+/// Each mode adds what lies inside of its own loop, and the telegram has what the drive takes.
+#[test]
+fn offsets_reach_the_drive_in_the_modes_that_add_them() {
+    let mapping = shipped();
+    let axis = rotary_axis(false);
+    let carried = |facts: &DriveFacts| {
+        let program = mapping.sercos_program(&axis, facts).unwrap();
+        [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
+            .map(|mode| program.carries(mode.into()))
+    };
+    let (velocity, torque) = (CommandSet::VELOCITY_OFFSET, CommandSet::TORQUE_OFFSET);
+    let mut facts = obedient(mapping, &axis);
+    let all = [CommandSet::POSITION | velocity | torque, CommandSet::VELOCITY | torque, CommandSet::TORQUE];
+    assert_eq!(carried(&facts), all);
+    facts.note_missing(Idn::standard(37));
+    let without = [all[0].difference(velocity), all[1], all[2]];
+    assert_eq!(carried(&facts), without, "no S-0-0037");
+    // S-0-0188, what it consumes, has no S-0-0081.
+    let list: Vec<u8> = [36_u32, 47, 80].iter().flat_map(|idn| idn.to_le_bytes()).collect();
+    facts.note_data(Idn::standard(188), &list);
+    assert_eq!(carried(&facts), [CommandSet::POSITION, CommandSet::VELOCITY, CommandSet::TORQUE]);
 }
 
 #[test]
@@ -75,11 +99,16 @@ fn commands_and_actions_become_a_telegram() {
     command.set(Signal::PositionCommand, -250_000_000);
     command.set(Signal::VelocityCommand, 25_000_000_000);
     command.set(Signal::TorqueCommand, -125_000);
-    let mut telegram = [0xA5; 12];
+    command.set(Signal::VelocityOffset, -1_000_000_000);
+    command.set(Signal::TorqueOffset, 250_000);
+    let mut telegram = [0xA5; 18];
     let mut report = ConversionReport::default();
     let word = program.encode(&command, Action::Enable, 0, &mut telegram, &mut report);
-    // 0xE000; -90 degrees within the modulo range of 512 turns: 1842300000; 15000000; -125.
-    let expected = [0x00, 0xE0, 0x60, 0x44, 0xCF, 0x6D, 0xC0, 0xE1, 0xE4, 0x00, 0x83, 0xFF];
+    // 0xE000; -90 degrees within the modulo range of 512 turns: 1842300000; -600000 and 250 more; 15000000; -125.
+    let expected = [
+        0x00, 0xE0, 0x60, 0x44, 0xCF, 0x6D, 0x40, 0xD8, 0xF6, 0xFF, 0xFA, 0x00, 0xC0, 0xE1, 0xE4, 0x00, 0x83,
+        0xFF,
+    ];
     assert_eq!((word, telegram, report.is_clean()), (0xE000, expected, true));
     command.mode = OperatingMode::Torque;
     let word = program.encode(&command, Action::Halt, word, &mut telegram, &mut report);

@@ -246,8 +246,8 @@ fn polarities_count_once() {
     let axis = rotary_axis(false);
     let rows = [
         (Signal::PositionCommand, 55, 0, 2),
-        (Signal::VelocityCommand, 43, 0, 6),
-        (Signal::TorqueCommand, 85, 0, 10),
+        (Signal::VelocityCommand, 43, 0, 12),
+        (Signal::TorqueCommand, 85, 0, 16),
     ];
     let actuals = [(55, 2), (43, 2), (85, 2)];
     for bits in 0..64_u32 {
@@ -265,7 +265,7 @@ fn polarities_count_once() {
         {
             command.set(signal, value);
         }
-        let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
+        let (mut telegram, mut report) = ([0; 18], ConversionReport::default());
         program.encode(&command, Action::None, 0, &mut telegram, &mut report);
         for (place, (signal, _, _, offset)) in rows.into_iter().enumerate() {
             let sent = telegram[offset..offset + 2].to_vec();
@@ -320,10 +320,11 @@ fn limits_of_the_drive_hold_commands_and_refuse_parameters() {
     let mut command = AxisCommand::default();
     command.set(Signal::PositionCommand, 5_000_000_000);
     command.set(Signal::VelocityCommand, 50_000_000_000);
-    let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
+    let (mut telegram, mut report) = ([0; 18], ConversionReport::default());
     program.encode(&command, Action::None, 0, &mut telegram, &mut report);
     assert_eq!(report.saturated, 1, "the velocity; limits without room between them are none");
-    assert_eq!(telegram[2..10], [&18_000_000_i32.to_le_bytes()[..], &20_000_000_i32.to_le_bytes()].concat());
+    assert_eq!(telegram[2..6], 18_000_000_i32.to_le_bytes());
+    assert_eq!(telegram[12..16], 20_000_000_i32.to_le_bytes());
     let limit = program.parameter(Parameter::TORQUE_LIMIT_POSITIVE).unwrap();
     assert_eq!(limit.encode(3_000_000), Some(([0xB8, 0x0B, 0, 0, 0, 0, 0, 0], 2, false)));
     assert_eq!(limit.encode(3_001_000).map(|(.., clamped)| clamped), Some(true));

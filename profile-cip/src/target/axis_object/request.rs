@@ -1,7 +1,7 @@
 //! What the controller asks of an axis: its cyclic block and the requests of Axis Control (clause 5-2.6.4).
 
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
-use super::super::drive_link::SetPoints;
+use super::super::drive_link::{SetPoints, Trims};
 use super::{Axis, Context, Held, RAMP_AND_DISABLE, UpdateTimes, fault_code, has_set_point, sub_code};
 use crate::wire::motion::CommandBlock;
 use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode, FeedbackMode};
@@ -9,10 +9,11 @@ use crate::wire::status::GeneralStatus;
 use profile_generic::time::MonotonicTime;
 
 impl Axis {
-    /// Takes the cyclic block of an update that was proven timely.
+    /// Takes the cyclic block of an update that was proven timely, with the trims of the same update.
     pub fn handle_block(
         &mut self,
         block: &CommandBlock,
+        trims: Trims,
         times: UpdateTimes,
         now: MonotonicTime,
         context: &Context,
@@ -27,6 +28,7 @@ impl Axis {
                 control_mode: mode,
                 feedback_mode: block.feedback_mode,
                 values: block.values,
+                trims,
                 target: block.target,
                 time_stamp: times.time_stamp,
                 target_time: times.time_stamp.map(|t| t.saturating_add(ahead)),
