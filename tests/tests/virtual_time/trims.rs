@@ -149,18 +149,21 @@ fn in_torque_control_the_torque_has_it_and_nothing_counts_twice_in_between() {
         counts((0, 0.0, 4.0)),
         Step::Torque { axis: 1, torque: 6.0, rate: 1_000.0, velocity_limit: 20.0 },
         dwell(0.02),
+        Step::Mode { axis: 1, mode: ControlMode::POSITION },
+        dwell(0.1),
         Step::Disable(turntable()),
     ]);
+    rig.drive_mut(0).set_mode_delay(millis(20));
     let mut most = 0;
     to_step(&mut rig, 2);
-    while rig.report().steps_finished < 7 {
+    while rig.report().steps_finished < 9 {
         rig.step();
         let torque_mode = rig.status().axes[0].mode == OperatingMode::Torque;
         let command = rig.line.slaves()[0].store().number_of(Idn::standard(80));
         most = most.max(added(&rig).1 + if torque_mode { command } else { 0 });
     }
     assert_eq!(most, 100, "6 % and 4 %");
-    assert_eq!(added(&rig), (0, 0), "the torque command has it already");
+    assert_eq!(added(&rig), (0, 40), "in position control again");
 }
 
 /// A trim that would throw the axis aside is no trim: the axis stops where it is.
