@@ -106,6 +106,7 @@ pub struct SetPoints {
 }
 
 /// Set-points, or why there are none.
+#[expect(clippy::large_enum_variant, reason = "made in every cycle, in which nothing may be allocated")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
     /// Follow these.
