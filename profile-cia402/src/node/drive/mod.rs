@@ -1,0 +1,174 @@
+//! A simulated drive behind a node: the device profile CiA 402 on simulated servo axes, up to eight of them.
+//!
+//! ```text
+//! not ready to switch on    20 ms after power-on
+//! switch on disabled, ready to switch on
+//!                           no torque; 3 waits for the voltage of the DC link
+//! switched on               no torque; 4 takes the time in which the servo builds it up
+//! operation enabled         the mode of operation leads; 5 and 8 brake first, where 605Ch and 605Bh say so
+//! quick stop active         brakes by 605Ah; 12 at the stand, or it holds
+//! fault reaction active     brakes by 605Eh, or as the servo must; then 14
+//! fault                     no torque, until 15 finds its cause gone
+//! ```
+//!
+//! In csp, 607Ah is what the axis goes to as soon as operation is enabled: where it is far from 6064h, the drive faults with
+//! 8611h, as real ones do.
+//!
+//! Objects of this manufacturer: 2000h velocity feed forward, 2FFEh room for any bytes, 2FFFh:1 an error code to raise.
+
+pub mod axis;
+pub mod faults;
+mod homing;
+mod monitor;
+pub mod objects;
+mod probe;
+mod profile;
+pub mod scaling;
+
+use profile_generic::servo::{ServoError, ServoParameters};
+use profile_generic::time::DurationNs;
+
+pub use self::axis::Axis;
+
+use self::objects::MODES;
+use self::scaling::Scales;
+use super::Identity;
+use super::application::{Application, Event, Report};
+use super::dictionary::{Definition, Dictionary};
+use crate::drive::Mode;
+use crate::drive::homing::Method;
+use crate::drive::index::{self, AXES_MAX, AXIS_OFFSET};
+use crate::wire::{AbortCode, Mux};
+
+/// A device with one axis or several.
+#[derive(Debug)]
+pub struct Device {
+    axes: Vec<Axis>,
+}
+
+/// Why there is no device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DeviceError {
+    /// A device has one to eight axes.
+    #[error("expected 1 to 8 axes, got {0}")]
+    Axes(usize),
+    /// The servo of an axis does not work.
+    #[error("axis {axis}: {error}")]
+    Servo {
+        /// Its number, from 1.
+        axis: usize,
+        /// What is wrong.
+        error: ServoError,
+    },
+}
+
+/// What a simulated drive says about itself.
+#[must_use]
+pub fn identity(axes: usize, serial: u32) -> Identity {
+    Identity {
+        device_type: if axes == 1 { objects::SERVO } else { objects::SEVERAL_AXES },
+        // No vendor has this number.
+        vendor: 0x7FFF_FFFF,
+        product: 402,
+        revision: 1,
+        serial,
+        name: "Axisbridge simulated CiA 402 drive",
+        hardware: "simulated",
+        software: env!("CARGO_PKG_VERSION"),
+    }
+}
+
+impl Device {
+    /// A device with these servos, one axis each.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn new(servos: &[ServoParameters]) -> Result<Self, DeviceError> {
+        if servos.is_empty() || servos.len() > usize::from(AXES_MAX) {
+            return Err(DeviceError::Axes(servos.len()));
+        }
+        let axes = (0..AXES_MAX).zip(servos).map(|(number, servo)| {
+            let axis = usize::from(number) + 1;
+            Axis::new(number, *servo).map_err(|error| DeviceError::Servo { axis, error })
+        });
+        Ok(Self { axes: axes.collect::<Result<_, _>>()? })
+    }
+
+    /// Its axes.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// Its axes, to act on them from outside.
+    pub fn axes_mut(&mut self) -> &mut [Axis] {
+        &mut self.axes
+    }
+
+    /// The axis that an object belongs to, and the object of the first axis that is like it.
+    fn axis_of(&self, index: u16) -> Option<(&Axis, u16)> {
+        let place = match index {
+            0x6000..=0x9FFF => index - 0x6000,
+            0x2000..=0x5FFF => index - 0x2000,
+            _ => return None,
+        };
+        let axis = self.axes.get(usize::from(place / AXIS_OFFSET))?;
+        Some((axis, index - place / AXIS_OFFSET * AXIS_OFFSET))
+    }
+}
+
+impl Application for Device {
+    fn define(&mut self, dictionary: &mut Dictionary) {
+        dictionary.variable(objects::SCRATCH, Definition::domain("Scratch", objects::SCRATCH_LEN));
+        for (number, axis) in (0..AXES_MAX).zip(&mut self.axes) {
+            objects::define(dictionary, number, axis.servo().parameters());
+            axis.adopt(dictionary);
+        }
+    }
+
+    fn check(&self, mux: Mux, number: i64, dictionary: &Dictionary) -> Result<(), AbortCode> {
+        let Some((_, index)) = self.axis_of(mux.index) else { return Ok(()) };
+        let small = i8::try_from(number).ok();
+        match index {
+            index::MODE if !small.is_some_and(|mode| MODES.has(Mode(mode))) => Err(AbortCode::VALUE),
+            index::HOMING_METHOD if small.and_then(|method| Method(method).plan()).is_none() => {
+                Err(AbortCode::VALUE)
+            }
+            index::GEAR_RATIO
+            | index::FEED_CONSTANT
+            | index::VELOCITY_FACTOR
+            | index::ACCELERATION_FACTOR
+            | index::VL_DIMENSION_FACTOR => {
+                let mut changed = dictionary.clone();
+                changed.set(mux.index, mux.sub, number);
+                let scales = Scales::read(&changed, mux.index - index);
+                scales.map(|_| ()).ok_or(AbortCode::PARAMETER)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn commanded(&mut self, dictionary: &mut Dictionary) {
+        if dictionary.take_changed() {
+            self.axes.iter_mut().for_each(|axis| axis.adopt(dictionary));
+        }
+        self.axes.iter_mut().for_each(|axis| axis.command(dictionary));
+    }
+
+    fn step(&mut self, elapsed: DurationNs, dictionary: &mut Dictionary) {
+        if dictionary.take_changed() {
+            self.axes.iter_mut().for_each(|axis| axis.adopt(dictionary));
+        }
+        self.axes.iter_mut().for_each(|axis| axis.step(elapsed, dictionary));
+    }
+
+    fn event(&mut self, event: Event, dictionary: &mut Dictionary) {
+        self.axes.iter_mut().for_each(|axis| axis.event(event, dictionary));
+    }
+
+    fn poll_report(&mut self) -> Option<Report> {
+        self.axes.iter_mut().find_map(Axis::poll_report)
+    }
+}
+
+#[cfg(test)]
+mod tests;

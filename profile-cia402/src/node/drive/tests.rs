@@ -1,0 +1,5 @@
+//! The simulated drive as its master sees it.
+
+mod homing;
+mod modes;
+mod states;
