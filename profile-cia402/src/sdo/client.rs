@@ -173,6 +173,12 @@ impl Client {
         }
     }
 
+    /// Whether a request has ended whose outcome has not been taken.
+    #[must_use]
+    pub fn has_outcome(&self) -> bool {
+        self.outcome.is_some()
+    }
+
     /// The outcome of the request, once.
     pub fn take_outcome(&mut self) -> Option<SdoOutcome> {
         self.outcome.take()

@@ -1,0 +1,220 @@
+//! How a device comes up (CiA 302-2), and what can be wrong with it.
+//!
+//! ```text
+//! Off --> Resetting --> Identify --> Configure --> Await --> Map --> Control --> Ready --> Starting --> Operational
+//!                        |  ^   \____________________^        |        |                      |            |
+//!              no answer |  |      operational already         +--------+------- Failed <------+            |
+//!                        v  |                                                     ^                        |
+//!                       Retry -------- boot time over -----------------------------+        Lost <---------+
+//!
+//! every state but Off and Resetting --boot-up--> Identify       Lost --after a while--> Resetting       every state --> Off
+//! ```
+//!
+//! `Await` is where the application works. `Map` configures the PDOs, `Control` the heartbeats, and `Ready` waits for the others
+//! if all shall start together.
+
+use core::fmt;
+
+/// Where a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum BootState {
+    /// The master does not run, or has stopped the device.
+    Off,
+    /// Reset communication was sent; its boot-up message is awaited.
+    Resetting,
+    /// Device type and identity are read.
+    Identify,
+    /// It did not answer; it is asked again after a while.
+    Retry,
+    /// The configuration is compared and written.
+    Configure,
+    /// The application works.
+    Await,
+    /// SYNC and PDO parameters are written and read back.
+    Map,
+    /// Heartbeats are set up.
+    Control,
+    /// All is set up.
+    Ready,
+    /// NMT start was sent.
+    Starting,
+    /// In operation.
+    Operational,
+    /// It was in operation, and its heartbeat is gone or tells another state.
+    Lost,
+    /// It does not come up, for a reason that was told. A boot-up message starts it again.
+    Failed,
+}
+
+/// What moves a device on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum BootEvent {
+    /// The master starts, or the application wants another try.
+    Start,
+    /// The master or the application stops the device.
+    Stop,
+    /// The device's boot-up message.
+    BootUp,
+    /// The time of the state has run out.
+    Elapsed,
+    /// The steps of the state are done.
+    Done,
+    /// The device is the right one and in operation, which it may keep.
+    Kept,
+    /// The device does not answer.
+    NoAnswer,
+    /// A step failed.
+    Failed,
+    /// The application is through, or the start is permitted.
+    Proceed,
+    /// The heartbeat is gone or tells another state, or the bus is off.
+    Lost,
+}
+
+impl BootState {
+    /// All states.
+    pub const ALL: [Self; 13] = [
+        Self::Off,
+        Self::Resetting,
+        Self::Identify,
+        Self::Retry,
+        Self::Configure,
+        Self::Await,
+        Self::Map,
+        Self::Control,
+        Self::Ready,
+        Self::Starting,
+        Self::Operational,
+        Self::Lost,
+        Self::Failed,
+    ];
+
+    /// The state after `event`; `None` when it means nothing here.
+    #[must_use]
+    pub const fn next(self, event: BootEvent) -> Option<Self> {
+        use BootEvent as E;
+        use BootState as S;
+        Some(match (self, event) {
+            (S::Off, E::Stop) => return None,
+            (_, E::Stop) => S::Off,
+            (S::Off | S::Failed | S::Lost | S::Retry, E::Start) => S::Resetting,
+            (S::Off, _) => return None,
+            (_, E::BootUp) => S::Identify,
+            (S::Resetting | S::Retry, E::Elapsed) => S::Identify,
+            (S::Identify, E::NoAnswer) => S::Retry,
+            (S::Identify, E::Done) => S::Configure,
+            (S::Identify, E::Kept) => S::Await,
+            (S::Configure, E::Done) => S::Await,
+            (S::Await, E::Proceed) => S::Map,
+            (S::Map, E::Done) => S::Control,
+            (S::Control, E::Done) => S::Ready,
+            (S::Ready, E::Proceed) => S::Starting,
+            (S::Starting, E::Done) => S::Operational,
+            (S::Ready | S::Starting | S::Operational, E::Lost) => S::Lost,
+            (S::Lost, E::Elapsed) => S::Resetting,
+            (S::Lost | S::Failed, E::Failed) => return None,
+            (_, E::Failed) => S::Failed,
+            _ => return None,
+        })
+    }
+
+    /// Whether the application's requests are carried.
+    #[must_use]
+    pub const fn serves(self) -> bool {
+        matches!(
+            self,
+            Self::Await | Self::Map | Self::Control | Self::Ready | Self::Starting | Self::Operational
+        )
+    }
+
+    /// Whether the heartbeat is watched.
+    #[must_use]
+    pub const fn supervises(self) -> bool {
+        matches!(self, Self::Ready | Self::Starting | Self::Operational)
+    }
+}
+
+impl fmt::Display for BootState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Off => "off",
+            Self::Resetting => "resetting",
+            Self::Identify => "identify",
+            Self::Retry => "retry",
+            Self::Configure => "configure",
+            Self::Await => "await",
+            Self::Map => "map",
+            Self::Control => "control",
+            Self::Ready => "ready",
+            Self::Starting => "starting",
+            Self::Operational => "operational",
+            Self::Lost => "lost",
+            Self::Failed => "failed",
+        })
+    }
+}
+
+profile_generic::open_code! {
+    /// Error status of a boot-up: a letter (CiA 302-2). This master does no node guarding and no program download: F to I never
+    /// come from it.
+    pub struct BootStatus(u8) {
+        /// A: the device is not in the list of this network.
+        NOT_LISTED = 0x41 => "A: not in the list of devices",
+        /// B: it does not answer to 1000.
+        NO_ANSWER = 0x42 => "B: no answer to device type",
+        /// C: 1000 is another one.
+        DEVICE_TYPE = 0x43 => "C: another device type",
+        /// D: 1018:1 is another one.
+        VENDOR = 0x44 => "D: another vendor",
+        /// E: its heartbeat was lost.
+        HEARTBEAT_LOST = 0x45 => "E: heartbeat lost",
+        /// F: it did not answer to node guarding.
+        GUARDING = 0x46 => "F: no answer to node guarding",
+        /// G: the version of its program cannot be told.
+        PROGRAM_VERSION = 0x47 => "G: program version not known",
+        /// H: it has another program, and may not be given one.
+        PROGRAM_OTHER = 0x48 => "H: another program",
+        /// I: its program could not be downloaded.
+        PROGRAM_DOWNLOAD = 0x49 => "I: program download failed",
+        /// J: its configuration could not be downloaded.
+        CONFIGURATION = 0x4A => "J: configuration download failed",
+        /// K: its heartbeat did not come when it was started.
+        NO_HEARTBEAT = 0x4B => "K: no heartbeat while starting",
+        /// L: it was in operation before the master came; no error.
+        ALREADY_OPERATIONAL = 0x4C => "L: was operational already",
+        /// M: 1018:2 is another one.
+        PRODUCT = 0x4D => "M: another product code",
+        /// N: 1018:3 is another one.
+        REVISION = 0x4E => "N: another revision",
+        /// O: 1018:4 is another one.
+        SERIAL = 0x4F => "O: another serial number",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_table() {
+        use BootEvent::*;
+        let events = [Start, Stop, BootUp, Elapsed, Done, Kept, NoAnswer, Failed, Proceed, Lost];
+        let mut table = String::new();
+        for state in BootState::ALL {
+            for event in events {
+                let next = state.next(event).map_or("-".to_string(), |next| next.to_string());
+                table += &format!("{state:<11} {:<8} {next}\n", format!("{event:?}"));
+            }
+        }
+        insta::assert_snapshot!(table);
+    }
+
+    #[test]
+    fn statuses_are_the_letters_a_to_o() {
+        let letters: String = BootStatus::NAMED.iter().map(|(status, _)| char::from(status.0)).collect();
+        assert_eq!(letters, "ABCDEFGHIJKLMNO");
+        for (status, name) in BootStatus::NAMED {
+            assert!(name.starts_with(&format!("{}: ", char::from(status.0))));
+        }
+    }
+}

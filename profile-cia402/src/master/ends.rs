@@ -1,0 +1,366 @@
+//! The master's ends of PDOs: what devices transmit is consumed, what they receive is produced.
+//!
+//! ```text
+//!            first TPDO            due and not there       more than permitted
+//! Waiting ---------------> Good ---------------------> Missing ----------------> Lost
+//!    |                      ^_____________________________|_______________________|
+//!    +--- more than permitted ---> Lost        TPDO
+//! ```
+
+use profile_generic::can::Id;
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::config::{Direction, PdoConfig};
+use crate::wire::NodeId;
+use crate::wire::pdo::{MappingEntry, mapped_len};
+
+/// Most bytes of a PDO, in an FD frame.
+const DATA_MAX: usize = 64;
+
+/// Periods in a row with a TPDO too many, which tell of a second device.
+const DOUBLES_MAX: u8 = 3;
+
+/// State of a consumer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ConsumerState {
+    /// Nothing has come since the device went into operation.
+    Waiting,
+    /// Every TPDO that was due came.
+    Good,
+    /// TPDOs are missing, not more than permitted.
+    Missing,
+    /// More were missing in a row than permitted, since the last one.
+    Lost,
+}
+
+/// What the application sees of a TPDO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Consumer<'a> {
+    /// The last values that came; zeros before the first.
+    pub data: &'a [u8],
+    /// Only in `Good` are cyclic data those of this cycle.
+    pub state: ConsumerState,
+    /// Whether values came since the last SYNC.
+    pub fresh: bool,
+    /// Whether they came after the synchronous window.
+    pub late: bool,
+    /// TPDOs in a row that were due and did not come.
+    pub missed: u32,
+}
+
+/// Consumer of one TPDO.
+#[derive(Debug)]
+pub(super) struct TpdoEnd {
+    pub number: u16,
+    pub id: Id,
+    pub mapping: Vec<MappingEntry>,
+    len: usize,
+    data: [u8; DATA_MAX],
+    state: ConsumerState,
+    fresh: bool,
+    late: bool,
+    missed: u32,
+    allowed: u32,
+    /// Every how many SYNCs it is due; 0 when it is not cyclic.
+    every: u32,
+    /// SYNCs since it was due.
+    syncs: u32,
+    longest: DurationNs,
+    deadline: Option<MonotonicTime>,
+    /// TPDOs that came in this period.
+    frames: u8,
+    /// Periods in a row in which more than one came.
+    doubles: u8,
+    /// A wrong length has been told.
+    pub length_told: bool,
+}
+
+/// What a frame was to a consumer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Taken {
+    /// A value.
+    Value,
+    /// The first one after a loss.
+    Back,
+    /// One too many in this period, again and again.
+    Double,
+}
+
+impl TpdoEnd {
+    pub fn new(pdo: &PdoConfig, node: NodeId) -> Self {
+        let mut end = Self {
+            number: pdo.number,
+            id: pdo.id(Direction::Transmit, node).unwrap_or(Id::Standard(0)),
+            mapping: Vec::with_capacity(crate::wire::pdo::MAPPING_MAX),
+            len: 0,
+            data: [0; DATA_MAX],
+            state: ConsumerState::Waiting,
+            fresh: false,
+            late: false,
+            missed: 0,
+            allowed: u32::from(pdo.allowed_losses),
+            every: u32::from(pdo.transmission.syncs().unwrap_or(0)),
+            syncs: 0,
+            longest: DurationNs::from_millis(i64::from(pdo.deadline_ms)),
+            deadline: None,
+            frames: 0,
+            doubles: 0,
+            length_told: false,
+        };
+        end.map(&pdo.mapping);
+        end
+    }
+
+    /// Takes another mapping, whose length has been checked.
+    pub fn map(&mut self, mapping: &[MappingEntry]) {
+        self.mapping.clear();
+        self.mapping.extend_from_slice(mapping);
+        self.len = mapped_len(mapping).unwrap_or(0).min(DATA_MAX);
+    }
+
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    pub fn view(&self) -> Consumer<'_> {
+        Consumer {
+            data: &self.data[..self.len],
+            state: self.state,
+            fresh: self.fresh,
+            late: self.late,
+            missed: self.missed,
+        }
+    }
+
+    /// Nothing is valid any more; the values stay for the record.
+    pub fn stop(&mut self) {
+        self.state = ConsumerState::Waiting;
+        (self.fresh, self.late, self.missed, self.syncs) = (false, false, 0, 0);
+        (self.frames, self.doubles) = (0, 0);
+        self.deadline = None;
+        self.length_told = false;
+    }
+
+    /// The device goes into operation.
+    pub fn start(&mut self, now: MonotonicTime) {
+        self.stop();
+        self.deadline = (self.longest > DurationNs::ZERO).then(|| now + self.longest);
+    }
+
+    /// Takes a value of the right length.
+    pub fn take(&mut self, now: MonotonicTime, data: &[u8], late: bool) -> Taken {
+        self.frames = self.frames.saturating_add(1);
+        self.data[..self.len].copy_from_slice(&data[..self.len]);
+        let back = self.state == ConsumerState::Lost;
+        self.state = ConsumerState::Good;
+        (self.fresh, self.late, self.missed, self.syncs) = (true, late, 0, 0);
+        self.length_told = false;
+        self.deadline = (self.longest > DurationNs::ZERO).then(|| now + self.longest);
+        if self.every == 1 && self.frames > 1 && self.doubles + 1 >= DOUBLES_MAX {
+            return Taken::Double;
+        }
+        if back { Taken::Back } else { Taken::Value }
+    }
+
+    /// One was due and did not come; `true` when that is the first one too many.
+    fn miss(&mut self) -> bool {
+        self.missed = self.missed.saturating_add(1);
+        if self.missed > self.allowed {
+            return core::mem::replace(&mut self.state, ConsumerState::Lost) != ConsumerState::Lost;
+        }
+        if self.state == ConsumerState::Good {
+            self.state = ConsumerState::Missing;
+        }
+        false
+    }
+
+    /// A SYNC goes out: what has come belongs to the period before. Says whether a TPDO was due and did not come, and whether
+    /// that is the first one too many.
+    pub fn sync(&mut self) -> (bool, bool) {
+        self.doubles = if self.frames > 1 { self.doubles.saturating_add(1).min(DOUBLES_MAX) } else { 0 };
+        self.frames = 0;
+        self.fresh = false;
+        self.late = false;
+        if self.every == 0 {
+            return (false, false);
+        }
+        self.syncs += 1;
+        if self.syncs <= self.every {
+            return (false, false);
+        }
+        // The SYNC that goes out now is the first one of the next period.
+        self.syncs = 1;
+        (true, self.miss())
+    }
+
+    pub fn deadline(&self) -> Option<MonotonicTime> {
+        self.deadline
+    }
+
+    /// As [`TpdoEnd::sync`], for a TPDO that has a time.
+    pub fn elapsed(&mut self, now: MonotonicTime) -> (bool, bool) {
+        match self.deadline {
+            Some(deadline) if now >= deadline => {
+                self.deadline = Some(now + self.longest);
+                self.fresh = false;
+                (true, self.miss())
+            }
+            _ => (false, false),
+        }
+    }
+}
+
+/// Producer of one RPDO.
+#[derive(Debug)]
+pub(super) struct RpdoEnd {
+    pub number: u16,
+    pub id: Id,
+    pub mapping: Vec<MappingEntry>,
+    len: usize,
+    data: [u8; DATA_MAX],
+    /// Goes out at once, not after SYNC.
+    pub event_driven: bool,
+    /// To be sent.
+    pub committed: bool,
+    /// To be sent in this period.
+    pub due: bool,
+}
+
+impl RpdoEnd {
+    pub fn new(pdo: &PdoConfig, node: NodeId) -> Self {
+        let mut end = Self {
+            number: pdo.number,
+            id: pdo.id(Direction::Receive, node).unwrap_or(Id::Standard(0)),
+            mapping: Vec::with_capacity(crate::wire::pdo::MAPPING_MAX),
+            len: 0,
+            data: [0; DATA_MAX],
+            event_driven: pdo.transmission.is_event_driven(),
+            committed: false,
+            due: false,
+        };
+        end.map(&pdo.mapping);
+        end
+    }
+
+    /// Takes another mapping, whose length has been checked.
+    pub fn map(&mut self, mapping: &[MappingEntry]) {
+        self.mapping.clear();
+        self.mapping.extend_from_slice(mapping);
+        self.len = mapped_len(mapping).unwrap_or(0).min(DATA_MAX);
+    }
+
+    pub fn data(&self) -> &[u8] {
+        &self.data[..self.len]
+    }
+
+    pub fn data_mut(&mut self) -> &mut [u8] {
+        &mut self.data[..self.len]
+    }
+
+    /// Nothing is sent any more; the values are zeros again, so that no old ones go out when the device is back.
+    pub fn stop(&mut self) {
+        (self.committed, self.due) = (false, false);
+        self.data = [0; DATA_MAX];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::pdo::TransmissionType;
+
+    fn end(transmission: u8, allowed_losses: u16) -> TpdoEnd {
+        let mapping = vec![MappingEntry(0x6041_0010)];
+        let pdo = PdoConfig {
+            transmission: TransmissionType(transmission),
+            allowed_losses,
+            ..PdoConfig::cyclic(1, mapping)
+        };
+        let mut end = TpdoEnd::new(&pdo, NodeId::MAX);
+        end.start(MonotonicTime::ZERO);
+        end
+    }
+
+    /// Each period: a SYNC, and a TPDO where there is an `x`.
+    fn run(end: &mut TpdoEnd, periods: &str) -> String {
+        let mut said = String::new();
+        for period in periods.chars() {
+            let (missed, lost) = end.sync();
+            said.push(match (missed, lost) {
+                (_, true) => 'L',
+                (true, _) => 'm',
+                _ => '.',
+            });
+            if period == 'x' && end.take(MonotonicTime::ZERO, &[1, 2], false) == Taken::Back {
+                said.push('B');
+            }
+        }
+        said
+    }
+
+    #[test]
+    fn losses_are_counted_from_the_sync_after_the_one_that_asked() {
+        assert_eq!(run(&mut end(1, 1), "xxx-x"), "....m");
+        assert_eq!(run(&mut end(1, 1), "x---x-"), "..mLmB.");
+        assert_eq!(run(&mut end(1, 0), "---"), ".Lm");
+        assert_eq!(run(&mut end(4, 0), "x---x----x"), ".........L".replace('L', "LB"));
+        assert_eq!(run(&mut end(255, 0), "-----"), ".....");
+    }
+
+    #[test]
+    fn states_and_freshness() {
+        let mut end = end(1, 1);
+        let states = |end: &TpdoEnd| (end.view().state, end.view().fresh, end.view().missed);
+        assert_eq!(states(&end), (ConsumerState::Waiting, false, 0));
+        run(&mut end, "x");
+        assert_eq!((states(&end), end.view().data), ((ConsumerState::Good, true, 0), &[1, 2][..]));
+        run(&mut end, "-");
+        assert_eq!(states(&end), (ConsumerState::Good, false, 0));
+        run(&mut end, "-");
+        assert_eq!(states(&end), (ConsumerState::Missing, false, 1));
+        run(&mut end, "-");
+        assert_eq!(states(&end), (ConsumerState::Lost, false, 2));
+        end.stop();
+        assert_eq!((states(&end), end.view().data), ((ConsumerState::Waiting, false, 0), &[1, 2][..]));
+    }
+
+    #[test]
+    fn a_second_sender_is_seen() {
+        let mut end = end(1, 1);
+        let now = MonotonicTime::ZERO;
+        let mut taken = vec![];
+        for _ in 0..3 {
+            end.sync();
+            taken.extend([end.take(now, &[0; 2], false), end.take(now, &[0; 2], false)]);
+        }
+        assert_eq!(taken[..5], [Taken::Value; 5]);
+        assert_eq!(taken[5], Taken::Double);
+        // One too many now and then is no second sender.
+        end.stop();
+        for _ in 0..5 {
+            end.sync();
+            end.take(now, &[0; 2], false);
+            assert_eq!(end.take(now, &[0; 2], false), Taken::Value);
+            end.sync();
+            end.take(now, &[0; 2], false);
+        }
+    }
+
+    #[test]
+    fn tpdos_that_are_not_cyclic_have_a_deadline_if_one_is_given() {
+        let pdo = PdoConfig {
+            transmission: TransmissionType::EVENT_PROFILE,
+            deadline_ms: 100,
+            ..PdoConfig::cyclic(2, vec![MappingEntry(0x6041_0010)])
+        };
+        let mut end = TpdoEnd::new(&pdo, NodeId::MAX);
+        let ms = |ms: u64| MonotonicTime(ms * 1_000_000);
+        end.start(ms(0));
+        assert_eq!((end.elapsed(ms(99)), end.elapsed(ms(100))), ((false, false), (true, false)));
+        end.take(ms(150), &[0; 2], false);
+        assert_eq!(
+            (end.deadline(), end.elapsed(ms(250)), end.elapsed(ms(350))),
+            (Some(ms(250)), (true, false), (true, true))
+        );
+    }
+}

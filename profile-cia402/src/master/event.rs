@@ -1,0 +1,253 @@
+//! What the master tells its caller.
+
+use core::fmt;
+
+use profile_generic::can::{Frame, Id};
+
+use super::boot::BootStatus;
+use super::config::Direction;
+use super::report::ReportRow;
+use crate::sdo::request::SdoOutcome;
+use crate::wire::emcy::Emcy;
+use crate::wire::nmt::NmtState;
+use crate::wire::{Function, NodeId};
+
+/// Names one submitted SDO request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Ticket {
+    /// The device.
+    pub node: NodeId,
+    /// Serial number at the device.
+    pub(super) serial: u64,
+}
+
+/// What the master wants done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output {
+    /// Send this frame.
+    Transmit(Frame),
+}
+
+/// Why two devices seem to have the same node-id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum DuplicateSign {
+    /// Two boot-up messages within the shortest time that a start takes. Some devices send two; it comes up nevertheless.
+    BootUps,
+    /// Two answers to one question. The device is stopped.
+    Answers,
+    /// Two TPDOs in one SYNC period, again and again. The device is stopped.
+    Pdos,
+}
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(clippy::large_enum_variant, reason = "events are taken one by one; only a few are kept")]
+pub enum Event {
+    /// The device is the right one and has its configuration. The application may work and then call `node_ready`.
+    AwaitingApplication {
+        /// The device.
+        node: NodeId,
+        /// It has been in operation all the time (status L): its configuration was not written.
+        kept: bool,
+    },
+    /// The device does not take the mapping of a PDO, and the one that it has is used. The application must look what that is.
+    MappingAdopted {
+        /// The device.
+        node: NodeId,
+        /// Which way.
+        direction: Direction,
+        /// Number of the PDO.
+        number: u16,
+    },
+    /// The device is in operation.
+    Operational {
+        /// The device.
+        node: NodeId,
+    },
+    /// The device does not come up. A boot-up message or `retry` starts it again; with status B it is asked again by itself
+    /// until its boot time is over.
+    BootFailed {
+        /// The device.
+        node: NodeId,
+        /// Error status; `None` for two devices with one node-id, for which CiA 302 has no letter.
+        status: Option<BootStatus>,
+        /// The step that failed, and how.
+        step: Option<ReportRow>,
+        /// Whether the network needs it.
+        mandatory: bool,
+    },
+    /// All mandatory devices are in operation.
+    NetworkOperational,
+    /// A device that was set up already has restarted: its data are not valid any more. It is brought up again.
+    Rebooted {
+        /// The device.
+        node: NodeId,
+        /// Whether it was in operation.
+        operational: bool,
+    },
+    /// The device's heartbeat is gone. It is stopped, and brought up again after a while.
+    HeartbeatLost {
+        /// The device.
+        node: NodeId,
+    },
+    /// The device has left operation by itself, or by somebody else's command. It is brought up again after a while.
+    StateChanged {
+        /// The device.
+        node: NodeId,
+        /// What its heartbeat tells.
+        state: NmtState,
+    },
+    /// EMCY.
+    Emcy {
+        /// The device.
+        node: NodeId,
+        /// What it tells.
+        emcy: Emcy,
+    },
+    /// The device sends more EMCYs than are told one by one. The last one can be read at any time.
+    EmcyStorm {
+        /// The device.
+        node: NodeId,
+    },
+    /// More TPDOs than permitted did not come.
+    PdoLost {
+        /// The device.
+        node: NodeId,
+        /// Number of the TPDO.
+        number: u16,
+    },
+    /// A TPDO that was lost comes again.
+    PdoBack {
+        /// The device.
+        node: NodeId,
+        /// Number of the TPDO.
+        number: u16,
+    },
+    /// A TPDO has another length than its mapping. It is not taken. Told once until a good one comes.
+    PdoLength {
+        /// The device.
+        node: NodeId,
+        /// Number of the TPDO.
+        number: u16,
+        /// Bytes mapped.
+        expected: usize,
+        /// Bytes that came.
+        found: usize,
+    },
+    /// Two devices seem to have the same node-id. Told once per boot and sign.
+    DuplicateNode {
+        /// The node-id.
+        node: NodeId,
+        /// Why it seems so.
+        sign: DuplicateSign,
+    },
+    /// A device that is not in the list is there (status A). Told once.
+    UnknownNode {
+        /// Its node-id.
+        node: NodeId,
+    },
+    /// Somebody else sends what only the master may send. Told once per kind of frame.
+    SecondMaster {
+        /// The kind of frame.
+        function: Option<Function>,
+        /// Its identifier.
+        id: Id,
+    },
+    /// The bus is off: no device can be reached, and nothing is valid.
+    BusOff,
+    /// The bus is back. All devices are brought up again.
+    BusOn,
+    /// A frame could not be sent. Told once until a SYNC period without.
+    TransmitFailed {
+        /// Its identifier.
+        id: Id,
+    },
+    /// A request of the application has ended.
+    Sdo {
+        /// Which.
+        ticket: Ticket,
+        /// What came out.
+        outcome: SdoOutcome,
+    },
+}
+
+/// Why a frame was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Refusal {
+    /// A remote frame.
+    Remote,
+    /// A frame that is not for the master.
+    NotOurs,
+    /// A device that is not in the list.
+    UnknownNode,
+    /// The frame has a wrong length or content for what it is.
+    Malformed,
+    /// An answer that nobody has asked for.
+    Unexpected,
+    /// A PDO of a device that is not in operation.
+    NotOperational,
+    /// A frame that only the master may send.
+    SecondMaster,
+}
+
+impl Refusal {
+    /// All reasons.
+    pub const ALL: [Self; 7] = [
+        Self::Remote,
+        Self::NotOurs,
+        Self::UnknownNode,
+        Self::Malformed,
+        Self::Unexpected,
+        Self::NotOperational,
+        Self::SecondMaster,
+    ];
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Remote => "remote frame",
+            Self::NotOurs => "not for the master",
+            Self::UnknownNode => "device that is not in the list",
+            Self::Malformed => "wrong length or content",
+            Self::Unexpected => "answer that nobody has asked for",
+            Self::NotOperational => "PDO of a device that is not in operation",
+            Self::SecondMaster => "frame that only the master may send",
+        })
+    }
+}
+
+/// Counters since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Statistics {
+    /// Frames taken.
+    pub accepted: u64,
+    /// Frames not taken, in the order of [`Refusal::ALL`].
+    pub refused: [u64; Refusal::ALL.len()],
+    /// SYNCs sent.
+    pub syncs: u64,
+    /// SYNCs left out because the caller came too late.
+    pub syncs_skipped: u64,
+    /// TPDOs that were due and did not come.
+    pub pdos_missed: u64,
+    /// TPDOs that came after the synchronous window.
+    pub pdos_late: u64,
+    /// Frames that could not be sent.
+    pub transmit_failures: u64,
+    /// EMCYs that were not told one by one.
+    pub emcys_suppressed: u64,
+    /// Events for which there was no room.
+    pub events_lost: u64,
+}
+
+impl Statistics {
+    /// Frames refused for this reason.
+    #[must_use]
+    pub fn refused(&self, reason: Refusal) -> u64 {
+        self.refused[reason as usize]
+    }
+
+    pub(super) fn count(&mut self, reason: Refusal) {
+        self.refused[reason as usize] += 1;
+    }
+}

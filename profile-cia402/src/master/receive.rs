@@ -1,0 +1,269 @@
+//! What comes from the bus.
+
+use super::boot::BootState;
+use super::ends::Taken;
+use super::station::EmcyVerdict;
+use super::*;
+use crate::wire::emcy::Emcy;
+
+/// No device starts twice within this time; but some send two boot-up messages.
+const BOOT_UP_SHORTEST: DurationNs = DurationNs::from_millis(50);
+
+/// Second answers to a question, after which two devices seem to answer.
+const STRAYS_MAX: u8 = 2;
+
+/// Identifiers of 11 bits.
+const STANDARD_COUNT: usize = 0x800;
+
+/// Whose a PDO is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Route {
+    None,
+    /// A TPDO of this device.
+    Tpdo(u16, u16),
+    /// An RPDO, which only the master sends.
+    Own,
+}
+
+/// PDOs by identifier.
+#[derive(Debug)]
+pub(super) struct Routes {
+    standard: Box<[Route]>,
+    extended: Vec<(u32, Route)>,
+}
+
+impl Routes {
+    pub fn new(stations: &[Station]) -> Self {
+        let mut routes = Self { standard: vec![Route::None; STANDARD_COUNT].into(), extended: vec![] };
+        let number = |place: usize| u16::try_from(place).unwrap_or(u16::MAX);
+        for (index, station) in stations.iter().enumerate() {
+            for (place, end) in station.tpdos.iter().enumerate() {
+                routes.set(end.id, Route::Tpdo(number(index), number(place)));
+            }
+            for end in &station.rpdos {
+                routes.set(end.id, Route::Own);
+            }
+        }
+        routes
+    }
+
+    fn set(&mut self, id: Id, route: Route) {
+        match id {
+            Id::Standard(id) => {
+                if let Some(place) = self.standard.get_mut(usize::from(id)) {
+                    *place = route;
+                }
+            }
+            Id::Extended(id) => self.extended.push((id, route)),
+        }
+    }
+
+    fn get(&self, id: Id) -> Route {
+        match id {
+            Id::Standard(id) => self.standard.get(usize::from(id)).copied().unwrap_or(Route::None),
+            Id::Extended(id) => {
+                self.extended.iter().find(|(own, _)| *own == id).map_or(Route::None, |(_, route)| *route)
+            }
+        }
+    }
+}
+
+impl Master {
+    pub(super) fn receive(&mut self, now: MonotonicTime, frame: &Frame) -> Result<(), Refusal> {
+        if frame.is_remote() {
+            return Err(Refusal::Remote);
+        }
+        let (id, data) = (frame.id(), frame.data());
+        match self.routes.get(id) {
+            Route::Tpdo(index, place) => {
+                return self.take_tpdo(now, usize::from(index), usize::from(place), data);
+            }
+            Route::Own => return Err(self.second_master(id, 0)),
+            Route::None => {}
+        }
+        let function = Function::of(id);
+        match function {
+            Some(Function::ErrorControl(node)) => self.take_heartbeat(now, node, data),
+            Some(Function::SdoResponse(node)) => self.take_answer(now, node, data),
+            Some(Function::Emcy(node)) => self.take_emcy(now, node, data),
+            Some(Function::Nmt) => Err(self.second_master(id, 1)),
+            Some(Function::Sync) if self.config.sync.is_some() => Err(self.second_master(id, 2)),
+            Some(Function::Tpdo(_, node)) => {
+                self.listed(node)?;
+                Err(Refusal::NotOurs)
+            }
+            _ => Err(Refusal::NotOurs),
+        }
+    }
+
+    fn second_master(&mut self, id: Id, kind: u8) -> Refusal {
+        if self.second_master & 1 << kind == 0 {
+            self.second_master |= 1 << kind;
+            self.emit(Event::SecondMaster { function: Function::of(id), id });
+        }
+        Refusal::SecondMaster
+    }
+
+    /// The place of a device; one that is not in the list is told once.
+    fn listed(&mut self, node: NodeId) -> Result<usize, Refusal> {
+        if let Some(place) = self.place(node) {
+            return Ok(place);
+        }
+        let (word, bit) = (node.index() / 64, 1 << (node.index() % 64));
+        let own = self.config.heartbeat.is_some_and(|own| own.node == node);
+        if own {
+            self.emit_once_own(node);
+        } else if self.unknown[word] & bit == 0 {
+            self.unknown[word] |= bit;
+            self.emit(Event::UnknownNode { node });
+        }
+        Err(Refusal::UnknownNode)
+    }
+
+    /// Somebody has the master's own node-id.
+    fn emit_once_own(&mut self, node: NodeId) {
+        let (word, bit) = (node.index() / 64, 1 << (node.index() % 64));
+        if self.unknown[word] & bit == 0 {
+            self.unknown[word] |= bit;
+            self.emit(Event::DuplicateNode { node, sign: DuplicateSign::Answers });
+        }
+    }
+
+    fn take_tpdo(
+        &mut self,
+        now: MonotonicTime,
+        index: usize,
+        place: usize,
+        data: &[u8],
+    ) -> Result<(), Refusal> {
+        let window = self.config.sync.map_or(0, |sync| sync.window_ns);
+        let late = window > 0 && now.since(self.last_sync).0 > i64::from(window);
+        let station = &mut self.stations[index];
+        if station.state != BootState::Operational {
+            return Err(Refusal::NotOperational);
+        }
+        let node = station.node;
+        let end = &mut station.tpdos[place];
+        let (number, expected) = (end.number, end.len());
+        if data.len() != expected {
+            if !core::mem::replace(&mut end.length_told, true) {
+                self.emit(Event::PdoLength { node, number, expected, found: data.len() });
+            }
+            return Err(Refusal::Malformed);
+        }
+        let taken = end.take(now, data, late);
+        self.statistics.pdos_late += u64::from(late);
+        match taken {
+            Taken::Value => {}
+            Taken::Back => self.emit(Event::PdoBack { node, number }),
+            Taken::Double => self.duplicate(now, index, DuplicateSign::Pdos),
+        }
+        Ok(())
+    }
+
+    /// Two devices obey one node-id: both are stopped.
+    fn duplicate(&mut self, now: MonotonicTime, index: usize, sign: DuplicateSign) {
+        if self.tell_duplicate(index, sign) {
+            self.stations[index].failed = None;
+            self.fail(now, index, None);
+            self.stations[index].nmt = Some(NmtCommand::STOP);
+        }
+    }
+
+    fn take_heartbeat(&mut self, now: MonotonicTime, node: NodeId, data: &[u8]) -> Result<(), Refusal> {
+        let index = self.listed(node)?;
+        let heartbeat = Heartbeat::parse(data).map_err(|_| Refusal::Malformed)?;
+        if heartbeat.is_boot_up() {
+            self.take_boot_up(now, index);
+            return Ok(());
+        }
+        let timeout = self.config.nodes[index].heartbeat.map(|heartbeat| heartbeat.timeout_ms);
+        let station = &mut self.stations[index];
+        let state = heartbeat.state;
+        station.heartbeat = Some(state);
+        if station.state.supervises() {
+            station.heartbeat_deadline = timeout.map(|timeout| now + DurationNs::from_millis(timeout.into()));
+        }
+        match (station.state, state) {
+            (BootState::Operational, NmtState::OPERATIONAL) => {}
+            (BootState::Operational, _) => self.lose(now, index, Event::StateChanged { node, state }),
+            // A device that was asked in vain is there.
+            (BootState::Retry, _) => {
+                self.advance(now, index, BootEvent::Elapsed);
+            }
+            (BootState::Resetting, _) if self.config.nodes[index].keep_alive => {
+                self.advance(now, index, BootEvent::Elapsed);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn take_boot_up(&mut self, now: MonotonicTime, index: usize) {
+        let station = &mut self.stations[index];
+        let (node, state) = (station.node, station.state);
+        let twice = station.boot_up_at.is_some_and(|at| now.since(at) < BOOT_UP_SHORTEST);
+        station.boot_up_at = Some(now);
+        station.heartbeat = Some(NmtState::BOOT_UP);
+        if twice {
+            self.tell_duplicate(index, DuplicateSign::BootUps);
+        }
+        if !self.advance(now, index, BootEvent::BootUp) {
+            return;
+        }
+        let set_up = !matches!(
+            state,
+            BootState::Resetting
+                | BootState::Identify
+                | BootState::Retry
+                | BootState::Lost
+                | BootState::Failed
+        );
+        if set_up {
+            self.emit(Event::Rebooted { node, operational: state == BootState::Operational });
+        }
+    }
+
+    fn take_answer(&mut self, now: MonotonicTime, node: NodeId, data: &[u8]) -> Result<(), Refusal> {
+        let index = self.listed(node)?;
+        let station = &mut self.stations[index];
+        let head = data.first_chunk().copied();
+        match station.client.handle(now, data) {
+            Err(_) => Err(Refusal::Malformed),
+            Ok(true) => {
+                station.last_answer = head;
+                self.collect(now, index);
+                Ok(())
+            }
+            Ok(false) => {
+                // What was given up may still be answered, once; and in operation somebody else may ask, a service tool for one.
+                let again = head.is_some() && head == station.last_answer;
+                let coming_up = station.state != BootState::Operational;
+                if !core::mem::take(&mut station.late_answer) && again && coming_up {
+                    station.strays = station.strays.saturating_add(1);
+                    if station.strays >= STRAYS_MAX {
+                        self.duplicate(now, index, DuplicateSign::Answers);
+                    }
+                }
+                Err(Refusal::Unexpected)
+            }
+        }
+    }
+
+    fn take_emcy(&mut self, now: MonotonicTime, node: NodeId, data: &[u8]) -> Result<(), Refusal> {
+        let index = self.listed(node)?;
+        let emcy = Emcy::parse(data).map_err(|_| Refusal::Malformed)?;
+        let station = &mut self.stations[index];
+        station.emcy = Some(emcy);
+        match station.emcy_limit.count(now, self.config.emcy_per_second) {
+            EmcyVerdict::Tell => self.emit(Event::Emcy { node, emcy }),
+            verdict => {
+                self.statistics.emcys_suppressed += 1;
+                if verdict == EmcyVerdict::Storm {
+                    self.emit(Event::EmcyStorm { node });
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,344 @@
+//! Moves each device through its boot-up.
+
+use super::boot::BootState;
+use super::config::{MandatoryError, StartPolicy};
+use super::plan::{self, Step, Verdict};
+use super::report::RowOutcome;
+use super::station::Work;
+use super::*;
+use crate::sdo::request::{SdoFailure, SdoOutcome};
+
+impl Master {
+    /// Moves a device on by `event`; `false` when it means nothing in its state.
+    pub(super) fn advance(&mut self, now: MonotonicTime, index: usize, event: BootEvent) -> bool {
+        let last = self.stations[index].state;
+        let Some(next) = last.next(event) else { return false };
+        self.abandon(index, event);
+        let config = &self.config;
+        let node = &config.nodes[index];
+        let station = &mut self.stations[index];
+        (station.state, station.since, station.deadline) = (next, now, None);
+        (station.at, station.again, station.proceed) = (0, None, false);
+        let kept = station.kept;
+        plan::fill(&mut station.steps, next, config, node, kept);
+        if last == BootState::Operational {
+            station.stop_ends();
+        }
+        if !next.supervises() {
+            station.heartbeat_deadline = None;
+        }
+        match next {
+            BootState::Off => (station.give_up, station.kept) = (None, false),
+            BootState::Resetting => {
+                let keep = node.keep_alive && last == BootState::Off;
+                station.nmt = (!keep).then_some(NmtCommand::RESET_COMMUNICATION);
+                (station.status, station.kept, station.heartbeat) = (None, false, None);
+                station.signs.clear();
+                (station.strays, station.late_answer) = (0, false);
+                station.deadline = Some(now + config.boot_up_time);
+                station.give_up = (config.boot_time > DurationNs::ZERO)
+                    .then(|| now + config.boot_up_time + config.boot_time);
+            }
+            BootState::Identify => {
+                station.report.clear();
+                (station.failed, station.device_type, station.identity) = (None, None, [None; 4]);
+                (station.configured, station.nmt) = (false, None);
+                if event == BootEvent::BootUp {
+                    (station.kept, station.status) = (false, None);
+                }
+            }
+            BootState::Retry => station.deadline = Some(now + config.retry_time),
+            BootState::Lost => {
+                station.nmt = Some(NmtCommand::STOP);
+                station.deadline = Some(now + config.retry_time);
+            }
+            BootState::Configure => station.give_up = None,
+            BootState::Await => {
+                station.give_up = None;
+                if kept {
+                    station.status = Some(BootStatus::ALREADY_OPERATIONAL);
+                }
+                let node = station.node;
+                self.emit(Event::AwaitingApplication { node, kept });
+            }
+            BootState::Map => station.adopted.clear(),
+            BootState::Ready => {
+                let timeout =
+                    node.heartbeat.map(|heartbeat| DurationNs::from_millis(heartbeat.timeout_ms.into()));
+                station.heartbeat_deadline = timeout.map(|timeout| now + timeout);
+            }
+            BootState::Starting => {
+                station.nmt = Some(NmtCommand::START);
+                station.heartbeat = None;
+                // Heartbeats that tell another state do not count.
+                let timeout =
+                    node.heartbeat.map(|heartbeat| DurationNs::from_millis(heartbeat.timeout_ms.into()));
+                station.deadline = timeout.map(|timeout| now + timeout * 2);
+            }
+            BootState::Operational => {
+                station.tpdos.iter_mut().for_each(|end| end.start(now));
+                let node = station.node;
+                self.emit(Event::Operational { node });
+            }
+            BootState::Control | BootState::Failed => {}
+        }
+        self.check_complete();
+        true
+    }
+
+    /// A device fails to come up.
+    pub(super) fn fail(&mut self, now: MonotonicTime, index: usize, status: Option<BootStatus>) {
+        let mandatory = self.config.nodes[index].mandatory;
+        let station = &mut self.stations[index];
+        (station.status, station.give_up) = (status, None);
+        let (node, step, kept) = (station.node, station.failed, station.kept);
+        if !self.advance(now, index, BootEvent::Failed) {
+            return;
+        }
+        // A device that was in operation all the time and is not what it should be does not stay there.
+        if kept {
+            self.stations[index].nmt = Some(NmtCommand::STOP);
+        }
+        self.emit(Event::BootFailed { node, status, step, mandatory });
+        self.mandatory_error(now, index);
+    }
+
+    /// A device that was set up is lost.
+    pub(super) fn lose(&mut self, now: MonotonicTime, index: usize, event: Event) {
+        let starting = self.stations[index].state == BootState::Starting;
+        if starting {
+            self.fail(now, index, Some(BootStatus::NO_HEARTBEAT));
+            // It may have started, and nobody sees it.
+            self.stations[index].nmt = Some(NmtCommand::STOP);
+            return;
+        }
+        self.stations[index].status = Some(BootStatus::HEARTBEAT_LOST);
+        if self.advance(now, index, BootEvent::Lost) {
+            self.emit(event);
+            self.mandatory_error(now, index);
+        }
+    }
+
+    /// The network does without a mandatory device, or it does not.
+    fn mandatory_error(&mut self, now: MonotonicTime, index: usize) {
+        if !self.config.nodes[index].mandatory || !self.running {
+            return;
+        }
+        match self.config.mandatory_error {
+            MandatoryError::Report => {}
+            MandatoryError::StopAll => {
+                for other in (0..self.stations.len()).filter(|&other| other != index) {
+                    if self.advance(now, other, BootEvent::Stop) {
+                        self.stations[other].nmt = None;
+                    }
+                }
+                self.nmt_all = Some(NmtCommand::STOP);
+            }
+            MandatoryError::ResetAll => {
+                for other in (0..self.stations.len()).filter(|&other| other != index) {
+                    self.advance(now, other, BootEvent::Stop);
+                    self.advance(now, other, BootEvent::Start);
+                }
+            }
+        }
+    }
+
+    /// Ends what runs at a device whose state changes. The device is there and goes on, or it is not.
+    fn abandon(&mut self, index: usize, event: BootEvent) {
+        let gone = matches!(event, BootEvent::BootUp | BootEvent::Lost | BootEvent::Stop | BootEvent::Failed);
+        let gone = gone || event == BootEvent::Start;
+        if !gone {
+            return;
+        }
+        let station = &mut self.stations[index];
+        station.client.drop_server();
+        if let Some(outcome) = station.client.take_outcome() {
+            self.give_back(index, outcome);
+        }
+        self.stations[index].queue.fail(SdoFailure::NodeLost);
+    }
+
+    /// Hands an outcome to whom it belongs; that of a step comes back.
+    fn give_back(&mut self, index: usize, mut outcome: SdoOutcome) -> Option<(Step, SdoOutcome)> {
+        let station = &mut self.stations[index];
+        match core::mem::replace(&mut station.work, Work::Free) {
+            Work::Application => station.queue.finish(outcome),
+            Work::Step(step) => {
+                // The bytes of the configuration are needed for the next time.
+                let write = match step {
+                    Step::Write(place) => self.config.nodes[index].writes.get_mut(place),
+                    _ => None,
+                };
+                if let Some(write) = write {
+                    write.data = core::mem::take(&mut outcome.data);
+                }
+                return Some((step, outcome));
+            }
+            Work::Free => {}
+        }
+        None
+    }
+
+    /// Does what is due at every device.
+    pub(super) fn work(&mut self, now: MonotonicTime) {
+        if !self.running {
+            return;
+        }
+        for index in 0..self.stations.len() {
+            self.watch(now, index);
+            self.collect(now, index);
+            // A state without steps is left at once; there are fewer states than this.
+            for _ in BootState::ALL {
+                if !self.ask(now, index) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Times that have run out.
+    fn watch(&mut self, now: MonotonicTime, index: usize) {
+        let station = &self.stations[index];
+        let (node, state) = (station.node, station.state);
+        let over = |at: Option<MonotonicTime>| at.is_some_and(|at| now >= at);
+        if over(station.heartbeat_deadline) {
+            self.lose(now, index, Event::HeartbeatLost { node });
+        } else if over(station.give_up) && state == BootState::Retry {
+            self.fail(now, index, Some(BootStatus::NO_ANSWER));
+        } else if over(station.deadline) {
+            if state == BootState::Starting {
+                self.lose(now, index, Event::HeartbeatLost { node });
+            } else {
+                self.advance(now, index, BootEvent::Elapsed);
+            }
+        }
+        for place in 0..self.stations[index].tpdos.len() {
+            let (missed, lost) = self.stations[index].tpdos[place].elapsed(now);
+            self.count_missed(index, place, missed, lost);
+        }
+    }
+
+    /// Takes the outcome of what runs at a device.
+    pub(super) fn collect(&mut self, now: MonotonicTime, index: usize) {
+        let station = &mut self.stations[index];
+        let Some(outcome) = station.client.take_outcome() else { return };
+        station.late_answer |= matches!(outcome.result, Err(SdoFailure::Timeout { .. }));
+        // The configured bytes of a step go back to where they came from.
+        let plain = ReportRow::new(station.state, &outcome);
+        let Some((step, outcome)) = self.give_back(index, outcome) else { return };
+        let station = &mut self.stations[index];
+        let node = &self.config.nodes[index];
+        let (row, verdict) = plan::judge(step, &outcome, plain.outcome, &self.config, node, station);
+        let row = plain.with(row);
+        station.note(row);
+        match verdict {
+            Verdict::Next => {}
+            Verdict::Then(step) => station.again = Some(step),
+            Verdict::SkipTo(step) => {
+                let place = station.steps.iter().position(|&other| other == step);
+                station.at = place.unwrap_or(station.at).max(station.at);
+            }
+            Verdict::Finish => station.at = station.steps.len(),
+            Verdict::Fail(status) => {
+                let timeout = matches!(row.outcome, RowOutcome::Failed(SdoFailure::Timeout { .. }));
+                if timeout && station.state == BootState::Identify {
+                    self.advance(now, index, BootEvent::NoAnswer);
+                } else {
+                    station.failed = Some(row);
+                    self.fail(now, index, Some(status));
+                }
+            }
+        }
+    }
+
+    /// Starts the next transfer at a device, or moves it on; `true` when there is more to do at once.
+    fn ask(&mut self, now: MonotonicTime, index: usize) -> bool {
+        let station = &mut self.stations[index];
+        if station.work != Work::Free || !station.client.is_free() {
+            return false;
+        }
+        if let Some(step) = station.next_step() {
+            let (sync, heartbeat) = (self.config.sync, self.config.heartbeat);
+            let request = plan::request(step, sync, heartbeat, &mut self.config.nodes[index], station);
+            station.work = Work::Step(step);
+            // It is free.
+            let _ = station.client.start(now, request);
+            return false;
+        }
+        if let Some(event) = self.next_event(index) {
+            let station = &mut self.stations[index];
+            station.kept |= event == BootEvent::Kept;
+            let (node, adopted) = (station.node, core::mem::take(&mut station.adopted));
+            for (direction, number) in adopted {
+                self.emit(Event::MappingAdopted { node, direction, number });
+            }
+            return self.advance(now, index, event);
+        }
+        let station = &mut self.stations[index];
+        if station.state.serves()
+            && let Some(request) = station.queue.start()
+        {
+            station.work = Work::Application;
+            let _ = station.client.start(now, request);
+        }
+        false
+    }
+
+    /// What moves a device on whose steps are done.
+    fn next_event(&self, index: usize) -> Option<BootEvent> {
+        let station = &self.stations[index];
+        Some(match station.state {
+            BootState::Identify => {
+                let operational = station.heartbeat == Some(NmtState::OPERATIONAL);
+                let keeps = operational && self.config.nodes[index].keep_alive;
+                if keeps { BootEvent::Kept } else { BootEvent::Done }
+            }
+            BootState::Configure | BootState::Map | BootState::Control => BootEvent::Done,
+            BootState::Await if station.proceed && station.is_quiet() => BootEvent::Proceed,
+            BootState::Ready if self.may_start() => BootEvent::Proceed,
+            BootState::Starting if self.has_started(index) => BootEvent::Done,
+            _ => return None,
+        })
+    }
+
+    /// Whether something can be done at a device at once.
+    pub(super) fn can_go_on(&self, index: usize) -> bool {
+        let station = &self.stations[index];
+        let free = station.work == Work::Free && station.client.is_free();
+        let steps = station.again.is_some() || station.at < station.steps.len();
+        let requests = station.state.serves() && station.queue.is_waiting();
+        free && (steps || requests || self.next_event(index).is_some())
+    }
+
+    /// Whether devices that are ready are started.
+    fn may_start(&self) -> bool {
+        let ready = |station: &Station| {
+            matches!(station.state, BootState::Ready | BootState::Starting | BootState::Operational)
+        };
+        self.config.start == StartPolicy::Each
+            || self
+                .config
+                .nodes
+                .iter()
+                .zip(&self.stations)
+                .all(|(node, station)| !node.mandatory || ready(station))
+    }
+
+    /// Whether a device that was started is in operation. One without a heartbeat is believed to be once the command is out.
+    fn has_started(&self, index: usize) -> bool {
+        let station = &self.stations[index];
+        let told = station.heartbeat == Some(NmtState::OPERATIONAL);
+        let silent = self.config.nodes[index].heartbeat.is_none();
+        station.nmt.is_none() && (told || silent)
+    }
+
+    fn check_complete(&mut self) {
+        let mut mandatory = self.config.nodes.iter().zip(&self.stations).filter(|(node, _)| node.mandatory);
+        let any = self.config.nodes.iter().any(|node| node.mandatory);
+        let complete = any && mandatory.all(|(_, station)| station.state == BootState::Operational);
+        if complete && !self.complete {
+            self.emit(Event::NetworkOperational);
+        }
+        self.complete = complete;
+    }
+}

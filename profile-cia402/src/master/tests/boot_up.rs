@@ -1,0 +1,392 @@
+//! How devices come up: the order of the steps, odd devices, and the error statuses.
+
+use super::*;
+use crate::sdo::request::SdoOperation;
+
+#[test]
+fn the_report_names_every_step() {
+    let mut config = network(1);
+    let write =
+        |index, value: &[u8]| Write { object: Mux::new(index, 0), data: SdoData::inline(value).unwrap() };
+    config.nodes[0].writes = vec![write(0x6060, &[8])];
+    config.nodes[0].stamp = Some(Stamp { date: 15_000, time: 36_000_000 });
+    config.sync = Some(SyncConfig { period_ns: 4_000_000, window_ns: 2_000_000, counter_overflow: 10 });
+    let mut rig = rig(config);
+    rig.master.start(rig.now);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    let report = rig.master.node(id(1)).unwrap().report.iter().map(ToString::to_string);
+    insta::assert_snapshot!(report.collect::<Vec<_>>().join("\n"));
+    let device = &rig.devices[0].objects;
+    let numbers = [(0x1400, 1), (0x1800, 1), (0x1401, 1), (0x1803, 1), (0x1016, 1), (0x1600, 2), (0x1A00, 2)];
+    assert_eq!(
+        numbers.map(|(index, sub)| device.number(Mux::new(index, sub))),
+        [0x201, 0x4000_0181, 0x8000_0301, 0xC000_0481, 127 << 16 | 300, TARGET.0, POSITION.0]
+    );
+}
+
+#[test]
+fn the_frames_of_a_start() {
+    let mut rig = rig(network(2));
+    rig.master.start(rig.now);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    rig.run_ms(10);
+    // One reset for all, then each is started by itself.
+    let nmt = |(_, frame): &(_, Frame)| {
+        (frame.id() == cob_id::NMT).then(|| Nmt::parse(frame.data()).unwrap().to_string())
+    };
+    let commands: Vec<_> = rig.sent.iter().filter_map(nmt).collect();
+    assert_eq!(commands, ["NMT reset communication all nodes", "NMT start node 1", "NMT start node 2"]);
+    // SYNC goes on at its times from the first one on, while devices are configured.
+    let syncs: Vec<_> =
+        rig.sent.iter().filter(|(_, frame)| frame.id() == cob_id::SYNC).map(|(at, _)| at.0).collect();
+    assert!(syncs.len() > 10);
+    assert!(syncs.windows(2).all(|pair| pair[1] - pair[0] == 4_000_000));
+    // No RPDO before its device is in operation.
+    let first = |id: Id| rig.sent.iter().position(|(_, frame)| frame.id() == id).unwrap();
+    let start =
+        rig.sent.iter().position(|(_, frame)| frame.data() == [1, 1] && frame.id() == cob_id::NMT).unwrap();
+    assert!(first(Id::Standard(0x201)) > start);
+    // The master's heartbeat: boot-up first.
+    let own = rig.sent.iter().filter(|(_, frame)| frame.id() == Id::Standard(0x77F));
+    let own: Vec<_> = own.map(|(_, frame)| frame.data()[0]).collect();
+    assert_eq!(own[..2], [0, 5]);
+    assert_eq!(
+        rig.log,
+        [
+            Event::AwaitingApplication { node: id(1), kept: false },
+            Event::AwaitingApplication { node: id(2), kept: false },
+            Event::Operational { node: id(1) },
+            Event::Operational { node: id(2) },
+            Event::NetworkOperational,
+        ]
+    );
+}
+
+#[test]
+fn a_configuration_of_the_same_date_is_not_written_again() {
+    let mut config = network(1);
+    config.nodes[0].writes =
+        vec![Write { object: Mux::new(0x6060, 0), data: SdoData::inline(&[8]).unwrap() }];
+    config.nodes[0].stamp = Some(Stamp { date: 15_000, time: 7 });
+    for (date, time, written) in [(15_000, 7, 0), (15_000, 8, 1), (14_999, 7, 1), (0, 0, 1)] {
+        let mut rig = rig(config.clone());
+        rig.device(1).objects.set(Mux::CONFIGURATION_DATE, date);
+        rig.device(1).objects.set(Mux::CONFIGURATION_TIME, time);
+        rig.master.start(rig.now);
+        rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+        let objects = &rig.devices[0].objects;
+        let writes = objects.writes.iter().filter(|(object, _)| object.index == 0x6060).count();
+        assert_eq!(writes, written, "{date} {time}");
+        assert_eq!(objects.number(Mux::CONFIGURATION_DATE), 15_000);
+        // The bytes are still there for the next time.
+        assert_eq!(rig.master.config().nodes[0].writes[0].data.as_slice(), [8]);
+    }
+}
+
+#[test]
+fn every_status_has_its_cause() {
+    type Case = (&'static str, fn(&mut MasterConfig), fn(&mut Device));
+    let cases: [Case; 11] = [
+        ("no answer", |_| {}, |device| device.mute = true),
+        ("another type", |config| config.nodes[0].expected.device_type = Some(0x0001_0192), |_| {}),
+        ("no type", |_| {}, |device| drop(device.objects.values.remove(&Mux::DEVICE_TYPE))),
+        ("another vendor", |config| config.nodes[0].expected.vendor = Some(0x31A), |_| {}),
+        ("no vendor", |_| {}, |device| drop(device.objects.values.remove(&Mux::VENDOR))),
+        ("another product", |config| config.nodes[0].expected.product = Some(8), |_| {}),
+        ("another revision", |config| config.nodes[0].expected.revision = Some(8), |_| {}),
+        ("another serial", |config| config.nodes[0].expected.serial = Some(8), |_| {}),
+        (
+            "configuration refused",
+            |config| {
+                let data = SdoData::inline(&[1]).unwrap();
+                config.nodes[0].writes = vec![Write { object: Mux::new(0x5000, 1), data }];
+            },
+            |_| {},
+        ),
+        ("no heartbeat", |_| {}, |device| device.no_heartbeat = true),
+        ("not started", |_| {}, |device| device.lazy = true),
+    ];
+    let mut table = String::new();
+    for (name, change, misdeed) in cases {
+        let mut config = network(2);
+        change(&mut config);
+        let mut rig = rig(config);
+        misdeed(rig.device(1));
+        rig.master.start(rig.now);
+        rig.until("failure", |rig| rig.count(|event| matches!(event, Event::BootFailed { .. })) > 0);
+        let (status, step) = rig.failed();
+        table += &format!("{name:<22} {status:<32} {step}\n");
+        assert_eq!(rig.master.node(id(1)).unwrap().status, Some(status));
+        rig.comes_up(&[2]);
+        assert_eq!(rig.state(1), BootState::Failed);
+    }
+    insta::assert_snapshot!(table);
+}
+
+#[test]
+fn odd_devices_come_up() {
+    type Case = (&'static str, fn(&mut Device));
+    let cases: [Case; 9] = [
+        ("vendor only", |device| {
+            for object in [Mux::PRODUCT, Mux::REVISION, Mux::SERIAL] {
+                device.objects.values.remove(&object);
+            }
+        }),
+        ("no 1020", |device| {
+            device.objects.values.remove(&Mux::CONFIGURATION_DATE);
+            device.objects.values.remove(&Mux::CONFIGURATION_TIME);
+        }),
+        ("no 1006, 1007, 1016", |device| {
+            for object in [Mux::CYCLE_PERIOD, Mux::SYNC_WINDOW, Mux::consumer_heartbeat(1)] {
+                device.objects.values.remove(&object);
+            }
+        }),
+        ("one PDO each way, without inhibit time and event timer", |device| {
+            let gone = |mux: &Mux| {
+                matches!(mux.index & 0xF3FF, 0x1001..=0x1003 | 0x1201..=0x1203) && mux.index >= 0x1400
+            };
+            device
+                .objects
+                .values
+                .retain(|mux, _| !(gone(mux) || mux.index == 0x1800 && [3, 5].contains(&mux.sub)));
+        }),
+        ("late boot-up", |device| device.boot_time = Some(DurationNs::from_millis(5_000))),
+        ("no boot-up", |device| device.boot_time = None),
+        ("boot-up twice", |device| device.boot_ups = 2),
+        ("slow answers", |device| device.answer_time = DurationNs::from_millis(200)),
+        ("bit 30 of TPDOs clear", |device| {
+            for number in 0..4 {
+                device.objects.set(Mux::new(0x1800 + number, 1), 0x8000_0181 + 0x100 * u32::from(number));
+            }
+        }),
+    ];
+    for (name, oddity) in cases {
+        let mut config = network(2);
+        config.nodes[0].stamp = Some(Stamp { date: 1, time: 1 });
+        let mut rig = rig(config);
+        oddity(rig.device(1));
+        rig.master.start(rig.now);
+        rig.until(name, |rig| rig.saw(&Event::NetworkOperational));
+        rig.comes_up(&[1, 2]);
+        let duplicate = Event::DuplicateNode { node: id(1), sign: DuplicateSign::BootUps };
+        assert_eq!(rig.saw(&duplicate), name == "boot-up twice", "{name}");
+    }
+}
+
+#[test]
+fn a_device_whose_answer_comes_after_the_time_out_is_asked_again() {
+    let mut rig = rig(network(1));
+    rig.device(1).answer_time = DurationNs::from_millis(600);
+    rig.master.start(rig.now);
+    rig.until("retry", |rig| rig.state(1) == BootState::Retry);
+    rig.run_ms(300);
+    rig.device(1).answer_time = DurationNs::from_millis(1);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    assert_eq!(rig.count(|event| matches!(event, Event::DuplicateNode { .. })), 0, "{:?}", rig.log);
+}
+
+#[test]
+fn a_device_that_is_switched_on_late_comes_in() {
+    let mut rig = rig(network(2));
+    rig.device(1).dead = true;
+    rig.master.start(rig.now);
+    // It is asked until its boot time is over.
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    assert_eq!((rig.failed().0, rig.now.0 / 1_000_000_000), (BootStatus::NO_ANSWER, 11));
+    rig.comes_up(&[2]);
+    rig.forget();
+    rig.device(1).dead = false;
+    let now = rig.now;
+    rig.device(1).reset(now);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    rig.comes_up(&[1, 2]);
+    assert_eq!(rig.count(|event| matches!(event, Event::Rebooted { .. })), 0);
+}
+
+#[test]
+fn a_mapping_that_the_device_does_not_take() {
+    for policy in [MappingPolicy::Exact, MappingPolicy::Adopt] {
+        let mut config = network(2);
+        config.nodes[0].tpdos[0].policy = policy;
+        let mut rig = rig(config);
+        // It can map nothing else than the statusword to TPDO 1.
+        for sub in 0..=8 {
+            rig.device(1).objects.refuse.insert(Mux::new(0x1A00, sub), AbortCode::READ_ONLY);
+        }
+        rig.master.start(rig.now);
+        if policy == MappingPolicy::Exact {
+            rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+            let step = "map write 1A00:00: refused with 06010002: attempt to write a read-only object";
+            assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, step.into()));
+            rig.comes_up(&[2]);
+            continue;
+        }
+        rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+        let adopted = Event::MappingAdopted { node: id(1), direction: Direction::Transmit, number: 1 };
+        let place = |event: &Event| rig.log.iter().position(|other| other == event).unwrap();
+        assert!(place(&adopted) < place(&Event::Operational { node: id(1) }));
+        assert_eq!(rig.master.mapping(id(1), Direction::Transmit, 1), Some(&[STATUSWORD][..]));
+        rig.comes_up(&[1, 2]);
+        assert_eq!(rig.master.consumer(id(1), 1).unwrap().data, [0x27, 6]);
+    }
+}
+
+#[test]
+fn a_device_that_keeps_another_mapping_than_it_says_is_found_out() {
+    let mut rig = rig(network(2));
+    rig.device(1).objects.values.insert(Mux::new(0x1A00, 2), vec![0; 4]);
+    rig.master.start(rig.now);
+    rig.until("map", |rig| rig.state(1) == BootState::Map);
+    rig.until("count", |rig| rig.devices[0].objects.number(Mux::new(0x1A00, 0)) == 2);
+    rig.device(1).objects.set(Mux::new(0x1A00, 2), 0x6064_0010);
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    let step = "map read 1A00:02: expected 0x60640020, got 0x60640010";
+    assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, step.into()));
+    rig.comes_up(&[2]);
+}
+
+#[test]
+fn the_application_works_before_pdos_are_configured() {
+    let mut rig = rig(network(2));
+    rig.auto = false;
+    rig.master.start(rig.now);
+    rig.until("await", |rig| rig.state(1) == BootState::Await && rig.state(2) == BootState::Await);
+    let name = SdoRequest::upload(Mux::new(0x1008, 0));
+    let ticket = rig.master.sdo_submit(id(1), name, Priority::Normal).unwrap();
+    let mode = SdoRequest::download_number(Mux::new(0x6060, 0), 8, 1);
+    rig.master.sdo_submit(id(1), mode, Priority::Urgent).unwrap();
+    let absent =
+        rig.master.sdo_submit(id(1), SdoRequest::upload(Mux::new(0x5555, 0)), Priority::Normal).unwrap();
+    // PDOs can be chosen by what the device has told.
+    let rpdos = vec![PdoConfig::cyclic(2, vec![CONTROLWORD])];
+    rig.master.set_pdos(id(2), rpdos, vec![PdoConfig::cyclic(3, vec![POSITION])]).unwrap();
+    let twice = vec![PdoConfig::cyclic(1, vec![CONTROLWORD]); 2];
+    assert!(matches!(rig.master.set_pdos(id(2), twice, vec![]), Err(CallError::Config(_))));
+    for node in [1, 2] {
+        rig.master.node_ready(id(node)).unwrap();
+    }
+    assert!(matches!(rig.master.set_pdos(id(2), vec![], vec![]), Err(CallError::State(BootState::Await))));
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    let outcomes: Vec<_> = rig
+        .log
+        .iter()
+        .filter_map(|event| match event {
+            Event::Sdo { ticket, outcome } => Some((*ticket, outcome.clone())),
+            _ => None,
+        })
+        .collect();
+    // The urgent one went first.
+    assert_eq!(outcomes[0].1.operation, SdoOperation::Download);
+    assert_eq!((outcomes[1].0, outcomes[1].1.data.as_slice().len()), (ticket, 61));
+    assert_eq!(
+        (outcomes[2].0, outcomes[2].1.result),
+        (absent, Err(SdoFailure::Refused(AbortCode::NO_OBJECT)))
+    );
+    rig.run_ms(20);
+    assert_eq!(rig.master.consumer(id(2), 3).unwrap().data, [0x27, 6, 1, 2]);
+    assert!(rig.master.consumer(id(2), 1).is_none());
+    // Requests are carried in operation too, between the PDOs.
+    let status = SdoRequest::upload(Mux::new(0x6060, 0));
+    rig.forget();
+    rig.master.sdo_submit(id(1), status, Priority::Normal).unwrap();
+    rig.until("answer", |rig| rig.count(|event| matches!(event, Event::Sdo { .. })) == 1);
+    rig.runs(&[1]);
+}
+
+#[test]
+fn requests_go_only_where_somebody_answers() {
+    let mut rig = rig(network(1));
+    let ask = |rig: &mut Rig, node| {
+        rig.master.sdo_submit(id(node), SdoRequest::upload(Mux::VENDOR), Priority::Normal)
+    };
+    assert_eq!(ask(&mut rig, 1).unwrap_err().0, SubmitError::State(BootState::Off));
+    assert_eq!(ask(&mut rig, 9).unwrap_err().0, SubmitError::NoNode);
+    rig.auto = false;
+    rig.master.start(rig.now);
+    rig.until("await", |rig| rig.state(1) == BootState::Await);
+    for _ in 0..QUEUE_MAX {
+        ask(&mut rig, 1).unwrap();
+    }
+    assert_eq!(ask(&mut rig, 1).unwrap_err().0, SubmitError::Full);
+    // The device goes: every request ends.
+    let now = rig.now;
+    rig.device(1).reset(now);
+    rig.run_ms(100);
+    let lost = |event: &Event| matches!(event, Event::Sdo { outcome, .. } if outcome.result == Err(SdoFailure::NodeLost));
+    let done = |event: &Event| matches!(event, Event::Sdo { outcome, .. } if outcome.result.is_ok());
+    assert_eq!(rig.count(lost) + rig.count(done), QUEUE_MAX);
+    assert!(rig.count(lost) > 0);
+    assert!(rig.saw(&Event::Rebooted { node: id(1), operational: false }));
+}
+
+#[test]
+fn devices_start_together_if_that_is_wanted() {
+    let mut config = network(3);
+    config.start = StartPolicy::Together;
+    config.nodes[2].mandatory = false;
+    let mut rig = rig(config);
+    rig.device(2).boot_time = Some(DurationNs::from_millis(3_000));
+    rig.device(2).mute = true;
+    rig.device(3).dead = true;
+    rig.master.start(rig.now);
+    rig.run_ms(2_900);
+    assert_eq!(rig.state(1), BootState::Ready);
+    rig.device(2).mute = false;
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    rig.comes_up(&[1, 2]);
+}
+
+#[test]
+fn a_mandatory_device_that_fails_stops_or_resets_the_others_if_that_is_wanted() {
+    for policy in [MandatoryError::Report, MandatoryError::StopAll, MandatoryError::ResetAll] {
+        let mut config = network(2);
+        config.mandatory_error = policy;
+        let mut rig = rig(config);
+        rig.master.start(rig.now);
+        rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+        rig.forget();
+        rig.device(1).dead = true;
+        rig.until("loss", |rig| rig.saw(&Event::HeartbeatLost { node: id(1) }));
+        rig.run_ms(1);
+        let (state, command): (_, Option<&[u8]>) = match policy {
+            MandatoryError::Report => (BootState::Operational, None),
+            MandatoryError::StopAll => (BootState::Off, Some(&[2, 0])),
+            MandatoryError::ResetAll => (BootState::Resetting, Some(&[130, 2])),
+        };
+        assert_eq!(rig.state(2), state, "{policy:?}");
+        let sent =
+            |data: &[u8]| rig.sent.iter().any(|(_, frame)| frame.id() == cob_id::NMT && frame.data() == data);
+        assert!(command.is_none_or(sent), "{policy:?}");
+    }
+}
+
+#[test]
+fn a_device_in_operation_may_stay_so() {
+    let mut rig = running(2);
+    let mut config = network(2);
+    config.nodes[0].keep_alive = true;
+    // The master alone starts again.
+    rig.master = Master::new(config).unwrap();
+    rig.device(1).objects.writes.clear();
+    rig.master.start(rig.now);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    assert!(rig.saw(&Event::AwaitingApplication { node: id(1), kept: true }));
+    assert_eq!(rig.master.node(id(1)).unwrap().status, Some(BootStatus::ALREADY_OPERATIONAL));
+    // Nothing was written to it, and it was not reset.
+    assert_eq!(rig.device(1).objects.writes, []);
+    let reset: Vec<_> =
+        rig.sent.iter().filter(|(_, frame)| frame.id() == cob_id::NMT).map(|(_, f)| f.data()[1]).collect();
+    assert_eq!(reset.iter().filter(|&&node| node == 0).count(), 0);
+    rig.comes_up(&[1, 2]);
+    // One that has another mapping does not stay.
+    rig.device(1).objects.set(Mux::new(0x1A00, 1), 0x6061_0010);
+    let mut config = network(2);
+    config.nodes[0].keep_alive = true;
+    rig.master = Master::new(config).unwrap();
+    rig.forget();
+    rig.master.start(rig.now);
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    assert_eq!(rig.failed().1, "map read 1A00:01: expected 0x60410010, got 0x60610010");
+    rig.run_ms(1);
+    assert_eq!(rig.device(1).state, NmtState::STOPPED);
+}

@@ -1,0 +1,278 @@
+//! A device for the tests of the master: NMT, SDO, PDOs on SYNC, heartbeat. What it does wrong is set by the test.
+
+use std::collections::VecDeque;
+
+use super::*;
+use crate::sdo::server::{ObjectAccess, Server, ServerConfig};
+use crate::wire::error_control::Heartbeat;
+use crate::wire::nmt::Nmt;
+use crate::wire::{cob_id, frame};
+
+/// Its object dictionary.
+pub struct Objects {
+    pub values: BTreeMap<Mux, Vec<u8>>,
+    /// Objects that refuse to be written.
+    pub refuse: BTreeMap<Mux, AbortCode>,
+    /// Whether mappings can be changed.
+    pub fixed_mapping: bool,
+    pub writes: Vec<(Mux, u64)>,
+}
+
+impl Objects {
+    fn new(node: NodeId) -> Self {
+        let mut objects =
+            Self { values: BTreeMap::new(), refuse: BTreeMap::new(), fixed_mapping: false, writes: vec![] };
+        let number = |value: u32| value.to_le_bytes().to_vec();
+        objects.values.extend([
+            (Mux::DEVICE_TYPE, number(0x0002_0192)),
+            (Mux::VENDOR, number(0x319)),
+            (Mux::PRODUCT, number(7)),
+            (Mux::REVISION, number(0x0001_0002)),
+            (Mux::SERIAL, number(u32::from(node.get()))),
+            (Mux::CYCLE_PERIOD, number(0)),
+            (Mux::SYNC_WINDOW, number(0)),
+            (Mux::SYNC_OVERFLOW, vec![0]),
+            (Mux::CONFIGURATION_DATE, number(0)),
+            (Mux::CONFIGURATION_TIME, number(0)),
+            (Mux::consumer_heartbeat(1), number(0)),
+            (Mux::PRODUCER_HEARTBEAT, vec![0; 2]),
+            (Mux::new(0x6060, 0), vec![0]),
+            (Mux::new(0x1008, 0), b"A drive of the tests with a name of some length, for segments".to_vec()),
+        ]);
+        objects.default_pdos(node);
+        objects
+    }
+
+    /// The PDOs as they are after a reset of the communication: 1 to 4 exist, the first ones valid.
+    pub fn default_pdos(&mut self, node: NodeId) {
+        for number in 1..=4_u16 {
+            for (communication, mapping, word, entry) in [
+                (0x1400, 0x1600, cob_id::rpdo(number, node), CONTROLWORD),
+                (0x1800, 0x1A00, cob_id::tpdo(number, node), STATUSWORD),
+            ] {
+                let (communication, mapping) = (communication + number - 1, mapping + number - 1);
+                let word =
+                    CobId::new(word.unwrap()).with_valid(number == 1).with_bit_30(communication >= 0x1800);
+                self.values.insert(Mux::new(communication, 1), word.0.to_le_bytes().to_vec());
+                self.values.insert(Mux::new(communication, 2), vec![255]);
+                for (sub, len) in [(3, 2), (5, 2), (6, 1)] {
+                    self.values.insert(Mux::new(communication, sub), vec![0; len]);
+                }
+                self.values.insert(Mux::new(mapping, 0), vec![1]);
+                self.values.insert(Mux::new(mapping, 1), entry.0.to_le_bytes().to_vec());
+                for sub in 2..=8 {
+                    self.values.insert(Mux::new(mapping, sub), vec![0; 4]);
+                }
+            }
+        }
+    }
+
+    pub fn number(&self, object: Mux) -> u32 {
+        let mut wide = [0; 4];
+        let bytes = self.values.get(&object).map(Vec::as_slice).unwrap_or_default();
+        wide[..bytes.len()].copy_from_slice(bytes);
+        u32::from_le_bytes(wide)
+    }
+
+    pub fn set(&mut self, object: Mux, value: u32) {
+        let len = self.values[&object].len();
+        self.values.insert(object, value.to_le_bytes()[..len].to_vec());
+    }
+
+    /// The rules for changing a mapping, as drives have them.
+    fn may_write(&self, object: Mux) -> Result<(), AbortCode> {
+        if let Some(&code) = self.refuse.get(&object) {
+            return Err(code);
+        }
+        let mapping = matches!(object.index, 0x1600..=0x1603 | 0x1A00..=0x1A03);
+        let valid = CobId(self.number(Mux::new(object.index.wrapping_sub(0x200), 1))).is_valid();
+        let count = self.number(Mux::new(object.index, 0));
+        match (mapping, object.sub) {
+            (true, _) if self.fixed_mapping => Err(AbortCode::READ_ONLY),
+            (true, _) if valid => Err(AbortCode::ACCESS),
+            (true, 1..) if count != 0 => Err(AbortCode::ACCESS),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl ObjectAccess for Objects {
+    fn read(&mut self, object: Mux, into: &mut [u8]) -> Result<usize, AbortCode> {
+        let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
+        into[..value.len()].copy_from_slice(value);
+        Ok(value.len())
+    }
+
+    fn write_begins(&mut self, object: Mux, _: Option<u32>) -> Result<usize, AbortCode> {
+        let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
+        self.may_write(object)?;
+        Ok(value.len())
+    }
+
+    fn write(&mut self, object: Mux, data: &[u8]) -> Result<(), AbortCode> {
+        if data.len() != self.values[&object].len() {
+            return Err(AbortCode::LENGTH);
+        }
+        let number = data.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte));
+        self.writes.push((object, number));
+        self.values.insert(object, data.to_vec());
+        Ok(())
+    }
+}
+
+/// A device.
+pub struct Device {
+    pub node: NodeId,
+    pub state: NmtState,
+    pub objects: Objects,
+    server: Server,
+    out: VecDeque<(MonotonicTime, Frame)>,
+    next_heartbeat: Option<MonotonicTime>,
+    /// Bytes of its TPDOs.
+    pub values: [u8; 8],
+    /// RPDOs that came.
+    pub received: Vec<Vec<u8>>,
+    pub syncs: Vec<Vec<u8>>,
+    /// Not there at all.
+    pub dead: bool,
+    /// Does not answer by SDO.
+    pub mute: bool,
+    /// Does not send heartbeats.
+    pub no_heartbeat: bool,
+    /// Does not obey NMT start.
+    pub lazy: bool,
+    /// Time from a reset to its boot-up message; `None` for no message.
+    pub boot_time: Option<DurationNs>,
+    /// Boot-up messages after a reset.
+    pub boot_ups: usize,
+    /// Time from a question to the answer.
+    pub answer_time: DurationNs,
+    /// Bytes left out of its TPDOs, or too many.
+    pub tpdo_len: Option<usize>,
+}
+
+impl Device {
+    pub fn new(node: NodeId) -> Self {
+        Self {
+            node,
+            state: NmtState::PRE_OPERATIONAL,
+            objects: Objects::new(node),
+            server: Server::new(ServerConfig::default()),
+            out: VecDeque::new(),
+            next_heartbeat: None,
+            values: [0x27, 6, 1, 2, 3, 4, 5, 6],
+            received: vec![],
+            syncs: vec![],
+            dead: false,
+            mute: false,
+            no_heartbeat: false,
+            lazy: false,
+            boot_time: Some(DurationNs::from_millis(20)),
+            boot_ups: 1,
+            answer_time: DurationNs::from_micros(300),
+            tpdo_len: None,
+        }
+    }
+
+    fn send(&mut self, at: MonotonicTime, frame: Frame) {
+        let place = self.out.iter().position(|(other, _)| *other > at).unwrap_or(self.out.len());
+        self.out.insert(place, (at, frame));
+    }
+
+    /// Starts again, by itself or by command.
+    pub fn reset(&mut self, now: MonotonicTime) {
+        self.state = NmtState::PRE_OPERATIONAL;
+        self.server.reset();
+        self.out.clear();
+        self.objects.default_pdos(self.node);
+        self.objects.set(Mux::PRODUCER_HEARTBEAT, 0);
+        self.next_heartbeat = None;
+        if let Some(time) = self.boot_time {
+            for turn in 0..self.boot_ups {
+                let boot_up = Heartbeat::new(NmtState::BOOT_UP);
+                let at = now + time + DurationNs::from_millis(10) * i64::try_from(turn).unwrap();
+                self.send(at, frame(cob_id::error_control(self.node), &boot_up.emit()));
+            }
+        }
+    }
+
+    pub fn handle(&mut self, now: MonotonicTime, frame_in: &Frame) {
+        if self.dead {
+            return;
+        }
+        let (id, data) = (frame_in.id(), frame_in.data());
+        if id == cob_id::NMT {
+            let nmt = Nmt::parse(data).unwrap();
+            if nmt.node.is_none_or(|node| node == self.node) {
+                match nmt.command {
+                    NmtCommand::START if !self.lazy => self.state = NmtState::OPERATIONAL,
+                    NmtCommand::START => {}
+                    NmtCommand::STOP => self.state = NmtState::STOPPED,
+                    NmtCommand::RESET_COMMUNICATION => self.reset(now),
+                    _ => self.state = NmtState::PRE_OPERATIONAL,
+                }
+            }
+        } else if id == cob_id::SYNC {
+            self.syncs.push(data.to_vec());
+            self.sync(now);
+        } else if id == cob_id::sdo_request(self.node) && self.state.has_sdo() && !self.mute {
+            self.server.handle(now, data, &mut self.objects).unwrap();
+            while self.server.wake_at() == Some(MonotonicTime::ZERO) {
+                let answer = self.server.poll(now).unwrap();
+                self.send(now + self.answer_time, frame(cob_id::sdo_response(self.node), &answer));
+            }
+            let period = self.objects.number(Mux::PRODUCER_HEARTBEAT);
+            if period > 0 && self.next_heartbeat.is_none() {
+                self.next_heartbeat = Some(now + DurationNs::from_millis(period.into()));
+            }
+        } else if self.state.has_pdo() {
+            for index in 0x1400..0x1404 {
+                let word = CobId(self.objects.number(Mux::new(index, 1)));
+                if word.is_valid() && word.id() == id {
+                    self.received.push(data.to_vec());
+                }
+            }
+        }
+    }
+
+    fn sync(&mut self, now: MonotonicTime) {
+        if !self.state.has_pdo() {
+            return;
+        }
+        for number in 0..4 {
+            let word = CobId(self.objects.number(Mux::new(0x1800 + number, 1)));
+            let every = self.objects.number(Mux::new(0x1800 + number, 2));
+            if word.is_valid() && every == 1 {
+                let mapping = 0x1A00 + number;
+                let count = u8::try_from(self.objects.number(Mux::new(mapping, 0))).unwrap();
+                let bits: u32 =
+                    (1..=count).map(|sub| self.objects.number(Mux::new(mapping, sub)) & 0xFF).sum();
+                let len = self.tpdo_len.unwrap_or(usize::try_from(bits / 8).unwrap());
+                self.send(now + DurationNs::from_micros(500), frame(word.id(), &self.values[..len]));
+            }
+        }
+    }
+
+    pub fn wake_at(&self) -> Option<MonotonicTime> {
+        let frames = self.out.front().map(|(at, _)| *at);
+        [frames, self.next_heartbeat].into_iter().flatten().min().filter(|_| !self.dead)
+    }
+
+    pub fn poll(&mut self, now: MonotonicTime) -> Option<Frame> {
+        if self.dead {
+            return None;
+        }
+        if self.next_heartbeat.is_some_and(|at| now >= at) {
+            let period = self.objects.number(Mux::PRODUCER_HEARTBEAT);
+            self.next_heartbeat = (period > 0).then(|| now + DurationNs::from_millis(period.into()));
+            let heartbeat = frame(cob_id::error_control(self.node), &Heartbeat::new(self.state).emit());
+            if !self.no_heartbeat {
+                return Some(heartbeat);
+            }
+        }
+        match self.out.front() {
+            Some((at, _)) if now >= *at => self.out.pop_front().map(|(_, frame)| frame),
+            _ => None,
+        }
+    }
+}
