@@ -112,6 +112,8 @@ fn every_part_of_every_profile_says_the_same_in_csv_and_json() {
         ("sercos", "communication", 91),
         ("sercos", "bits", sercos_bits(&dictionaries())),
         ("sercos", "codes", sercos_codes(&dictionaries())),
+        ("cia402", "objects", cia402_objects(&dictionaries())),
+        ("cia402", "codes", cia402_codes(&dictionaries())),
         ("generic", "instance", 22 + dictionaries().generic.parameters().len()),
     ];
     for (profile, part, count) in parts {
@@ -160,6 +162,25 @@ fn sercos_bits(dictionaries: &Dictionaries) -> usize {
 
 fn sercos_codes(dictionaries: &Dictionaries) -> usize {
     dictionaries.sercos.code_sets().iter().map(|set| set.codes.len() + set.groups.len()).sum()
+}
+
+fn cia402_objects(dictionaries: &Dictionaries) -> usize {
+    dictionaries.cia402.objects().iter().map(|object| object.subs.len()).sum()
+}
+
+fn cia402_codes(dictionaries: &Dictionaries) -> usize {
+    let sets = dictionaries.cia402.code_sets().iter();
+    sets.map(|set| set.codes.len() + set.ranges.len() + set.classes.len()).sum()
+}
+
+/// The whole CiA 402 dictionary as it is printed.
+#[test]
+fn cia402_reads_as_its_files_say() {
+    for part in ["objects", "codes"] {
+        let text = String::from_utf8(printed(&["cia402", "--part", part])).unwrap();
+        insta::assert_snapshot!(format!("cia402_{part}"), text);
+    }
+    assert_eq!(printed(&["cia402"]), printed(&["cia402", "--part", "objects"]));
 }
 
 /// Without a part there are the IDNs of both lists, by number.
@@ -236,6 +257,10 @@ fn a_part_that_a_profile_lacks_is_a_usage_error() {
         (
             ["generic", "--part", "services"],
             "error: the generic dictionary has no part `services`; expected one of: instance\n",
+        ),
+        (
+            ["cia402", "--part", "idns"],
+            "error: the cia402 dictionary has no part `idns`; expected one of: objects, codes\n",
         ),
     ] {
         let output = run(&arguments);

@@ -16,8 +16,9 @@ use serde_json::{Map, Value, json};
 
 use crate::config::file::File;
 use crate::mapping::format::{
-    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipNetworkFile, CipServiceFile,
-    GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile, SercosIdnFile, SercosTermFile,
+    Cia402CodeFile, Cia402ObjectFile, CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile,
+    CipNetworkFile, CipServiceFile, GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile,
+    SercosIdnFile, SercosTermFile,
 };
 use crate::mapping::{Mapping, OverlayHead, Section, sections};
 
@@ -48,7 +49,7 @@ fn either(one: &str, other: &str) -> Value {
     json!([{ "required": [one] }, { "required": [other] }])
 }
 
-const KINDS: [Kind; 14] = [
+const KINDS: [Kind; 16] = [
     Kind { name: "config", root: root::<File> },
     Kind { name: "generic", root: root::<GenericFile> },
     Kind { name: "cip-attributes", root: root::<CipAttributeFile> },
@@ -61,6 +62,8 @@ const KINDS: [Kind; 14] = [
     Kind { name: "sercos-communication", root: root::<SercosIdnFile> },
     Kind { name: "sercos-bits", root: root::<SercosBitFile> },
     Kind { name: "sercos-codes", root: root::<SercosCodeFile> },
+    Kind { name: "cia402-objects", root: root::<Cia402ObjectFile> },
+    Kind { name: "cia402-codes", root: root::<Cia402CodeFile> },
     Kind { name: "cip-generic", root: root::<CipGenericFile> },
     Kind { name: "generic-sercos", root: root::<GenericSercosFile> },
 ];

@@ -1,5 +1,6 @@
 //! `axisbridge dictionary`: prints what a profile has, as the tables say it.
 
+mod cia402;
 mod cip;
 mod generic;
 mod sercos;
@@ -55,7 +56,7 @@ fn sheet(
     part: Option<DictionaryPart>,
 ) -> Result<Sheet, String> {
     use DictionaryPart::{
-        Bits, Class, Codes, Communication, Enums, Faults, Idns, Instance, Networks, Services,
+        Bits, Class, Codes, Communication, Enums, Faults, Idns, Instance, Networks, Objects, Services,
     };
     Ok(match (profile, part) {
         (DictionaryProfile::Cip, None | Some(Instance)) => cip::instance(&dictionaries.cip),
@@ -71,6 +72,8 @@ fn sheet(
         }
         (DictionaryProfile::Sercos, Some(Bits)) => sercos::bits(&dictionaries.sercos),
         (DictionaryProfile::Sercos, Some(Codes)) => sercos::codes(&dictionaries.sercos),
+        (DictionaryProfile::Cia402, None | Some(Objects)) => cia402::objects(&dictionaries.cia402),
+        (DictionaryProfile::Cia402, Some(Codes)) => cia402::codes(&dictionaries.cia402),
         (DictionaryProfile::Generic, None | Some(Instance)) => generic::instance(&dictionaries.generic),
         (_, Some(part)) => return Err(no_part(profile, part)),
     })
@@ -80,6 +83,7 @@ fn no_part(profile: DictionaryProfile, part: DictionaryPart) -> String {
     let (name, parts) = match profile {
         DictionaryProfile::Cip => ("cip", "instance, class, enums, services, networks, faults"),
         DictionaryProfile::Sercos => ("sercos", "idns, communication, bits, codes"),
+        DictionaryProfile::Cia402 => ("cia402", "objects, codes"),
         DictionaryProfile::Generic => ("generic", "instance"),
     };
     format!("the {name} dictionary has no part `{}`; expected one of: {parts}", part.name())

@@ -225,7 +225,8 @@ struct DictionaryArguments {
     #[arg(long, value_enum, default_value_t = DictionaryFormat::Csv)]
     format: DictionaryFormat,
     /// What of it. cip has instance (when it is not given), class, enums, services, networks, faults; sercos has idns and
-    /// communication (both when it is not given), bits, codes; generic has instance.
+    /// communication (both when it is not given), bits, codes; cia402 has objects (when it is not given), codes; generic has
+    /// instance.
     #[arg(long, value_enum)]
     part: Option<DictionaryPart>,
     /// A folder of mapping tables; a file that is not there is taken from the binary.
@@ -240,6 +241,8 @@ enum DictionaryProfile {
     Cip,
     /// SERCOS: the parameters of a drive.
     Sercos,
+    /// CANopen with the drive profile CiA 402: objects of a device and its axes.
+    Cia402,
     /// The generic drive model between them.
     Generic,
 }
@@ -274,8 +277,10 @@ enum DictionaryPart {
     Communication,
     /// Words and their bits.
     Bits,
-    /// Codes of SERCOS.
+    /// sercos: codes; cia402: codes, bits and states.
     Codes,
+    /// Objects.
+    Objects,
 }
 
 impl DictionaryPart {
@@ -292,6 +297,7 @@ impl DictionaryPart {
             Self::Communication => "communication",
             Self::Bits => "bits",
             Self::Codes => "codes",
+            Self::Objects => "objects",
         }
     }
 }

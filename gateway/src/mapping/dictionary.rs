@@ -1,27 +1,37 @@
 //! The dictionaries: what each profile has, looked up by name or number.
 
+mod cia402;
+mod cia402_codes;
+mod cia402_objects;
 mod cip;
 mod cip_attributes;
 mod cip_codes;
 mod cip_faults;
 mod cip_networks;
 mod cip_services;
+mod documents;
 mod sercos;
 mod sercos_bits;
 mod sercos_codes;
 mod sercos_idns;
 mod sercos_terms;
 
+pub use cia402::Cia402Dictionary;
+pub use cia402_codes::{Cia402Class, Cia402Code, Cia402CodeSet, Cia402Range, Cia402RangeKind, Cia402SetKind};
+pub use cia402_objects::{
+    Cia402Access, Cia402Category, Cia402Kind, Cia402Object, Cia402Pdo, Cia402Sub, Cia402Type,
+};
 pub use cip::{CipDictionary, DataElement};
 pub use cip_attributes::{Access, CipAttribute, CipType, DEVICE_FUNCTIONS, PolarityEffect};
 pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use cip_networks::{CipNetwork, ConnectionDataFormat, ETHERNET_IP, NetworkObject, networks};
 pub use cip_services::CipService;
+pub use documents::{Confidence, Document, Documents, Trust};
 pub use sercos::SercosDictionary;
 pub use sercos_bits::{Field, FieldValue, Layout, Pattern, Word};
 pub use sercos_codes::{CodeGroup, CodeSet, GroupKind, NamedCode};
 pub use sercos_idns::{IdnFormat, IdnPart, IdnUnit, SercosIdn};
-pub use sercos_terms::{Confidence, Document, ScaledQuantity, SercosTerms, Trust};
+pub use sercos_terms::{ScaledQuantity, SercosTerms};
 
 use profile_generic::image::Signal;
 use profile_generic::parameter::{Parameter, ParameterRow};
@@ -244,6 +254,8 @@ pub struct Dictionaries {
     pub cip: CipDictionary,
     /// SERCOS.
     pub sercos: SercosDictionary,
+    /// CANopen with the drive profile CiA 402.
+    pub cia402: Cia402Dictionary,
 }
 
 impl Dictionaries {
@@ -252,6 +264,7 @@ impl Dictionaries {
             generic: GenericDictionary::resolve(&tables.generic, errors),
             cip: CipDictionary::resolve(tables, errors),
             sercos: SercosDictionary::resolve(tables, errors),
+            cia402: Cia402Dictionary::resolve(tables, errors),
         }
     }
 }

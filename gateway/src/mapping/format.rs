@@ -4,6 +4,7 @@
 //! it. Names of signals, IDNs, attributes and codes are plain text here; the resolvers turn them into what
 //! they name.
 
+mod cia402_dictionary;
 mod cip_dictionary;
 mod cip_faults;
 mod cip_generic;
@@ -12,6 +13,7 @@ mod dictionary;
 mod generic_sercos;
 mod sercos_dictionary;
 
+pub use cia402_dictionary::*;
 pub use cip_dictionary::*;
 pub use cip_faults::*;
 pub use cip_generic::*;

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::format::{
-    CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile, CipNetworkFile, CipServiceFile,
-    GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile, SercosIdnFile, SercosTermFile,
+    Cia402CodeFile, Cia402ObjectFile, CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile,
+    CipNetworkFile, CipServiceFile, GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile,
+    SercosIdnFile, SercosTermFile,
 };
 use super::overlay::Overlay;
 use super::rows;
@@ -18,7 +19,7 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-pub(super) const FILES: [(&str, &str); 13] = [
+pub(super) const FILES: [(&str, &str); 15] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
@@ -33,6 +34,8 @@ pub(super) const FILES: [(&str, &str); 13] = [
     ),
     ("dictionary/sercos-bits.toml", include_str!("../../../mappings/dictionary/sercos-bits.toml")),
     ("dictionary/sercos-codes.toml", include_str!("../../../mappings/dictionary/sercos-codes.toml")),
+    ("dictionary/cia402-objects.toml", include_str!("../../../mappings/dictionary/cia402-objects.toml")),
+    ("dictionary/cia402-codes.toml", include_str!("../../../mappings/dictionary/cia402-codes.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
 ];
@@ -77,6 +80,10 @@ pub struct TableTexts {
     pub sercos_bits: TableText,
     /// SERCOS dictionary: codes.
     pub sercos_codes: TableText,
+    /// CiA 402 dictionary: documents, units, objects.
+    pub cia402_objects: TableText,
+    /// CiA 402 dictionary: codes, bits and states.
+    pub cia402_codes: TableText,
     /// CIP Motion to generic.
     pub cip_generic: TableText,
     /// Generic to SERCOS.
@@ -119,6 +126,10 @@ pub struct Tables {
     pub sercos_bits: Parsed<SercosBitFile>,
     /// SERCOS dictionary: codes.
     pub sercos_codes: Parsed<SercosCodeFile>,
+    /// CiA 402 dictionary: documents, units, objects.
+    pub cia402_objects: Parsed<Cia402ObjectFile>,
+    /// CiA 402 dictionary: codes, bits and states.
+    pub cia402_codes: Parsed<Cia402CodeFile>,
     /// CIP Motion to generic.
     pub cip_generic: Parsed<CipGenericFile>,
     /// Generic to SERCOS.
@@ -195,6 +206,8 @@ impl TableTexts {
             sercos_communication,
             sercos_bits,
             sercos_codes,
+            cia402_objects,
+            cia402_codes,
             cip_generic,
             generic_sercos,
         ] = texts;
@@ -210,6 +223,8 @@ impl TableTexts {
             sercos_communication,
             sercos_bits,
             sercos_codes,
+            cia402_objects,
+            cia402_codes,
             cip_generic,
             generic_sercos,
             overlays: Vec::new(),
@@ -229,6 +244,8 @@ impl TableTexts {
             sercos_communication,
             sercos_bits,
             sercos_codes,
+            cia402_objects,
+            cia402_codes,
             cip_generic,
             generic_sercos,
             overlays: _,
@@ -245,6 +262,8 @@ impl TableTexts {
             sercos_communication,
             sercos_bits,
             sercos_codes,
+            cia402_objects,
+            cia402_codes,
             cip_generic,
             generic_sercos,
         ]
@@ -266,6 +285,8 @@ impl TableTexts {
             rows::parse(&self.sercos_communication, "sercos-communication", &layers, findings);
         let sercos_bits = rows::parse(&self.sercos_bits, "sercos-bits", &layers, findings);
         let sercos_codes = rows::parse(&self.sercos_codes, "sercos-codes", &layers, findings);
+        let cia402_objects = rows::parse(&self.cia402_objects, "cia402-objects", &layers, findings);
+        let cia402_codes = rows::parse(&self.cia402_codes, "cia402-codes", &layers, findings);
         let cip_generic = rows::parse(&self.cip_generic, "cip-generic", &layers, findings);
         let generic_sercos = rows::parse(&self.generic_sercos, "generic-sercos", &layers, findings);
         if findings.has_errors() {
@@ -283,6 +304,8 @@ impl TableTexts {
             sercos_communication: sercos_communication?,
             sercos_bits: sercos_bits?,
             sercos_codes: sercos_codes?,
+            cia402_objects: cia402_objects?,
+            cia402_codes: cia402_codes?,
             cip_generic: cip_generic?,
             generic_sercos: generic_sercos?,
         })

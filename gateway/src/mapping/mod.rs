@@ -63,9 +63,11 @@ pub use compile_cip::{
 };
 pub use compile_sercos::{SercosAxis, SercosError};
 pub use dictionary::{
-    Access, CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup,
-    CodeRange, CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries,
-    Document, ETHERNET_IP, Enumeration, ExceptionAction, FaultRecord, Field, FieldValue, GenericDictionary,
+    Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,
+    Cia402Kind, Cia402Object, Cia402Pdo, Cia402Range, Cia402RangeKind, Cia402SetKind, Cia402Sub, Cia402Type,
+    CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup, CodeRange,
+    CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries, Document,
+    Documents, ETHERNET_IP, Enumeration, ExceptionAction, FaultRecord, Field, FieldValue, GenericDictionary,
     GroupKind, IdnFormat, IdnPart, IdnUnit, Layout, NamedCode, NetworkObject, Pattern, PolarityEffect,
     RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode, Trust, Word,
     networks,

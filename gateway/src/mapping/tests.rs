@@ -1,6 +1,7 @@
 //! Tests over the shipped tables and over tables that are broken on purpose.
 
 mod broken_tables;
+mod cia402_dictionary;
 mod cip_codes;
 mod cip_dictionary;
 mod cip_program;

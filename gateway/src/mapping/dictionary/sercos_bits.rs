@@ -2,8 +2,8 @@
 
 use profile_sercos::wire::idn::Idn;
 
+use super::documents::Trust;
 use super::sercos::SercosDictionary;
-use super::sercos_terms::Trust;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::format::{FieldRow, PatternRow, SercosBitFile, ValueRow, WordRow};
@@ -172,7 +172,7 @@ fn resolve_word(row: &WordRow, dictionary: &SercosDictionary, resolver: &mut Res
         );
         return None;
     }
-    let trust = dictionary.terms.trust(&row.source, &row.confidence, resolver);
+    let trust = dictionary.terms.documents.trust(&row.source, &row.confidence, resolver);
     let mut idns = Vec::with_capacity(row.idns.len());
     for name in &row.idns {
         let Some(idn) = dictionary.idn_or_error("idns", name, resolver) else { continue };
@@ -285,7 +285,7 @@ fn resolve_field(
         parts,
         values: Vec::with_capacity(row.values.len()),
         codes,
-        trust: dictionary.terms.trust_or(own, &word.trust, resolver),
+        trust: dictionary.terms.documents.trust_or(own, &word.trust, resolver),
         note: row.note.clone().unwrap_or_default(),
     };
     for value in &row.values {
@@ -309,7 +309,7 @@ fn resolve_value(
     FieldValue {
         value: *row.value.get_ref(),
         name: row.name.clone(),
-        trust: dictionary.terms.trust_or(own, &field.trust, resolver),
+        trust: dictionary.terms.documents.trust_or(own, &field.trust, resolver),
         note: row.note.clone().unwrap_or_default(),
     }
 }
@@ -335,7 +335,7 @@ fn resolve_pattern(
     let value = FieldValue {
         value,
         name: row.name.clone(),
-        trust: dictionary.terms.trust_or(own, &word.trust, resolver),
+        trust: dictionary.terms.documents.trust_or(own, &word.trust, resolver),
         note: row.note.clone().unwrap_or_default(),
     };
     Some(Pattern { bits: (low, high), value })

@@ -2,8 +2,8 @@
 
 use profile_sercos::wire::idn::Idn;
 
+use super::documents::Trust;
 use super::sercos::SercosDictionary;
-use super::sercos_terms::Trust;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::format::{SercosCodeFile, SercosCodesRow, SercosRangeRow};
@@ -129,7 +129,7 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
         field: row.field.as_ref().map(|field| field.get_ref()).map(|[first, last]| (*first, *last)),
         codes: Vec::with_capacity(row.codes.len()),
         groups: Vec::with_capacity(row.ranges.len()),
-        trust: dictionary.terms.trust(&row.source, &row.confidence, resolver),
+        trust: dictionary.terms.documents.trust(&row.source, &row.confidence, resolver),
         note: row.note.clone().unwrap_or_default(),
     };
     for code in &row.codes {
@@ -145,7 +145,7 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
         set.codes.push(NamedCode {
             code: number,
             name: code.name.get_ref().clone(),
-            trust: dictionary.terms.trust_or(own, &set.trust, resolver),
+            trust: dictionary.terms.documents.trust_or(own, &set.trust, resolver),
             note: code.note.clone().unwrap_or_default(),
         });
     }
@@ -191,7 +191,7 @@ fn resolve_group(
         last,
         kind,
         name: row.name.clone(),
-        trust: dictionary.terms.trust_or(own, &set.trust, resolver),
+        trust: dictionary.terms.documents.trust_or(own, &set.trust, resolver),
         note: row.note.clone().unwrap_or_default(),
     })
 }

@@ -3,7 +3,8 @@
 use profile_sercos::wire::attribute::{Attribute, Format};
 use profile_sercos::wire::idn::Idn;
 
-use super::sercos_terms::{Confidence, SercosTerms};
+use super::documents::Confidence;
+use super::sercos_terms::SercosTerms;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::format::{IdnRow, Name, SercosIdnFile};
@@ -205,7 +206,7 @@ fn resolve_idn(
             "expected the clause of IEC 61800-7-204, got none",
         );
     }
-    let trust = terms.trust(&row.source, &row.confidence, resolver);
+    let trust = terms.documents.trust(&row.source, &row.confidence, resolver);
     let format = match &row.format {
         Some(name) => Some(resolver.word("format", name, IdnFormat::NAMED)?),
         None => None,
@@ -332,7 +333,7 @@ fn cyclic(row: &IdnRow, terms: &SercosTerms, resolver: &mut Resolver<'_>) -> [St
     }
     [("at", &keys.at), ("mdt", &keys.mdt)].map(|(key, source)| match source {
         Some(source) => {
-            let _ = terms.families(source, key, resolver);
+            let _ = terms.documents.families(source, key, resolver);
             source.get_ref().clone()
         }
         None => String::new(),

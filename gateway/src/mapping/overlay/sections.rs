@@ -60,6 +60,18 @@ const SERCOS_TERMS: &[Section] = &[
     section("group", &["group"]),
 ];
 
+const CIA402_OBJECTS: &[Section] = &[
+    section("source", &["key"]),
+    section("unit", &["unit"]),
+    nested("object", &["index"], const { &[section("subs", &["sub"])] }),
+];
+
+const CIA402_SETS: &[Section] = &[nested(
+    "enumeration",
+    &["name"],
+    const { &[section("codes", &["code", "name"]), RANGES, section("classes", &["from", "name"])] },
+)];
+
 const CIP_GENERIC: &[Section] = &[
     section("unit", &["unit", "quantity"]),
     section("displacement_unit", &["enumeration", "code"]),
@@ -110,6 +122,8 @@ pub fn sections(table: &str) -> &'static [Section] {
         "sercos-idns" | "sercos-communication" => const { &[section("idn", &["idn"])] },
         "sercos-bits" => const { &[nested("word", &["name", "layout"], FIELDS)] },
         "sercos-codes" => const { &[nested("enumeration", &["name"], CODES)] },
+        "cia402-objects" => CIA402_OBJECTS,
+        "cia402-codes" => CIA402_SETS,
         "cip-generic" => CIP_GENERIC,
         "generic-sercos" => GENERIC_SERCOS,
         _ => &[],
