@@ -112,8 +112,7 @@ fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>>
         let name = key.get_ref().as_ref();
         if !names.contains(&name) {
             let problem = Problem::new(code::UNKNOWN_TABLE, key.span()).key(name);
-            let problem =
-                problem.expected(format!("expected rows of a table, such as [[{}.parameter]]", names[12]));
+            let problem = problem.expected("expected rows of a table, such as [[generic-sercos.parameter]]");
             let close = closest(name, names.iter().copied());
             findings.push(
                 &source,
