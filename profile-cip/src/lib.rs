@@ -14,5 +14,6 @@
 #![forbid(unsafe_code)]
 
 pub mod controller;
+pub mod devicenet;
 pub mod target;
 pub mod wire;

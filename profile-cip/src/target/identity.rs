@@ -114,7 +114,7 @@ pub struct Health {
 
 /// What has become of the motion connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ownership {
+pub(crate) enum Ownership {
     /// Nobody has it.
     Free,
     /// It has timed out, and nobody has had it since.
@@ -124,7 +124,7 @@ pub(super) enum Ownership {
 }
 
 /// The Identity object as it is at this moment.
-pub(super) struct Identity<'a> {
+pub(crate) struct Identity<'a> {
     pub config: &'a IdentityConfig,
     pub health: Health,
     pub ownership: Ownership,
@@ -183,7 +183,7 @@ impl Object for Identity<'_> {
 }
 
 /// Reads the parameter of a Reset service; without one the type is 0.
-pub(super) fn reset_kind(data: &[u8]) -> Result<ResetKind, GeneralStatus> {
+pub(crate) fn reset_kind(data: &[u8]) -> Result<ResetKind, GeneralStatus> {
     match data {
         [] | [0] => Ok(ResetKind::PowerCycle),
         [1] => Ok(ResetKind::FactoryDefaults),

@@ -31,7 +31,7 @@ pub mod motion_link;
 pub mod motion_open;
 mod motion_owner;
 mod node;
-mod object;
+pub(crate) mod object;
 pub mod object_list;
 pub mod qos;
 mod refusal;

@@ -10,7 +10,7 @@ use crate::wire::{Error, Reader, Writer};
 
 /// Answer of an object to a service.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct Answer {
+pub(crate) struct Answer {
     pub status: GeneralStatus,
     pub extended: ArrayVec<u16, EXTENDED_STATUS_MAX>,
     pub data: Vec<u8>,
@@ -49,7 +49,7 @@ impl From<Result<Vec<u8>, GeneralStatus>> for Answer {
 }
 
 /// General status for malformed service data.
-pub(super) fn data_status(error: Error) -> GeneralStatus {
+pub(crate) fn data_status(error: Error) -> GeneralStatus {
     match error {
         Error::Truncated { .. } => GeneralStatus::NOT_ENOUGH_DATA,
         Error::Trailing { .. } => GeneralStatus::TOO_MUCH_DATA,
@@ -58,7 +58,7 @@ pub(super) fn data_status(error: Error) -> GeneralStatus {
 }
 
 /// An object with one instance.
-pub(super) trait Object {
+pub(crate) trait Object {
     /// Revision of the class (class attribute 1).
     const REVISION: u16;
     /// Number of the instance (class attribute 2).
@@ -101,7 +101,7 @@ pub(super) trait Object {
 }
 
 /// Runs one of the common attribute services; replies beyond `limit` bytes are refused while they grow.
-pub(super) fn serve<T: Object>(
+pub(crate) fn serve<T: Object>(
     object: &mut T,
     service: Service,
     path: &ObjectPath,

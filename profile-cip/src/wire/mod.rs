@@ -5,7 +5,7 @@
 
 pub mod attributes;
 #[cfg(test)]
-mod check;
+pub(crate) mod check;
 pub mod class1;
 pub mod cpf;
 pub mod encapsulation;
