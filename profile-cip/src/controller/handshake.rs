@@ -26,7 +26,7 @@ enum Exchange {
 
 /// An acknowledged request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Acknowledge {
+pub(crate) struct Acknowledge {
     /// The request.
     pub request: AxisControl,
     /// Response Status; 0 is success.
@@ -35,7 +35,7 @@ pub(super) struct Acknowledge {
 
 /// The handshake of one axis.
 #[derive(Debug, Clone)]
-pub(super) struct Handshake {
+pub(crate) struct Handshake {
     exchange: Exchange,
     next: Option<AxisControl>,
     response: AxisControl,

@@ -30,7 +30,7 @@ pub mod failure;
 mod fault_reader;
 mod following;
 mod format;
-mod handshake;
+pub(crate) mod handshake;
 pub mod limits;
 mod link;
 pub mod misbehaviour;

@@ -16,5 +16,9 @@ pub mod access;
 pub mod connection;
 pub mod fragmentation;
 pub mod link;
+pub mod master;
 pub mod slave;
 pub mod wire;
+
+#[cfg(test)]
+mod tests;

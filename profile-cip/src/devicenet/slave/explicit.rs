@@ -71,7 +71,11 @@ pub(super) fn path_of<'a>(request: &Request<'a>) -> Result<(ObjectPath, &'a [u8]
     Ok((ObjectPath { attribute: Some(u16::from(*attribute)), ..path }, data))
 }
 
-fn serve<T: Object>(object: &mut T, request: &Request<'_>, reply: &mut Body) -> Result<(), ServiceError> {
+pub(super) fn serve<T: Object>(
+    object: &mut T,
+    request: &Request<'_>,
+    reply: &mut Body,
+) -> Result<(), ServiceError> {
     let (path, data) = path_of(request)?;
     let Answer { status, data, .. } = object::serve(object, request.service, &path, data, EXPLICIT_MAX);
     if status != GeneralStatus::SUCCESS {
@@ -81,7 +85,7 @@ fn serve<T: Object>(object: &mut T, request: &Request<'_>, reply: &mut Body) -> 
     append(reply, &data)
 }
 
-fn append(reply: &mut Body, data: &[u8]) -> Result<(), ServiceError> {
+pub(super) fn append(reply: &mut Body, data: &[u8]) -> Result<(), ServiceError> {
     reply.try_extend_from_slice(data).map_err(|_| GeneralStatus::REPLY_DATA_TOO_LARGE.into())
 }
 

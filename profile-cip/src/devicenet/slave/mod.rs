@@ -17,7 +17,9 @@ pub mod application;
 pub mod event;
 mod explicit;
 mod io;
+pub mod motion_drive;
 mod objects;
+pub mod speed_drive;
 
 use std::collections::VecDeque;
 

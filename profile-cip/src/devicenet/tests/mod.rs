@@ -1,0 +1,4 @@
+//! Master and slaves together on a bus in virtual time.
+
+mod motion;
+mod rig;
