@@ -1,11 +1,15 @@
 //! The explicit messages of the master to one slave: one request at a time, in fragments where it has to be.
 //!
-//! A request is sent, and once more after the time-out; then it has no answer. Its XID tells its answer from a late one to
+//! A request is sent, and once more after the time-out; then it has no answer. The time-out is longer than a server needs to
+//! send a fragment twice, so that the two never repeat themselves into each other; on the unconnected port, where nothing is
+//! fragmented, it is one second. Its XID tells its answer from a late one to
 //! the request before.
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::super::fragmentation::{Body, EXPLICIT_MAX, ExplicitReceiver, ExplicitSender};
+use super::super::fragmentation::{
+    ACKNOWLEDGE_TIMEOUT, Body, EXPLICIT_MAX, ExplicitReceiver, ExplicitSender,
+};
 use super::super::link::Refusal;
 use super::super::wire::explicit::UNFRAGMENTED_MAX;
 use super::super::wire::{
@@ -129,6 +133,14 @@ impl Client {
         self.outcome = Some(outcome);
     }
 
+    /// How long to wait for an answer.
+    const fn patience(&self) -> DurationNs {
+        match self.way {
+            Way::Connected => self.timeout,
+            Way::Unconnected => ACKNOWLEDGE_TIMEOUT,
+        }
+    }
+
     fn header(&self, fragmented: bool) -> u8 {
         Header { fragmented, xid: self.xid, mac: self.master }.byte()
     }
@@ -156,7 +168,7 @@ impl Client {
             self.due = true;
         }
         if core::mem::take(&mut self.due) {
-            self.deadline = Some(now + self.timeout);
+            self.deadline = Some(now + self.patience());
             self.receiver.reset();
             if self.body.len() <= UNFRAGMENTED_MAX {
                 let mut data = FrameData::from_iter([self.header(false)]);

@@ -5,7 +5,7 @@ use profile_generic::can::timing::{BitRate, Bits, Shape};
 use profile_generic::time::DurationNs;
 
 use super::super::connection::{ConnectionKind, TIMEOUT_MULTIPLIER};
-use super::super::fragmentation::{IO_FRAGMENT_MAX, IO_MAX, IO_UNFRAGMENTED_MAX};
+use super::super::fragmentation::{ACKNOWLEDGE_TIMEOUT, IO_FRAGMENT_MAX, IO_MAX, IO_UNFRAGMENTED_MAX};
 use super::super::wire::{AllocationChoice, MacId};
 
 /// Most slaves: every MAC ID but the master's.
@@ -172,7 +172,8 @@ pub struct MasterConfig {
     pub rate: DataRate,
     /// Time from one poll to the next.
     pub cycle: DurationNs,
-    /// Time to wait for the answer to an explicit request before it is sent once more, and then given up.
+    /// Time to wait for the answer to a request on an explicit connection before it is sent once more, and then given up:
+    /// more than the 2 s after which a server gives up a response in fragments.
     pub explicit_timeout: DurationNs,
     /// Time after which a slave that is missing, lost or refuses is asked again.
     pub retry: DurationNs,
@@ -188,13 +189,15 @@ pub enum ConfigError {
     /// The cycle is no time, or more than a second.
     #[error("cycle: expected more than 0 and at most 1 s, got {0}")]
     Cycle(DurationNs),
-    /// A time is not above 0.
-    #[error("{what}: expected more than 0, got {got}")]
+    /// A time is too short.
+    #[error("{what}: expected more than {above}, got {got}")]
     Time {
         /// Which one.
         what: &'static str,
         /// What it is.
         got: DurationNs,
+        /// What it has to be above.
+        above: DurationNs,
     },
     /// Two nodes have this MAC ID.
     #[error("MAC ID {0} is given twice")]
@@ -258,7 +261,7 @@ pub enum ConfigError {
 }
 
 impl MasterConfig {
-    /// A master without slaves, with the usual times: one second for answers and between attempts.
+    /// A master without slaves, with the usual times: 2.5 s for answers, one second between attempts.
     #[must_use]
     pub fn new(mac: MacId, vendor: u16, serial: u32, rate: DataRate, cycle: DurationNs) -> Self {
         Self {
@@ -267,7 +270,7 @@ impl MasterConfig {
             serial,
             rate,
             cycle,
-            explicit_timeout: DurationNs::from_secs(1),
+            explicit_timeout: DurationNs::from_millis(2500),
             retry: DurationNs::from_secs(1),
             bus_off_reset: false,
             slaves: Vec::new(),
@@ -293,10 +296,12 @@ impl MasterConfig {
         if self.cycle <= DurationNs::ZERO || self.cycle > DurationNs::from_secs(1) {
             return Err(ConfigError::Cycle(self.cycle));
         }
-        for (what, got) in [("time for an explicit answer", self.explicit_timeout), ("retry", self.retry)] {
-            if got <= DurationNs::ZERO {
-                return Err(ConfigError::Time { what, got });
-            }
+        let times = [
+            ("time for an explicit answer", self.explicit_timeout, ACKNOWLEDGE_TIMEOUT * 2),
+            ("retry", self.retry, DurationNs::ZERO),
+        ];
+        if let Some((what, got, above)) = times.into_iter().find(|(_, got, above)| got <= above) {
+            return Err(ConfigError::Time { what, got, above });
         }
         let mut seen = [false; MacId::COUNT];
         for mac in core::iter::once(self.mac).chain(self.slaves.iter().map(|slave| slave.mac)) {

@@ -58,6 +58,7 @@ impl ExplicitRequest {
 
 /// How a request ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(clippy::large_enum_variant, reason = "an answer is moved a few times; boxing it would allocate")]
 pub enum Outcome {
     /// Done; the data of the response.
     Done(Body),

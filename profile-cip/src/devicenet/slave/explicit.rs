@@ -10,7 +10,7 @@ use super::super::link::Refusal;
 use super::super::wire::allocation::{ALLOCATE, CLASS_DEVICENET, RELEASE};
 use super::super::wire::explicit::{ERROR_RESPONSE, UNFRAGMENTED_MAX};
 use super::super::wire::{
-    AcknowledgeStatus, Fragment, FragmentKind, Header, Identifier, MacId, Request, Response,
+    AcknowledgeStatus, BodyFormat, Fragment, FragmentKind, Header, Identifier, MacId, Request, Response,
 };
 use super::Slave;
 use super::allocation::NOT_ON_UNCONNECTED_PORT;
@@ -121,7 +121,8 @@ impl<A: Application> Slave<A> {
                 expected: 0,
             }));
         }
-        let request = Request::parse(self.config.body_format, body).map_err(malformed)?;
+        // The format that the answer to an allocation names is that of the explicit connection.
+        let request = Request::parse(BodyFormat::CLASS_8_INSTANCE_8, body).map_err(malformed)?;
         let mut reply = Body::new();
         let allocates = matches!(request.service.0, ALLOCATE | RELEASE)
             && (request.class, request.instance) == (u16::from(CLASS_DEVICENET), 1);

@@ -209,7 +209,7 @@ impl SpeedDrive {
     }
 
     /// Whether a bit of the command counts: in the extended assemblies it says so itself.
-    fn from_net(&self, bit: SpeedControl, setting: bool) -> bool {
+    fn is_networked(&self, bit: SpeedControl, setting: bool) -> bool {
         if self.config.output.is_extended() { self.command.control.contains(bit) } else { setting }
     }
 
@@ -218,7 +218,7 @@ impl SpeedDrive {
         let control = self.command.control;
         let runs = (control.contains(SpeedControl::RUN_FORWARD), control.contains(SpeedControl::RUN_REVERSE));
         match runs {
-            _ if !self.from_net(SpeedControl::NET_CONTROL, self.settings.net_control) => 0,
+            _ if !self.is_networked(SpeedControl::NET_CONTROL, self.settings.net_control) => 0,
             (true, false) => 1,
             (false, true) => -1,
             _ => 0,
@@ -231,7 +231,7 @@ impl SpeedDrive {
 
     /// The speed that is wanted, nanounits a second.
     fn reference(&self) -> i64 {
-        if !self.from_net(SpeedControl::NET_REFERENCE, self.settings.net_reference) {
+        if !self.is_networked(SpeedControl::NET_REFERENCE, self.settings.net_reference) {
             return 0;
         }
         let speed = i64::from(self.command.speed) * self.direction();
@@ -334,7 +334,7 @@ impl SpeedDrive {
             SupervisorState::ENABLED | SupervisorState::STOPPING | SupervisorState::FAULT_STOP
         );
         let forward = self.actual.velocity.0 > 0 || self.actual.velocity.0 == 0 && self.direction() >= 0;
-        let net_reference = self.from_net(SpeedControl::NET_REFERENCE, self.settings.net_reference);
+        let net_reference = self.is_networked(SpeedControl::NET_REFERENCE, self.settings.net_reference);
         let off = self.actual.velocity.0.saturating_sub(self.reference()).abs();
         let near = off <= nano(AT_REFERENCE_RPM, 0) / 60;
         let mut status = SpeedStatus::empty();
@@ -347,7 +347,7 @@ impl SpeedDrive {
         let ready =
             matches!(state, SupervisorState::READY | SupervisorState::ENABLED | SupervisorState::STOPPING);
         status.set(SpeedStatus::READY, ready);
-        let net_control = self.from_net(SpeedControl::NET_CONTROL, self.settings.net_control);
+        let net_control = self.is_networked(SpeedControl::NET_CONTROL, self.settings.net_control);
         status.set(SpeedStatus::CONTROL_FROM_NET, net_control);
         status.set(SpeedStatus::REFERENCE_FROM_NET, net_reference);
         status.set(SpeedStatus::AT_REFERENCE, state == SupervisorState::ENABLED && near);
