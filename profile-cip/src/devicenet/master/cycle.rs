@@ -74,6 +74,10 @@ impl Master {
     ) -> Result<(), Refusal> {
         let station = &mut self.stations[place];
         let exchanging = station.phase == Phase::Exchange;
+        if station.phase == Phase::Rates {
+            // A connection speaks as soon as it has its rate, which may be before the last one has.
+            return Err(Refusal::NotForUs(identifier));
+        }
         let mac = station.config.mac;
         let end = station.ends.iter_mut().find(|end| end.config.kind == kind);
         let Some(end) = end.filter(|_| exchanging) else { return Err(Refusal::NoConnection(identifier)) };

@@ -9,6 +9,7 @@ use profile_generic::fault::FaultCause;
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
+use super::io::Terminal;
 use crate::devicenet::master::Master;
 use crate::devicenet::master::config::{DataRate, MasterConfig, SlaveConfig as Planned};
 use crate::devicenet::master::event::Event;
@@ -73,6 +74,7 @@ pub enum Node {
     Master(Master),
     Motion(Slave<MotionDrive>),
     Speed(Slave<SpeedDrive>),
+    Terminal(Slave<Terminal>),
     /// Says nothing by itself, and hears nothing.
     Dumb,
 }
@@ -84,6 +86,7 @@ impl Node {
             Self::Master(node) => node.handle_frame(now, frame),
             Self::Motion(node) => node.handle_frame(now, frame),
             Self::Speed(node) => node.handle_frame(now, frame),
+            Self::Terminal(node) => node.handle_frame(now, frame),
             Self::Dumb => Ok(()),
         };
     }
@@ -93,6 +96,7 @@ impl Node {
             Self::Master(node) => node.poll(now),
             Self::Motion(node) => node.poll(now),
             Self::Speed(node) => node.poll(now),
+            Self::Terminal(node) => node.poll(now),
             Self::Dumb => None,
         }
     }
@@ -102,6 +106,7 @@ impl Node {
             Self::Master(node) => node.wake_at(),
             Self::Motion(node) => node.wake_at(),
             Self::Speed(node) => node.wake_at(),
+            Self::Terminal(node) => node.wake_at(),
             Self::Dumb => None,
         }
     }
@@ -143,6 +148,7 @@ impl Net {
             Node::Master(node) => node.start(now),
             Node::Motion(node) => node.start(now),
             Node::Speed(node) => node.start(now),
+            Node::Terminal(node) => node.start(now),
             Node::Dumb => {}
         }
         self.nodes.push(node);
@@ -192,6 +198,13 @@ impl Net {
         }
     }
 
+    pub fn terminal(&mut self, node: usize) -> &mut Slave<Terminal> {
+        match &mut self.nodes[node] {
+            Node::Terminal(slave) => slave,
+            _ => panic!("no terminal"),
+        }
+    }
+
     /// Puts a frame on the bus as `node`, whatever the node thinks.
     pub fn inject(&mut self, node: usize, identifier: Identifier, data: &[u8]) {
         let frame = Frame::new(identifier.can(), data).unwrap();
@@ -234,6 +247,11 @@ impl Net {
                         self.log.push((now, who, event.to_string()));
                     }
                 }
+                Node::Terminal(node) => {
+                    while let Some(event) = node.poll_event() {
+                        self.log.push((now, who, event.to_string()));
+                    }
+                }
                 Node::Dumb => {}
             }
         }
@@ -248,11 +266,12 @@ impl Net {
                         trace.push((at, frame));
                     }
                 }
-                Output::State { station, state, .. } if state == State::BusOff => {
+                Output::State { station, state: State::BusOff, .. } => {
                     match &mut self.nodes[station.index()] {
                         Node::Master(node) => node.handle_bus_off(self.now),
                         Node::Motion(node) => node.handle_bus_off(self.now),
                         Node::Speed(node) => node.handle_bus_off(self.now),
+                        Node::Terminal(node) => node.handle_bus_off(self.now),
                         Node::Dumb => {}
                     }
                 }
