@@ -7,6 +7,7 @@
 //! * [`drive`]: words, states and modes of CiA 402, for both roles.
 //! * [`master`]: the network's master: boot-up, configuration, SYNC and PDOs, supervision.
 //! * [`node`]: a device, with a simulated drive behind it.
+//! * [`plan`]: whether the bus can carry it all.
 //!
 //! Everything here is sans-IO: frames and the time go in as arguments, frames and events come out. Nothing opens a socket, reads a
 //! clock or logs. CiA 301, 302, 305, 306 and 402 are not public; facts come from implementations and vendor manuals, and each
@@ -21,5 +22,6 @@ pub mod eds;
 pub mod lss;
 pub mod master;
 pub mod node;
+pub mod plan;
 pub mod sdo;
 pub mod wire;

@@ -89,6 +89,7 @@ pub struct Kernel {
     writable: Vec<PathBuf>,
     limit: Duration,
     user: u32,
+    environment: Vec<(&'static str, OsString)>,
 }
 
 impl Default for Kernel {
@@ -102,7 +103,14 @@ impl Kernel {
     #[must_use]
     pub fn new() -> Self {
         let (interfaces, limit) = (vec!["vcan0".to_owned()], Duration::from_secs(60));
-        Self { interfaces, modules: Vec::new(), writable: Vec::new(), limit, user: 0 }
+        Self {
+            interfaces,
+            modules: Vec::new(),
+            writable: Vec::new(),
+            limit,
+            user: 0,
+            environment: Vec::new(),
+        }
     }
 
     /// With these interfaces instead: `vcan0`, or `vxcan0:vxcan1` for the two ends of a cable.
@@ -133,6 +141,13 @@ impl Kernel {
     #[must_use]
     pub fn user(mut self, id: u32) -> Self {
         self.user = id;
+        self
+    }
+
+    /// With this in the environment of a test that goes [inside](Kernel::inside).
+    #[must_use]
+    pub fn environment(mut self, name: &'static str, value: &OsStr) -> Self {
+        self.environment.push((name, value.to_owned()));
         self
     }
 
@@ -179,6 +194,7 @@ impl Kernel {
         }
         let mut command = Command::new(std::env::current_exe().expect("the test knows its own path"));
         command.args([name, "--exact", "--nocapture", "--test-threads=1"]);
+        command.envs(self.environment.iter().map(|(name, value)| (name, value)));
         let finished = self.run(&command);
         let said = format!("{}\n{}", finished.stdout, finished.stderr);
         assert!(finished.status == 0, "inside the CAN kernel:\n{said}");

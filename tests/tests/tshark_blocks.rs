@@ -541,7 +541,7 @@ fn actual_blocks(cases: &mut Vec<Case>) {
 
 fn record(cases: &[Case], name: &str) -> PathBuf {
     let mut writer =
-        Writer::new(Vec::new(), ["192.0.2.2", "none", "not used"]).expect("memory can be written");
+        Writer::new(Vec::new(), ["192.0.2.2", "none", "not used"], &[]).expect("memory can be written");
     let mut synthesizer = Synthesizer::new();
     for (number, case) in (1_u16..).zip(cases) {
         let mut buffer = [0; 1472];

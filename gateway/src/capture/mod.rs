@@ -4,11 +4,14 @@
 //! [`synth`] puts the headers around their payloads that the network had there, so that any protocol analyser
 //! dissects the file.
 
+pub mod can;
 pub mod reader;
 pub mod recorder;
 pub mod synth;
 pub mod writer;
 
+#[cfg(test)]
+mod tshark_can_tests;
 #[cfg(test)]
 mod tshark_tests;
 
@@ -25,20 +28,33 @@ pub enum Side {
     /// Towards the drives, on one of the two SERCOS ports: interfaces 1 and 2. A frame that goes out there and one
     /// that comes in look the same in the file; the order tells.
     South(Port),
+    /// Towards the drives, on a CAN bus, from 0, below [`CAN_BUSES_MAX`]: interfaces 3 and up, in files that have them.
+    Can(u8),
 }
 
+/// CAN buses that a recording can have.
+pub const CAN_BUSES_MAX: usize = 8;
+
+const CAN_NAMES: [&str; CAN_BUSES_MAX] =
+    ["can bus 1", "can bus 2", "can bus 3", "can bus 4", "can bus 5", "can bus 6", "can bus 7", "can bus 8"];
+
 impl Side {
-    /// All of them, in the order of their interface numbers.
-    pub const ALL: [Self; 3] = [Self::North, Self::South(Port::One), Self::South(Port::Two)];
+    /// Those of Ethernet, which every file has, in the order of their interface numbers.
+    pub const ETHERNET: [Self; 3] = [Self::North, Self::South(Port::One), Self::South(Port::Two)];
+
+    /// How many there are.
+    pub(crate) const COUNT: usize = Self::ETHERNET.len() + CAN_BUSES_MAX;
+
+    /// All that a file with so many CAN buses has, in the order of their interface numbers.
+    pub fn all(can: usize) -> impl Iterator<Item = Self> {
+        let buses = (0..can.min(CAN_BUSES_MAX)).filter_map(|bus| u8::try_from(bus).ok().map(Self::Can));
+        Self::ETHERNET.into_iter().chain(buses)
+    }
 
     /// The interface number in files this box writes.
     #[must_use]
-    pub const fn number(self) -> u32 {
-        match self {
-            Self::North => 0,
-            Self::South(Port::One) => 1,
-            Self::South(Port::Two) => 2,
-        }
+    pub fn number(self) -> u32 {
+        u32::try_from(self.index()).unwrap_or(u32::MAX)
     }
 
     /// The interface name in files this box writes.
@@ -48,21 +64,29 @@ impl Side {
             Self::North => "north",
             Self::South(Port::One) => "sercos port 1",
             Self::South(Port::Two) => "sercos port 2",
+            Self::Can(bus) => CAN_NAMES[can_index(bus)],
         }
     }
 
     /// The one with this name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|side| side.name() == name)
+        Self::all(CAN_BUSES_MAX).find(|side| side.name() == name)
     }
 
-    /// Its place in [`Side::ALL`].
+    /// Its place in [`Side::all`].
     pub(crate) const fn index(self) -> usize {
         match self {
             Self::North => 0,
             Self::South(Port::One) => 1,
             Self::South(Port::Two) => 2,
+            Self::Can(bus) => Self::ETHERNET.len() + can_index(bus),
         }
     }
+}
+
+/// Place of a bus; one beyond the last counts as that.
+const fn can_index(bus: u8) -> usize {
+    let bus = bus as usize;
+    if bus < CAN_BUSES_MAX { bus } else { CAN_BUSES_MAX - 1 }
 }

@@ -14,8 +14,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use profile_generic::can::Frame;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::can::{self, RECORD_LEN_MAX};
 use super::synth::{DATAGRAM_LEN_MAX, SEGMENT_LEN_MAX, Synthesizer};
 use super::writer::Writer;
 use super::{FRAME_LEN_MAX, Side};
@@ -25,7 +27,7 @@ use crate::sys::clock::KernelTime;
 pub const FILE_LEN_MAX_DEFAULT: u64 = 4 << 30;
 
 /// Interfaces of a file.
-const SIDES: usize = Side::ALL.len();
+const SIDES: usize = Side::COUNT;
 
 /// How long the writer thread sleeps when it has nothing to do.
 const IDLE: Duration = Duration::from_millis(2);
@@ -39,6 +41,8 @@ pub struct Settings {
     pub north: String,
     /// Descriptions of the two SERCOS ports in the file, such as the names of their network interfaces.
     pub south: [String; 2],
+    /// Descriptions of the CAN buses, such as the names of their network interfaces; none that are not here are recorded.
+    pub can: Vec<String>,
     /// Records each tap can hold until the writer thread takes them; each takes about 1.5 KiB.
     pub depth: usize,
     /// Bytes of the file at which recording ends; what comes after counts as dropped.
@@ -53,6 +57,7 @@ impl Settings {
             path: path.to_owned(),
             north: "EtherNet/IP".to_owned(),
             south: ["SERCOS III".to_owned(), "SERCOS III".to_owned()],
+            can: Vec::new(),
             depth: 1024,
             file_len_max: FILE_LEN_MAX_DEFAULT,
         }
@@ -105,6 +110,13 @@ impl Tap {
     /// A whole Ethernet frame, cut to [`FRAME_LEN_MAX`].
     pub fn frame(&mut self, at: KernelTime, side: Side, frame: &[u8]) {
         self.push(at, Kind::Frame(side), frame.get(..FRAME_LEN_MAX).unwrap_or(frame));
+    }
+
+    /// A frame of a CAN bus.
+    pub fn can_frame(&mut self, at: KernelTime, bus: u8, frame: &Frame) {
+        let mut record = [0; RECORD_LEN_MAX];
+        let len = can::emit(frame, &mut record);
+        self.push(at, Kind::Frame(Side::Can(bus)), &record[..len]);
     }
 
     /// The payload of a UDP datagram with its type-of-service octet.
@@ -175,7 +187,8 @@ impl Recorder {
     pub fn start(settings: Settings, taps: usize) -> io::Result<(Self, Vec<Tap>)> {
         let file = File::create(&settings.path)?;
         let [one, two] = &settings.south;
-        let writer = Writer::new(file, [&settings.north, one, two])?;
+        let can: Vec<&str> = settings.can.iter().map(String::as_str).collect();
+        let writer = Writer::new(file, [&settings.north, one, two], &can)?;
         let dropped = Arc::new([const { AtomicU64::new(0) }; SIDES]);
         let mut queues = Vec::with_capacity(taps);
         let mut ends = Vec::with_capacity(taps);
@@ -245,7 +258,7 @@ impl Task {
         if let Some(error) = self.failed {
             return Err(error);
         }
-        for (index, side) in Side::ALL.into_iter().enumerate() {
+        for (index, side) in Side::all(self.writer.can_buses()).enumerate() {
             self.writer.statistics(side, last, self.written[index] + dropped[index], dropped[index])?;
         }
         self.writer.finish()?;
@@ -262,7 +275,11 @@ impl Task {
 
     fn write(&mut self, record: &Record) {
         let side = record.kind.side();
-        if self.failed.is_some() || self.writer.bytes_written() >= self.limit {
+        let described = match side {
+            Side::Can(bus) => usize::from(bus) < self.writer.can_buses(),
+            _ => true,
+        };
+        if !described || self.failed.is_some() || self.writer.bytes_written() >= self.limit {
             count(&self.dropped, side);
             return;
         }
@@ -312,6 +329,19 @@ mod tests {
         }
         std::fs::remove_file(path).unwrap();
         frames
+    }
+
+    #[test]
+    fn frames_of_a_can_bus_have_an_interface_of_their_own() {
+        let path = path("can");
+        let settings = Settings { can: vec!["can0".to_owned()], ..Settings::new(&path) };
+        let (recorder, mut taps) = Recorder::start(settings, 1).unwrap();
+        let id = profile_generic::can::Id::Standard(0x181);
+        taps[0].can_frame(KernelTime(5), 0, &Frame::new(id, &[1, 2, 3]).unwrap());
+        // The recording knows of one bus only.
+        taps[0].can_frame(KernelTime(6), 1, &Frame::new(id, &[1]).unwrap());
+        assert_eq!(recorder.finish().unwrap(), Summary { frames: 1, dropped: 1 });
+        assert_eq!(frames(&path), [(3, 5, 11)]);
     }
 
     #[test]

@@ -41,7 +41,7 @@ const LIST_IDENTITY: [u8; 24] = *b"\x63\0\0\0\0\0\0\0\0\0\0\0axisbrdg\0\0\0\0";
 const REGISTER_SESSION: [u8; 28] = *b"\x65\0\x04\0\0\0\0\0\0\0\0\0axisbrdg\0\0\0\0\x01\0\0\0";
 
 fn recording() -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), ["192.0.2.2", "in-process", "not used"]).unwrap();
+    let mut writer = Writer::new(Vec::new(), ["192.0.2.2", "in-process", "not used"], &[]).unwrap();
     let mut synth = Synthesizer::new();
     let mut time = 1_800_000_000_000_000_123;
     let mut frames = Vec::new();

@@ -1,4 +1,4 @@
-//! Writes pcapng files with one interface for each side and SERCOS port of the box and nanosecond time stamps.
+//! Writes pcapng files with one interface for each side, SERCOS port and CAN bus of the box and nanosecond time stamps.
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
@@ -12,8 +12,10 @@ use pcap_file::pcapng::blocks::interface_statistics::{InterfaceStatisticsBlock, 
 use pcap_file::pcapng::blocks::section_header::{SectionHeaderBlock, SectionHeaderOption};
 use pcap_file::pcapng::{PcapNgBlock, PcapNgWriter};
 use pcap_file::{DataLink, Endianness, PcapError};
+use profile_generic::can::Frame;
 
-use super::{FRAME_LEN_MAX, Side};
+use super::can::{self, RECORD_LEN_MAX};
+use super::{CAN_BUSES_MAX, FRAME_LEN_MAX, Side};
 use crate::sys::clock::KernelTime;
 
 /// Time stamps count units of 10^-9 s (`if_tsresol`).
@@ -23,14 +25,16 @@ const RESOLUTION_NS: u8 = 9;
 pub struct Writer<W: Write> {
     inner: PcapNgWriter<BufWriter<W>>,
     bytes: u64,
+    /// CAN buses it has.
+    can: usize,
 }
 
 impl<W: Write> Writer<W> {
-    /// Writes the headers: the program, and the interfaces of [`Side::ALL`], each described as given.
+    /// Writes the headers: the program, the interfaces of [`Side::ETHERNET`] and one for each CAN bus, each described as given.
     ///
     /// # Errors
     /// What the destination says.
-    pub fn new(destination: W, descriptions: [&str; Side::ALL.len()]) -> io::Result<Self> {
+    pub fn new(destination: W, descriptions: [&str; Side::ETHERNET.len()], can: &[&str]) -> io::Result<Self> {
         let program = concat!("axisbridge ", env!("CARGO_PKG_VERSION"));
         let section = SectionHeaderBlock {
             endianness: Endianness::Little,
@@ -38,11 +42,16 @@ impl<W: Write> Writer<W> {
             ..SectionHeaderBlock::default()
         };
         let inner = PcapNgWriter::with_section_header(BufWriter::new(destination), section).map_err(to_io)?;
-        let mut writer = Self { inner, bytes: 0 };
-        for (side, description) in Side::ALL.into_iter().zip(descriptions) {
+        let mut writer = Self { inner, bytes: 0, can: can.len().min(CAN_BUSES_MAX) };
+        let all = Side::all(can.len()).zip(descriptions.into_iter().chain(can.iter().copied()));
+        for (side, description) in all {
+            let (linktype, snaplen) = match side {
+                Side::Can(_) => (DataLink::CAN_SOCKETCAN, RECORD_LEN_MAX),
+                _ => (DataLink::ETHERNET, FRAME_LEN_MAX),
+            };
             let interface = InterfaceDescriptionBlock {
-                linktype: DataLink::ETHERNET,
-                snaplen: u32::try_from(FRAME_LEN_MAX).unwrap_or(0),
+                linktype,
+                snaplen: u32::try_from(snaplen).unwrap_or(0),
                 options: vec![
                     InterfaceDescriptionOption::IfName(Cow::Borrowed(side.name())),
                     InterfaceDescriptionOption::IfDescription(Cow::Borrowed(description)),
@@ -54,10 +63,32 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
+    /// CAN buses that the file has.
+    #[must_use]
+    pub const fn can_buses(&self) -> usize {
+        self.can
+    }
+
+    /// Writes one frame of a CAN bus.
+    ///
+    /// # Errors
+    /// What the destination says; a bus that the file has not.
+    pub fn can_frame(
+        &mut self,
+        bus: u8,
+        at: KernelTime,
+        frame: &Frame,
+        comment: Option<&str>,
+    ) -> io::Result<()> {
+        let mut record = [0; RECORD_LEN_MAX];
+        let len = can::emit(frame, &mut record);
+        self.frame(Side::Can(bus), at, &record[..len], comment)
+    }
+
     /// Writes one frame, cut to [`FRAME_LEN_MAX`], with an optional comment that analysers show beside it.
     ///
     /// # Errors
-    /// What the destination says.
+    /// What the destination says; a CAN bus that the file has not.
     pub fn frame(
         &mut self,
         side: Side,
@@ -65,6 +96,12 @@ impl<W: Write> Writer<W> {
         frame: &[u8],
         comment: Option<&str>,
     ) -> io::Result<()> {
+        if let Side::Can(bus) = side
+            && usize::from(bus) >= self.can
+        {
+            let text = format!("the recording has {} CAN buses, expected one with number {bus}", self.can);
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        }
         let kept = frame.get(..FRAME_LEN_MAX).unwrap_or(frame);
         let options =
             comment.map(|text| EnhancedPacketOption::Comment(Cow::Borrowed(text))).into_iter().collect();
@@ -139,7 +176,7 @@ mod tests {
 
     #[test]
     fn statistics_carry_the_time_high_half_first() {
-        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"], &[]).unwrap();
         writer.statistics(Side::South(Port::One), KernelTime(0x0102_0304_0506_0708), 9, 2).unwrap();
         let file = writer.finish().unwrap();
         // Block type 5, interface 1, then the time.
@@ -152,7 +189,7 @@ mod tests {
 
     #[test]
     fn the_bytes_written_are_those_of_the_file() {
-        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"], &[]).unwrap();
         writer.frame(Side::North, KernelTime(1), &[7; 61], Some("text")).unwrap();
         let bytes = writer.bytes_written();
         let file = writer.finish().unwrap();
@@ -162,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_frame_longer_than_the_limit_keeps_its_length_on_record() {
-        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"]).unwrap();
+        let mut writer = Writer::new(Vec::new(), ["a", "b", "c"], &[]).unwrap();
         writer.frame(Side::North, KernelTime(1), &[7; 2000], None).unwrap();
         let file = writer.finish().unwrap();
         let mut reader = crate::capture::reader::Reader::new(file.as_slice()).unwrap();

@@ -46,7 +46,7 @@ struct Recording {
 
 impl Recording {
     fn new() -> Self {
-        let writer = Writer::new(Vec::new(), ["north", "sercos port 1", "not used"]).unwrap();
+        let writer = Writer::new(Vec::new(), ["north", "sercos port 1", "not used"], &[]).unwrap();
         Self { writer, synth: Synthesizer::new(), at: 1_000_000_000 }
     }
 

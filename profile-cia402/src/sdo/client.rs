@@ -510,7 +510,11 @@ impl Client {
 
     fn end_block_upload(&mut self, unused: u8, crc: u16) -> Step {
         let tail = self.tail.take().unwrap_or_default();
-        self.append(&tail[..SEGMENT_LEN - usize::from(unused.min(7))])?;
+        // A last segment of which nothing counts would not have been sent: some servers (durand 0.5) say so of one that is full.
+        // The size that was told decides; the CRC judges it.
+        let full = u32::try_from(self.bytes().len() + SEGMENT_LEN).is_ok_and(|size| self.size == Some(size));
+        let unused = if full { 0 } else { usize::from(unused.min(7)) };
+        self.append(&tail[..SEGMENT_LEN - unused])?;
         if self.crc && crc16(0, self.bytes()) != crc {
             return Err(protocol(AbortCode::CRC));
         }

@@ -8,7 +8,7 @@ use crate::capture::Side;
 use crate::capture::writer::Writer;
 
 fn written() -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), ["192.0.2.1", "in-process", "not used"]).unwrap();
+    let mut writer = Writer::new(Vec::new(), ["192.0.2.1", "in-process", "not used"], &[]).unwrap();
     writer.frame(Side::North, KernelTime(1_800_000_000_000_000_007), &[1; 61], None).unwrap();
     writer
         .frame(Side::South(Port::One), KernelTime(1_800_000_000_001_000_000), &[2; 60], Some("phase 2"))
