@@ -1,12 +1,13 @@
-//! The pages on what the box does of CIP Motion and of SERCOS name tests; each of them has to exist.
+//! The pages on what the box does of CIP Motion, SERCOS and CANopen name tests; each of them has to exist.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A page in `docs/` and how many tests it names at least: fewer are a page that is not read rightly.
-const PAGES: [(&str, &str, usize); 2] = [
+const PAGES: [(&str, &str, usize); 3] = [
     ("compliance-cip-motion.md", include_str!("../../docs/compliance-cip-motion.md"), 150),
     ("sercos.md", include_str!("../../docs/sercos.md"), 150),
+    ("canopen.md", include_str!("../../docs/canopen.md"), 60),
 ];
 
 /// What stands between backquotes and looks like `file.rs::function`.

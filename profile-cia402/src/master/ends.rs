@@ -40,8 +40,11 @@ pub struct Consumer<'a> {
     pub data: &'a [u8],
     /// Only in `Good` are cyclic data those of this cycle.
     pub state: ConsumerState,
-    /// Whether values came since the last SYNC.
+    /// Whether values came since the last SYNC. In a network without SYNC, whether any came in operation and no deadline has passed
+    /// since.
     pub fresh: bool,
+    /// When they came; `None` before the first ones in operation.
+    pub at: Option<MonotonicTime>,
     /// Whether they came after the synchronous window.
     pub late: bool,
     /// TPDOs in a row that were due and did not come.
@@ -58,6 +61,7 @@ pub(super) struct TpdoEnd {
     data: [u8; DATA_MAX],
     state: ConsumerState,
     fresh: bool,
+    at: Option<MonotonicTime>,
     late: bool,
     missed: u32,
     allowed: u32,
@@ -96,6 +100,7 @@ impl TpdoEnd {
             data: [0; DATA_MAX],
             state: ConsumerState::Waiting,
             fresh: false,
+            at: None,
             late: false,
             missed: 0,
             allowed: u32::from(pdo.allowed_losses),
@@ -127,6 +132,7 @@ impl TpdoEnd {
             data: &self.data[..self.len],
             state: self.state,
             fresh: self.fresh,
+            at: self.at,
             late: self.late,
             missed: self.missed,
         }
@@ -137,7 +143,7 @@ impl TpdoEnd {
         self.state = ConsumerState::Waiting;
         (self.fresh, self.late, self.missed, self.syncs) = (false, false, 0, 0);
         (self.frames, self.doubles) = (0, 0);
-        self.deadline = None;
+        (self.at, self.deadline) = (None, None);
         self.length_told = false;
     }
 
@@ -155,6 +161,7 @@ impl TpdoEnd {
         self.state = ConsumerState::Good;
         (self.fresh, self.late, self.missed, self.syncs) = (true, late, 0, 0);
         self.length_told = false;
+        self.at = Some(now);
         self.deadline = (self.longest > DurationNs::ZERO).then(|| now + self.longest);
         if self.every == 1 && self.frames > 1 && self.doubles + 1 >= DOUBLES_MAX {
             return Taken::Double;
@@ -358,6 +365,7 @@ mod tests {
         end.start(ms(0));
         assert_eq!((end.elapsed(ms(99)), end.elapsed(ms(100))), ((false, false), (true, false)));
         end.take(ms(150), &[0; 2], false);
+        assert_eq!((end.view().at, end.view().fresh), (Some(ms(150)), true));
         assert_eq!(
             (end.deadline(), end.elapsed(ms(250)), end.elapsed(ms(350))),
             (Some(ms(250)), (true, false), (true, true))

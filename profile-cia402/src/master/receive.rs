@@ -236,10 +236,9 @@ impl Master {
                 Ok(())
             }
             Ok(false) => {
-                // What was given up may still be answered, once; and in operation somebody else may ask, a service tool for one.
+                // In operation somebody else may ask, a service tool for one.
                 let again = head.is_some() && head == station.last_answer;
-                let coming_up = station.state != BootState::Operational;
-                if !core::mem::take(&mut station.late_answer) && again && coming_up {
+                if again && station.state != BootState::Operational {
                     station.strays = station.strays.saturating_add(1);
                     if station.strays >= STRAYS_MAX {
                         self.duplicate(now, index, DuplicateSign::Answers);

@@ -34,7 +34,7 @@ impl Master {
                 station.nmt = (!keep).then_some(NmtCommand::RESET_COMMUNICATION);
                 (station.status, station.kept, station.heartbeat) = (None, false, None);
                 station.signs.clear();
-                (station.strays, station.late_answer) = (0, false);
+                (station.strays, station.last_answer) = (0, None);
                 station.deadline = Some(now + config.boot_up_time);
                 station.give_up = (config.boot_time > DurationNs::ZERO)
                     .then(|| now + config.boot_up_time + config.boot_time);
@@ -52,7 +52,13 @@ impl Master {
                 station.nmt = Some(NmtCommand::STOP);
                 station.deadline = Some(now + config.retry_time);
             }
-            BootState::Configure => station.give_up = None,
+            BootState::Configure => {
+                station.give_up = None;
+                // It was not reset, and may be in any state.
+                if node.keep_alive {
+                    station.nmt = Some(NmtCommand::ENTER_PRE_OPERATIONAL);
+                }
+            }
             BootState::Await => {
                 station.give_up = None;
                 if kept {
@@ -222,7 +228,10 @@ impl Master {
     pub(super) fn collect(&mut self, now: MonotonicTime, index: usize) {
         let station = &mut self.stations[index];
         let Some(outcome) = station.client.take_outcome() else { return };
-        station.late_answer |= matches!(outcome.result, Err(SdoFailure::Timeout { .. }));
+        if matches!(outcome.result, Err(SdoFailure::Timeout { .. })) {
+            // What was given up may still be answered, which is no second answer.
+            station.last_answer = None;
+        }
         // The configured bytes of a step go back to where they came from.
         let plain = ReportRow::new(station.state, &outcome);
         let Some((step, outcome)) = self.give_back(index, outcome) else { return };

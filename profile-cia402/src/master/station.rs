@@ -102,9 +102,7 @@ pub(super) struct Station {
     pub heartbeat: Option<NmtState>,
     pub heartbeat_deadline: Option<MonotonicTime>,
     pub boot_up_at: Option<MonotonicTime>,
-    /// An answer may still come for a transfer that was given up.
-    pub late_answer: bool,
-    /// Command and object of the last answer that was asked for.
+    /// Command and object of the last answer that was asked for, unless one may still come that was given up.
     pub last_answer: Option<[u8; 4]>,
     /// Answers that came twice.
     pub strays: u8,
@@ -147,7 +145,6 @@ impl Station {
             heartbeat: None,
             heartbeat_deadline: None,
             boot_up_at: None,
-            late_answer: false,
             last_answer: None,
             strays: 0,
             signs: ArrayVec::new(),

@@ -186,6 +186,38 @@ fn a_device_whose_answer_comes_after_the_time_out_is_asked_again() {
 }
 
 #[test]
+fn a_device_that_becomes_slow_is_not_taken_for_two() {
+    let mut rig = rig(network(1));
+    // Its first answer comes in time, every other one after its time-out.
+    rig.device(1).mute = true;
+    rig.master.start(rig.now);
+    rig.until("identify", |rig| rig.state(1) == BootState::Identify);
+    rig.hear(Id::Standard(0x581), &[0x43, 0, 0x10, 0, 0x92, 1, 2, 0]).unwrap();
+    assert_eq!(rig.master.node(id(1)).unwrap().device_type, Some(0x0002_0192));
+    rig.device(1).mute = false;
+    rig.device(1).answer_time = DurationNs::from_millis(600);
+    rig.run_ms(8_000);
+    assert!(rig.master.statistics().refused(Refusal::Unexpected) >= 3);
+    assert_eq!(rig.count(|event| matches!(event, Event::DuplicateNode { .. })), 0, "{:?}", rig.log);
+    rig.device(1).answer_time = DurationNs::from_millis(1);
+    rig.comes_up(&[1]);
+}
+
+#[test]
+fn a_device_that_keeps_another_identifier_than_it_was_given_is_found_out() {
+    let mut rig = rig(network(2));
+    rig.master.start(rig.now);
+    let valid = |rig: &Rig| CobId(rig.devices[0].objects.number(Mux::new(0x1800, 1)));
+    rig.until("switched off", |rig| !valid(rig).is_valid());
+    rig.until("switched on", |rig| valid(rig).is_valid());
+    rig.device(1).objects.set(Mux::new(0x1800, 1), 0x4000_0182);
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    let step = "map read 1800:01: expected 0x40000181, got 0x40000182";
+    assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, step.into()));
+    rig.comes_up(&[2]);
+}
+
+#[test]
 fn a_device_that_is_switched_on_late_comes_in() {
     let mut rig = rig(network(2));
     rig.device(1).dead = true;
@@ -389,4 +421,20 @@ fn a_device_in_operation_may_stay_so() {
     assert_eq!(rig.failed().1, "map read 1A00:01: expected 0x60410010, got 0x60610010");
     rig.run_ms(1);
     assert_eq!(rig.device(1).state, NmtState::STOPPED);
+}
+
+#[test]
+fn a_device_that_does_not_tell_its_state_is_taken_out_of_operation_to_be_configured() {
+    let mut rig = running(1);
+    let mut config = network(1);
+    config.nodes[0].keep_alive = true;
+    rig.master = Master::new(config).unwrap();
+    // It does not tell that it is in operation.
+    rig.device(1).no_heartbeat = true;
+    rig.master.start(rig.now);
+    rig.until("await", |rig| rig.state(1) == BootState::Map);
+    assert_eq!(rig.device(1).state, NmtState::PRE_OPERATIONAL);
+    rig.device(1).no_heartbeat = false;
+    rig.comes_up(&[1]);
+    assert!(rig.saw(&Event::AwaitingApplication { node: id(1), kept: false }));
 }
