@@ -306,6 +306,8 @@ impl DictionaryPart {
 enum Simulate {
     /// A line of simulated SERCOS III drives on a network interface.
     SercosDrive(SercosDriveArguments),
+    /// A simulated CiA 402 drive on a CAN interface.
+    CanDrive(CanDriveArguments),
     /// A CIP Motion controller that configures, enables and moves the axes of a device.
     Controller(ControllerArguments),
 }
@@ -328,6 +330,26 @@ struct SercosDriveArguments {
     /// Addresses of the drives that slide instead of turning, separated by commas.
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     linear: Vec<u16>,
+    /// End by itself after this many seconds.
+    #[arg(long, value_name = "N")]
+    seconds: Option<u64>,
+}
+
+/// Arguments of `simulate can-drive`.
+#[derive(Debug, Args)]
+struct CanDriveArguments {
+    /// The CAN interface, such as can0; its bit rate is set already.
+    #[arg(long, value_name = "IF")]
+    interface: String,
+    /// Node-id; without one the drive waits until LSS gives it one.
+    #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
+    node: Option<u8>,
+    /// How many axes the drive has.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
+    axes: u8,
+    /// Where to write the drive's electronic data sheet.
+    #[arg(long, value_name = "FILE")]
+    eds: Option<PathBuf>,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
@@ -392,6 +414,7 @@ pub fn main() -> ExitCode {
         Command::Snapshot(arguments) => snapshot::run(&arguments),
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
+        Command::Simulate(Simulate::CanDrive(arguments)) => simulate::can_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),
     };
     match result {

@@ -7,16 +7,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use arrayvec::ArrayVec;
+use profile_cia402::wire::NodeId;
 use profile_generic::scaling::UnitKind;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
-use super::{CliError, ControllerArguments, SercosDriveArguments, script, signal};
+use super::{CanDriveArguments, CliError, ControllerArguments, SercosDriveArguments, script, signal};
 use crate::mapping::Mapping;
+use crate::simulate::can_drive;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::drives;
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
+use crate::sys::can_socket::{self, CanSocket};
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
 use crate::sys::realtime;
 
@@ -68,6 +71,33 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         if refused.is_empty() { String::new() } else { format!(" ({refused})") }
     ));
     drives::run(&mut drives, &sockets, &stop)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A simulated CiA 402 drive on a CAN interface.
+pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
+    let node = arguments.node.map(NodeId::new).transpose()?;
+    let mut drive = can_drive::drive(node, arguments.axes)?;
+    if let Some(path) = &arguments.eds {
+        std::fs::write(path, drive.eds()).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    let mut socket = CanSocket::open(&arguments.interface, &can_socket::Options::default())?;
+    let stop = signal::stop_on_signals()?;
+    if let Some(seconds) = arguments.seconds {
+        end_after(Arc::clone(&stop), seconds);
+    }
+    // Without real-time scheduling the drive answers later; nothing else changes.
+    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), ..realtime::Request::default() };
+    let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    let mut progress = Progress::new(false);
+    progress.step(&format!(
+        "a drive with {} on {}, {}{}",
+        if arguments.axes == 1 { "one axis".into() } else { format!("{} axes", arguments.axes) },
+        arguments.interface,
+        node.map_or("waiting for a node-id".into(), |node| format!("node {node}")),
+        if refused.is_empty() { String::new() } else { format!(" ({refused})") }
+    ));
+    can_drive::run(&mut drive, &mut socket, &stop)?;
     Ok(ExitCode::SUCCESS)
 }
 

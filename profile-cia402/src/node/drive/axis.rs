@@ -558,11 +558,13 @@ impl Axis {
             }
             State::FaultReactionActive => {
                 let option = FaultReactionOption(self.option(dictionary, index::FAULT_REACTION_OPTION));
+                let runs = matches!(self.actual.report, ServoReport::Operating | ServoReport::Halted);
                 match (self.actual.fault, option.stop()) {
                     // The servo does what it must by itself.
                     (Some(_), _) => return ServoCommand { control: ServoControl::Disable, ..off },
-                    (None, None | Some(Stop::Disable)) => return off,
-                    (None, Some(stop)) => self.brake(stop, span, dictionary),
+                    (None, Some(stop)) if runs && stop != Stop::Disable => self.brake(stop, span, dictionary),
+                    // A fault never gives torque to an axis that has none.
+                    _ => return off,
                 }
             }
             _ => return off,
@@ -739,7 +741,7 @@ impl Axis {
         self.motion = Motion { position, velocity: i64::try_from(change).unwrap_or(0) };
         self.limited = clipped || i128::from(position) != wanted;
         self.follows = !clipped;
-        self.monitor.target = Some(self.segment.to);
+        self.monitor.target = i64::try_from(wanted).ok();
         position
     }
 
@@ -967,6 +969,8 @@ impl Axis {
         let [negative, positive, home, manufacturer] = self.inputs();
         let velocity = scales.velocity_object(actual.velocity.0);
         let speed = |servo: i64| scales.velocity_sign() * scales.speed.counts(servo);
+        let leads = matches!(self.mode, Mode::TORQUE | Mode::CYCLIC_TORQUE) && self.brake.is_none();
+        let torque = if leads { self.torque } else { actual.torque.0 };
         let rated = self.servo.parameters().rated_current.0.max(1);
         let wrap = |count: i64| i64::from(i32::from_le_bytes(low_half(count)));
         let values = [
@@ -980,7 +984,7 @@ impl Axis {
             (index::CONTROL_EFFORT, scales.velocity_object(self.motion.velocity)),
             (index::VL_VELOCITY_DEMAND, speed(self.motion.velocity)),
             (index::VL_VELOCITY_ACTUAL, speed(actual.velocity.0)),
-            (index::TORQUE_DEMAND, self.torque / TORQUE),
+            (index::TORQUE_DEMAND, torque / TORQUE),
             (index::TORQUE_ACTUAL, actual.torque.0 / TORQUE),
             (index::CURRENT_ACTUAL, actual.current.0.saturating_mul(1_000) / rated),
             (index::DC_LINK_VOLTAGE, actual.bus_voltage.0 / 1_000),

@@ -138,9 +138,11 @@ impl Application for Device {
             | index::VELOCITY_FACTOR
             | index::ACCELERATION_FACTOR
             | index::VL_DIMENSION_FACTOR => {
-                let mut changed = dictionary.clone();
-                changed.set(mux.index, mux.sub, number);
-                let scales = Scales::read(&changed, mux.index - index);
+                let offset = mux.index - index;
+                let scales = Scales::of(|other, sub| {
+                    let is_it = (other, sub) == (index, mux.sub);
+                    if is_it { number } else { dictionary.number(other + offset, sub) }
+                });
                 scales.map(|_| ()).ok_or(AbortCode::PARAMETER)
             }
             _ => Ok(()),

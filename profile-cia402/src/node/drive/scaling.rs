@@ -78,7 +78,11 @@ impl Scales {
 
     /// The scales that the objects of an axis ask for; `None` when they make none.
     pub fn read(dictionary: &Dictionary, offset: u16) -> Option<Self> {
-        let number = |index: u16, sub| dictionary.number(index + offset, sub);
+        Self::of(|index, sub| dictionary.number(index + offset, sub))
+    }
+
+    /// The scales that these numbers make, by the index that an object of the first axis has.
+    pub fn of(number: impl Fn(u16, u8) -> i64) -> Option<Self> {
         let ratio = |upper: (u16, u8), lower: (u16, u8)| {
             Ratio::new(number(upper.0, upper.1), number(lower.0, lower.1))
         };

@@ -1,6 +1,8 @@
 //! Network management, heartbeats, SYNC, PDOs and errors of a device.
 
 use super::*;
+use crate::sdo::client::{Client, ClientConfig};
+use crate::sdo::request::{Method, SdoData, SdoFailure, SdoOutcome, SdoRequest};
 
 #[test]
 fn a_device_boots_and_tells_its_state() {
@@ -329,4 +331,48 @@ fn a_node_id_comes_by_lss() {
     assert_eq!(rig.read(0x1018, 4), Ok(77));
     rig.send(0x7E5, &[0; 7]);
     assert_eq!(rig.node.statistics().malformed, 1);
+}
+
+/// A master's client and the device, frame by frame.
+fn transfer(rig: &mut Rig, request: SdoRequest) -> SdoOutcome {
+    let mut client = Client::new(ClientConfig::default());
+    client.start(rig.now, request).expect("a free client");
+    for _ in 0..100_000 {
+        if let Some(outcome) = client.take_outcome() {
+            return outcome;
+        }
+        while let Some(frame) = client.poll(rig.now) {
+            rig.send(0x605, &frame);
+        }
+        for answer in rig.take_of(0x585) {
+            client.handle(rig.now, &answer).expect("eight bytes");
+        }
+    }
+    panic!("no end");
+}
+
+/// The data sheet out of 1021h, and a long value into 2FFEh and back: in segments and in blocks.
+#[test]
+fn long_values_go_both_ways() {
+    for method in [Method::Segments, Method::Blocks] {
+        let mut rig = Rig::new(1);
+        rig.take();
+        let eds = rig.node.eds().to_vec();
+        let request = SdoRequest::upload_into(Mux::new(0x1021, 0), Vec::with_capacity(eds.len())).by(method);
+        assert_eq!(transfer(&mut rig, request).data.as_slice(), eds);
+        let bytes: Vec<_> = (0..4_000_u32).map(|number| number.to_le_bytes()[0]).collect();
+        let scratch = Mux::new(0x2FFE, 0);
+        let outcome =
+            transfer(&mut rig, SdoRequest::download(scratch, SdoData::Buffer(bytes.clone())).by(method));
+        assert_eq!(outcome.result, Ok(()));
+        let outcome =
+            transfer(&mut rig, SdoRequest::upload_into(scratch, Vec::with_capacity(5_000)).by(method));
+        assert_eq!(outcome.data.as_slice(), bytes);
+        let outcome =
+            transfer(&mut rig, SdoRequest::download(scratch, SdoData::Buffer(vec![0; 5_000])).by(method));
+        assert_eq!(outcome.result, Err(SdoFailure::Refused(AbortCode::TOO_LONG)));
+        let outcome =
+            transfer(&mut rig, SdoRequest::upload_into(scratch, Vec::with_capacity(5_000)).by(method));
+        assert_eq!(outcome.data.as_slice(), bytes, "as before");
+    }
 }

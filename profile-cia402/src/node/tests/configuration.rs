@@ -164,3 +164,32 @@ fn the_data_sheet_tells_every_object() {
     }
     insta::assert_snapshot!(String::from_utf8(Rig::new(1).node.eds().to_vec()).unwrap());
 }
+
+/// The reader of data sheets finds nothing odd in it, and the same objects, axes and PDOs.
+#[test]
+fn the_data_sheet_reads_as_the_device_is() {
+    for axes in [1, 3, 8] {
+        let mut rig = Rig::new(axes);
+        let reading = crate::eds::read(rig.node.eds()).unwrap();
+        assert!(reading.diagnostics.is_empty(), "{:?}", reading.diagnostics.list().first());
+        let description = reading.description;
+        assert!(description.is_drive());
+        let found = description.axes();
+        assert_eq!(found.len(), axes);
+        assert!(found.iter().all(|axis| axis.modes == Some(0x3EF)));
+        for (direction, first) in [
+            (crate::eds::drive::Direction::Receive, 0x1400),
+            (crate::eds::drive::Direction::Transmit, 0x1800),
+        ] {
+            let pdos = description.pdos(direction, NODE);
+            assert_eq!(pdos.len(), 4 * axes);
+            for pdo in pdos {
+                assert!(pdo.is_changeable() && pdo.cob_id_writable && pdo.transmission_writable);
+                let word = rig.read(first + pdo.number, 1).unwrap();
+                assert_eq!(pdo.valid, word >> 31 == 0, "{:x}", first + pdo.number);
+                let count = rig.read(first + pdo.number + 0x200, 0).unwrap();
+                assert_eq!(pdo.mapping.len(), usize::try_from(count).unwrap());
+            }
+        }
+    }
+}

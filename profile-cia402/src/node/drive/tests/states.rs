@@ -229,3 +229,22 @@ fn without_voltage_nothing_is_switched_on() {
     rig.node.application_mut().axes_mut()[0].set_main_power(true);
     assert!(rig.run_until(2_000, |rig| rig.state() == State::SwitchedOn), "as soon as there is");
 }
+
+/// A fault in a state without torque must not give any.
+#[test]
+fn a_fault_never_gives_torque_to_an_axis_that_has_none() {
+    for words in [&[][..], &[6], &[6, 7]] {
+        let mut rig = Rig::new(1);
+        for &number in words {
+            word(&mut rig, number);
+            rig.run(5);
+        }
+        rig.set(0x2FFF, 1, 0x9000).unwrap();
+        for _ in 0..20 {
+            rig.run(1);
+            let report = rig.node.application().axes()[0].actual().report;
+            assert_eq!(report, profile_generic::state::Report::Ready, "{words:?}");
+        }
+        assert_eq!(rig.state(), State::Fault);
+    }
+}
