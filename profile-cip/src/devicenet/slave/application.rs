@@ -78,7 +78,7 @@ pub trait Application {
     fn health(&self) -> Health;
 
     /// Whether the device may be started anew now, by the Reset service of the Identity object.
-    fn permits_reset(&mut self) -> bool;
+    fn permits_reset(&mut self, now: MonotonicTime) -> bool;
 
     /// The device starts anew.
     fn reset(&mut self);

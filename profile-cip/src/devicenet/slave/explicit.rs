@@ -237,7 +237,7 @@ impl<A: Application> Slave<A> {
         reply: &mut Body,
     ) -> Result<(), ServiceError> {
         match request.class {
-            CLASS_IDENTITY => self.serve_identity(request, reply),
+            CLASS_IDENTITY => self.serve_identity(now, request, reply),
             CLASS_MESSAGE_ROUTER => {
                 let exists = |one: &&super::Connection| one.state() != ConnectionState::NON_EXISTENT;
                 let active = u16::try_from(self.connections.iter().filter(exists).count()).unwrap_or(0);
@@ -254,10 +254,15 @@ impl<A: Application> Slave<A> {
         }
     }
 
-    fn serve_identity(&mut self, request: &Request<'_>, reply: &mut Body) -> Result<(), ServiceError> {
+    fn serve_identity(
+        &mut self,
+        now: MonotonicTime,
+        request: &Request<'_>,
+        reply: &mut Body,
+    ) -> Result<(), ServiceError> {
         if request.service == Service::RESET && request.instance == 1 {
             let kind = reset_kind(request.data)?;
-            if !self.application.permits_reset() {
+            if !self.application.permits_reset(now) {
                 return Err(GeneralStatus::DEVICE_STATE_CONFLICT.into());
             }
             self.application.reset();

@@ -521,9 +521,9 @@ impl Application for MotionDrive {
         Health { state, ..Health::default() }
     }
 
-    fn permits_reset(&mut self) -> bool {
+    fn permits_reset(&mut self, now: MonotonicTime) -> bool {
         let token = self.token();
-        let reply = self.request(MonotonicTime::ZERO, MotionRequest::PrepareReset(token));
+        let reply = self.request(now, MotionRequest::PrepareReset(token));
         matches!(reply, Some(MotionReply::ResetPrepared { granted: true, .. }))
     }
 

@@ -83,7 +83,7 @@ impl Application for Terminal {
         Health::default()
     }
 
-    fn permits_reset(&mut self) -> bool {
+    fn permits_reset(&mut self, _: MonotonicTime) -> bool {
         true
     }
 

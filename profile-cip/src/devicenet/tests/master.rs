@@ -382,6 +382,23 @@ fn an_explicit_answer_that_is_lost_is_asked_for_once_more_and_then_given_up() {
 }
 
 #[test]
+fn the_xid_of_every_request_is_another_than_that_of_the_one_before() {
+    let mut net = two();
+    net.run_for(100);
+    net.trace = Some(Vec::new());
+    for _ in 0..4 {
+        net.master().submit(mac(9), ExplicitRequest::get(1, 1, 1)).unwrap();
+    }
+    net.run_for(50);
+    let asked = Identifier::ExplicitRequest(mac(9)).can();
+    let trace = net.trace.take().unwrap();
+    let headers: Vec<u8> =
+        trace.iter().filter(|(_, frame)| frame.id() == asked).map(|(_, frame)| frame.data()[0]).collect();
+    assert_eq!(headers.len(), 4);
+    assert!(headers.windows(2).all(|pair| pair[0] ^ pair[1] == 0x40), "{headers:02x?}");
+}
+
+#[test]
 fn explicit_answers_that_cannot_be_read() {
     let mut net = two();
     net.run_for(100);

@@ -195,3 +195,31 @@ fn three_drives_and_one_that_fails() {
     assert_eq!(net.motion(1).application().axis_state(), AxisState::Running);
     insta::assert_snapshot!(net.text());
 }
+
+#[test]
+fn a_slave_that_is_given_back_while_its_axis_runs_has_no_torque_and_no_fault() {
+    let (mut net, controllers) = stopped(&[(5, SetPoint::Velocity(0.0), Watched::Velocity)]);
+    enable(&mut net, &controllers);
+    controllers[0].borrow_mut().end.set(SetPoint::Velocity(1e6)).unwrap();
+    run(&mut net, &controllers, 200);
+    let now = net.now;
+    net.master().stop(now);
+    net.run_for(5);
+    assert_eq!(net.motion(1).application().axis_state(), AxisState::Initializing, "{}", net.text());
+    net.run_for(300);
+    assert_eq!(net.motion(1).application().axis_state(), AxisState::Initializing, "nobody has lost anything");
+    assert_eq!(net.motion(1).application().actual().torque.0, 0);
+}
+
+#[test]
+fn another_rate_is_another_connection() {
+    let (mut net, controllers) = stopped(&[(5, SetPoint::Velocity(0.0), Watched::Velocity)]);
+    enable(&mut net, &controllers);
+    let rate = ExplicitRequest::set(5, 2, 9, &[20, 0]).unwrap();
+    net.master().submit(mac(5), rate).unwrap();
+    run(&mut net, &controllers, 100);
+    let drive = net.motion(1).application();
+    assert_eq!(drive.device().connection().map(|connection| connection.rpi_us), Some(20_000));
+    assert_eq!(drive.axis_state(), AxisState::Initializing, "and the axis begins anew");
+    assert_eq!(drive.actual().velocity.0, 0);
+}

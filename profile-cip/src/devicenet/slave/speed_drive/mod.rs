@@ -476,7 +476,7 @@ impl Application for SpeedDrive {
         Health { state, ..Health::default() }
     }
 
-    fn permits_reset(&mut self) -> bool {
+    fn permits_reset(&mut self, _: MonotonicTime) -> bool {
         self.check_idle().is_ok()
     }
 
