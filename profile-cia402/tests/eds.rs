@@ -10,6 +10,12 @@ use profile_cia402::eds::{
     DataType, DeviceDescription, Form, Kind, Object, Reading, Refused, Setting, Severity, SubObject, Value,
     concise, read,
 };
+use profile_cia402::node::dictionary::{Access as NodeAccess, Mapping};
+use profile_cia402::node::drive::{Device, identity};
+use profile_cia402::node::{Config, Node};
+use profile_cia402::wire::cob_id::NodeId;
+use profile_generic::servo::ServoParameters;
+use profile_generic::time::DurationNs;
 use proptest::prelude::*;
 
 /// Every file of the corpus.
@@ -574,6 +580,52 @@ proptest! {
                 });
                 prop_assert!(found != left, "{wish}");
             }
+        }
+    }
+}
+
+/// The data sheet that a simulated drive carries says what the drive has.
+#[test]
+fn the_simulated_drive_carries_a_good_data_sheet() {
+    for axes in [1, 2, 8] {
+        let device = Device::new(&vec![ServoParameters::default(); axes]).expect("a device");
+        let config = Config {
+            node: NodeId::new(NODE).ok(),
+            identity: identity(axes, 1),
+            boot_time: DurationNs::from_millis(10),
+            has_blocks: true,
+        };
+        let node = Node::new(&config, device);
+        let Reading { description, diagnostics } = read(node.eds()).expect("not refused");
+        assert_eq!(diagnostics.to_string(), "", "{axes} axes");
+        assert_eq!((description.is_drive(), description.axes().len()), (true, axes));
+        assert_eq!(description.number(0x1018, 1, NODE), Some(config.identity.vendor));
+        assert_eq!(description.number(0x1018, 2, NODE), Some(config.identity.product));
+        let entries = node.dictionary().entries();
+        let described: usize = description.objects.iter().map(|object| object.subs.len()).sum();
+        assert_eq!(described, entries.len());
+        for entry in entries {
+            let mux = entry.mux();
+            let value = description.sub(mux.index, mux.sub).unwrap_or_else(|| panic!("{mux:?}"));
+            assert_eq!(value.data_type.0, entry.definition().data_type.code(), "{mux:?}");
+            assert_eq!(value.access.writes(), entry.definition().access == NodeAccess::ReadWrite, "{mux:?}");
+            let mapping = entry.definition().mapping;
+            let [receives, transmits] =
+                [value.access.receives(), value.access.transmits()].map(|may| may && value.pdo_mapping);
+            assert_eq!(receives, matches!(mapping, Mapping::Rpdo | Mapping::Both), "{mux:?}");
+            assert_eq!(transmits, matches!(mapping, Mapping::Tpdo | Mapping::Both), "{mux:?}");
+        }
+        // And a drive in csp finds its way into PDOs, axis by axis.
+        let axes = description.axes();
+        let wanted = |objects: [u16; 2]| -> Vec<Wanted> {
+            axes.iter().flat_map(|axis| objects.map(|index| Wanted::must(axis.index(index), 0))).collect()
+        };
+        let layout = derive(&description, NODE, &wanted([0x6040, 0x607A]), &wanted([0x6041, 0x6064]));
+        assert!(layout.is_usable(), "{layout:?}");
+        for axis in &axes {
+            let own =
+                |index| layout.find(Direction::Receive, axis.index(index), 0).map(|(pdo, _)| pdo.number);
+            assert_eq!(own(0x6040), own(0x607A));
         }
     }
 }

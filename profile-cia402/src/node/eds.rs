@@ -106,10 +106,12 @@ fn one_object(text: &mut String, dictionary: &Dictionary, object: &Object) -> st
 
 fn one_entry(text: &mut String, entry: &Entry) -> std::fmt::Result {
     let definition = entry.definition();
-    let access = match definition.access {
-        Access::Constant => "const",
-        Access::ReadOnly => "ro",
-        Access::ReadWrite => "rw",
+    let access = match (definition.access, definition.mapping) {
+        (Access::Constant, _) => "const",
+        (Access::ReadOnly, _) => "ro",
+        (Access::ReadWrite, Mapping::None | Mapping::Both) => "rw",
+        (Access::ReadWrite, Mapping::Tpdo) => "rwr",
+        (Access::ReadWrite, Mapping::Rpdo) => "rww",
     };
     writeln!(text, "DataType={:#06X}\nAccessType={access}", definition.data_type.code())?;
     match definition.data_type {
