@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use axisbridge_tests::peer;
-use profile_cia402::eds::{
-    DataType, DeviceDescription, Form, Object, ObjectKind, Setting, SubObject, Value, read,
-};
+use profile_cia402::eds::{DeviceDescription, Form, Object, ObjectKind, Setting, SubObject, Value, read};
 use serde_json::{Value as Json, json};
 
 /// The node that `$NODEID` stands for.
