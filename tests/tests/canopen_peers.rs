@@ -10,10 +10,14 @@ use axisbridge::sys::clock::monotonic_now;
 use axisbridge_tests::can_kernel::{Kernel, is_inside};
 use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
 use axisbridge_tests::process::Running;
+use profile_cia402::node::drive::{Device, identity};
+use profile_cia402::node::{self, Node};
 use profile_cia402::sdo::client::{Client, ClientConfig};
 use profile_cia402::sdo::request::{Method, SdoData, SdoFailure, SdoOutcome, SdoRequest};
-use profile_cia402::wire::{AbortCode, Mux};
+use profile_cia402::wire::{AbortCode, Mux, NodeId};
 use profile_generic::can::{Frame, Id};
+use profile_generic::servo::ServoParameters;
+use profile_generic::time::DurationNs;
 
 const NODE: u8 = 5;
 
@@ -82,10 +86,7 @@ impl Channel {
     fn open() -> Self {
         let answers = Filter::exactly(Id::Standard(0x580 + u16::from(NODE)));
         let socket = CanSocket::open("vcan0", &Options { filters: vec![answers], own: false }).unwrap();
-        let config = ClientConfig {
-            timeout: profile_generic::time::DurationNs::from_secs(5),
-            ..ClientConfig::default()
-        };
+        let config = ClientConfig { timeout: DurationNs::from_secs(5), ..ClientConfig::default() };
         Self { socket, client: Client::new(config) }
     }
 
@@ -175,4 +176,54 @@ fn the_two_foreign_peers_understand_each_other() {
         assert!(said.lines().any(|said| said == line), "no `{line}` in:\n{said}");
     }
     drive.says("fault -> switch on disabled");
+}
+
+/// Runs our simulated drive on the bus until a command has ended, and gives what that said.
+fn with_our_drive(mut command: Command) -> (std::process::Output, Node<Device>) {
+    let config = node::Config {
+        node: NodeId::new(NODE).ok(),
+        identity: identity(1, 0x1234_5678),
+        boot_time: DurationNs::from_millis(10),
+        has_blocks: true,
+    };
+    let device = Device::new(&[ServoParameters::default()]).unwrap();
+    let mut node = Node::new(&config, device);
+    let mut socket = CanSocket::open("vcan0", &Options::default()).unwrap();
+    let output = std::env::temp_dir().join("master.txt");
+    let file = File::create(&output).unwrap();
+    command.stdin(Stdio::null()).stdout(file.try_clone().unwrap()).stderr(file);
+    let mut master = Running::start("the master", &mut command);
+    let status = loop {
+        node.handle_time(monotonic_now());
+        while let Some(received) = socket.recv().unwrap() {
+            if let Content::Frame(frame) = received.content {
+                node.handle_frame(monotonic_now(), &frame);
+            }
+        }
+        while let Some(frame) = node.poll(monotonic_now()) {
+            socket.send(&frame).unwrap();
+        }
+        if let Some(status) = master.ended() {
+            break status;
+        }
+        let _ = socket.wait(Duration::from_millis(1)).unwrap();
+    };
+    let stdout = std::fs::read(&output).unwrap();
+    (std::process::Output { status, stdout, stderr: Vec::new() }, node)
+}
+
+#[test]
+fn our_drive_follows_a_foreign_master() {
+    let Some(python) = python_inside("our_drive_follows_a_foreign_master") else { return };
+    let mut master = Command::new(&python);
+    master.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/peers/canopen_master.py"));
+    master.args(["vcan0", "5", "--period", "0.02"]);
+    let (output, node) = with_our_drive(master);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    for line in ["type 00020192", "missing 06020000", "state 27", "error 7305", "cleared 40"] {
+        assert!(said.lines().any(|said| said == line), "no `{line}` in:\n{said}");
+    }
+    assert!(said.contains("name Axisbridge simulated CiA 402 drive"), "{said}");
+    assert_eq!(node.statistics().malformed, 0);
 }

@@ -45,6 +45,7 @@ fn options(arguments: &DecodeArguments) -> Options {
     let only = arguments.only.map(|side| match side {
         Side::Sercos => Protocol::Sercos,
         Side::Cip => Protocol::EtherNetIp,
+        Side::Can => Protocol::Can,
     });
     Options { first, last, only, ..Options::default() }
 }

@@ -213,6 +213,8 @@ enum Side {
     Sercos,
     /// EtherNet/IP, CIP and CIP Motion.
     Cip,
+    /// CAN with CANopen.
+    Can,
 }
 
 /// Arguments of `dictionary`.

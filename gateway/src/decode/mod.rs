@@ -1,10 +1,10 @@
-//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, and SERCOS
-//! III.
+//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, SERCOS III, and CANopen.
 //!
 //! A frame is understood with what came before it: TCP streams are put together, class-1 data are known by
 //! the Forward_Open that opened their connection, SERCOS telegrams by the layout that the master wrote over
-//! the service channel. So every frame is read, also those that are not printed; none is kept.
+//! the service channel, CANopen PDOs by the mapping that it wrote by SDO. So every frame is read, also those that are not printed; none is kept.
 
+mod canopen;
 mod connections;
 mod ethernet_ip;
 mod explicit;
@@ -19,14 +19,16 @@ use profile_sercos::wire::describe::{DecodeContext, Names, describe};
 use thiserror::Error;
 
 use crate::capture::Side;
+use crate::capture::can::{self, LINK_TYPE_CAN, Record};
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
 use crate::sys::clock::KernelTime;
 
+use canopen::Canopen;
 use ethernet_ip::EtherNetIp;
 use packet::Packet;
 use text::Text;
 
-/// SERCOS buses told apart by the interface they were recorded on; frames of further ones share the last
+/// SERCOS buses, and CAN buses, told apart by the interface they were recorded on; frames of further ones share the last
 /// place.
 const BUSES_MAX: usize = 8;
 
@@ -37,6 +39,8 @@ pub enum Protocol {
     EtherNetIp,
     /// SERCOS III.
     Sercos,
+    /// CAN, and CANopen on it.
+    Can,
     /// Everything else; one line tells what it is.
     Other,
 }
@@ -130,6 +134,8 @@ pub(crate) struct Decoder<'n> {
     names: &'n dyn Names,
     /// By interface; `None` for the ports of this box.
     buses: Vec<(Option<u32>, DecodeContext<'n>)>,
+    /// By interface.
+    can_buses: Vec<(u32, Canopen)>,
     ethernet_ip: EtherNetIp,
     start: Option<KernelTime>,
     text: Text,
@@ -140,6 +146,7 @@ impl<'n> Decoder<'n> {
         Self {
             names,
             buses: Vec::new(),
+            can_buses: Vec::new(),
             ethernet_ip: EtherNetIp::default(),
             start: None,
             text: Text::default(),
@@ -156,8 +163,12 @@ impl<'n> Decoder<'n> {
     pub(crate) fn frame(&mut self, frame: &Frame<'_>) -> Protocol {
         self.text.clear();
         self.heading(frame);
+        if frame.link_type == LINK_TYPE_CAN {
+            self.can(frame);
+            return Protocol::Can;
+        }
         if frame.link_type != LINK_TYPE_ETHERNET {
-            self.text.append(format_args!("link type {} is not Ethernet", frame.link_type));
+            self.text.append(format_args!("link type {} is neither Ethernet nor CAN", frame.link_type));
             return Protocol::Other;
         }
         let protocol = match packet::parse(frame.data) {
@@ -189,6 +200,24 @@ impl<'n> Decoder<'n> {
             self.text.line(1, format_args!("cut in the recording: {lost} bytes are missing"));
         }
         protocol
+    }
+
+    fn can(&mut self, frame: &Frame<'_>) {
+        let record = can::parse(frame.data);
+        match &record {
+            Ok(record) => self.text.append(format_args!("CAN {record}")),
+            Err(error) => self.text.append(format_args!("CAN, not readable: {error}")),
+        }
+        self.comment(frame);
+        let Ok(Record::Frame(content)) = record else { return };
+        let known = self.can_buses.iter().position(|(interface, _)| *interface == frame.interface);
+        let index = known.unwrap_or_else(|| {
+            if self.can_buses.len() < BUSES_MAX {
+                self.can_buses.push((frame.interface, Canopen::default()));
+            }
+            self.can_buses.len() - 1
+        });
+        self.can_buses[index].1.frame(&content, &mut self.text);
     }
 
     fn heading(&mut self, frame: &Frame<'_>) {
