@@ -27,6 +27,16 @@ pub const PROCEDURE_COMMANDS_MAX: usize = 4;
 /// Bytes of the control and of the status word.
 pub(super) const WORD_BYTES: u16 = 2;
 
+/// The most rows for reports.
+pub const REPORTS_MAX: usize = 32;
+
+/// The most rows for actions that depend on what the drive shows.
+pub const STEPS_MAX: usize = 16;
+
+/// Where the operating mode stands in the control and the status as the rows of a program see them: above the 16 bits of the
+/// word, for drives that have an octet of its own for it.
+pub const MODE_SHIFT: u32 = 16;
+
 /// The most rows for status bits.
 pub const MAX_STATUS_ROWS: usize = 32;
 
@@ -92,6 +102,16 @@ pub(super) struct ModeEntry {
     pub carried: CommandSet,
 }
 
+/// What an action writes while the drive shows something.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StepRow {
+    pub action: Action,
+    /// Bits of the status.
+    pub when: BitPattern,
+    /// Bits of the control.
+    pub control: BitPattern,
+}
+
 /// A status bit in a word of the telegram.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StatusRow {
@@ -124,10 +144,14 @@ pub struct DriveProgram {
     pub feedback: FeedbackProgram,
     /// The bits of the control word for each action.
     pub actions: ActionTable,
+    /// The same while the drive shows something; they go before.
+    pub(super) steps: ArrayVec<StepRow, STEPS_MAX>,
+    /// Octets of the operating mode in both telegrams, where the drive has such.
+    pub(super) mode_octets: Option<[u16; 2]>,
     /// What a status word says.
-    pub reports: StateTable,
+    pub reports: StateTable<REPORTS_MAX>,
     /// What it says while the drive carries out a procedure.
-    pub(super) led_reports: StateTable,
+    pub(super) led_reports: StateTable<REPORTS_MAX>,
     pub(super) procedures: ArrayVec<Procedure, PROCEDURES_MAX>,
     pub(super) modes: ArrayVec<ModeEntry, MAX_MODES>,
     pub(super) status: ArrayVec<StatusRow, MAX_STATUS_ROWS>,
@@ -163,6 +187,8 @@ impl DriveProgram {
             command: CommandProgram::new(),
             feedback: FeedbackProgram::new(),
             actions: ActionTable::new(),
+            steps: ArrayVec::new(),
+            mode_octets: None,
             reports: StateTable::new(),
             led_reports: StateTable::new(),
             procedures: ArrayVec::new(),
@@ -180,37 +206,44 @@ impl DriveProgram {
         }
     }
 
-    /// Puts a command and a control word into the master's telegram. `word` is the control word sent last;
-    /// the new one comes back. An action without bits leaves the word alone, and so does a mode without a
-    /// slot.
+    /// Puts a command and its control into the telegram to the drive. `control` is what was sent last, `status` what the
+    /// drive showed last; the new control comes back. An action without bits leaves it alone, and so does a mode that the
+    /// drive does not have.
     pub fn encode(
         &self,
         command: &AxisCommand,
         action: Action,
-        word: u16,
+        control: u32,
+        status: u32,
         telegram: &mut [u8],
         report: &mut ConversionReport,
-    ) -> u16 {
-        let word = self.control_word(action, command.selection(), word);
+    ) -> u32 {
+        let control = self.control(action, command.selection(), control, status);
+        let [low, high, mode, _] = control.to_le_bytes();
         if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
-            bytes.copy_from_slice(&word.to_le_bytes());
+            bytes.copy_from_slice(&[low, high]);
+        }
+        if let Some(octet) = self.mode_octets.and_then(|[at, _]| telegram.get_mut(usize::from(at))) {
+            *octet = mode;
         }
         self.command.encode(command, telegram, report);
-        word
+        control
     }
 
-    /// The control word after an action in a mode.
-    pub fn control_word(&self, action: Action, selection: ModeSelection, word: u16) -> u16 {
-        let word = u32::from(word);
-        let word = self.actions.apply(action, word).unwrap_or(word);
-        let slot = self.shown_in(selection).and_then(|shown| self.entry(shown));
-        let word = slot.map_or(word, |entry| entry.control.apply(word));
-        let bytes = word.to_le_bytes();
-        u16::from_le_bytes([bytes[0], bytes[1]])
+    /// The control after an action in a mode: the control word, and the operating mode above it where it has an octet of its
+    /// own.
+    pub fn control(&self, action: Action, selection: ModeSelection, control: u32, status: u32) -> u32 {
+        let step = self.steps.iter().find(|step| step.action == action && step.when.matches(status));
+        let control = match step {
+            Some(step) => step.control.apply(control),
+            None => self.actions.apply(action, control).unwrap_or(control),
+        };
+        let entry = self.shown_in(selection).and_then(|shown| self.entry(shown));
+        entry.map_or(control, |entry| entry.control.apply(control))
     }
 
     /// Takes the drive's telegram apart into report, mode, status bits and actual values. `led` is whether the drive carries
-    /// out a procedure. Returns the status word, or `None` when the telegram is too short to hold one.
+    /// out a procedure. Returns the status, or `None` when the telegram is too short to hold one.
     pub fn decode(
         &self,
         telegram: &[u8],
@@ -218,31 +251,41 @@ impl DriveProgram {
         feedback: &mut AxisFeedback,
         trackers: &mut Trackers,
         report: &mut ConversionReport,
-    ) -> Option<u16> {
-        let word = telegram.first_chunk().map(|bytes| u16::from_le_bytes(*bytes))?;
-        feedback.report = if led { self.led_report(word) } else { self.report(word) };
-        let ModeSelection { mode, interpolation } = self.mode(word).unwrap_or_default();
+    ) -> Option<u32> {
+        let status = self.status(telegram)?;
+        feedback.report = if led { self.led_report(status) } else { self.report(status) };
+        let ModeSelection { mode, interpolation } = self.mode(status).unwrap_or_default();
         (feedback.mode, feedback.interpolation) = (mode, interpolation);
         let words = self.status_words(telegram);
         let known = feedback.status.difference(self.known_status);
-        feedback.status = known.union(self.status_bits(word, &words));
+        feedback.status = known.union(self.status_bits(status, &words));
         self.feedback.decode(telegram, feedback, trackers, report);
-        Some(word)
+        Some(status)
     }
 
-    /// What a status word says; a word that no row matches says that the drive is not ready.
-    pub fn report(&self, status: u16) -> Report {
-        self.reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
+    /// The status in a telegram: the status word, and the operating mode above it where it has an octet of its own.
+    fn status(&self, telegram: &[u8]) -> Option<u32> {
+        let [low, high] = *telegram.first_chunk()?;
+        let mode = match self.mode_octets {
+            Some([_, at]) => *telegram.get(usize::from(at))?,
+            None => 0,
+        };
+        Some(u32::from_le_bytes([low, high, mode, 0]))
+    }
+
+    /// What a status says; one that no row matches says that the drive is not ready.
+    pub fn report(&self, status: u32) -> Report {
+        self.reports.decode(status).unwrap_or(Report::NotReady)
     }
 
     /// The same while the drive carries out a procedure: that it does not follow command values is right then.
-    pub fn led_report(&self, status: u16) -> Report {
-        self.led_reports.decode(u32::from(status)).unwrap_or(Report::NotReady)
+    pub fn led_report(&self, status: u32) -> Report {
+        self.led_reports.decode(status).unwrap_or(Report::NotReady)
     }
 
-    /// The operation mode that a status word reports.
-    pub fn mode(&self, status: u16) -> Option<ModeSelection> {
-        self.modes.iter().find(|entry| entry.status.matches(u32::from(status))).map(|entry| entry.selection)
+    /// The operating mode that a status shows.
+    pub fn mode(&self, status: u32) -> Option<ModeSelection> {
+        self.modes.iter().find(|entry| entry.status.matches(status)).map(|entry| entry.selection)
     }
 
     fn entry(&self, selection: ModeSelection) -> Option<&ModeEntry> {
@@ -292,10 +335,10 @@ impl DriveProgram {
         self.status_words.iter().filter_map(word).collect()
     }
 
-    /// The status bits in a status word, and in the words beside it.
-    pub fn status_bits(&self, status: u16, words: &[(Item, u32)]) -> StatusBits {
+    /// The status bits in a status, and in the words beside it.
+    pub fn status_bits(&self, status: u32, words: &[(Item, u32)]) -> StatusBits {
         let shows = |row: &&StatusRow| match row.word {
-            None => row.pattern.matches(u32::from(status)),
+            None => row.pattern.matches(status),
             Some(item) => words.iter().any(|(known, word)| *known == item && row.pattern.matches(*word)),
         };
         self.status.iter().filter(shows).fold(StatusBits::empty(), |bits, row| bits | row.bit)

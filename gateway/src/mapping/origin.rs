@@ -126,23 +126,23 @@ impl Mapping {
 
     /// The `[[report]]` row that a status word meets; `silent` as in [`super::SercosAxis`].
     #[must_use]
-    pub fn report_row(&self, status: u16, silent: bool) -> Option<Origin> {
+    pub fn report_row(&self, status: u32, silent: bool) -> Option<Origin> {
         let file = &self.tables.generic_sercos;
         let at = self.sercos.reports.iter().position(|rule| {
             rule.acknowledges.is_none_or(|wanted| wanted != silent)
                 && rule.procedure != Some(true)
-                && rule.pattern.matches(u32::from(status))
+                && rule.pattern.matches(status)
         })?;
         Some(origin(&file.text, "report", &file.rows.report.get(at)?.report))
     }
 
     /// The `[[status]]` rows that a status word and the words beside it meet; `silent` as in [`super::SercosAxis`].
     #[must_use]
-    pub fn status_rows(&self, status: u16, words: &[(Item, u32)], silent: bool) -> Vec<Origin> {
+    pub fn status_rows(&self, status: u32, words: &[(Item, u32)], silent: bool) -> Vec<Origin> {
         let file = &self.tables.generic_sercos;
         let value = |idn: Idn| match words.iter().find(|(known, _)| *known == idn.into()) {
             Some((_, word)) => Some(*word),
-            None => (idn == self.sercos.status_word).then_some(u32::from(status)),
+            None => (idn == self.sercos.status_word).then_some(status),
         };
         let rows = self.sercos.status.iter().zip(&file.rows.status).filter(|(rule, _)| {
             rule.acknowledges.is_none_or(|wanted| wanted != silent)

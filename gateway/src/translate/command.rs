@@ -113,8 +113,9 @@ impl Translator {
         let mut bytes = [0; TELEGRAM_MAX];
         let len = usize::from(axis.south.telegram.command_bytes).min(TELEGRAM_MAX);
         let mut report = ConversionReport::default();
-        let word = axis.south.encode(&command, action, state.control_word, &mut bytes[..len], &mut report);
-        (state.control_word, state.command) = (word, command);
+        let (control, status) = (state.control, state.status);
+        let word = axis.south.encode(&command, action, control, status, &mut bytes[..len], &mut report);
+        (state.control, state.command) = (word, command);
         let mut node =
             Node::new(format!("MDT of {}, connection 0, {len} bytes: {}", axis.drive, hex(&bytes[..len])));
         if !led {

@@ -49,6 +49,7 @@ impl Translator {
             node.push(Node::new(format!("expected {needed} bytes")));
             return node;
         };
+        state.status = word;
         let told = state.feedback.report;
         let machine = state.machine.get_or_insert_with(|| heard_first(told));
         let before = machine.state();

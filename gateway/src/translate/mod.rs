@@ -53,7 +53,8 @@ struct AxisState {
     /// The state of the drive; `None` before it was heard.
     machine: Option<BasicDrive>,
     action: Action,
-    control_word: u16,
+    control: u32,
+    status: u32,
     north: CipTrackers,
     south: Trackers,
     command: AxisCommand,
@@ -104,7 +105,8 @@ impl Translator {
         let states = stage.axes.iter().map(|axis| AxisState {
             machine: None,
             action: Action::TorqueOff,
-            control_word: 0,
+            control: 0,
+            status: 0,
             north: axis.north.trackers(),
             south: axis.south.feedback.trackers(),
             command: AxisCommand::default(),

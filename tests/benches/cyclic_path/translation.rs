@@ -39,7 +39,7 @@ pub struct Axis {
     command: AxisCommand,
     feedback: AxisFeedback,
     telegram: [u8; TELEGRAM_MAX],
-    control_word: u16,
+    control: u32,
     saturated: u32,
     target: SystemTime,
     swing: Vec<CommandValues>,
@@ -68,7 +68,7 @@ impl Axis {
             command: AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() },
             feedback: *axis.feedback(),
             telegram: [0; TELEGRAM_MAX],
-            control_word: 0,
+            control: 0,
             saturated: 0,
             target: rig.system(),
             swing: (0..SWING).map(values).collect(),
@@ -92,10 +92,11 @@ impl Axis {
     /// The generic command becomes bytes for the drive.
     pub fn encode(&mut self) {
         let mut report = ConversionReport::default();
-        self.control_word = self.south.encode(
+        self.control = self.south.encode(
             black_box(&self.command),
             Action::Enable,
-            self.control_word,
+            self.control,
+            0,
             &mut self.telegram,
             &mut report,
         );

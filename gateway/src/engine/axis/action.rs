@@ -1,6 +1,6 @@
 //! From the controller to the axis: actions and resets.
 
-use super::{AxisChannel, Loss, RESET_TIME_OUT, Reset, caused_by_controller};
+use super::{AxisChannel, Loss, RESET_CYCLES, RESET_TIME_OUT, Reset, caused_by_controller};
 use profile_cip::target::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::{ActiveFault, Origin};
@@ -170,6 +170,7 @@ impl AxisChannel {
     /// The drive's own fault reset is on its way.
     pub fn drive_reset_sent(&mut self) {
         self.drive_reset_wanted = false;
+        self.reset_cycles = RESET_CYCLES;
     }
 
     /// A controller has opened a connection: what the last one had caused may be forgotten once the axis is powered up.

@@ -42,10 +42,11 @@ impl AxisChannel {
         let mut conversions = ConversionReport::default();
         let led = self.procedure.leads();
         let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
-        let word = program.decode(received.data, led, &mut self.feedback, trackers, &mut conversions);
-        let Some(word) = word else { return };
-        self.shown = program.mode(word);
-        self.follows = program.report(word) == Report::Operating;
+        let status = program.decode(received.data, led, &mut self.feedback, trackers, &mut conversions);
+        let Some(status) = status else { return };
+        self.status = status;
+        self.shown = program.mode(status);
+        self.follows = program.report(status) == Report::Operating;
         if referenced && !self.feedback.status.contains(StatusBits::REFERENCED) {
             self.procedure.lose_reference();
         }

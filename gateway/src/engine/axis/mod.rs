@@ -55,6 +55,9 @@ pub const MODE_TIME_OUT: DurationNs = DurationNs::from_millis(100);
 /// How long the drive may take to clear its faults after a reset.
 pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 
+/// Cycles for which a fault reset stands in the control word: its edge counts, and a telegram or two may be lost.
+const RESET_CYCLES: u8 = 5;
+
 /// Update periods that the interpolator goes on beyond its last target before it holds and the command counts as lost.
 /// The connection's own limit for missed updates, 4 by default (class attribute Controller Update Delay High Limit), is
 /// of the same order: whichever is reached first stops the axis.
@@ -149,7 +152,11 @@ pub struct AxisChannel {
     feedback: AxisFeedback,
     /// The action whose bits stand in the control word.
     action: Action,
-    control_word: u16,
+    /// What was sent last, and what the drive showed last: words, and operating modes above them.
+    control: u32,
+    status: u32,
+    /// Cycles for which a fault reset still stands in the control word.
+    reset_cycles: u8,
     action_id: u32,
     north_action: DriveAction,
     /// How the device wants the axis stopped for a fault.
@@ -221,7 +228,9 @@ impl AxisChannel {
             trims: trim::Trims::default(),
             feedback: AxisFeedback::default(),
             action: Action::TorqueOff,
-            control_word: 0,
+            control: 0,
+            status: 0,
+            reset_cycles: 0,
             action_id: 0,
             north_action: DriveAction::None,
             abort: None,
@@ -313,7 +322,7 @@ impl AxisChannel {
         self.south = Some((program, trackers));
         self.captures.restart();
         self.action = Action::TorqueOff;
-        self.control_word = 0;
+        (self.control, self.status, self.reset_cycles) = (0, 0, 0);
     }
 
     /// The drive is gone: until it is commissioned again there is nobody to speak to.

@@ -183,10 +183,17 @@ impl AxisChannel {
         self.watch_step(now, system, before);
         let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
         let mut conversions = ConversionReport::default();
-        self.control_word = program.encode(
+        let action = match self.action {
+            _ if !self.moves => Action::TorqueOff,
+            Action::TorqueOff if self.reset_cycles > 0 => Action::ResetFault,
+            action => action,
+        };
+        self.reset_cycles = self.reset_cycles.saturating_sub(1);
+        self.control = program.encode(
             &self.command,
-            if self.moves { self.action } else { Action::TorqueOff },
-            self.control_word,
+            action,
+            self.control,
+            self.status,
             telegram,
             &mut conversions,
         );
@@ -322,7 +329,7 @@ impl AxisChannel {
                 self.enable_pending = matches!(self.north_action, DriveAction::Enable | DriveAction::Test);
             }
             Action::ResetFault => {
-                // The reset is a pulse, here a procedure command; the control word stays without torque.
+                // The reset is a pulse, of the control word or a procedure command; the axis stays without torque.
                 self.action = Action::TorqueOff;
                 self.drive_reset_wanted = true;
             }

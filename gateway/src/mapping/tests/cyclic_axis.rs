@@ -105,7 +105,7 @@ impl Chain {
         self.north.decode(&CyclicValues::from(&values), 0, &mut self.trackers, &mut command);
         let mut telegram = [0; 12];
         let mut report = ConversionReport::default();
-        self.south.encode(&command, Action::Enable, 0, &mut telegram, &mut report);
+        self.south.encode(&command, Action::Enable, 0, 0, &mut telegram, &mut report);
         // S-0-0047 follows the control word, S-0-0051 the status word.
         let mut back = [0; 12];
         back[2..6].copy_from_slice(&telegram[2..6]);

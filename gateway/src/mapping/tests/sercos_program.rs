@@ -103,7 +103,7 @@ fn commands_and_actions_become_a_telegram() {
     command.set(Signal::TorqueOffset, 250_000);
     let mut telegram = [0xA5; 18];
     let mut report = ConversionReport::default();
-    let word = program.encode(&command, Action::Enable, 0, &mut telegram, &mut report);
+    let word = program.encode(&command, Action::Enable, 0, 0, &mut telegram, &mut report);
     // 0xE000; -90 degrees within the modulo range of 512 turns: 1842300000; -600000 and 250 more; 15000000; -125.
     let expected = [
         0x00, 0xE0, 0x60, 0x44, 0xCF, 0x6D, 0x40, 0xD8, 0xF6, 0xFF, 0xFA, 0x00, 0xC0, 0xE1, 0xE4, 0x00, 0x83,
@@ -111,12 +111,12 @@ fn commands_and_actions_become_a_telegram() {
     ];
     assert_eq!((word, telegram, report.is_clean()), (0xE000, expected, true));
     command.mode = OperatingMode::Torque;
-    let word = program.encode(&command, Action::Halt, word, &mut telegram, &mut report);
+    let word = program.encode(&command, Action::Halt, word, 0, &mut telegram, &mut report);
     assert_eq!(word, 0xC200, "halt, third mode");
-    assert_eq!(program.encode(&command, Action::Disable, word, &mut telegram, &mut report), 0x6200);
-    assert_eq!(program.encode(&command, Action::TorqueOff, word, &mut telegram, &mut report), 0x0200);
-    assert_eq!(program.encode(&command, Action::None, 0xE200, &mut telegram, &mut report), 0xE200);
-    assert_eq!(program.encode(&command, Action::Reject, 0xE200, &mut telegram, &mut report), 0xE200);
+    assert_eq!(program.encode(&command, Action::Disable, word, 0, &mut telegram, &mut report), 0x6200);
+    assert_eq!(program.encode(&command, Action::TorqueOff, word, 0, &mut telegram, &mut report), 0x0200);
+    assert_eq!(program.encode(&command, Action::None, 0xE200, 0, &mut telegram, &mut report), 0xE200);
+    assert_eq!(program.encode(&command, Action::Reject, 0xE200, 0, &mut telegram, &mut report), 0xE200);
     assert_eq!(program.command_of(Action::ResetFault), Some(Idn::RESET_C1D.into()));
     assert_eq!(program.command_of(Action::Enable), None);
 }
@@ -153,7 +153,7 @@ fn status_words_say_what_the_drive_does() {
     let axis = rotary_axis(true);
     let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
     let mut text = String::new();
-    for word in (0..=0xFFFF_u16).filter(|word| word & !0xF018 == 0) {
+    for word in (0..=0xFFFF_u32).filter(|word| word & !0xF018 == 0) {
         let status: Vec<_> = StatusBits::NAMED
             .iter()
             .filter(|(bit, _)| program.status_bits(word, &[]).contains(*bit))
@@ -202,7 +202,7 @@ fn values_of_the_motor_shaft_go_through_the_gear() {
     let mut command = AxisCommand::default();
     command.set(Signal::PositionCommand, 2_000_000_000);
     let mut telegram = [0; 12];
-    program.encode(&command, Action::None, 0, &mut telegram, &mut ConversionReport::default());
+    program.encode(&command, Action::None, 0, 0, &mut telegram, &mut ConversionReport::default());
     assert_eq!(telegram[2..6], (5 * 3_600_000_i32).to_le_bytes());
 }
 
@@ -288,7 +288,7 @@ proptest! {
         let mut command = AxisCommand::default();
         command.set(Signal::PositionCommand, position);
         let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
-        program.encode(&command, Action::None, 0, &mut telegram, &mut report);
+        program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
         let mut feedback = AxisFeedback::default();
         program.decode(&telegram, false, &mut feedback, &mut program.feedback.trackers(), &mut report);
         let count = 1_000_000_000_u64.div_ceil(u64::from(resolution)).max(1);
@@ -318,7 +318,7 @@ fn modes_and_slots() {
                     write!(text, ", led in {mode}").unwrap();
                 }
             }
-            None => write!(text, "mode {}", program.control_word(Action::None, *selection, 0) >> 8).unwrap(),
+            None => write!(text, "mode {}", program.control(Action::None, *selection, 0, 0) >> 8).unwrap(),
         }
         writeln!(text, ", needs {:?}", program.needs(*selection)).unwrap();
     }
@@ -337,7 +337,7 @@ fn modes_and_slots() {
         let (idn, refused) = written.unwrap();
         let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
         let selection = ModeSelection::by_drive(OperatingMode::Position);
-        let word = program.control_word(Action::Enable, selection, 0x0100);
+        let word = program.control(Action::Enable, selection, 0x0100, 0);
         assert_eq!(program.mode(word), Some(selection), "the status word has the same bits");
         writeln!(text, "slot {}: {idn} {refused:?} {word:04X}", slots - 1).unwrap();
     }
@@ -424,7 +424,7 @@ fn class_3_bits_become_status() {
 proptest! {
     /// Whatever is asked for, only the bits of the mode and of the three switches change, and the mode is the one chosen.
     #[test]
-    fn control_words_hold_the_mode(word in any::<u16>(), mode in 0..5_usize, action in 0..Action::ALL.len()) {
+    fn control_words_hold_the_mode(word in any::<u16>().prop_map(u32::from), mode in 0..5_usize, action in 0..Action::ALL.len()) {
         let mapping = shipped();
         let modes = [
             ModeSelection::from(OperatingMode::Position),
@@ -435,7 +435,7 @@ proptest! {
         ];
         let axis = SercosAxis { modes: modes.into_iter().collect(), ..rotary_axis(false) };
         let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
-        let after = program.control_word(Action::ALL[action], modes[mode], word);
+        let after = program.control(Action::ALL[action], modes[mode], word, 0);
         prop_assert_eq!((after ^ word) & 0x18FF, 0);
         match program.procedure(modes[mode]) {
             Some(_) => prop_assert_eq!((after ^ word) & 0x0700, 0, "homing by the drive leaves the mode alone"),

@@ -266,7 +266,7 @@ fn polarities_count_once() {
             command.set(signal, value);
         }
         let (mut telegram, mut report) = ([0; 18], ConversionReport::default());
-        program.encode(&command, Action::None, 0, &mut telegram, &mut report);
+        program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
         for (place, (signal, _, _, offset)) in rows.into_iter().enumerate() {
             let sent = telegram[offset..offset + 2].to_vec();
             let negative = telegram[offset + if place == 2 { 1 } else { 3 }] & 0x80 != 0;
@@ -321,7 +321,7 @@ fn limits_of_the_drive_hold_commands_and_refuse_parameters() {
     command.set(Signal::PositionCommand, 5_000_000_000);
     command.set(Signal::VelocityCommand, 50_000_000_000);
     let (mut telegram, mut report) = ([0; 18], ConversionReport::default());
-    program.encode(&command, Action::None, 0, &mut telegram, &mut report);
+    program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
     assert_eq!(report.saturated, 1, "the velocity; limits without room between them are none");
     assert_eq!(telegram[2..6], 18_000_000_i32.to_le_bytes());
     assert_eq!(telegram[12..16], 20_000_000_i32.to_le_bytes());
@@ -422,7 +422,7 @@ proptest! {
             position += step;
             command.set(Signal::PositionCommand, position * 2_500 / 9);
             let mut telegram = [0; 12];
-            program.encode(&command, Action::None, 0, &mut telegram, &mut report);
+            program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
             let sent = i64::from(i32::from_le_bytes(telegram[2..6].try_into().unwrap()));
             prop_assert!((0..range).contains(&sent), "{} of {}", sent, range);
             program.decode(&telegram, false, &mut feedback, &mut trackers, &mut report);
