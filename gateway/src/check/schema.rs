@@ -17,8 +17,8 @@ use serde_json::{Map, Value, json};
 use crate::config::file::File;
 use crate::mapping::format::{
     Cia402CodeFile, Cia402ObjectFile, CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile,
-    CipNetworkFile, CipServiceFile, GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile,
-    SercosIdnFile, SercosTermFile,
+    CipNetworkFile, CipServiceFile, GenericCia402File, GenericFile, GenericSercosFile, SercosBitFile,
+    SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
 use crate::mapping::{Mapping, OverlayHead, Section, sections};
 
@@ -49,7 +49,7 @@ fn either(one: &str, other: &str) -> Value {
     json!([{ "required": [one] }, { "required": [other] }])
 }
 
-const KINDS: [Kind; 16] = [
+const KINDS: [Kind; 17] = [
     Kind { name: "config", root: root::<File> },
     Kind { name: "generic", root: root::<GenericFile> },
     Kind { name: "cip-attributes", root: root::<CipAttributeFile> },
@@ -66,6 +66,7 @@ const KINDS: [Kind; 16] = [
     Kind { name: "cia402-codes", root: root::<Cia402CodeFile> },
     Kind { name: "cip-generic", root: root::<CipGenericFile> },
     Kind { name: "generic-sercos", root: root::<GenericSercosFile> },
+    Kind { name: "generic-cia402", root: root::<GenericCia402File> },
 ];
 
 /// The name of the schema of overlays.

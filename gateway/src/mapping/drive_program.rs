@@ -44,7 +44,7 @@ pub const MAX_STATUS_ROWS: usize = 32;
 pub const STATUS_WORDS_MAX: usize = 2;
 
 /// The most rows for faults and warnings.
-pub const MAX_FAULT_ROWS: usize = 96;
+pub const MAX_FAULT_ROWS: usize = 160;
 
 /// What stands in the two telegrams of an axis, in order. The control and the status word come first.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -11,11 +11,13 @@ use profile_sercos::wire::idn::Idn;
 
 use super::cip_tables::CipTables;
 use super::compile_sercos::{Compiler, unit_of};
-use super::format::{CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow};
+use super::format::{
+    Cia402ExampleRow, CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow,
+};
 use super::load::Tables;
 use super::{
-    AxisUnits, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS, Mapping, Rated, Reference,
-    SercosAxis,
+    AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
+    Mapping, ObjectFacts, Rated, Reference, SercosAxis,
 };
 use crate::finding::{Findings, Problem, Source, registry as code};
 
@@ -55,6 +57,13 @@ pub(super) fn run(mapping: &Mapping, tables: &Tables, findings: &mut Findings) -
         for example in &row.examples {
             let result = runner.mapping.drive_example(Parameter::from_name(row.parameter.get_ref()), example);
             runner.note(&sercos.text, result);
+        }
+    }
+    let cia402 = &tables.generic_cia402;
+    for row in &cia402.rows.scaling {
+        for example in &row.examples {
+            let result = runner.mapping.object_example(example);
+            runner.note(&cia402.text, result);
         }
     }
     runner.count
@@ -240,6 +249,25 @@ impl Mapping {
                 expect(span, "value on the way back", &Some(number(back)), &got)
             }
         }
+    }
+
+    fn object_example(&self, example: &Cia402ExampleRow) -> Result<(), Wrong> {
+        let wrong = |message: String| (example.object.span(), message);
+        let value = |text: &str| {
+            let value = Cia402Tables::value_of(&self.dictionaries, text);
+            value.ok_or_else(|| wrong(format!("{text} is no object of known length in the dictionary")))
+        };
+        let mut facts = ObjectFacts::new();
+        for (name, number) in &example.drive {
+            let held = value(name)?;
+            let bytes = number.to_le_bytes();
+            facts.note_data(held.object, bytes.get(..held.width.bytes()).unwrap_or_default());
+        }
+        let held = value(example.object.get_ref())?;
+        let made = self.cia402.round_trip(&held, *example.generic.get_ref(), &Cia402Axis::default(), &facts);
+        let (bytes, back) = made.map_err(|error| wrong(error.to_string()))?;
+        expect(example.bytes.span(), "bytes", &hex(&example.bytes)?, &bytes)?;
+        expect(example.back.span(), "generic value on the way back", example.back.get_ref(), &back)
     }
 
     /// `parameter` for the example of a [[parameter]] row, `None` for that of a [[scaling]] row.

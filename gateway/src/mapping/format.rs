@@ -10,6 +10,7 @@ mod cip_faults;
 mod cip_generic;
 mod cip_networks;
 mod dictionary;
+mod generic_cia402;
 mod generic_sercos;
 mod sercos_dictionary;
 
@@ -19,6 +20,7 @@ pub use cip_faults::*;
 pub use cip_generic::*;
 pub use cip_networks::*;
 pub use dictionary::*;
+pub use generic_cia402::*;
 pub use generic_sercos::*;
 pub use sercos_dictionary::*;
 

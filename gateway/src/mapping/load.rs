@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::format::{
     Cia402CodeFile, Cia402ObjectFile, CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile,
-    CipNetworkFile, CipServiceFile, GenericFile, GenericSercosFile, SercosBitFile, SercosCodeFile,
-    SercosIdnFile, SercosTermFile,
+    CipNetworkFile, CipServiceFile, GenericCia402File, GenericFile, GenericSercosFile, SercosBitFile,
+    SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
 use super::overlay::Overlay;
 use super::rows;
@@ -19,7 +19,7 @@ pub const FORMAT: u32 = 1;
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
 /// Where each file lies below the folder, and the text built into the binary.
-pub(super) const FILES: [(&str, &str); 15] = [
+pub(super) const FILES: [(&str, &str); 16] = [
     ("dictionary/generic.toml", include_str!("../../../mappings/dictionary/generic.toml")),
     ("dictionary/cip-attributes.toml", include_str!("../../../mappings/dictionary/cip-attributes.toml")),
     ("dictionary/cip-enumerations.toml", include_str!("../../../mappings/dictionary/cip-enumerations.toml")),
@@ -38,6 +38,7 @@ pub(super) const FILES: [(&str, &str); 15] = [
     ("dictionary/cia402-codes.toml", include_str!("../../../mappings/dictionary/cia402-codes.toml")),
     ("cip-generic.toml", include_str!("../../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../../mappings/generic-sercos.toml")),
+    ("generic-cia402.toml", include_str!("../../../mappings/generic-cia402.toml")),
 ];
 
 /// The name of a table: that of its file without folder and ending.
@@ -88,6 +89,8 @@ pub struct TableTexts {
     pub cip_generic: TableText,
     /// Generic to SERCOS.
     pub generic_sercos: TableText,
+    /// Generic to CiA 402.
+    pub generic_cia402: TableText,
     /// What is laid over them, in this order.
     pub overlays: Vec<Overlay>,
 }
@@ -134,6 +137,8 @@ pub struct Tables {
     pub cip_generic: Parsed<CipGenericFile>,
     /// Generic to SERCOS.
     pub generic_sercos: Parsed<GenericSercosFile>,
+    /// Generic to CiA 402.
+    pub generic_cia402: Parsed<GenericCia402File>,
 }
 
 impl TableTexts {
@@ -210,6 +215,7 @@ impl TableTexts {
             cia402_codes,
             cip_generic,
             generic_sercos,
+            generic_cia402,
         ] = texts;
         Self {
             generic,
@@ -227,6 +233,7 @@ impl TableTexts {
             cia402_codes,
             cip_generic,
             generic_sercos,
+            generic_cia402,
             overlays: Vec::new(),
         }
     }
@@ -248,6 +255,7 @@ impl TableTexts {
             cia402_codes,
             cip_generic,
             generic_sercos,
+            generic_cia402,
             overlays: _,
         } = self;
         [
@@ -266,6 +274,7 @@ impl TableTexts {
             cia402_codes,
             cip_generic,
             generic_sercos,
+            generic_cia402,
         ]
     }
 
@@ -289,6 +298,7 @@ impl TableTexts {
         let cia402_codes = rows::parse(&self.cia402_codes, "cia402-codes", &layers, findings);
         let cip_generic = rows::parse(&self.cip_generic, "cip-generic", &layers, findings);
         let generic_sercos = rows::parse(&self.generic_sercos, "generic-sercos", &layers, findings);
+        let generic_cia402 = rows::parse(&self.generic_cia402, "generic-cia402", &layers, findings);
         if findings.has_errors() {
             return None;
         }
@@ -308,6 +318,7 @@ impl TableTexts {
             cia402_codes: cia402_codes?,
             cip_generic: cip_generic?,
             generic_sercos: generic_sercos?,
+            generic_cia402: generic_cia402?,
         })
     }
 }

@@ -14,6 +14,7 @@
 mod attributes;
 mod capture_program;
 mod captures;
+mod cia402;
 mod cip_events;
 mod cip_scaling;
 mod cip_tables;
@@ -50,6 +51,7 @@ pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
+pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, Object, ObjectFacts, ObjectStep, Plan};
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
@@ -98,6 +100,8 @@ pub struct Mapping {
     pub cip: CipTables,
     /// The generic model and SERCOS.
     pub sercos: SercosTables,
+    /// The generic model and CiA 402.
+    pub cia402: Cia402Tables,
     tables: Tables,
 }
 
@@ -142,12 +146,16 @@ impl Mapping {
     pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
         let tables = texts.parse(findings)?;
         let dictionaries = Dictionaries::resolve(&tables, findings);
+        let sound = !findings.has_errors();
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
-        (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, tables })
+        // What is wrong with a dictionary need not be told again by every row that names it.
+        let cia402 = sound.then(|| Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, findings));
+        let cia402 = cia402.unwrap_or_default();
+        (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, cia402, tables })
     }
 
-    /// The same with another text of one of the two mapping tables, `cip-generic.toml` or `generic-sercos.toml`: for whoever
+    /// The same with another text of one of the mapping tables, such as `cip-generic.toml`: for whoever
     /// tries a change. The dictionaries stay as they are.
     ///
     /// # Errors
@@ -167,8 +175,13 @@ impl Mapping {
                     tables.generic_sercos = parsed;
                 }
             }
+            "generic-cia402" => {
+                if let Some(parsed) = rows::parse(&table, "generic-cia402", &[], &mut findings) {
+                    tables.generic_cia402 = parsed;
+                }
+            }
             _ => {
-                let message = format!("expected cip-generic.toml or generic-sercos.toml, got `{file}`");
+                let message = format!("expected the file of a mapping table, got `{file}`");
                 findings.push_file(crate::finding::registry::STRANGER, Path::new(file), message);
             }
         }
@@ -178,7 +191,8 @@ impl Mapping {
         let dictionaries = self.dictionaries.clone();
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, &mut findings);
-        findings.into_result(Self { dictionaries, cip, sercos, tables })
+        let cia402 = Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, &mut findings);
+        findings.into_result(Self { dictionaries, cip, sercos, cia402, tables })
     }
 
     /// The operation modes that drives have, each once, as many as a drive has places for.
@@ -260,6 +274,31 @@ impl Mapping {
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
     pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<DriveProgram, SercosError> {
         DriveProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// What is asked of a CiA 402 drive at start, or told to it.
+    ///
+    /// # Errors
+    /// A mode is not there, or a value does not fit the drive.
+    pub fn cia402_steps(
+        &self,
+        plan: Plan,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Vec<ObjectStep>, Cia402Error> {
+        self.cia402.steps(plan, axis, facts)
+    }
+
+    /// The program of an axis on the CiA 402 side, once its drive was asked.
+    ///
+    /// # Errors
+    /// The drive lacks a mode or a value that it must have, or nobody says what its counts are.
+    pub fn cia402_program(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<DriveProgram, Cia402Error> {
+        self.cia402.program(axis, facts)
     }
 
     /// Runs every worked example of the tables.

@@ -36,7 +36,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-fn shipped() -> &'static Mapping {
+pub(super) fn shipped() -> &'static Mapping {
     static SHIPPED: LazyLock<Mapping> = LazyLock::new(|| match Mapping::embedded() {
         Ok(mapping) => mapping,
         Err(errors) => panic!("{errors}"),

@@ -189,14 +189,8 @@ impl AxisChannel {
             action => action,
         };
         self.reset_cycles = self.reset_cycles.saturating_sub(1);
-        self.control = program.encode(
-            &self.command,
-            action,
-            self.control,
-            self.status,
-            telegram,
-            &mut conversions,
-        );
+        self.control =
+            program.encode(&self.command, action, self.control, self.status, telegram, &mut conversions);
         self.captures.encode(program.captures(), telegram);
         self.count_saturated(conversions.saturated);
         if conversions.saturated > 0 && self.state() == DriveState::Operating {

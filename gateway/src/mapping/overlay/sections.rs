@@ -109,6 +109,20 @@ const GENERIC_SERCOS: &[Section] = &[
     section("unbound", &["reason"]),
 ];
 
+const GENERIC_CIA402: &[Section] = &[
+    section("unit", &["unit", "quantity"]),
+    nested("scaling", &["unit"], const { &[first("methods", &["name"])] }),
+    section("signal", &["signal"]),
+    section("mode", &["mode"]),
+    section("action", &["action", "when"]),
+    first("report", &["state", "pattern", "modes", "follows"]),
+    section("status", &["status", "object", "state", "pattern", "modes"]),
+    first("fault", &["codes"]),
+    first("fault_class", &["classes"]),
+    section("parameter", &["parameter"]),
+    section("commission", &["do", "object", "parameter", "value"]),
+];
+
 /// The lists of a table by its name; everything else in it is a table of single keys.
 pub fn sections(table: &str) -> &'static [Section] {
     match table {
@@ -126,6 +140,7 @@ pub fn sections(table: &str) -> &'static [Section] {
         "cia402-codes" => CIA402_SETS,
         "cip-generic" => CIP_GENERIC,
         "generic-sercos" => GENERIC_SERCOS,
+        "generic-cia402" => GENERIC_CIA402,
         _ => &[],
     }
 }

@@ -1,0 +1,192 @@
+//! What is written to and read from a drive before it takes part in the cycle.
+
+use profile_generic::program::Width;
+use profile_generic::time::DurationNs;
+
+use super::compile::{Cia402Axis, Cia402Error};
+use super::facts::ObjectFacts;
+use super::{Cia402Tables, Object, StepKind, Value};
+use crate::mapping::dictionary::Cia402Dictionary;
+use crate::mapping::item::Item;
+
+/// One SDO access.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ObjectStep {
+    /// Reads an object and notes it in the [`ObjectFacts`].
+    Read {
+        /// The object, as the tables have it.
+        object: Object,
+        /// Whether commissioning fails when the drive refuses.
+        fail: bool,
+    },
+    /// Writes an object.
+    Write {
+        /// The object, as the tables have it.
+        object: Object,
+        /// The bytes.
+        bytes: Vec<u8>,
+        /// Whether commissioning fails when the drive refuses.
+        fail: bool,
+    },
+}
+
+impl ObjectStep {
+    /// What is accessed on the axis of a device.
+    #[must_use]
+    pub fn item(&self, axis: &Cia402Axis) -> Option<Item> {
+        let (Self::Read { object, .. } | Self::Write { object, .. }) = self;
+        axis.item(*object)
+    }
+}
+
+/// The steps, in order. What follows depends on what was read, so there are two parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Plan {
+    /// What the drive is asked.
+    Ask,
+    /// What it is told, once it has answered.
+    Tell,
+}
+
+impl Cia402Tables {
+    /// The steps of one part of commissioning.
+    ///
+    /// # Errors
+    /// A value does not fit the drive, or a mode is not there.
+    pub(in crate::mapping) fn steps(
+        &self,
+        plan: Plan,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Vec<ObjectStep>, Cia402Error> {
+        let mut steps = Vec::new();
+        for rule in &self.steps {
+            let fail = rule.fail;
+            match (plan, &rule.kind) {
+                (Plan::Ask, StepKind::Read(object)) => steps.push(ObjectStep::Read { object: *object, fail }),
+                (Plan::Ask, StepKind::ReadScaling) => {
+                    let values = self.scaling_values();
+                    steps.extend(values.iter().map(|value| ObjectStep::Read { object: value.object, fail }));
+                }
+                (Plan::Ask, StepKind::ReadParameters) => {
+                    let parameters = self.parameters.iter().map(|rule| rule.value.object);
+                    let signals = self.signals.iter().map(|rule| rule.value.object);
+                    for object in signals.chain(parameters) {
+                        let step = ObjectStep::Read { object, fail };
+                        if !steps.contains(&step) {
+                            steps.push(step);
+                        }
+                    }
+                }
+                (Plan::Tell, StepKind::Write(value, number)) => {
+                    steps.push(ObjectStep::Write {
+                        object: value.object,
+                        bytes: bytes(value, *number)?,
+                        fail,
+                    });
+                }
+                (Plan::Tell, StepKind::WriteParameter(parameter)) => {
+                    for (_, generic) in axis.parameters.iter().filter(|(known, _)| known == parameter) {
+                        steps.extend(self.write_parameter(*parameter, *generic, axis, facts, fail)?);
+                    }
+                }
+                (Plan::Tell, StepKind::WriteCycle(value, exponent)) => {
+                    let (number, power) = cycle(axis.cycle).ok_or(Cia402Error::Cycle(axis.cycle))?;
+                    for (value, number) in [(value, number), (exponent, power)] {
+                        let bytes = bytes(value, number)?;
+                        steps.push(ObjectStep::Write { object: value.object, bytes, fail });
+                    }
+                }
+                (Plan::Tell, StepKind::WriteMode) => {
+                    if let Some(mode) = self.chosen(axis, facts)?.first() {
+                        let bytes = mode.1.code.to_le_bytes().to_vec();
+                        steps.push(ObjectStep::Write { object: self.words.mode, bytes, fail });
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(steps)
+    }
+
+    fn write_parameter(
+        &self,
+        parameter: profile_generic::parameter::Parameter,
+        generic: i64,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+        fail: bool,
+    ) -> Result<Option<ObjectStep>, Cia402Error> {
+        let Some(rule) = self.parameters.iter().find(|rule| rule.parameter == parameter) else {
+            return Ok(None);
+        };
+        let object = rule.value.object;
+        let Some(entry) = self.entry(rule, axis, facts)? else { return Ok(None) };
+        let Some((bytes, len, clamped)) = entry.encode(generic) else { return Ok(None) };
+        if clamped {
+            return Err(Cia402Error::Range { object, value: generic });
+        }
+        Ok(Some(ObjectStep::Write { object, bytes: bytes[..len].to_vec(), fail }))
+    }
+}
+
+/// A number in the bytes of a value.
+fn bytes(value: &Value, number: i64) -> Result<Vec<u8>, Cia402Error> {
+    let (min, max) = value.width.range();
+    if !(min..=max).contains(&number) {
+        return Err(Cia402Error::Range { object: value.object, value: number });
+    }
+    Ok(number.to_le_bytes()[..value.width.bytes()].to_vec())
+}
+
+/// A time as a whole number of 1 to 255 and a power of ten in seconds; `None` when there is none.
+fn cycle(time: DurationNs) -> Option<(i64, i64)> {
+    let (mut number, mut power) = (time.as_nanos(), -9);
+    while number % 10 == 0 && number > 0 && power < 0 {
+        (number, power) = (number / 10, power + 1);
+    }
+    (1..=i64::from(u8::MAX)).contains(&number).then_some((number, power))
+}
+
+impl Cia402Axis {
+    /// An object of the tables on this axis of the device; `None` when the device has no such axis.
+    #[must_use]
+    pub fn item(&self, object: Object) -> Option<Item> {
+        Some(Item::object(Cia402Dictionary::on_axis(object.index, self.axis)?, object.sub))
+    }
+}
+
+/// Width of a value by its type in the dictionary; `None` for texts and for types that nobody tells.
+pub(super) fn width(data_type: crate::mapping::dictionary::Cia402Type) -> Option<Width> {
+    use crate::mapping::dictionary::Cia402Type as T;
+    Some(match data_type {
+        T::Bool | T::U8 => Width::U8,
+        T::I8 => Width::I8,
+        T::I16 => Width::I16,
+        T::I32 => Width::I32,
+        T::I64 => Width::I64,
+        T::U16 => Width::U16,
+        T::U32 => Width::U32,
+        T::U64 => Width::U64,
+        T::F32 => Width::F32,
+        T::F64 => Width::F64,
+        T::VisibleString | T::OctetString | T::Domain => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cycle_is_a_number_and_a_power_of_ten() {
+        let of = |ns| cycle(DurationNs(ns));
+        assert_eq!(of(1_000_000), Some((1, -3)));
+        assert_eq!(of(10_000_000), Some((1, -2)));
+        assert_eq!(of(2_500_000), Some((25, -4)));
+        assert_eq!(of(125_000), Some((125, -6)));
+        assert_eq!(of(1_000_000_000), Some((1, 0)));
+        assert_eq!(of(31_250), None, "3125 does not fit an octet");
+        assert_eq!((of(0), of(-1)), (None, None));
+    }
+}

@@ -1,0 +1,388 @@
+//! The program of one axis.
+
+use arrayvec::ArrayVec;
+use profile_generic::image::{CommandSet, Signal};
+use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{BitPattern, Conversion, Field, Width};
+use profile_generic::quantity::Quantity;
+use profile_generic::ratio::{Ratio, Rounding};
+use profile_generic::time::DurationNs;
+
+use super::facts::ObjectFacts;
+use super::{Cia402Tables, DriveMode, ModeRule, Object, ParameterRule, SignalRule, Value};
+use crate::mapping::capture_program::Place;
+use crate::mapping::drive_program::{
+    DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeEntry, ParameterEntry, StatusRow, StepRow, Telegram,
+    WORD_BYTES,
+};
+use crate::mapping::item::Item;
+use crate::mapping::scaling::AxisUnits;
+
+/// Octets of a mode of operation.
+const MODE_BYTES: u16 = 1;
+
+/// Wraps of a position: the range of its 32 bits.
+const FULL_RANGE: i64 = 1 << 32;
+
+/// What must be known of an axis to work with its CiA 402 drive.
+#[derive(Debug, Clone, Default)]
+pub struct Cia402Axis {
+    /// Units.
+    pub units: AxisUnits,
+    /// The axis of the device, from 0.
+    pub axis: u16,
+    /// Modes; the first is active at start.
+    pub modes: ArrayVec<ModeSelection, MAX_MODES>,
+    /// Nanounits of a linear axis in a nanoturn.
+    pub way_of_a_turn: Option<Ratio>,
+    /// Generic units in one count, where the drive's factor group is not to be asked.
+    pub counts: Vec<(Quantity, Ratio)>,
+    /// Time between set-points.
+    pub cycle: DurationNs,
+    /// Parameters to write at start, in generic units.
+    pub parameters: Vec<(Parameter, i64)>,
+    /// The drive's statusword does not tell whether it follows command values.
+    pub silent: bool,
+}
+
+impl Cia402Axis {
+    /// What the configuration says of the counts of a quantity.
+    pub(super) fn count_of(&self, quantity: Quantity) -> Option<Ratio> {
+        self.counts.iter().find(|(known, _)| *known == quantity).map(|(_, ratio)| *ratio)
+    }
+}
+
+/// Why no program can be made for an axis.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Cia402Error {
+    /// An operating mode without a row.
+    #[error("no [[mode]] row for operating mode {0}")]
+    Mode(ModeSelection),
+    /// No operating mode at all.
+    #[error("expected at least one operating mode, got none")]
+    NoMode,
+    /// The drive has no mode of operation that an operating mode can be.
+    #[error("{mode} needs one of the modes {wanted}, the drive has none of them by 6502")]
+    NotSupported {
+        /// The mode.
+        mode: ModeSelection,
+        /// The drive's modes that would do.
+        wanted: String,
+    },
+    /// The drive lacks a value that the mode needs.
+    #[error("the drive has no {object}, which carries {signal}")]
+    Missing {
+        /// The object.
+        object: Object,
+        /// The signal.
+        signal: Signal,
+    },
+    /// The unit of an object is not known.
+    #[error("{object}: no [[unit]] or [[scaling]] row for `{unit}`")]
+    Unit {
+        /// The object.
+        object: Object,
+        /// The unit.
+        unit: String,
+    },
+    /// The drive has told nothing that a unit follows from, and the configuration does not say it either.
+    #[error(
+        "nobody says what a count of {0} is: expected a factor group in the drive, or the unit in the configuration"
+    )]
+    NoScaling(String),
+    /// A linear axis whose way in a turn is not known.
+    #[error("expected the way that a linear axis makes in a turn of its motor, got none")]
+    Way,
+    /// A ratio beyond 64 bits.
+    #[error("{0}: its scaling does not fit 64 bits")]
+    Overflow(Object),
+    /// A value that the object cannot hold.
+    #[error("{object}: {value} does not fit")]
+    Range {
+        /// The object.
+        object: Object,
+        /// The value.
+        value: i64,
+    },
+    /// A cycle that an interpolation time cannot be.
+    #[error("a cycle of {0} is no whole number up to 255 of a power of ten of seconds")]
+    Cycle(DurationNs),
+    /// The device has no axis of this number.
+    #[error("expected an axis from 0 to 7 of a device, got {0}")]
+    Axis(u16),
+    /// A table does not fit the program.
+    #[error("{0} does not fit the program of an axis")]
+    Full(&'static str),
+}
+
+impl Cia402Tables {
+    /// The modes of an axis, with what they are in the drive. The mode of operation that 6502 names first in the row counts;
+    /// a drive without 6502 is believed to have the first.
+    pub(super) fn chosen(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Vec<(&ModeRule, &DriveMode)>, Cia402Error> {
+        let supported = facts.integer(self.words.modes_supported, Width::U32);
+        let has = |mode: &&DriveMode| supported.is_none_or(|word| word >> mode.bit & 1 != 0);
+        let mut chosen = Vec::with_capacity(axis.modes.len());
+        for selection in &axis.modes {
+            let rule = self.modes.iter().find(|rule| rule.selection == *selection);
+            let rule = rule.ok_or(Cia402Error::Mode(*selection))?;
+            match rule.modes.iter().find(has) {
+                Some(mode) => chosen.push((rule, mode)),
+                None if rule.optional => {}
+                None => {
+                    let names: Vec<_> = rule.modes.iter().map(|mode| mode.name.as_str()).collect();
+                    return Err(Cia402Error::NotSupported { mode: *selection, wanted: names.join(", ") });
+                }
+            }
+        }
+        if chosen.is_empty() {
+            return Err(Cia402Error::NoMode);
+        }
+        Ok(chosen)
+    }
+
+    /// The program of an axis whose drive was asked.
+    ///
+    /// # Errors
+    /// [`Cia402Error`].
+    pub(in crate::mapping) fn program(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<DriveProgram, Cia402Error> {
+        let chosen = self.chosen(axis, facts)?;
+        let item = |object| axis.item(object).ok_or(Cia402Error::Axis(axis.axis));
+        let words = &self.words;
+        let head = WORD_BYTES + MODE_BYTES;
+        let mut telegram = Telegram {
+            command: vec![item(words.control)?, item(words.mode)?],
+            feedback: vec![item(words.status)?, item(words.mode_shown)?],
+            command_bytes: head,
+            feedback_bytes: head,
+        };
+        let mut fields = Vec::new();
+        for (to_drive, items, bytes) in [
+            (true, &mut telegram.command, &mut telegram.command_bytes),
+            (false, &mut telegram.feedback, &mut telegram.feedback_bytes),
+        ] {
+            for rule in self.signals_of(&chosen, to_drive, facts)? {
+                items.push(item(rule.value.object)?);
+                fields.push(self.field(rule, *bytes, axis, facts)?);
+                *bytes += octets(rule.value.width);
+            }
+        }
+        let mut program = DriveProgram::new(telegram, false);
+        program.mode_octets = Some([WORD_BYTES, WORD_BYTES]);
+        for field in fields {
+            let full = match field.signal.is_command() {
+                true => program.command.push(field),
+                false => program.feedback.push(field),
+            };
+            full.map_err(|_| Cia402Error::Full("the cyclic values"))?;
+        }
+        for (rule, mode) in &chosen {
+            let pattern = shown(mode.code);
+            let entry = ModeEntry {
+                selection: rule.selection,
+                control: pattern,
+                status: pattern,
+                needs: self.needs(rule),
+                carried: Self::carried(rule, &program),
+            };
+            program.modes.try_push(entry).map_err(|_| Cia402Error::Full("the table of modes"))?;
+        }
+        self.words(axis, &chosen, &mut program)?;
+        let error = item(words.error)?;
+        for row in &self.faults {
+            let row = FaultRow { word: error, ..*row };
+            program.faults.try_push(row).map_err(|_| Cia402Error::Full("the table of faults"))?;
+        }
+        for rule in &self.parameters {
+            match self.entry(rule, axis, facts)? {
+                Some(entry) => program.parameters.push(entry),
+                None if rule.reject => program.rejected.push(rule.parameter),
+                None => {}
+            }
+        }
+        program.parameters.sort_by_key(|entry| entry.parameter);
+        Ok(program)
+    }
+
+    /// The signals of all modes, each once, in the order of the modes.
+    fn signals_of(
+        &self,
+        chosen: &[(&ModeRule, &DriveMode)],
+        to_drive: bool,
+        facts: &ObjectFacts,
+    ) -> Result<Vec<&SignalRule>, Cia402Error> {
+        let mut rules: Vec<&SignalRule> = Vec::new();
+        for signal in chosen.iter().flat_map(|(rule, _)| if to_drive { &rule.command } else { &rule.actual })
+        {
+            let Some(rule) = self.signal(*signal) else { continue };
+            if rules.iter().any(|known| known.signal == *signal) {
+                continue;
+            }
+            match facts.is_missing(rule.value.object) {
+                true if rule.refuse => {
+                    return Err(Cia402Error::Missing { object: rule.value.object, signal: *signal });
+                }
+                true => {}
+                false => rules.push(rule),
+            }
+        }
+        Ok(rules)
+    }
+
+    /// The signals without which a mode must not be chosen.
+    fn needs(&self, rule: &ModeRule) -> CommandSet {
+        let refuse = |signal: &&Signal| self.signal(**signal).is_some_and(|row| row.refuse);
+        rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect()
+    }
+
+    /// The signals of a mode that go to the drive.
+    fn carried(rule: &ModeRule, program: &DriveProgram) -> CommandSet {
+        let there = |signal: &&Signal| program.command.fields().any(|field| field.signal == **signal);
+        rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect()
+    }
+
+    fn field(
+        &self,
+        rule: &SignalRule,
+        offset: u16,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Field, Cia402Error> {
+        let (signal, value) = (rule.signal, &rule.value);
+        let count = self.count(value, signal.quantity(), axis, facts)?;
+        let conversion = if signal.is_command() { to_drive(value, count)? } else { Conversion::new(count) };
+        let absolute = matches!(signal, Signal::PositionActual) && value.width.bits() == 32;
+        let modulo = absolute.then_some(FULL_RANGE);
+        Ok(Field { signal, offset, width: value.width, conversion, modulo })
+    }
+
+    /// Actions, reports and status bits.
+    fn words(
+        &self,
+        axis: &Cia402Axis,
+        chosen: &[(&ModeRule, &DriveMode)],
+        program: &mut DriveProgram,
+    ) -> Result<(), Cia402Error> {
+        for rule in &self.actions {
+            match rule.when {
+                Some(when) => {
+                    let row = StepRow { action: rule.action, when, control: rule.pattern };
+                    program.steps.try_push(row).map_err(|_| Cia402Error::Full("the table of actions"))?;
+                }
+                None => program.actions.set(rule.action, rule.pattern),
+            }
+        }
+        for rule in
+            self.reports.iter().filter(|rule| rule.follows.is_none_or(|follows| follows != axis.silent))
+        {
+            for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
+                if !program.reports.push(pattern, rule.report) {
+                    return Err(Cia402Error::Full("the table of reports"));
+                }
+            }
+        }
+        for rule in self.status.iter() {
+            let word = (rule.object != self.words.status).then(|| axis.item(rule.object)).flatten();
+            if word.is_some_and(|word| !program.status_words.iter().any(|place: &Place| place.item == word)) {
+                continue;
+            }
+            for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
+                let row = StatusRow { word, pattern, bit: rule.bit };
+                program.status.try_push(row).map_err(|_| Cia402Error::Full("the table of status bits"))?;
+            }
+            program.known_status |= rule.bit;
+        }
+        Ok(())
+    }
+
+    /// The entry of a parameter; `None` when the drive lacks it, or its unit is not known.
+    pub(super) fn entry(
+        &self,
+        rule: &ParameterRule,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Option<ParameterEntry>, Cia402Error> {
+        let value = &rule.value;
+        if facts.is_missing(value.object) {
+            return Ok(None);
+        }
+        let count = match self.count(value, rule.quantity, axis, facts) {
+            Ok(count) => count,
+            Err(Cia402Error::NoScaling(_) | Cia402Error::Way) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let overflow = || Cia402Error::Overflow(value.object);
+        let ratio = rule.factor.inverse().and_then(|factor| count.then(factor)).ok_or_else(overflow)?;
+        let (min, max) = value.width.range();
+        Ok(Some(ParameterEntry {
+            parameter: rule.parameter,
+            item: axis.item(value.object).ok_or(Cia402Error::Axis(axis.axis))?,
+            width: value.width,
+            to_drive: if rule.to_drive { Some(to_drive(value, ratio)?.within(min, max)) } else { None },
+            from_drive: rule.from_drive.then(|| Conversion::new(ratio)),
+        }))
+    }
+
+    /// Converts a value to the bytes of an object and back; for worked examples.
+    pub(in crate::mapping) fn round_trip(
+        &self,
+        value: &Value,
+        generic: i64,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<(Vec<u8>, i64), Cia402Error> {
+        let rule = self.scalings.iter().find(|rule| rule.unit == value.unit);
+        let quantity = rule.map_or(Quantity::None, |rule| rule.quantity);
+        let count = self.count(value, quantity, axis, facts)?;
+        let number = to_drive(value, count)?.convert(generic).value;
+        let back = count.apply(number, Rounding::Nearest).map_err(|_| Cia402Error::Overflow(value.object))?;
+        Ok((number.to_le_bytes()[..value.width.bytes()].to_vec(), back))
+    }
+}
+
+fn octets(width: Width) -> u16 {
+    u16::try_from(width.bytes()).unwrap_or(u16::MAX)
+}
+
+/// From the generic unit to counts.
+fn to_drive(value: &Value, count: Ratio) -> Result<Conversion, Cia402Error> {
+    Ok(Conversion::new(count.inverse().ok_or(Cia402Error::Overflow(value.object))?))
+}
+
+/// A mode of operation in control or status.
+fn shown(code: i8) -> BitPattern {
+    BitPattern::new(0xFF << MODE_SHIFT, u32::from(code.to_le_bytes()[0]) << MODE_SHIFT)
+}
+
+/// A row for each mode of the axis that it is for, or one for all.
+fn in_modes(pattern: BitPattern, modes: &[i8], chosen: &[(&ModeRule, &DriveMode)]) -> Vec<BitPattern> {
+    if modes.is_empty() {
+        return vec![pattern];
+    }
+    let there = chosen.iter().map(|(_, mode)| mode.code).filter(|code| modes.contains(code));
+    let with = |code| {
+        let mode = shown(code);
+        BitPattern::new(pattern.mask | mode.mask, pattern.value | mode.value)
+    };
+    there.map(with).collect()
+}
+
+/// The item of an object, for those who know only the item.
+impl TryFrom<Item> for Object {
+    type Error = ();
+
+    fn try_from(item: Item) -> Result<Self, ()> {
+        match item {
+            Item::Object { index, sub } => Ok(Self { index, sub }),
+            Item::Idn(_) => Err(()),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What a drive has told of its objects.
+
+use std::collections::BTreeMap;
+
+use profile_generic::program::Width;
+
+use super::{Object, Value};
+
+/// What a drive has said about itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ObjectFacts {
+    facts: BTreeMap<Object, Fact>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Fact {
+    data: Option<Vec<u8>>,
+    missing: bool,
+}
+
+impl ObjectFacts {
+    /// Nothing known.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The drive has given the value of an object, or has taken these bytes for it.
+    pub fn note_data(&mut self, object: Object, data: &[u8]) {
+        *self.facts.entry(object).or_default() = Fact { data: Some(data.to_vec()), missing: false };
+    }
+
+    /// The drive has no such object.
+    pub fn note_missing(&mut self, object: Object) {
+        *self.facts.entry(object).or_default() = Fact { data: None, missing: true };
+    }
+
+    /// Whether the drive has said that it has no such object.
+    #[must_use]
+    pub fn is_missing(&self, object: Object) -> bool {
+        self.facts.get(&object).is_some_and(|fact| fact.missing)
+    }
+
+    /// The value, if the drive has given it in the length that belongs to it.
+    pub(super) fn number(&self, value: &Value) -> Option<i64> {
+        self.integer(value.object, value.width)
+    }
+
+    pub(super) fn integer(&self, object: Object, width: Width) -> Option<i64> {
+        width.integer(self.facts.get(&object)?.data.as_deref()?)
+    }
+}

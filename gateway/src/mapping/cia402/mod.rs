@@ -1,0 +1,201 @@
+//! Generic <-> CiA 402: the mapping file with every name resolved, and what is compiled from it for one axis.
+//!
+//! ```text
+//! Cia402Tables --plan(axis)--> ObjectStep, read into ObjectFacts --program(axis, facts)--> DriveProgram
+//! ```
+
+mod builder;
+mod commissioning;
+mod compile;
+mod facts;
+mod scaling;
+
+#[cfg(test)]
+mod tests;
+
+use profile_generic::image::{Signal, StatusBits};
+use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
+use profile_generic::program::{BitPattern, Width};
+use profile_generic::quantity::Quantity;
+use profile_generic::ratio::Ratio;
+use profile_generic::state::{Action, Report};
+
+pub use self::commissioning::{ObjectStep, Plan};
+pub use self::compile::{Cia402Axis, Cia402Error};
+pub use self::facts::ObjectFacts;
+
+use super::drive_program::FaultRow;
+
+/// An object of the dictionary, of the first axis of a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Object {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub sub: u8,
+}
+
+impl core::fmt::Display for Object {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:04X}:{:02X}", self.index, self.sub)
+    }
+}
+
+/// An object that holds a number, and what it measures.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Value {
+    pub object: Object,
+    pub width: Width,
+    /// Unit as the dictionary names it; empty without.
+    pub unit: String,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct FixedUnit {
+    pub unit: String,
+    pub quantity: Quantity,
+    pub ratio: Ratio,
+}
+
+/// What a count is.
+#[derive(Debug, Clone)]
+pub(super) struct ScalingRule {
+    pub unit: String,
+    pub quantity: Quantity,
+    pub methods: Vec<Method>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Method {
+    pub base: Base,
+    pub times: Vec<Value>,
+    pub over: Vec<Value>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Base {
+    Generic(Ratio),
+    /// The count of the rule in this place.
+    Like(usize),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct SignalRule {
+    pub signal: Signal,
+    pub value: Value,
+    /// Whether an axis cannot work without it.
+    pub refuse: bool,
+}
+
+/// A mode of operation: its code, and its bit in the list of those that a drive has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct DriveMode {
+    pub name: String,
+    pub code: i8,
+    pub bit: u32,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct ModeRule {
+    pub selection: ModeSelection,
+    /// Whether an axis can do without it.
+    pub optional: bool,
+    pub modes: Vec<DriveMode>,
+    pub command: Vec<Signal>,
+    pub actual: Vec<Signal>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct ActionRule {
+    pub action: Action,
+    pub when: Option<BitPattern>,
+    pub pattern: BitPattern,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct ReportRule {
+    pub pattern: BitPattern,
+    /// Modes that the drive shows; empty = any.
+    pub modes: Vec<i8>,
+    pub follows: Option<bool>,
+    pub report: Report,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct StatusRule {
+    pub object: Object,
+    pub pattern: BitPattern,
+    pub modes: Vec<i8>,
+    pub bit: StatusBits,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct ParameterRule {
+    pub parameter: Parameter,
+    pub quantity: Quantity,
+    pub value: Value,
+    pub to_drive: bool,
+    pub from_drive: bool,
+    pub reject: bool,
+    pub factor: Ratio,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum StepKind {
+    Read(Object),
+    Write(Value, i64),
+    WriteParameter(Parameter),
+    ReadScaling,
+    ReadParameters,
+    /// The cycle as value and power of ten.
+    WriteCycle(Value, Value),
+    WriteMode,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct StepRule {
+    pub kind: StepKind,
+    /// Whether commissioning fails when the drive refuses.
+    pub fail: bool,
+}
+
+/// The words that lead a drive.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Words {
+    pub control: Object,
+    pub status: Object,
+    pub mode: Object,
+    pub mode_shown: Object,
+    pub modes_supported: Object,
+    /// The error code.
+    pub error: Object,
+}
+
+/// The mapping of the generic model to CiA 402.
+#[derive(Debug, Clone, Default)]
+pub struct Cia402Tables {
+    pub(super) units: Vec<FixedUnit>,
+    pub(super) scalings: Vec<ScalingRule>,
+    pub(super) words: Words,
+    pub(super) signals: Vec<SignalRule>,
+    pub(super) modes: Vec<ModeRule>,
+    pub(super) actions: Vec<ActionRule>,
+    pub(super) reports: Vec<ReportRule>,
+    pub(super) status: Vec<StatusRule>,
+    pub(super) faults: Vec<FaultRow>,
+    pub(super) parameters: Vec<ParameterRule>,
+    pub(super) steps: Vec<StepRule>,
+}
+
+impl Cia402Tables {
+    pub(super) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
+        self.signals.iter().find(|rule| rule.signal == signal)
+    }
+
+    /// What error codes mean, the first that fits counts.
+    #[must_use]
+    pub fn faults(&self) -> &[FaultRow] {
+        &self.faults
+    }
+}

@@ -1,0 +1,313 @@
+//! Plans and programs of the CiA 402 side.
+
+use std::fmt::Write as _;
+
+use profile_generic::cast::f64_from_i64;
+use profile_generic::image::{AxisCommand, AxisFeedback};
+use profile_generic::mode::OperatingMode;
+use profile_generic::program::ConversionReport;
+use profile_generic::scaling::UnitKind;
+use profile_generic::time::DurationNs;
+use proptest::prelude::*;
+
+use super::*;
+use crate::mapping::tests::shipped;
+use crate::mapping::{AxisUnits, DriveProgram, Item, Mapping};
+
+const ALL: [OperatingMode; 3] = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
+
+fn axis(modes: &[OperatingMode]) -> Cia402Axis {
+    Cia402Axis {
+        modes: modes.iter().map(|mode| (*mode).into()).collect(),
+        cycle: DurationNs::from_millis(2),
+        ..Cia402Axis::default()
+    }
+}
+
+fn object(index: u16, sub: u8) -> Object {
+    Object { index, sub }
+}
+
+/// A drive with csp, csv and cst, with this feed constant.
+fn with_feed(feed: u32, shaft: u32) -> ObjectFacts {
+    let mut facts = ObjectFacts::new();
+    facts.note_data(object(0x6502, 0), &0x380_u32.to_le_bytes());
+    facts.note_data(object(0x6092, 1), &feed.to_le_bytes());
+    facts.note_data(object(0x6092, 2), &shaft.to_le_bytes());
+    facts
+}
+
+/// A drive with csp, csv and cst that counts 3600 in a turn, and has every object.
+fn servo() -> ObjectFacts {
+    with_feed(3600, 1)
+}
+
+fn program(modes: &[OperatingMode]) -> DriveProgram {
+    shipped().cia402_program(&axis(modes), &servo()).unwrap()
+}
+
+/// The state of a drive, as its statusword shows it.
+const STATES: [(&str, u32); 8] = [
+    ("not ready to switch on", 0x00),
+    ("switch on disabled", 0x40),
+    ("ready to switch on", 0x21),
+    ("switched on", 0x23),
+    ("operation enabled", 0x27),
+    ("quick stop active", 0x07),
+    ("fault reaction active", 0x0F),
+    ("fault", 0x08),
+];
+
+#[test]
+fn every_action_in_every_state() {
+    let program = program(&ALL);
+    let mut text = String::new();
+    for (name, status) in STATES {
+        write!(text, "{name:<24}").unwrap();
+        for action in Action::ALL {
+            // What stood there before must not matter where an action writes anything.
+            let [low, high] = [0x0000, 0x0080]
+                .map(|before| program.control(*action, OperatingMode::Position.into(), before, status));
+            assert!(
+                low == high || (low, high) == (0x08_0000, 0x08_0080),
+                "{name} {action}: {low:X} {high:X}"
+            );
+            write!(text, " {}={:04X}", action.name(), low & 0xFFFF).unwrap();
+        }
+        text.push('\n');
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn torque_comes_one_state_at_a_time_and_only_by_enable() {
+    let program = program(&ALL);
+    for action in Action::ALL {
+        for (name, status) in STATES {
+            let control = program.control(*action, OperatingMode::Position.into(), 0, status);
+            let enabled = control & 0x0F == 0x0F;
+            let may = matches!(*action, Action::Enable) && matches!(status, 0x23 | 0x27)
+                || matches!(*action, Action::Halt) && status == 0x27;
+            assert_eq!(enabled, may, "{action} in {name}: {control:04X}");
+        }
+    }
+}
+
+#[test]
+fn a_drive_is_led_from_its_start_into_operation() {
+    // The transitions of CiA 402, as a drive makes them.
+    let next = |status: u32, control: u32| match (status, control & 0x8F) {
+        (0x40, 0x06) => 0x21,
+        (0x21, 0x07) => 0x23,
+        (0x23, 0x0F) => 0x27,
+        (_, word) if word & 0x02 == 0 => 0x40,
+        (status, _) => status,
+    };
+    let program = program(&ALL);
+    let (mut status, mut control, mut passed) = (0x40, 0, vec![]);
+    for _ in 0..6 {
+        control = program.control(Action::Enable, OperatingMode::Position.into(), control, status);
+        status = next(status, control);
+        passed.push(status);
+    }
+    assert_eq!(passed, [0x21, 0x23, 0x27, 0x27, 0x27, 0x27]);
+    let control = program.control(Action::TorqueOff, OperatingMode::Position.into(), control, status);
+    assert_eq!(next(status, control), 0x40);
+}
+
+#[test]
+fn what_every_status_says() {
+    let program = program(&ALL);
+    let silent = Cia402Axis { silent: true, ..axis(&ALL) };
+    let silent = shipped().cia402_program(&silent, &servo()).unwrap();
+    let mut text = String::new();
+    for mode in [8_u32, 9, 3, 0] {
+        for (name, state) in STATES {
+            for bits in [0, 0x10, 0x1000, 0x1490] {
+                let status = mode << 16 | state | bits;
+                let shown: Vec<_> =
+                    program.status_bits(status, &[]).iter_names().map(|(name, _)| name).collect();
+                let (report, without) = (program.report(status), silent.report(status));
+                let mode = program.mode(status).map_or("-".to_owned(), |mode| mode.to_string());
+                let shown = shown.join(" ");
+                writeln!(text, "{status:06X} {name:<22} {mode:<9} {report:<15} {without:<15} {shown}")
+                    .unwrap();
+            }
+        }
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn the_telegrams_carry_what_the_modes_need() {
+    let items = |items: &[Item]| items.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let all = program(&ALL).telegram;
+    assert_eq!(items(&all.command), "6040:00 6060:00 607A:00 60FF:00 6071:00");
+    assert_eq!(items(&all.feedback), "6041:00 6061:00 6064:00 606C:00 6077:00");
+    assert_eq!((all.command_bytes, all.feedback_bytes), (13, 13));
+    let third = Cia402Axis { axis: 2, ..axis(&ALL[..1]) };
+    let mut facts = servo();
+    facts.note_missing(object(0x6077, 0));
+    let third = shipped().cia402_program(&third, &facts).unwrap().telegram;
+    assert_eq!(items(&third.command), "7040:00 7060:00 707A:00");
+    assert_eq!(items(&third.feedback), "7041:00 7061:00 7064:00 706C:00");
+}
+
+#[test]
+fn set_points_and_actual_values_go_both_ways() {
+    let program = program(&ALL);
+    let mut command = AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() };
+    command.set(Signal::PositionCommand, 250_000_000);
+    command.set(Signal::VelocityCommand, -1_000_000_000);
+    command.set(Signal::TorqueCommand, 500_000);
+    let (mut bytes, mut report) = ([0xA5; 13], ConversionReport::default());
+    let control = program.encode(&command, Action::Enable, 0, 0x23, &mut bytes, &mut report);
+    assert!(report.is_clean());
+    assert_eq!(control, 0x08_000F);
+    // Controlword, mode 8, 900 counts, -3600 counts a second, 500 permille.
+    assert_eq!(bytes, [0x0F, 0, 8, 0x84, 0x03, 0, 0, 0xF0, 0xF1, 0xFF, 0xFF, 0xF4, 0x01]);
+    let (mut feedback, mut trackers) = (AxisFeedback::default(), program.feedback.trackers());
+    let shown = [0x37, 0x12, 9, 0x84, 0x03, 0, 0, 0xF0, 0xF1, 0xFF, 0xFF, 0x0C, 0xFE];
+    let status = program.decode(&shown, false, &mut feedback, &mut trackers, &mut report);
+    assert_eq!(status, Some(0x09_1237));
+    assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
+    assert_eq!(feedback.get(Signal::PositionActual), Some(250_000_000));
+    assert_eq!(feedback.get(Signal::VelocityActual), Some(-1_000_000_000));
+    assert_eq!(feedback.get(Signal::TorqueActual), Some(-500_000));
+    assert_eq!(program.decode(&shown[..2], false, &mut feedback, &mut trackers, &mut report), None);
+}
+
+#[test]
+fn the_first_mode_that_the_drive_has_is_taken() {
+    let mut facts = servo();
+    // csp and the two profile modes.
+    facts.note_data(object(0x6502, 0), &0x8C_u32.to_le_bytes());
+    let program = shipped().cia402_program(&axis(&ALL), &facts).unwrap();
+    let modes = ALL.map(|mode| program.control(Action::None, mode.into(), 0, 0) >> 16);
+    assert_eq!(modes, [8, 3, 4]);
+    facts.note_data(object(0x6502, 0), &0x04_u32.to_le_bytes());
+    let error = shipped().cia402_program(&axis(&ALL), &facts).unwrap_err();
+    assert_eq!(error.to_string(), "position needs one of the modes csp, the drive has none of them by 6502");
+    // A drive that does not say is believed to have what is wanted most.
+    let mut unsaid = servo();
+    unsaid.note_missing(object(0x6502, 0));
+    let program = shipped().cia402_program(&axis(&ALL), &unsaid).unwrap();
+    assert_eq!(ALL.map(|mode| program.control(Action::None, mode.into(), 0, 0) >> 16), [8, 9, 10]);
+}
+
+fn steps(plan: Plan, axis: &Cia402Axis) -> String {
+    let steps = shipped().cia402_steps(plan, axis, &servo()).unwrap();
+    let line = |step: &ObjectStep| match step {
+        ObjectStep::Read { object, fail } => format!("read  {object} fail={fail}"),
+        ObjectStep::Write { object, bytes, fail } => format!("write {object} {bytes:02X?} fail={fail}"),
+    };
+    steps.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn what_a_drive_is_asked_and_told() {
+    let mut axis = axis(&ALL);
+    let limit = |name: &str, value| (Parameter::from_name(name).unwrap(), value);
+    axis.parameters = vec![
+        limit("torque_limit_positive", 1_500_000),
+        limit("torque_limit_negative", -1_200_000),
+        limit("velocity_limit_positive", 50_000_000_000),
+    ];
+    let mut text = steps(Plan::Ask, &axis);
+    text.push_str("\n\n");
+    text.push_str(&steps(Plan::Tell, &axis));
+    insta::assert_snapshot!(text);
+    let step = ObjectStep::Read { object: object(0x6064, 0), fail: false };
+    let of = |number| step.item(&Cia402Axis { axis: number, ..Cia402Axis::default() });
+    assert_eq!(of(1), Some(Item::object(0x6864, 0)));
+    assert_eq!(of(8), None);
+}
+
+#[test]
+fn what_cannot_be_told_is_an_error() {
+    let with = |change: &dyn Fn(&mut Cia402Axis)| {
+        let mut axis = axis(&ALL);
+        change(&mut axis);
+        shipped().cia402_steps(Plan::Tell, &axis, &servo()).unwrap_err().to_string()
+    };
+    let limit = Parameter::from_name("torque_limit_positive").unwrap();
+    let mut text = String::new();
+    for error in [
+        with(&|axis| axis.cycle = DurationNs(31_250)),
+        with(&|axis| axis.parameters = vec![(limit, 70_000_000)]),
+        with(&|axis| axis.modes.clear()),
+        with(&|axis| axis.modes = [OperatingMode::Acceleration.into()].into_iter().collect()),
+    ] {
+        writeln!(text, "{error}").unwrap();
+    }
+    let linear =
+        Cia402Axis { units: AxisUnits { kind: UnitKind::Linear, ..AxisUnits::default() }, ..axis(&ALL) };
+    writeln!(text, "{}", shipped().cia402_program(&linear, &servo()).unwrap_err()).unwrap();
+    let bare = shipped().cia402_program(&axis(&ALL), &ObjectFacts::new()).unwrap_err();
+    writeln!(text, "{bare}").unwrap();
+    let mut facts = servo();
+    facts.note_missing(object(0x607A, 0));
+    writeln!(text, "{}", shipped().cia402_program(&axis(&ALL), &facts).unwrap_err()).unwrap();
+    let ninth = Cia402Axis { axis: 8, ..axis(&ALL) };
+    writeln!(text, "{}", shipped().cia402_program(&ninth, &servo()).unwrap_err()).unwrap();
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn the_configuration_goes_before_the_factor_group() {
+    let mut own = axis(&ALL);
+    own.counts = vec![(Quantity::Velocity, Ratio::new(5_000_000, 3).unwrap())];
+    let program = shipped().cia402_program(&own, &servo()).unwrap();
+    let lsb =
+        |signal| program.feedback.fields().find(|field| field.signal == signal).unwrap().conversion.ratio;
+    // 0.1 rpm; a turn of 3600 counts.
+    assert_eq!(lsb(Signal::VelocityActual), Ratio::new(5_000_000, 3).unwrap());
+    assert_eq!(lsb(Signal::PositionActual), Ratio::new(1_000_000_000, 3600).unwrap());
+    // A spindle of 10 mm: 3600 counts are 10^10 nanometres of a millimetre.
+    let units = AxisUnits { kind: UnitKind::Linear, ..AxisUnits::default() };
+    let linear = Cia402Axis { units, way_of_a_turn: Ratio::new(10, 1), ..axis(&ALL) };
+    let program = shipped().cia402_program(&linear, &servo()).unwrap();
+    let lsb = program.feedback.fields().find(|field| field.signal == Signal::PositionActual).unwrap();
+    assert_eq!(lsb.conversion.ratio, Ratio::new(10_000_000_000, 3600).unwrap());
+}
+
+#[test]
+fn every_error_code_has_a_cause_and_a_code_counts_before_its_class() {
+    let mapping = shipped();
+    let program = program(&ALL);
+    let set = mapping.dictionaries.cia402.codes("Error code").unwrap();
+    let word = program.diagnostic_words(true).next().unwrap();
+    assert_eq!(word.to_string(), "603F:00");
+    let mut text = String::new();
+    for code in set.codes.iter().filter(|code| code.code != 0) {
+        let found: Vec<_> = program.faults(word, u32::try_from(code.code).unwrap()).collect();
+        let [(cause, reaction)] = found[..] else { panic!("{:04X} {}: {found:?}", code.code, code.name) };
+        writeln!(text, "{:04X} {:<45} {cause} {reaction}", code.code, code.name).unwrap();
+    }
+    insta::assert_snapshot!(text);
+    // Codes without a name have the cause of their class.
+    let cause = |code| program.faults(word, code).next().map(|(cause, _)| cause.to_string());
+    assert_eq!(cause(0x8699), Some("excessive_position_error".to_owned()));
+    assert_eq!(cause(0x2FFF), Some("over_current".to_owned()));
+    assert_eq!(cause(0), None);
+    for class in &set.classes {
+        assert!(cause(u32::try_from(class.first).unwrap() | 0x0F).is_some(), "{}", class.name);
+    }
+}
+
+proptest! {
+    /// A value loses at most half a count on its way to the drive and back.
+    #[test]
+    fn positions_lose_at_most_one_count(
+        generic in -2_000_000_000_i64..2_000_000_000, feed in 1_u32..1 << 24, shaft in 1_u32..16,
+    ) {
+        let mapping: &Mapping = shipped();
+        let program = mapping.cia402_program(&axis(&ALL[..1]), &with_feed(feed, shaft)).unwrap();
+        let field = program.command.fields().next().unwrap();
+        let back = program.feedback.fields().next().unwrap();
+        let outcome = field.conversion.convert(generic);
+        let lsb = 1e9 * f64::from(shaft) / f64::from(feed);
+        let lost = f64_from_i64(back.conversion.convert(outcome.value).value - generic).abs();
+        prop_assert!(lost <= lsb.max(1.0), "{lost} of {lsb}");
+    }
+}

@@ -1,0 +1,266 @@
+//! Rows of the mapping between the generic model and CiA 402.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::finding::Spanned;
+
+use super::{FieldValueRow, Name, RatioRow, Source, UnitRow};
+
+/// `mappings/generic-cia402.toml`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GenericCia402File {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `generic to cia402`.
+    pub mapping: Name,
+    /// Fixed units of objects.
+    pub unit: Vec<UnitRow>,
+    /// Units that the drive's factor group defines.
+    pub scaling: Vec<Cia402ScalingRow>,
+    /// Control, status and modes.
+    pub words: Cia402WordsRow,
+    /// Signals.
+    pub signal: Vec<Cia402SignalRow>,
+    /// Operating modes.
+    pub mode: Vec<Cia402ModeRow>,
+    /// Controlword of each action.
+    pub action: Vec<Cia402ActionRow>,
+    /// What a statusword says.
+    pub report: Vec<Cia402ReportRow>,
+    /// Status bits.
+    pub status: Vec<Cia402StatusRow>,
+    /// Faults and warnings by error code.
+    pub fault: Vec<Cia402FaultRow>,
+    /// The same of codes that have no row of their own.
+    pub fault_class: Vec<Cia402FaultClassRow>,
+    /// Parameters.
+    pub parameter: Vec<Cia402ParameterRow>,
+    /// What is written and read at start.
+    pub commission: Vec<Cia402CommissionRow>,
+}
+
+/// How a unit follows from the drive's factor group.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ScalingRow {
+    /// Unit as the dictionary names it.
+    pub unit: Name,
+    /// Generic quantity.
+    pub quantity: Name,
+    /// How to work out what a count is; the first whose objects the drive has, all of them above 0.
+    pub methods: Vec<Cia402MethodRow>,
+    /// Where it comes from.
+    pub source: Source,
+    /// Worked examples.
+    #[serde(default)]
+    pub examples: Vec<Cia402ExampleRow>,
+}
+
+/// One way to work out what a count is: base, or the count of another unit, times and over objects.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402MethodRow {
+    /// What it is called.
+    pub name: String,
+    /// Generic units of a rotary axis to begin with.
+    pub base: Option<RatioRow>,
+    /// Unit whose count to begin with instead; of a row above.
+    pub like: Option<Name>,
+    /// Objects that multiply it.
+    #[serde(default)]
+    pub times: Vec<Name>,
+    /// Objects that divide it.
+    #[serde(default)]
+    pub over: Vec<Name>,
+}
+
+/// A worked example: what a drive with these objects gets for a generic value, and what becomes of it on the way back.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ExampleRow {
+    /// What the drive holds: object and value.
+    pub drive: Vec<(String, i64)>,
+    /// Object whose value is converted.
+    pub object: Name,
+    /// The generic value.
+    pub generic: Spanned<i64>,
+    /// The bytes in the object.
+    pub bytes: Name,
+    /// The generic value on the way back.
+    pub back: Spanned<i64>,
+}
+
+/// The words that lead a drive.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402WordsRow {
+    /// Controlword.
+    pub control: Name,
+    /// Statusword.
+    pub status: Name,
+    /// Mode of operation that is wanted.
+    pub mode: Name,
+    /// Mode of operation that is shown.
+    pub mode_shown: Name,
+    /// Modes of operation that there are.
+    pub modes_supported: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A signal and its object.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402SignalRow {
+    /// Signal of the generic model.
+    pub signal: Name,
+    /// Object.
+    pub object: Name,
+    /// `to_drive` or `from_drive`.
+    pub direction: Name,
+    /// What happens when the drive has no such object: `refuse` or `omit`.
+    pub missing: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// An operating mode on CiA 402.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ModeRow {
+    /// Operating mode.
+    pub mode: Name,
+    /// What happens when the drive has none of the modes, or lacks a value: `refuse` the drive, or `omit` the mode.
+    pub missing: Name,
+    /// Modes of operation, the preferred one first.
+    pub modes: Vec<Name>,
+    /// Signals to the drive.
+    pub command: Vec<Name>,
+    /// Signals from the drive.
+    pub actual: Vec<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What the controlword becomes by an action.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ActionRow {
+    /// Generic action.
+    pub action: Name,
+    /// State that the drive has to show. Default: any.
+    pub when: Option<Name>,
+    /// Fields of the controlword; none when the action leaves it alone.
+    pub pattern: Vec<FieldValueRow>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What a statusword says.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ReportRow {
+    /// State of the drive.
+    pub state: Name,
+    /// Fields of the statusword beside the state.
+    #[serde(default)]
+    pub pattern: Vec<FieldValueRow>,
+    /// Modes of operation that the drive shows. Default: any.
+    #[serde(default)]
+    pub modes: Vec<Name>,
+    /// Whether it is for drives that tell whether they follow command values, or for those that do not. Default: both.
+    pub follows: Option<bool>,
+    /// Report.
+    pub report: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A status bit.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402StatusRow {
+    /// Object with the word.
+    pub object: Name,
+    /// State of the drive, of the statusword.
+    pub state: Option<Name>,
+    /// Fields of the word.
+    #[serde(default)]
+    pub pattern: Vec<FieldValueRow>,
+    /// As in a report.
+    #[serde(default)]
+    pub modes: Vec<Name>,
+    /// Generic status bit.
+    pub status: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What error codes mean.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402FaultRow {
+    /// Error codes by name.
+    pub codes: Vec<Name>,
+    /// Generic cause.
+    pub cause: Name,
+    /// Reaction, where it is not the usual one of the cause.
+    pub reaction: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// What error codes of a class mean.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402FaultClassRow {
+    /// Classes of error codes by name.
+    pub classes: Vec<Name>,
+    /// Generic cause.
+    pub cause: Name,
+    /// Reaction, where it is not the usual one of the cause.
+    pub reaction: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// A parameter and its object.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ParameterRow {
+    /// Generic parameter.
+    pub parameter: Name,
+    /// Object.
+    pub object: Name,
+    /// `both`, `to_drive` or `from_drive`.
+    pub direction: Name,
+    /// What happens when the drive has no such object: `shadow` or `reject`.
+    pub missing: Name,
+    /// Factor between parameter and object, for signs (`[-1, 1]`).
+    pub factor: Option<RatioRow>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// One step of commissioning.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402CommissionRow {
+    /// `write`, `read`, `read_scaling`, `read_parameters`, `write_cycle` or `write_mode`.
+    #[serde(rename = "do")]
+    pub step: Name,
+    /// Object; none for the steps that know theirs.
+    pub object: Option<Name>,
+    /// Object with the power of ten of the cycle in seconds; `write_cycle`.
+    pub exponent: Option<Name>,
+    /// Value to write.
+    pub value: Option<Spanned<i64>>,
+    /// Parameter of the axis configuration to write, if it is given there.
+    pub parameter: Option<Name>,
+    /// What happens when the drive refuses: `fail` or `continue`.
+    pub refused: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
