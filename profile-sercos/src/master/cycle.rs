@@ -11,6 +11,7 @@ use super::station::{End, Presence, Station};
 use super::svc::request::SvcFailure;
 use super::topology::{Route, Topology};
 use crate::wire::cp0::AtRepr;
+use crate::wire::device_control::Topology as Loop;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::error::u16_at;
 use crate::wire::header::{Kind, Phase};
@@ -160,8 +161,16 @@ impl Master {
             self.evaluate_scan();
             return;
         }
+        self.turning.clear();
         for index in 0..self.found {
             self.read_station(index);
+            let turns = self.valid_status(index).is_some_and(|status| match status.topology() {
+                Loop::LoopbackForwardPrimary | Loop::LoopbackForwardSecondary => true,
+                Loop::FastForward | Loop::StoreAndForward => false,
+            });
+            if turns {
+                self.turning.push(SlaveId::from_index(index).0);
+            }
         }
         if self.state.supervises() {
             self.supervise();
@@ -355,6 +364,7 @@ impl Master {
     pub(super) fn lose(&mut self, index: usize) {
         let station = &mut self.stations[index];
         station.presence = Presence::Lost;
+        self.admission.count_anew();
         station.channel.abort(SvcFailure::SlaveLost);
         let address = station.address;
         let slave = SlaveId::from_index(index);
@@ -515,6 +525,7 @@ impl Master {
             if let Some(station) = self.stations.get_mut(self.found) {
                 station.found(address, Some(slave));
                 station.presence = Presence::Absent;
+                self.admission.count_anew();
                 self.found += 1;
                 self.emit(Event::PlaceKept { address });
             } else {

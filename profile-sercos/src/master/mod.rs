@@ -126,6 +126,8 @@ pub struct Master {
     /// Slaves in a stable scan that has not been taken over yet.
     scan_ready: Option<u16>,
     stations: Vec<Station>,
+    /// Those that turn telegrams round in this cycle.
+    turning: Vec<u16>,
     /// Slaves found by the last scan, and places kept for others.
     found: usize,
     /// Those of them that the scan has found.
@@ -167,6 +169,7 @@ impl Master {
             measuring: Measuring::default(),
             scan_ready: None,
             stations: (0..slaves).map(|_| Station::new(&config)).collect(),
+            turning: Vec::with_capacity(slaves),
             found: 0,
             scanned: 0,
             layout: CyclicLayout::with_capacity(slaves),
@@ -346,6 +349,7 @@ impl Master {
         let station = self.station(slave).ok_or(CallError::NoSlave)?;
         station.presence = Presence::Excluded;
         station.channel.abort(svc::request::SvcFailure::SlaveLost);
+        self.admission.count_anew();
         Ok(())
     }
 

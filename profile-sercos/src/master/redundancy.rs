@@ -137,18 +137,15 @@ impl Redundancy {
         next.map(|&index| usize::from(index))
     }
 
-    /// The slaves from port 1 to port 2.
-    pub fn in_order(&self) -> impl Iterator<Item = usize> + '_ {
-        self.order.iter().map(|&index| usize::from(index))
-    }
-
     /// No commands to close the ring are under way.
     pub fn is_at_ease(&self) -> bool {
         matches!(self.closing, Closing::Idle | Closing::Settling | Closing::Refused)
     }
 
-    fn position(&self, index: usize) -> Option<usize> {
-        self.order.iter().position(|&other| usize::from(other) == index)
+    /// Where a station is in the line. As the scan numbers them, most are where their number says.
+    pub fn position(&self, index: usize) -> Option<usize> {
+        let is = |&other: &u16| usize::from(other) == index;
+        if self.order.get(index).is_some_and(is) { Some(index) } else { self.order.iter().position(is) }
     }
 
     fn move_on(&mut self, event: ClosingEvent) -> bool {
@@ -254,12 +251,10 @@ impl Master {
 
     /// A slave that has turned the telegrams round has no link on its other side.
     fn find_open_cables(&mut self) {
-        for position in 0..self.redundancy.order.len() {
-            let index = usize::from(self.redundancy.order[position]);
-            let Some(status) = self.stations[index].status.filter(|_| self.is_valid(&self.stations[index]))
-            else {
-                continue;
-            };
+        for place in 0..self.turning.len() {
+            let index = usize::from(self.turning[place]);
+            let position = self.redundancy.position(index);
+            let Some((position, status)) = position.zip(self.valid_status(index)) else { continue };
             let cable = match status.topology() {
                 Loop::LoopbackForwardPrimary => position + 1,
                 Loop::LoopbackForwardSecondary => position,
@@ -276,18 +271,20 @@ impl Master {
 
     /// The slaves that turn telegrams round, if closing the ring is a matter of commanding them.
     fn closable_ends(&self) -> Option<ArrayVec<usize, ENDS_MAX>> {
-        let mut ends = ArrayVec::new();
         let (mut low, mut high) = (None, None);
-        for (position, &index) in self.redundancy.order.iter().enumerate() {
+        for &index in &self.turning {
             let station = &self.stations[usize::from(index)];
-            let Some(status) = station.status.filter(|_| self.is_valid(station)) else { continue };
+            let position = self.redundancy.position(usize::from(index));
+            let Some((position, status)) = position.zip(self.valid_status(usize::from(index))) else {
+                continue;
+            };
             let (end, wanted) = match status.topology() {
                 Loop::LoopbackForwardPrimary => (&mut low, InactivePort::SecondaryTelegram),
                 Loop::LoopbackForwardSecondary => (&mut high, InactivePort::PrimaryTelegram),
                 Loop::FastForward | Loop::StoreAndForward => continue,
             };
             let sees = status.inactive_port() == wanted && station.is_active();
-            if !sees || end.replace(position).is_some() || ends.try_push(usize::from(index)).is_err() {
+            if !sees || end.replace(position).is_some() {
                 return None;
             }
         }
@@ -301,7 +298,8 @@ impl Master {
             }
             _ => false,
         };
-        joined.then_some(ends)
+        let station = |position: usize| self.redundancy.order.get(position).copied().map(usize::from);
+        joined.then(|| [low, high].into_iter().flatten().filter_map(station).collect())
     }
 
     /// One cycle of closing the ring.

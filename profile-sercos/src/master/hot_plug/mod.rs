@@ -127,10 +127,21 @@ pub(super) struct Admission {
     rest: u16,
     /// The last refusal that was told: it is not told again until something changes.
     told: Option<(Option<u16>, HotPlugRefusal)>,
+    /// How many slaves are not there, counted anew when one has gone or come.
+    census: Option<Census>,
     /// The closed ring was told of.
     ring_told: bool,
     /// Cycles in which the ends of the lines have had a link and not heard their own telegrams from behind.
     linked: [u16; 2],
+}
+
+/// Slaves that are not there.
+#[derive(Debug, Clone, Copy)]
+struct Census {
+    /// That may come.
+    free: usize,
+    /// That were there before.
+    lost: usize,
 }
 
 impl Admission {
@@ -142,6 +153,11 @@ impl Admission {
     /// A phase begins.
     pub fn reset(&mut self) {
         *self = Admission { supported: self.supported, ..Admission::default() };
+    }
+
+    /// The presence of a slave has changed.
+    pub fn count_anew(&mut self) {
+        self.census = None;
     }
 
     /// Ends of lines are being commanded.
@@ -243,9 +259,18 @@ impl Master {
         }
     }
 
+    /// How many slaves are not there.
+    fn census(&mut self) -> Census {
+        let stations = &self.stations[..self.found];
+        *self.admission.census.get_or_insert_with(|| Census {
+            free: stations.iter().filter(|station| station.may_come()).count(),
+            lost: stations.iter().filter(|station| station.presence == Presence::Lost).count(),
+        })
+    }
+
     /// A place is free, and the ring is open.
-    fn is_wanted(&self) -> bool {
-        let free = self.stations[..self.found].iter().any(|station| station.may_come());
+    fn is_wanted(&mut self) -> bool {
+        let free = self.census().free > 0;
         let open = !self.redundancy.topology().is_ring() && self.redundancy.is_at_ease();
         free && open && self.ends_are_known()
     }
@@ -270,7 +295,7 @@ impl Master {
 
     fn tell_closed_ring(&mut self) {
         let closed = self.redundancy.topology().is_ring();
-        if !closed || self.admission.ring_told {
+        if !closed || self.admission.ring_told || self.census().free == 0 {
             self.admission.ring_told &= closed;
             return;
         }
@@ -293,9 +318,15 @@ impl Master {
             self.watch_line()?;
         }
         let done = |done: bool| Ok(done.then_some(StageEvent::Done));
-        match self.admission.stage {
+        let stage = self.admission.stage;
+        match stage {
             Stage::Idle => {
-                self.watch_links(false);
+                // Only the lost ones can be named, and only with them does it matter how long a link has been there.
+                if self.census().lost > 0 {
+                    self.watch_links(false);
+                } else {
+                    self.admission.linked = [0; 2];
+                }
                 Ok(self.is_wanted().then_some(StageEvent::Wanted))
             }
             Stage::Offer if !self.is_wanted() => Ok(Some(StageEvent::Unwanted)),
@@ -360,11 +391,13 @@ impl Master {
 
     /// The slave at the end of the line whose telegrams are those of `channel`.
     fn end_of(&self, channel: Channel) -> Option<(usize, DeviceStatus)> {
-        let mut ends = self.redundancy.in_order().filter_map(|index| {
+        let ends = self.turning.iter().filter_map(|&index| {
+            let index = usize::from(index);
             let status = self.valid_status(index).filter(|_| self.stations[index].is_active())?;
-            (status.topology() == loopback(channel)).then_some((index, status))
+            let position = self.redundancy.position(index)?;
+            (status.topology() == loopback(channel)).then_some((position, index, status))
         });
-        ends.next()
+        ends.min_by_key(|(position, ..)| *position).map(|(_, index, status)| (index, status))
     }
 
     /// Where a slave has taken the parameters and turns telegrams round.
@@ -525,6 +558,7 @@ impl Master {
         let config = self.config.slaves.iter().find(|slave| slave.address == address);
         station.found(address, config);
         station.presence = Presence::Joining;
+        self.admission.census = None;
         // As at the end of CP1.
         station.channel.rest(true);
         station.channel.set_open(false);
@@ -574,6 +608,7 @@ impl Master {
         station.misses = 0;
         station.channel.set_open(true);
         let address = station.address;
+        self.admission.census = None;
         self.redundancy.insert(index, place.end(), place.channel());
         self.measuring.joined();
         self.admission.told = None;
@@ -590,6 +625,7 @@ impl Master {
         station.presence = before;
         station.channel.abort(SvcFailure::SlaveLost);
         station.channel.set_open(false);
+        self.admission.census = None;
     }
 
     /// Time is over, and nobody turns telegrams round without having been asked.
