@@ -332,6 +332,9 @@ struct SercosDriveArguments {
     /// Addresses of the drives that slide instead of turning, separated by commas.
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     linear: Vec<u16>,
+    /// They can be plugged in while the bus runs (SCP_HP).
+    #[arg(long)]
+    hot_plug: bool,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,

@@ -54,7 +54,12 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
     let kind =
         |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
     let addresses = (arguments.address..=last).map(|address| (address, kind(&address)));
-    let mut drives = drives::drives(addresses, arguments.ring.is_some());
+    let ring = arguments.ring.is_some();
+    let mut drives = if arguments.hot_plug {
+        drives::hot_plug_drives(addresses, ring)
+    } else {
+        drives::drives(addresses, ring)
+    };
     let stop = signal::stop_on_signals()?;
     if let Some(seconds) = arguments.seconds {
         end_after(Arc::clone(&stop), seconds);

@@ -10,7 +10,8 @@ use profile_generic::servo::ServoParameters;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::{Config as SlaveConfig, Network, Slave};
+use profile_sercos::slave::{Config as SlaveConfig, Network, Slave, communication};
+use profile_sercos::wire::scp::ScpEntry;
 
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
@@ -70,6 +71,20 @@ pub fn linear() -> ServoParameters {
 /// Never with the servos of this module; a test builds both.
 #[must_use]
 pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
+    of_classes(drives, ring, communication::CLASSES)
+}
+
+/// The same with hot plug (SCP_HP): they can be plugged in while the bus runs.
+#[must_use]
+pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
+    of_classes(drives, ring, communication::CLASSES_WITH_HOT_PLUG)
+}
+
+fn of_classes(
+    drives: impl IntoIterator<Item = (u16, UnitKind)>,
+    ring: bool,
+    classes: &'static [ScpEntry],
+) -> DriveNetwork {
     let slaves = drives.into_iter().map(|(address, kind)| {
         let servo = match kind {
             UnitKind::Rotary => rotary(),
@@ -78,7 +93,8 @@ pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> 
         let drive = Drive::new(servo).expect("the servos of this module work");
         let [low, high] = address.to_le_bytes();
         let mac = [0x02, 0x41, 0x42, 0x01, high, low];
-        let config = SlaveConfig { address, mac, serial: u32::from(address), ..SlaveConfig::default() };
+        let config =
+            SlaveConfig { address, mac, serial: u32::from(address), classes, ..SlaveConfig::default() };
         Slave::new(&config, drive)
     });
     let slaves = slaves.collect();

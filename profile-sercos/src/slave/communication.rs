@@ -23,6 +23,14 @@ pub const CLASSES: &[ScpEntry] = &[
     ScpEntry { class: ScpClass::NRT, version: 1 },
 ];
 
+/// The same with hot plug.
+pub const CLASSES_WITH_HOT_PLUG: &[ScpEntry] = &[
+    ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
+    ScpEntry { class: ScpClass::SYNC, version: 1 },
+    ScpEntry { class: ScpClass::NRT, version: 1 },
+    ScpEntry { class: ScpClass::HOT_PLUG, version: 1 },
+];
+
 /// IDNs that [`Idn`] does not name.
 pub mod idn {
     use crate::wire::idn::Idn;

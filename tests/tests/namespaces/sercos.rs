@@ -15,8 +15,18 @@ use super::{in_namespace, one_bus, scratch, wait_for};
 /// Address of the box, where its controller is in the same namespace.
 const BOX: &str = "127.0.0.2";
 
-/// A configuration with so many turning axes, each on the drive with its number as address.
-fn configuration(name: &str, axes: usize, cycle_ms: u16, ring: bool) -> PathBuf {
+/// What the drives form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    Line,
+    Ring,
+    /// A line with a cable behind it that leads to a place for one more drive, and is not plugged in yet.
+    Prepared,
+}
+
+/// A configuration with so many turning axes, each on the drive with its number as address; the last so many `late` ones may
+/// come later.
+fn configuration(name: &str, axes: usize, cycle_ms: u16, ring: bool, late: usize) -> PathBuf {
     // Nobody promises the tests a host that keeps time: two seconds without an answer.
     let losses = 2_000 / cycle_ms;
     let names = (1..=axes).map(|axis| format!("\"axis-{axis}\"")).collect::<Vec<_>>().join(", ");
@@ -32,8 +42,9 @@ fn configuration(name: &str, axes: usize, cycle_ms: u16, ring: bool) -> PathBuf 
     for axis in 1..=axes {
         let _ = write!(
             text,
-            "[[south.sercos.drive]]\nname = \"drive-{axis}\"\naddress = {axis}\n\
-             [[axis]]\nname = \"axis-{axis}\"\ninstance = {axis}\ndrive = \"drive-{axis}\"\nunit = \"revolution\"\n"
+            "[[south.sercos.drive]]\nname = \"drive-{axis}\"\naddress = {axis}\nhot_plug = {}\n\
+             [[axis]]\nname = \"axis-{axis}\"\ninstance = {axis}\ndrive = \"drive-{axis}\"\nunit = \"revolution\"\n",
+            axis + late > axes
         );
     }
     let path = scratch(&format!("{name}.toml"));
@@ -53,9 +64,11 @@ struct Bus {
 
 impl Bus {
     /// Starts so many processes with so many drives each, and the box.
-    fn start(name: &str, processes: usize, drives_each: usize, cycle_ms: u16, ring: bool) -> Self {
+    fn start(name: &str, processes: usize, drives_each: usize, cycle_ms: u16, shape: Shape) -> Self {
+        let (ring, late) = (shape == Shape::Ring, usize::from(shape == Shape::Prepared));
         let gateway = Namespace::new("box");
-        let segments: Vec<_> = (0..processes).map(|number| Namespace::new(&format!("d{number}"))).collect();
+        let places = 0..processes + late;
+        let segments: Vec<_> = places.map(|number| Namespace::new(&format!("d{number}"))).collect();
         cable((&gateway, "sercos0", None), (&segments[0], "in", None));
         for pair in segments.windows(2) {
             cable((&pair[0], "out", None), (&pair[1], "in", None));
@@ -63,19 +76,22 @@ impl Bus {
         if ring {
             cable((&segments[processes - 1], "out", None), (&gateway, "sercos1", None));
         }
-        let drives = segments.iter().enumerate().map(|(number, segment)| {
+        if late > 0 {
+            segments[processes].set_link("in", false);
+        }
+        let drives = segments[..processes].iter().enumerate().map(|(number, segment)| {
             let (count, first) = (drives_each.to_string(), (number * drives_each + 1).to_string());
             let arguments =
                 ["simulate", "sercos-drive", "--interface", "in", "--slaves", &count, "--address", &first];
             let mut command = in_namespace(segment, &arguments);
-            if ring || number + 1 < processes {
+            if ring || number + 1 < segments.len() {
                 command.args(["--ring", "out"]);
             }
             command.args(["--seconds", "90"]).stderr(Stdio::inherit());
             Running::start("simulate sercos-drive", &mut command)
         });
         let drives = drives.collect();
-        let config = configuration(name, processes * drives_each, cycle_ms, ring);
+        let config = configuration(name, processes * drives_each + late, cycle_ms, ring, late);
         let log = scratch(&format!("{name}.log"));
         let mut command = in_namespace(&gateway, &["run", "--config", config.to_str().expect("UTF-8")]);
         command.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
@@ -133,7 +149,7 @@ fn moves(name: &str, processes: usize, drives_each: usize, cycle_ms: u16) {
     }
     let _alone = one_bus();
     in_real_time(name, || {
-        let mut bus = Bus::start(name, processes, drives_each, cycle_ms, false);
+        let mut bus = Bus::start(name, processes, drives_each, cycle_ms, Shape::Line);
         bus.wait_for("CP4");
         let mut controller = bus.controller(processes * drives_each, 2);
         let status = controller.wait(Duration::from_secs(60));
@@ -166,7 +182,7 @@ fn a_ring_of_eight_is_cut_and_healed_while_all_axes_move() {
     }
     let _alone = one_bus();
     in_real_time(name, || {
-        let mut bus = Bus::start(name, 2, 4, 4, true);
+        let mut bus = Bus::start(name, 2, 4, 4, Shape::Ring);
         bus.wait_for("CP4");
         let mut controller = bus.controller(8, 6);
         bus.wait_for("-> Running");
@@ -178,6 +194,40 @@ fn a_ring_of_eight_is_cut_and_healed_while_all_axes_move() {
         let log = text(&bus.log);
         assert!(status.success(), "the controller moved all axes: {status}\n{log}");
         assert!(!log.contains("lost"), "no slave was lost: {log}");
+        bus.end();
+    });
+}
+
+/// A process with a drive is started behind a running one while that one moves; its axis comes in and is moved, and is gone
+/// when its cable is pulled.
+#[test]
+fn a_drive_is_plugged_in_behind_a_running_one_and_moved() {
+    let name = "a_drive_is_plugged_in_behind_a_running_one_and_moved";
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let _alone = one_bus();
+    in_real_time(name, || {
+        let mut bus = Bus::start(name, 1, 1, 4, Shape::Prepared);
+        bus.wait_for("a place is kept for the slave with address 2");
+        bus.wait_for("CP4");
+        let mut first = bus.controller(1, 12);
+        bus.wait_for("-> Running");
+        bus.segments[1].set_link("in", true);
+        let arguments = ["simulate", "sercos-drive", "--interface", "in", "--address", "2", "--hot-plug"];
+        let mut command = in_namespace(&bus.segments[1], &arguments);
+        command.args(["--seconds", "90"]).stderr(Stdio::inherit());
+        bus.drives.push(Running::start("simulate sercos-drive", &mut command));
+        bus.wait_for("with address 2 takes part");
+        let status = first.wait(Duration::from_secs(60));
+        assert!(status.success(), "the first axis moved on: {status}\n{}", text(&bus.log));
+        let mut both = bus.controller(2, 2);
+        let status = both.wait(Duration::from_secs(60));
+        let log = text(&bus.log);
+        assert!(status.success(), "both axes moved: {status}\n{log}");
+        assert!(!log.contains("lost"), "no slave was lost: {log}");
+        bus.segments[1].set_link("in", false);
+        bus.wait_for("slave at position 2 with address 2 was lost in CP4");
         bus.end();
     });
 }

@@ -11,20 +11,13 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::event::{Event, HotPlugRefusal};
+use profile_sercos::slave::communication::CLASSES_WITH_HOT_PLUG;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
-use profile_sercos::wire::scp::{ScpClass, ScpEntry};
-
-const CLASSES: &[ScpEntry] = &[
-    ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
-    ScpEntry { class: ScpClass::SYNC, version: 1 },
-    ScpEntry { class: ScpClass::NRT, version: 1 },
-    ScpEntry { class: ScpClass::HOT_PLUG, version: 1 },
-];
 
 /// A slide with SCP_HP.
 fn slide(address: u16) -> Slave<Drive> {
-    let config = SlaveConfig { address, classes: CLASSES, ..SlaveConfig::default() };
+    let config = SlaveConfig { address, classes: CLASSES_WITH_HOT_PLUG, ..SlaveConfig::default() };
     Slave::new(&config, Drive::new(linear()).expect("the servo works"))
 }
 
