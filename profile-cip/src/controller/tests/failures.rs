@@ -280,3 +280,13 @@ proptest! {
         prop_assert!(report.cycles < 60_000);
     }
 }
+
+/// The handle of the session, changed on the way: the device refuses it, and the controller gives up.
+#[test]
+fn a_session_handle_that_was_changed_is_refused() {
+    let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![enable(), Step::Dwell { seconds: 0.3 }]);
+    rig.spoil = Some((0, 4, 0, false));
+    let report = rig.run(100);
+    assert!(rig.controller.is_closed());
+    assert!(report.failure.is_some(), "{report:?}");
+}

@@ -308,10 +308,15 @@ impl Peer {
                 self.seen.push("UnRegisterSession".into());
                 return Vec::new();
             }
-            _ => {
-                assert_eq!(packet.session_handle, SESSION);
-                self.rr_data(packet.data)
+            _ if packet.session_handle != SESSION => {
+                // As a device says it; the controller took over a handle that was changed on the way.
+                let status = EncapsulationStatus::INVALID_SESSION_HANDLE;
+                let refusal = Packet { status, data: &[], ..packet };
+                let mut out = vec![0; refusal.buffer_len()];
+                refusal.emit(&mut out).unwrap();
+                return out;
             }
+            _ => self.rr_data(packet.data),
         };
         let reply =
             Packet { session_handle: SESSION, status: EncapsulationStatus::SUCCESS, data: &data, ..packet };
