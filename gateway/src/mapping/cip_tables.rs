@@ -3,7 +3,6 @@
 mod builder;
 
 use profile_cip::target::drive_link::DriveAction;
-use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;
@@ -11,7 +10,7 @@ use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
-use profile_generic::state::{Action, DriveState, Request};
+use profile_generic::state::{DriveState, Request};
 
 use super::cip_events::EventTables;
 use super::compile_cip::{
@@ -19,8 +18,6 @@ use super::compile_cip::{
 };
 use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::{CipAttribute, CipType};
-use super::format::Name;
-use super::resolver::Resolver;
 
 /// What multiplies the ratio of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -252,37 +249,4 @@ pub(super) const fn has_direction(quantity: Quantity) -> bool {
 /// Whether the limits of the two directions differ in sign. Those of acceleration and deceleration are magnitudes.
 pub(super) const fn limit_has_sign(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Position | Quantity::Velocity | Quantity::Torque)
-}
-
-/// A signal by name.
-pub(super) fn signal(resolver: &mut Resolver<'_>, key: &str, name: &Name) -> Option<Signal> {
-    let known = Signal::ALL.iter().map(|signal| signal.name());
-    resolver.name(key, name, "a signal of the generic model", Signal::parse, known)
-}
-
-/// An operating mode by name.
-pub(super) fn operating_mode(resolver: &mut Resolver<'_>, name: &Name) -> Option<OperatingMode> {
-    let known = OperatingMode::ALL.iter().map(|mode| mode.name());
-    resolver.name("mode", name, "an operating mode", OperatingMode::parse, known)
-}
-
-/// An action by name.
-pub(super) fn action(resolver: &mut Resolver<'_>, name: &Name) -> Option<Action> {
-    let known = Action::ALL.iter().map(|action| action.name());
-    resolver.name("action", name, "an action of the generic model", Action::parse, known)
-}
-
-/// Rotary or linear, by name.
-pub(super) fn unit_kind(resolver: &mut Resolver<'_>, name: &Name) -> Option<UnitKind> {
-    let known = UnitKind::ALL.iter().map(|kind| kind.name());
-    resolver.name("kind", name, "rotary or linear", UnitKind::parse, known)
-}
-
-/// A capture by the names of its source and its edge.
-pub(super) fn capture_kind(resolver: &mut Resolver<'_>, source: &Name, edge: &Name) -> Option<CaptureKind> {
-    let known = CaptureSource::ALL.iter().map(|source| source.name());
-    let source = resolver.name("capture", source, "a source of captures", CaptureSource::parse, known);
-    let known = CaptureEdge::ALL.iter().map(|edge| edge.name());
-    let edge = resolver.name("edge", edge, "positive or negative", CaptureEdge::parse, known);
-    Some(CaptureKind::new(source?, edge?))
 }

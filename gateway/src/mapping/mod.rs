@@ -28,6 +28,7 @@ mod drive_facts;
 mod drive_program;
 mod examples;
 pub mod format;
+mod generic_names;
 mod item;
 mod load;
 mod numbers;

@@ -1,12 +1,10 @@
 //! From rows to the resolved mapping.
 
-use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{Signal, StatusBits};
-use profile_generic::parameter::Parameter;
+use profile_generic::image::Signal;
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
-use profile_generic::state::{Action, Report};
+use profile_generic::state::Action;
 
 use super::commissioning::width;
 use super::{
@@ -15,12 +13,14 @@ use super::{
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
-use crate::mapping::cip_tables::{action, operating_mode, signal};
 use crate::mapping::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::mapping::drive_program::FaultRow;
 use crate::mapping::format::{
     Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402MethodRow, Cia402ModeRow,
     Cia402ParameterRow, Cia402ScalingRow, Cia402SignalRow, FieldValueRow, GenericCia402File, Name,
+};
+use crate::mapping::generic_names::{
+    action, cause_and_reaction, directions, operating_mode, parameter, report, signal, status_bit,
 };
 use crate::mapping::item::Item;
 use crate::mapping::load::Parsed;
@@ -322,9 +322,7 @@ impl<'a> Builder<'a> {
             }
         }
         for row in &rows.report {
-            let known = Report::ALL.iter().map(|report| report.name());
-            let report =
-                self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
+            let report = report(&mut self.resolver, &row.report);
             let state = self.state("state", &row.state);
             let pattern = self.pattern("Statusword", &row.pattern);
             let modes = self.mode_codes(&row.modes);
@@ -333,8 +331,7 @@ impl<'a> Builder<'a> {
             self.tables.reports.push(rule);
         }
         for row in &rows.status {
-            let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
-            let bit = self.resolver.name("status", &row.status, "a status bit", StatusBits::parse, known);
+            let bit = status_bit(&mut self.resolver, &row.status);
             let Some((object, _)) = self.object("object", &row.object) else { continue };
             let state = match &row.state {
                 Some(name) => self.state("state", name),
@@ -386,17 +383,7 @@ impl<'a> Builder<'a> {
         reaction: Option<&Name>,
         patterns: &[(BitPattern, std::ops::Range<usize>)],
     ) {
-        let known = FaultCause::NAMED.iter().map(|(_, name)| *name);
-        let what = "a cause of the fault catalogue";
-        let cause = self.resolver.name("cause", cause, what, FaultCause::from_name, known);
-        let reaction = match reaction {
-            None => cause.map(FaultCause::default_reaction),
-            Some(name) => {
-                let known = Reaction::ALL.iter().map(|reaction| reaction.name());
-                self.resolver.name("reaction", name, "a reaction", Reaction::parse, known)
-            }
-        };
-        let (Some(cause), Some(reaction)) = (cause, reaction) else { return };
+        let Some((cause, reaction)) = cause_and_reaction(&mut self.resolver, cause, reaction) else { return };
         let word = Item::object(ERROR_CODE.index, ERROR_CODE.sub);
         for (pattern, place) in patterns {
             if self.tables.faults.iter().any(|known| known.pattern == *pattern) {
@@ -407,18 +394,10 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn parameter_id(&mut self, name: &Name) -> Option<(Parameter, Quantity)> {
-        let generic = &self.dictionaries.generic;
-        let what = "a parameter of the generic model";
-        let find = |text: &str| generic.parameter(text).map(|row| (row.parameter, row.quantity));
-        self.resolver.name("parameter", name, what, find, generic.names())
-    }
-
     fn parameter(&mut self, row: &Cia402ParameterRow) {
-        let parameter = self.parameter_id(&row.parameter);
+        let parameter = parameter(&mut self.resolver, &self.dictionaries.generic, &row.parameter);
         let value = self.value("object", &row.object);
-        let words = [("both", (true, true)), ("to_drive", (true, false)), ("from_drive", (false, true))];
-        let direction = self.resolver.word("direction", &row.direction, &words);
+        let direction = directions(&mut self.resolver, &row.direction);
         let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
         let factor = match &row.factor {
             None => Some(Ratio::ONE),
@@ -463,8 +442,8 @@ impl<'a> Builder<'a> {
     }
 
     fn kind(&mut self, row: &Cia402CommissionRow, verb: Verb) -> Option<StepKind> {
-        let Cia402CommissionRow { object, exponent, value, parameter, .. } = row;
-        match (verb, object, exponent, value, parameter) {
+        let Cia402CommissionRow { object, exponent, value, parameter: wanted, .. } = row;
+        match (verb, object, exponent, value, wanted) {
             (Verb::Read, Some(object), None, None, None) => {
                 Some(StepKind::Read(self.object("object", object)?.0))
             }
@@ -479,7 +458,7 @@ impl<'a> Builder<'a> {
                 Some(StepKind::Write(held, *number.get_ref()))
             }
             (Verb::Write, None, None, None, Some(name)) => {
-                let (parameter, _) = self.parameter_id(name)?;
+                let (parameter, _) = parameter(&mut self.resolver, &self.dictionaries.generic, name)?;
                 let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
                 if rule.is_none_or(|rule| !rule.to_drive) {
                     let message = "expected a parameter with a [[parameter]] row that goes to the drive";

@@ -12,8 +12,7 @@ use profile_generic::state::{DriveState, Request};
 
 use super::{
     CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes,
-    SequenceAttributes, Served, ServedAttribute, Times, capture_kind, has_direction, operating_mode, signal,
-    unit_kind,
+    SequenceAttributes, Served, ServedAttribute, Times, has_direction,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
@@ -27,6 +26,9 @@ use crate::mapping::dictionary::{Access, CipAttribute, Dictionaries, quantity};
 use crate::mapping::format::{
     CipAttributeRow, CipEventRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
     RejectRow,
+};
+use crate::mapping::generic_names::{
+    capture_kind, cause, operating_mode, reaction, signal, status_bit, unit_kind,
 };
 use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
@@ -320,8 +322,7 @@ impl Builder<'_> {
         for row in &rows.status {
             let mut status = StatusBits::empty();
             for name in &row.status {
-                let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
-                match self.resolver.name("status", name, "a status bit", StatusBits::parse, known) {
+                match status_bit(&mut self.resolver, name) {
                     Some(bit) => status |= bit,
                     None => return,
                 }
@@ -340,9 +341,7 @@ impl Builder<'_> {
     }
 
     fn fault(&mut self, row: &CipFaultRow) {
-        let known = FaultCause::NAMED.iter().map(|(_, name)| *name);
-        let what = "a cause of the fault catalogue";
-        let cause = self.resolver.name("cause", &row.cause, what, FaultCause::from_name, known);
+        let cause = cause(&mut self.resolver, &row.cause);
         let mut faults = Vec::new();
         let mut given = 0;
         if let Some(name) = &row.exception {
@@ -529,8 +528,7 @@ impl Builder<'_> {
             let methods = StopMethod::ALL.iter().map(|method| method.name());
             let what = "a way to stop of the generic model";
             let method = self.resolver.name("method", &row.method, what, StopMethod::parse, methods);
-            let reactions = Reaction::ALL.iter().map(|reaction| reaction.name());
-            let abort = self.resolver.name("abort", &row.abort, "a reaction", Reaction::parse, reactions);
+            let abort = reaction(&mut self.resolver, "abort", &row.abort);
             if let (Some(code), Some(method), Some(abort)) = (code, method, abort) {
                 let plan = StopPlan { method, hold: row.holds };
                 self.tables.stoppings.push(CipStopping { code, plan, abort });

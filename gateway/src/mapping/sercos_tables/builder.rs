@@ -3,14 +3,12 @@
 use std::collections::BTreeSet;
 
 use profile_cip::target::exception::ExceptionAction;
-use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{Signal, StatusBits};
+use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
-use profile_generic::parameter::Parameter;
 use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
-use profile_generic::state::{Action, Report};
+use profile_generic::state::Action;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
@@ -22,13 +20,16 @@ use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
-use crate::mapping::cip_tables::{action, capture_kind, operating_mode, signal, unit_kind};
 use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::mapping::format::{
     CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow, ScalingMethodRow,
     SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
     UnboundRow,
+};
+use crate::mapping::generic_names::{
+    action, capture_kind, cause_and_reaction, directions, operating_mode, parameter, report, signal,
+    status_bit, unit_kind,
 };
 use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
@@ -473,9 +474,7 @@ impl<'a> Builder<'a> {
             }
         }
         for row in &rows.report {
-            let known = Report::ALL.iter().map(|report| report.name());
-            let report =
-                self.resolver.name("report", &row.report, "a report of a drive", Report::parse, known);
+            let report = report(&mut self.resolver, &row.report);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
                 let (acknowledges, procedure) = (row.acknowledges, row.procedure);
                 self.tables.reports.push(ReportRule { pattern, report, acknowledges, procedure });
@@ -487,8 +486,7 @@ impl<'a> Builder<'a> {
             self.resolver.error(code::TOO_MANY, rows.mapping.span(), "report", message);
         }
         for row in &rows.status {
-            let known = StatusBits::NAMED.iter().map(|(_, name)| *name);
-            let bit = self.resolver.name("status", &row.status, "a status bit", StatusBits::parse, known);
+            let bit = status_bit(&mut self.resolver, &row.status);
             let Some((idn, word)) = self.word("word", &row.word) else { continue };
             if let (Some(pattern), Some(bit)) = (self.pattern(word, &row.pattern), bit) {
                 let acknowledges = row.acknowledges;
@@ -504,19 +502,10 @@ impl<'a> Builder<'a> {
     }
 
     fn fault(&mut self, row: &SercosFaultRow) {
-        let known = FaultCause::NAMED.iter().map(|(_, name)| *name);
-        let what = "a cause of the fault catalogue";
-        let cause = self.resolver.name("cause", &row.cause, what, FaultCause::from_name, known);
-        let reaction = match &row.reaction {
-            None => cause.map(FaultCause::default_reaction),
-            Some(name) => {
-                let known = Reaction::ALL.iter().map(|reaction| reaction.name());
-                self.resolver.name("reaction", name, "a reaction", Reaction::parse, known)
-            }
-        };
+        let named = cause_and_reaction(&mut self.resolver, &row.cause, row.reaction.as_ref());
         let Some((idn, word)) = self.word("word", &row.word) else { return };
         let pattern = self.pattern(word, &row.pattern);
-        if let (Some(cause), Some(reaction), Some(pattern)) = (cause, reaction, pattern) {
+        if let (Some((cause, reaction)), Some(pattern)) = (named, pattern) {
             let severe =
                 |known: &&ExceptionRow| known.cause == cause && known.default > ExceptionAction::ALARM.0;
             if !reaction.stops() && self.exceptions.iter().any(|row| severe(&row)) {
@@ -612,18 +601,10 @@ impl<'a> Builder<'a> {
         Some(CaptureRule { kind, by })
     }
 
-    fn parameter_id(&mut self, name: &Name) -> Option<(Parameter, Quantity)> {
-        let generic = &self.dictionaries.generic;
-        let what = "a parameter of the generic model";
-        let find = |text: &str| generic.parameter(text).map(|row| (row.parameter, row.quantity));
-        self.resolver.name("parameter", name, what, find, generic.names())
-    }
-
     fn parameter(&mut self, row: &SercosParameterRow) {
-        let parameter = self.parameter_id(&row.parameter);
+        let parameter = parameter(&mut self.resolver, &self.dictionaries.generic, &row.parameter);
         let idn = self.idn("idn", &row.idn);
-        let words = [("both", (true, true)), ("to_drive", (true, false)), ("from_drive", (false, true))];
-        let direction = self.resolver.word("direction", &row.direction, &words);
+        let direction = directions(&mut self.resolver, &row.direction);
         let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
         let factor = match &row.factor {
             None => Some(Ratio::ONE),
@@ -723,7 +704,7 @@ impl<'a> Builder<'a> {
                 Some(StepKind::WriteValue(idn.idn, *value.get_ref()))
             }
             (Verb::Write, None, None, Some(name)) => {
-                let (parameter, _) = self.parameter_id(name)?;
+                let (parameter, _) = parameter(&mut self.resolver, &self.dictionaries.generic, name)?;
                 let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
                 if rule.is_none_or(|rule| !rule.to_drive) {
                     let message = "expected a parameter with a [[parameter]] row that goes to the drive";
