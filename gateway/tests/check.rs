@@ -53,7 +53,7 @@ fn codes_are_explained_and_listed() {
 #[test]
 fn schemas_are_written() {
     let names = out(&check(&["--schema"]));
-    assert_eq!(names.lines().count(), 17, "{names}");
+    assert_eq!(names.lines().count(), 18, "{names}");
     let schema: serde_json::Value =
         serde_json::from_str(&out(&check(&["--schema", "generic-sercos"]))).unwrap();
     let parameter = &schema["definitions"]["SercosParameterRow"]["properties"]["parameter"]["enum"];
