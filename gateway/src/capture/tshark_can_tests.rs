@@ -63,21 +63,9 @@ fn dissect(name: &str, frames: &[Frame]) -> Option<Vec<BTreeMap<&'static str, St
     for field in FIELDS {
         command.args(["-e", field]);
     }
-    let output = command.output();
+    let lines = super::tshark_tests::columns(&mut command);
     std::fs::remove_file(&path).unwrap();
-    let output = match output {
-        Ok(output) => output,
-        Err(error) => {
-            assert!(std::env::var_os("CI").is_none(), "tshark is required in CI: {error}");
-            println!("SKIPPED: tshark cannot be run: {error}");
-            return None;
-        }
-    };
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(output.stdout).unwrap();
-    let lines =
-        text.lines().map(|line| FIELDS.into_iter().zip(line.split('\t').map(str::to_owned)).collect());
-    Some(lines.collect())
+    Some(lines?.into_iter().map(|line| FIELDS.into_iter().zip(line).collect()).collect())
 }
 
 fn frame(id: u16, data: &[u8]) -> Frame {

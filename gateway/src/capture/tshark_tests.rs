@@ -75,6 +75,11 @@ fn dissect(file: &Path, fields: &[&str]) -> Option<Vec<Vec<String>>> {
     for field in fields {
         command.args(["-e", field]);
     }
+    columns(&mut command)
+}
+
+/// What tshark prints, a line a frame, split at the tabs; `None` when it is not installed.
+pub(super) fn columns(command: &mut Command) -> Option<Vec<Vec<String>>> {
     let output = match command.output() {
         Ok(output) => output,
         Err(error) => {

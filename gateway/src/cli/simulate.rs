@@ -64,16 +64,15 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
     if let Some(seconds) = arguments.seconds {
         end_after(Arc::clone(&stop), seconds);
     }
-    // Without real-time scheduling the drives answer later, which the master counts; nothing else changes.
-    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), ..realtime::Request::default() };
-    let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    // Without it the drives answer later, which the master counts; nothing else changes.
+    let refused = ask_for_real_time();
     let mut progress = Progress::new(false);
     progress.step(&format!(
         "{} drives with addresses {} to {last} on {}{}",
         arguments.slaves,
         arguments.address,
         arguments.ring.iter().fold(arguments.interface.clone(), |all, ring| format!("{all}, {ring}")),
-        if refused.is_empty() { String::new() } else { format!(" ({refused})") }
+        refused
     ));
     drives::run(&mut drives, &sockets, &stop)?;
     Ok(ExitCode::SUCCESS)
@@ -91,19 +90,25 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
     if let Some(seconds) = arguments.seconds {
         end_after(Arc::clone(&stop), seconds);
     }
-    // Without real-time scheduling the drive answers later; nothing else changes.
-    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), ..realtime::Request::default() };
-    let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    // Without it the drive answers later; nothing else changes.
+    let refused = ask_for_real_time();
     let mut progress = Progress::new(false);
     progress.step(&format!(
         "a drive with {} on {}, {}{}",
         if arguments.axes == 1 { "one axis".into() } else { format!("{} axes", arguments.axes) },
         arguments.interface,
         node.map_or("waiting for a node-id".into(), |node| format!("node {node}")),
-        if refused.is_empty() { String::new() } else { format!(" ({refused})") }
+        refused
     ));
     can_drive::run(&mut drive, &mut socket, &stop)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Asks for the scheduling of a drive. Returns what was refused, in brackets behind a space; empty when all was granted.
+fn ask_for_real_time() -> String {
+    let request = realtime::Request { priority: Some(DRIVE_PRIORITY), ..realtime::Request::default() };
+    let refused = realtime::apply(&request).refused().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    if refused.is_empty() { refused } else { format!(" ({refused})") }
 }
 
 fn end_after(stop: Arc<AtomicBool>, seconds: u64) {

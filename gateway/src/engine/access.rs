@@ -79,15 +79,6 @@ pub enum Progress {
     Failed,
 }
 
-/// What an access brought.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reply<'a> {
-    /// What was read.
-    pub data: &'a [u8],
-    /// How far the command is.
-    pub progress: Progress,
-}
-
 /// Why the drive refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {

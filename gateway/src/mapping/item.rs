@@ -4,25 +4,36 @@ use core::fmt;
 
 use profile_sercos::wire::idn::Idn;
 
+/// An object of a CANopen drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Object {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub sub: u8,
+}
+
+/// As the tables write it: `607A:00`.
+impl fmt::Display for Object {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:04X}:{:02X}", self.index, self.sub)
+    }
+}
+
 /// The number of something that a drive keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Item {
     /// An IDN of a SERCOS drive.
     Idn(Idn),
     /// An object of a CANopen drive.
-    Object {
-        /// Its index.
-        index: u16,
-        /// Its sub-index.
-        sub: u8,
-    },
+    Object(Object),
 }
 
 impl Item {
     /// An object of a CANopen drive.
     #[must_use]
     pub const fn object(index: u16, sub: u8) -> Self {
-        Self::Object { index, sub }
+        Self::Object(Object { index, sub })
     }
 
     /// The IDN, where it is one.
@@ -30,7 +41,7 @@ impl Item {
     pub const fn idn(self) -> Option<Idn> {
         match self {
             Self::Idn(idn) => Some(idn),
-            Self::Object { .. } => None,
+            Self::Object(_) => None,
         }
     }
 }
@@ -46,7 +57,7 @@ impl fmt::Display for Item {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Idn(idn) => write!(f, "{idn}"),
-            Self::Object { index, sub } => write!(f, "{index:04X}:{sub:02X}"),
+            Self::Object(object) => write!(f, "{object}"),
         }
     }
 }

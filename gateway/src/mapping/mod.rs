@@ -52,7 +52,7 @@ pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
-pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, Object, ObjectFacts, ObjectStep, Plan};
+pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, ObjectFacts, ObjectStep, Plan};
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
@@ -77,7 +77,7 @@ pub use dictionary::{
 };
 pub use drive_facts::{Difference, DriveFacts};
 pub use drive_program::{DriveProgram, FaultRow, MAX_MODES, ParameterEntry, Procedure, Telegram};
-pub use item::Item;
+pub use item::{Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
@@ -147,13 +147,19 @@ impl Mapping {
     pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
         let tables = texts.parse(findings)?;
         let dictionaries = Dictionaries::resolve(&tables, findings);
+        // Tables that were parsed were parsed without an error: those there are now are the dictionaries'.
         let sound = !findings.has_errors();
+        let mapping = Self::join(tables, dictionaries, sound, findings);
+        (!findings.has_errors()).then_some(mapping)
+    }
+
+    /// The mapping tables, resolved by the dictionaries, which are sound or were told not to be.
+    fn join(tables: Tables, dictionaries: Dictionaries, sound: bool, findings: &mut Findings) -> Self {
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
         // What is wrong with a dictionary need not be told again by every row that names it.
         let cia402 = sound.then(|| Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, findings));
-        let cia402 = cia402.unwrap_or_default();
-        (!findings.has_errors()).then_some(Self { dictionaries, cip, sercos, cia402, tables })
+        Self { dictionaries, cip, sercos, cia402: cia402.unwrap_or_default(), tables }
     }
 
     /// The same with another text of one of the mapping tables, such as `cip-generic.toml`: for whoever
@@ -189,11 +195,8 @@ impl Mapping {
         if findings.has_errors() {
             return Err(findings);
         }
-        let dictionaries = self.dictionaries.clone();
-        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, &mut findings);
-        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, &mut findings);
-        let cia402 = Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, &mut findings);
-        findings.into_result(Self { dictionaries, cip, sercos, cia402, tables })
+        let mapping = Self::join(tables, self.dictionaries.clone(), true, &mut findings);
+        findings.into_result(mapping)
     }
 
     /// The operation modes that drives have, each once, as many as a drive has places for.

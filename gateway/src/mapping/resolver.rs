@@ -27,7 +27,6 @@ impl<'a> Resolver<'a> {
         self.errors.has_errors()
     }
 
-    /// Notes that the value at `span` is wrong.
     /// A reason is more than nothing.
     pub fn reason(&mut self, reason: &Name) {
         if reason.get_ref().trim().is_empty() {
@@ -35,6 +34,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
+    /// Notes that the value at `span` is wrong.
     pub fn error(&mut self, code: Code, span: Range<usize>, key: &str, message: impl Into<String>) {
         self.errors.push(self.file, Problem::new(code, span).key(key).expected(message));
     }

@@ -40,6 +40,7 @@ use crate::wire::cob_id::{self, CobId, Function};
 use crate::wire::error_control::Heartbeat;
 use crate::wire::lss::LssAddress;
 use crate::wire::nmt::{Nmt, NmtState};
+use crate::wire::pdo::PDO_LEN_MAX;
 use crate::wire::sync::Sync;
 use crate::wire::time::TimeOfDay;
 use crate::wire::{self, NodeId};
@@ -504,13 +505,18 @@ impl<A: Application> Node<A> {
         if !self.state.has_pdo() {
             return;
         }
+        self.send_tpdos(|pdo, dictionary| pdo.event(now, dictionary));
+    }
+
+    /// Sends the valid TPDOs for which `due` gives bytes.
+    fn send_tpdos(&mut self, mut due: impl FnMut(&mut Pdo, &Dictionary) -> Option<[u8; PDO_LEN_MAX]>) {
         for number in 0..self.tpdos.len() {
             let pdo = &mut self.tpdos[number];
             if !pdo.valid {
                 continue;
             }
             let (id, len) = (pdo.id, pdo.len());
-            if let Some(bytes) = pdo.event(now, &self.dictionary) {
+            if let Some(bytes) = due(pdo, &self.dictionary) {
                 self.statistics.tpdos += 1;
                 self.send(id, &bytes[..len]);
             }
@@ -538,17 +544,7 @@ impl<A: Application> Node<A> {
         if !self.state.has_pdo() {
             return;
         }
-        for number in 0..self.tpdos.len() {
-            let pdo = &mut self.tpdos[number];
-            if !pdo.valid {
-                continue;
-            }
-            let (id, len) = (pdo.id, pdo.len());
-            if let Some(bytes) = pdo.sync(sync.counter, &self.dictionary) {
-                self.statistics.tpdos += 1;
-                self.send(id, &bytes[..len]);
-            }
-        }
+        self.send_tpdos(|pdo, dictionary| pdo.sync(sync.counter, dictionary));
         for pdo in self.rpdos.iter_mut().filter(|pdo| pdo.valid && pdo.transmission.is_synchronous()) {
             pdo.apply(&mut self.dictionary);
         }

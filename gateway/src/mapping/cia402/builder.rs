@@ -6,7 +6,6 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::state::Action;
 
-use super::commissioning::width;
 use super::{
     ActionRule, Base, Cia402Tables, DriveMode, FixedUnit, Method, ModeRule, Object, ParameterRule,
     ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value, Words,
@@ -84,7 +83,7 @@ fn parse(text: &str) -> Option<Object> {
 }
 
 fn value(object: Object, row: &Cia402Sub) -> Option<Value> {
-    Some(Value { object, width: width(row.data_type?)?, unit: row.unit.clone() })
+    Some(Value { object, width: row.data_type?.width()?, unit: row.unit.clone() })
 }
 
 struct Builder<'a> {

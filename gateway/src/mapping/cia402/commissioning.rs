@@ -1,12 +1,10 @@
 //! What is written to and read from a drive before it takes part in the cycle.
 
-use profile_generic::program::Width;
 use profile_generic::time::DurationNs;
 
 use super::compile::{Cia402Axis, Cia402Error};
 use super::facts::ObjectFacts;
 use super::{Cia402Tables, Object, StepKind, Value};
-use crate::mapping::dictionary::Cia402Dictionary;
 use crate::mapping::item::Item;
 
 /// One SDO access.
@@ -146,32 +144,6 @@ fn cycle(time: DurationNs) -> Option<(i64, i64)> {
         (number, power) = (number / 10, power + 1);
     }
     (1..=i64::from(u8::MAX)).contains(&number).then_some((number, power))
-}
-
-impl Cia402Axis {
-    /// An object of the tables on this axis of the device; `None` when the device has no such axis.
-    #[must_use]
-    pub fn item(&self, object: Object) -> Option<Item> {
-        Some(Item::object(Cia402Dictionary::on_axis(object.index, self.axis)?, object.sub))
-    }
-}
-
-/// Width of a value by its type in the dictionary; `None` for texts and for types that nobody tells.
-pub(super) fn width(data_type: crate::mapping::dictionary::Cia402Type) -> Option<Width> {
-    use crate::mapping::dictionary::Cia402Type as T;
-    Some(match data_type {
-        T::Bool | T::U8 => Width::U8,
-        T::I8 => Width::I8,
-        T::I16 => Width::I16,
-        T::I32 => Width::I32,
-        T::I64 => Width::I64,
-        T::U16 => Width::U16,
-        T::U32 => Width::U32,
-        T::U64 => Width::U64,
-        T::F32 => Width::F32,
-        T::F64 => Width::F64,
-        T::VisibleString | T::OctetString | T::Domain => return None,
-    })
 }
 
 #[cfg(test)]

@@ -6,12 +6,13 @@ use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{BitPattern, Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
-use profile_generic::ratio::{Ratio, Rounding};
+use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
 use super::{Cia402Tables, DriveMode, ModeRule, Object, ParameterRule, SignalRule, Value};
 use crate::mapping::capture_program::Place;
+use crate::mapping::dictionary::Cia402Dictionary;
 use crate::mapping::drive_program::{
     DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeEntry, ParameterEntry, StatusRow, StepRow, Telegram,
     WORD_BYTES,
@@ -47,6 +48,12 @@ pub struct Cia402Axis {
 }
 
 impl Cia402Axis {
+    /// An object of the tables on this axis of the device; `None` when the device has no such axis.
+    #[must_use]
+    pub fn item(&self, object: Object) -> Option<Item> {
+        Some(Item::object(Cia402Dictionary::on_axis(object.index, self.axis)?, object.sub))
+    }
+
     /// What the configuration says of the counts of a quantity.
     pub(super) fn count_of(&self, quantity: Quantity) -> Option<Ratio> {
         self.counts.iter().find(|(known, _)| *known == quantity).map(|(_, ratio)| *ratio)
@@ -304,7 +311,7 @@ impl Cia402Tables {
     }
 
     /// The entry of a parameter; `None` when the drive lacks it, or its unit is not known.
-    pub(super) fn entry(
+    pub(in crate::mapping) fn entry(
         &self,
         rule: &ParameterRule,
         axis: &Cia402Axis,
@@ -331,20 +338,19 @@ impl Cia402Tables {
         }))
     }
 
-    /// Converts a value to the bytes of an object and back; for worked examples.
-    pub(in crate::mapping) fn round_trip(
-        &self,
-        value: &Value,
-        generic: i64,
-        axis: &Cia402Axis,
-        facts: &ObjectFacts,
-    ) -> Result<(Vec<u8>, i64), Cia402Error> {
-        let rule = self.scalings.iter().find(|rule| rule.unit == value.unit);
-        let quantity = rule.map_or(Quantity::None, |rule| rule.quantity);
-        let count = self.count(value, quantity, axis, facts)?;
-        let number = to_drive(value, count)?.convert(generic).value;
-        let back = count.apply(number, Rounding::Nearest).map_err(|_| Cia402Error::Overflow(value.object))?;
-        Ok((number.to_le_bytes()[..value.width.bytes()].to_vec(), back))
+    /// A rule that only converts a value, both ways, to the quantity that its unit measures; for worked examples.
+    pub(in crate::mapping) fn plain_rule(&self, value: Value) -> ParameterRule {
+        let scaling = self.scalings.iter().find(|rule| rule.unit == value.unit);
+        ParameterRule {
+            // The number of the parameter does not matter for the conversion.
+            parameter: Parameter::default(),
+            quantity: scaling.map_or(Quantity::None, |rule| rule.quantity),
+            value,
+            to_drive: true,
+            from_drive: true,
+            reject: false,
+            factor: Ratio::ONE,
+        }
     }
 }
 
@@ -373,16 +379,4 @@ fn in_modes(pattern: BitPattern, modes: &[i8], chosen: &[(&ModeRule, &DriveMode)
         BitPattern::new(pattern.mask | mode.mask, pattern.value | mode.value)
     };
     there.map(with).collect()
-}
-
-/// The item of an object, for those who know only the item.
-impl TryFrom<Item> for Object {
-    type Error = ();
-
-    fn try_from(item: Item) -> Result<Self, ()> {
-        match item {
-            Item::Object { index, sub } => Ok(Self { index, sub }),
-            Item::Idn(_) => Err(()),
-        }
-    }
 }

@@ -26,21 +26,7 @@ pub use self::compile::{Cia402Axis, Cia402Error};
 pub use self::facts::ObjectFacts;
 
 use super::drive_program::FaultRow;
-
-/// An object of the dictionary, of the first axis of a device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Object {
-    /// Index.
-    pub index: u16,
-    /// Sub-index.
-    pub sub: u8,
-}
-
-impl core::fmt::Display for Object {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{:04X}:{:02X}", self.index, self.sub)
-    }
-}
+use super::item::Object;
 
 /// An object that holds a number, and what it measures.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use profile_generic::program::Width;
+
 use super::cia402::Cia402Dictionary;
 use super::documents::{Confidence, Trust, one_of};
 use crate::finding::registry as code;
@@ -75,6 +77,23 @@ words! {
 }
 
 impl Cia402Type {
+    /// How a number of this type lies in an object; `None` for texts.
+    pub const fn width(self) -> Option<Width> {
+        Some(match self {
+            Self::Bool | Self::U8 => Width::U8,
+            Self::I8 => Width::I8,
+            Self::I16 => Width::I16,
+            Self::I32 => Width::I32,
+            Self::I64 => Width::I64,
+            Self::U16 => Width::U16,
+            Self::U32 => Width::U32,
+            Self::U64 => Width::U64,
+            Self::F32 => Width::F32,
+            Self::F64 => Width::F64,
+            Self::VisibleString | Self::OctetString | Self::Domain => return None,
+        })
+    }
+
     /// Bits of a value; `None` when its length is its own.
     pub const fn bits(self) -> Option<u32> {
         match self {
