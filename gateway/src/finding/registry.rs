@@ -177,7 +177,7 @@ registry! {
         "Correct its name, or move it out of the folder. Rows of your own belong in an overlay.";
 
     UNKNOWN_NAME = 10 Error "an unknown name":
-        "The row names an attribute, a signal, a parameter, an IDN, a field or a code that no dictionary has.",
+        "The row names an attribute, a signal, a parameter, an IDN, an object, a field or a code that no dictionary has.",
         "[[cip-generic.attribute]]\nattribute = \"Kpq\"",
         "Correct the name. `axisbridge dictionary` prints all of them. What really is new goes into the dictionary first.";
     BAD_IDN = 11 Error "no IDN":
