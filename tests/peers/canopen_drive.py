@@ -4,7 +4,7 @@
 
 SDO (expedited, segmented), NMT, heartbeat producer and consumer, EMCY, four RPDOs and four TPDOs with free mapping, SYNC; pp, pv,
 hm (35, 37), csp, csv, cst. An error code written to 2FFF:01 raises that fault, 1 written to 2FFF:02 stops the heartbeat until 0
-is. Each change of state is one line on standard output.
+is or the node is reset. Each change of state is one line on standard output.
 """
 
 import argparse
@@ -56,6 +56,7 @@ NAMES = {
     ENABLED: "operation enabled", QUICK_STOP: "quick stop active", REACTION: "fault reaction active", FAULT: "fault",
 }  # fmt: skip
 MODES = (0, 1, 3, 6, 8, 9, 10)
+METHODS = (35, 37)
 
 
 def dictionary(node):
@@ -184,6 +185,8 @@ class Drive:
                 raise SdoAbortedError(0x06090030)
         if index == 0x6060 and struct.unpack("b", data)[0] not in MODES:
             raise SdoAbortedError(0x06090030)
+        if index == 0x6098 and struct.unpack("b", data)[0] not in METHODS:
+            raise SdoAbortedError(0x06090030)
         self.node.data_store.setdefault(index, {})[subindex] = bytes(data)
         with self.lock:
             if index & 0xFFFC == 0x1400:
@@ -193,6 +196,7 @@ class Drive:
             elif (index, subindex) == (0x2FFF, 1) and value:
                 self.fault(value)
             elif (index, subindex) == (0x2FFF, 2):
+                print("heartbeat off" if value else "heartbeat on", flush=True)
                 self.node.nmt.stop_heartbeat()
                 if not value:
                     self.node.nmt.start_heartbeat(self.get(0x1017))
@@ -286,7 +290,8 @@ class Drive:
             self.status()
 
     def emergency(self, code):
-        register = 0 if code == 0 else 0x11 if code & 0xF000 == 0x8000 else 0x81
+        # Communication, device profile, or of the manufacturer.
+        register = 0 if code == 0 else 0x11 if 0x8100 <= code < 0x8300 else 0x21 if 0x8300 <= code < 0x9000 else 0x81
         self.set(0x1001, register)
         self.network.send_message(0x80 + self.id, struct.pack("<HB5x", code, register))
 
