@@ -5,12 +5,17 @@ use profile_generic::can::{Frame, Id};
 
 use super::*;
 
-/// Starts our drive as a user does, and waits for its boot-up message.
+/// Starts our drive as a user does.
 fn drive(binary: &Path, arguments: &[&str]) -> Peer {
-    let mut bus = CanSocket::open(INTERFACE, &Options::default()).unwrap();
     let mut command = Command::new(binary);
     command.args(["simulate", "can-drive", "--interface", INTERFACE]).args(arguments);
-    let drive = Peer::command("axisbridge", command);
+    Peer::command("axisbridge", command)
+}
+
+/// One with a node-id, after its boot-up message.
+fn booted(binary: &Path) -> Peer {
+    let mut bus = CanSocket::open(INTERFACE, &Options::default()).unwrap();
+    let drive = drive(binary, &["--node", &NODE.to_string()]);
     let boot_up = Frame::new(Id::Standard(0x700 + u16::from(NODE)), &[0]).unwrap();
     assert!(bus.wait(Duration::from_secs(30)).unwrap(), "no boot-up message: {}", drive.said());
     let first = bus.recv().unwrap().map(|received| received.content);
@@ -36,9 +41,38 @@ fn the_two_foreign_peers_understand_each_other() {
 fn our_drive_follows_a_foreign_master() {
     let test = "our_drive::our_drive_follows_a_foreign_master";
     let Some((python, binary)) = python_and_binary_inside(test) else { return };
-    let mut drive = drive(&binary, &["--node", "5"]);
+    let mut drive = booted(&binary);
     let said = Peer::script(&python, "canopen_master.py", &[INTERFACE, "5", "--period", "0.02"]).succeeds();
     has_lines(&said, &["type 00020192", "missing 06020000", "state 27", "error 7305", "cleared 40"]);
     has_lines(&said, &["name Axisbridge simulated CiA 402 drive"]);
+    assert!(drive.running.terminate(Duration::from_secs(5)).success(), "{}", drive.said());
+}
+
+#[test]
+fn our_drive_does_what_a_foreign_library_expects_of_one() {
+    let test = "our_drive::our_drive_does_what_a_foreign_library_expects_of_one";
+    let Some((python, binary)) = python_and_binary_inside(test) else { return };
+    let sheet = std::env::temp_dir().join("drive.eds");
+    let sheet = sheet.to_str().unwrap();
+    // Without a node-id; the library finds it by LSS and reads its objects from the data sheet that it writes.
+    let mut drive = drive(&binary, &["--eds", sheet]);
+    let said = Peer::script(&python, "canopen_remote.py", &[INTERFACE, "5", sheet]).succeeds();
+    has_lines(
+        &said,
+        &[
+            "address 7FFFFFFF 192 1 0",
+            "type 00020192",
+            "name Axisbridge simulated CiA 402 drive",
+            // No object, no sub-index, read only, a mode that is none, too short, too long, a mapping in use, no room.
+            "refused 06020000 06090011 06010002 06090030 06070013 06070012 06010000 06070012",
+            "mapped 6040 607A 6060 60FF 6071 6041 6064 6061 606C 6077",
+            "states READY TO SWITCH ON, SWITCHED ON, READY TO SWITCH ON, SWITCH ON DISABLED, OPERATION ENABLED, \
+             SWITCHED ON, OPERATION ENABLED, READY TO SWITCH ON",
+            "mode refused",
+            "error 7305 21 7305 7305 21",
+            "after OPERATION ENABLED",
+            "silence 8130 7500 08",
+        ],
+    );
     assert!(drive.running.terminate(Duration::from_secs(5)).success(), "{}", drive.said());
 }
