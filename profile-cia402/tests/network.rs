@@ -2,7 +2,7 @@
 //! names whoever sends what cannot be.
 
 use profile_cia402::drive::controlword::Command;
-use profile_cia402::drive::{State, Statusword};
+use profile_cia402::drive::{ErrorCode, State, Statusword};
 use profile_cia402::lss::master::{LssReply, LssTask, Master as LssMaster, MasterConfig as LssConfig};
 use profile_cia402::master::boot::BootState;
 use profile_cia402::master::config::{
@@ -15,7 +15,7 @@ use profile_cia402::node::{Config, Node};
 use profile_cia402::sdo::request::{Method, SdoData, SdoRequest};
 use profile_cia402::wire::pdo::MappingEntry;
 use profile_cia402::wire::{Mux, NodeId, cob_id, frame};
-use profile_generic::can::bus::{self, Bus, Station};
+use profile_generic::can::bus::{self, Bus, Disturbance, Effect, Station};
 use profile_generic::can::timing::BitRate;
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -78,6 +78,8 @@ struct Axis {
     periods: i32,
     /// Largest distance of the position from the target of two periods ago, while enabled.
     error_max: u32,
+    /// Periods without a position since it was enabled first.
+    stale: u32,
     last: [i32; 3],
 }
 
@@ -160,6 +162,9 @@ impl Rig {
             let mut moved = false;
             while let Some(output) = self.bus.poll(now) {
                 moved = true;
+                if let bus::Output::State { at, station, state } = output {
+                    self.controller(at, station, state);
+                }
                 if let bus::Output::Received { at, to, frame, .. } = output {
                     if to == self.at_master {
                         let _ = self.master.handle_frame(at, &frame);
@@ -178,7 +183,12 @@ impl Rig {
                 }
                 while let Some(frame) = node.poll(now) {
                     moved = true;
-                    self.bus.send(now, *station, &frame).unwrap();
+                    // A drive that is off the bus, or was pulled, talks to itself.
+                    let sent = self.bus.send(now, *station, &frame);
+                    assert!(matches!(
+                        sent,
+                        Ok(()) | Err(bus::SendError::BusOff | bus::SendError::Disconnected)
+                    ));
                 }
             }
             if self.master.next_sync().is_some_and(|at| now >= at) {
@@ -188,7 +198,9 @@ impl Rig {
             while self.bus.waiting(self.at_master) < QUEUE {
                 let Some(Output::Transmit(frame)) = self.master.poll(now) else { break };
                 moved = true;
-                self.bus.send(now, self.at_master, &frame).unwrap();
+                if self.bus.send(now, self.at_master, &frame).is_err() {
+                    self.master.transmit_failed(frame.id());
+                }
             }
             if let Some(bytes) = self.lss.poll(now) {
                 moved = true;
@@ -205,6 +217,34 @@ impl Rig {
                 return;
             }
         }
+    }
+
+    /// The state of a controller changes: its owner is told when it goes off the bus, and when it is back.
+    fn controller(&mut self, at: MonotonicTime, station: Station, state: bus::State) {
+        let off = state == bus::State::BusOff;
+        if station == self.at_master {
+            if off { self.master.bus_off(at) } else { self.master.bus_on(at) }
+        } else if let Some((_, node)) = self.nodes.iter_mut().find(|(own, _)| *own == station)
+            && off
+        {
+            node.bus_off();
+        }
+    }
+
+    /// Axis `place` has been led all the time and has not noticed anything.
+    fn undisturbed(&self, place: usize) {
+        let (axis, node) = (&self.axes[place], id(u8::try_from(place + 1).unwrap()));
+        assert_eq!(axis.state, Some(State::OperationEnabled), "{:#?}", self.log);
+        assert!(axis.error_max < 1_000 && axis.periods > 20, "{axis:?}");
+        assert_eq!(axis.stale, 0, "{axis:?}");
+        let consumer = self.master.consumer(node, 1).unwrap();
+        assert_eq!((consumer.state, consumer.missed), (ConsumerState::Good, 0));
+    }
+
+    /// Whether the servo of a drive has no torque and does not move.
+    fn rests(&self, place: usize) -> bool {
+        let axis = &self.nodes[place].1.application().axes()[0];
+        axis.actual().velocity.0 == 0 && axis.actual().torque.0 == 0
     }
 
     /// Cyclic synchronous position, at the period of the network.
@@ -227,6 +267,7 @@ impl Rig {
         for (node, axis) in nodes.into_iter().zip(&mut self.axes) {
             let Some(consumer) = self.master.consumer(node, 1) else { continue };
             if !consumer.fresh {
+                axis.stale += u32::from(axis.state.is_some());
                 axis.state = None;
                 continue;
             }
@@ -340,6 +381,132 @@ fn a_fault_comes_as_emcy_and_in_the_statusword() {
     rig.run_ms(200);
     assert_eq!((rig.axes[1].state, rig.axes[1].error_max < 1_000), (Some(State::OperationEnabled), true));
     rig.bus.judge();
+}
+
+#[test]
+fn a_drive_whose_plug_is_pulled_stops_by_itself() {
+    let mut rig = enabled();
+    rig.run_ms(900);
+    assert!(!rig.rests(0) && rig.nodes[0].1.application().axes()[0].actual().velocity.0 != 0);
+    let (now, station) = (rig.now, rig.nodes[0].0);
+    rig.bus.disconnect(now, station);
+    rig.until("loss of its PDO", |rig| rig.saw(&Event::PdoLost { node: id(1), number: 1 }));
+    assert!(
+        rig.now.since(now) <= DurationNs::from_millis(4 * i64::from(PERIOD_MS)),
+        "told after a few periods"
+    );
+    rig.until("loss", |rig| rig.saw(&Event::HeartbeatLost { node: id(1) }));
+    assert!(rig.now.since(now) <= DurationNs::from_millis(150));
+    // SYNC stays away: three periods later it brakes along its ramp, as 605Eh says.
+    rig.run_ms(500);
+    let axis = &rig.nodes[0].1.application().axes()[0];
+    assert_eq!((axis.state(), rig.rests(0)), (State::Fault, true));
+    let code = rig.nodes[0].1.dictionary().number(0x603F, 0);
+    assert_eq!(code, i64::from(ErrorCode::SYNC_CONTROLLER.0), "{code:04X}");
+    rig.undisturbed(1);
+    // Plugged in again it comes into operation, and stands there with its fault.
+    let now = rig.now;
+    rig.bus.connect(now, station);
+    rig.until("operation", |rig| rig.master.node(id(1)).unwrap().state == BootState::Operational);
+    rig.run_ms(500);
+    assert_eq!((rig.axes[0].state, rig.rests(0)), (Some(State::Fault), true));
+    rig.undisturbed(1);
+}
+
+#[test]
+fn a_drive_that_goes_bus_off_stops_by_itself() {
+    let mut rig = enabled();
+    rig.bus.set_restart(Some(DurationNs::from_millis(1_000)));
+    rig.run_ms(900);
+    let (now, station) = (rig.now, rig.nodes[0].0);
+    rig.bus.take_off(now, station);
+    rig.until("loss", |rig| rig.saw(&Event::HeartbeatLost { node: id(1) }));
+    rig.run_ms(500);
+    let axis = &rig.nodes[0].1.application().axes()[0];
+    assert_eq!((axis.state(), rig.rests(0)), (State::Fault, true));
+    // Its abort connection option says fault: 7500h, communication.
+    let code = rig.nodes[0].1.dictionary().number(0x603F, 0);
+    assert_eq!(code, i64::from(ErrorCode::COMMUNICATION_MODULE.0), "{code:04X}");
+    rig.undisturbed(1);
+    rig.until("operation", |rig| rig.master.node(id(1)).unwrap().state == BootState::Operational);
+    rig.undisturbed(1);
+}
+
+#[test]
+fn every_drive_stops_when_the_master_goes_bus_off() {
+    let mut rig = enabled();
+    rig.bus.set_restart(Some(DurationNs::from_millis(2_000)));
+    rig.run_ms(900);
+    let (now, station) = (rig.now, rig.at_master);
+    rig.bus.take_off(now, station);
+    rig.run_ms(700);
+    assert!(rig.saw(&Event::BusOff) && !rig.saw(&Event::BusOn));
+    for place in [0, 1] {
+        let axis = &rig.nodes[place].1.application().axes()[0];
+        assert_eq!((axis.state(), rig.rests(place)), (State::Fault, true), "axis {place}");
+    }
+    // Nothing moves when the bus is back: the faults stay.
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    rig.run_ms(500);
+    assert!([0, 1].map(|place| rig.rests(place)) == [true; 2]);
+    assert_eq!([rig.axes[0].state, rig.axes[1].state], [Some(State::Fault); 2]);
+}
+
+#[test]
+fn a_storm_of_emcys_delays_nobody() {
+    let mut rig = enabled();
+    let babbler = rig.bus.add(8).unwrap();
+    rig.bus.share(cob_id::emcy(id(1)));
+    // One in every millisecond, with more precedence than any PDO: an eighth of the bus.
+    for number in 0..500_u16 {
+        let [low, high] = number.to_le_bytes();
+        let emcy = frame(cob_id::emcy(id(1)), &[0x11, 0x86, 1, low, high, 0, 0, 0]);
+        let now = rig.now;
+        rig.bus.send(now, babbler, &emcy).unwrap();
+        rig.run_ms(1);
+    }
+    assert!(rig.saw(&Event::EmcyStorm { node: id(1) }));
+    let told = rig.log.iter().filter(|event| matches!(event, Event::Emcy { .. })).count();
+    assert!((16..=32).contains(&told), "{told} told one by one in half a second");
+    // One of them is the drive's own: 8150h, somebody else sends what only it may send.
+    assert_eq!(rig.master.statistics().emcys_suppressed, 501 - u64::try_from(told).unwrap());
+    assert_eq!(rig.master.node(id(1)).unwrap().emcy.unwrap().vendor[..2], 499_u16.to_le_bytes());
+    rig.undisturbed(0);
+    rig.undisturbed(1);
+    rig.bus.judge();
+}
+
+#[test]
+fn a_noisy_bus_costs_time_and_nothing_else() {
+    let mut rig = enabled();
+    for skip in [3, 40, 41, 90, 200, 201, 202, 400] {
+        assert!(rig.bus.disturb(Disturbance::all(Effect::Spoil).skip(skip).count(1)));
+    }
+    rig.run_ms(1_000);
+    assert!(rig.bus.traffic().errors >= 8);
+    rig.undisturbed(0);
+    rig.undisturbed(1);
+    assert_eq!(rig.log, []);
+    rig.bus.judge();
+}
+
+#[test]
+fn a_second_drive_with_the_same_node_id_is_not_let_into_operation() {
+    let mut rig = enabled();
+    let station = rig.bus.add(128).unwrap();
+    // Another device of the same kind that was given this node-id by mistake.
+    rig.nodes.push((station, node(Some(1), 99)));
+    rig.until("the boot-up of the other one", |rig| {
+        rig.saw(&Event::Rebooted { node: id(1), operational: true })
+    });
+    rig.run_ms(3_000);
+    let info = rig.master.node(id(1)).unwrap();
+    assert!(info.state != BootState::Operational, "{:#?}", rig.log);
+    for place in [0, 2] {
+        assert!(rig.rests(place), "axis {place}");
+    }
+    rig.undisturbed(1);
+    rig.bus.pardon();
 }
 
 #[test]

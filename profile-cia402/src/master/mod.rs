@@ -218,10 +218,10 @@ impl Master {
         stations.chain(sync).chain(heartbeat).min()
     }
 
-    /// The next SYNC.
+    /// The next SYNC; `None` while there is none.
     #[must_use]
     pub fn next_sync(&self) -> Option<MonotonicTime> {
-        self.config.sync.filter(|_| self.running).map(|_| self.next_sync)
+        self.config.sync.filter(|_| self.running && !self.bus_off).map(|_| self.next_sync)
     }
 
     /// Does what is due, and gives the frames to send one by one.

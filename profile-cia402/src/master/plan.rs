@@ -285,18 +285,18 @@ pub(super) fn judge(
     };
     let expected = node.expected;
     let refused = outcome.result.err().filter(|failure| matches!(failure, SdoFailure::Refused(_)));
-    // A value that the device need not have.
-    let optional = || match refused {
+    // A value that the device need not have, but has to say so.
+    let optional_or = |status| match refused {
         Some(failure) if failure.is_absent() => (RowOutcome::Absent, Verdict::Next),
         Some(failure) => (RowOutcome::Tolerated(failure), Verdict::Next),
-        None => required(row),
+        None => required_or(row, status),
     };
+    let optional = || optional_or(BootStatus::CONFIGURATION);
     match step {
         Step::DeviceType => {
             station.device_type = value;
             // An abort is an answer; it is no answer to what the device is.
-            let tolerant = if refused.is_some() { optional() } else { required(row) };
-            compare(expected.device_type, value, BootStatus::DEVICE_TYPE, tolerant)
+            compare(expected.device_type, value, BootStatus::DEVICE_TYPE, optional_or(BootStatus::NO_ANSWER))
         }
         Step::Identity(sub) => {
             let (expected, status) = match sub {
@@ -306,7 +306,7 @@ pub(super) fn judge(
                 _ => (expected.serial, BootStatus::SERIAL),
             };
             station.identity[usize::from(sub - 1).min(3)] = value;
-            compare(expected, value, status, optional())
+            compare(expected, value, status, optional_or(status))
         }
         Step::Date | Step::Time => {
             let wanted = node.stamp.map(|stamp| if step == Step::Date { stamp.date } else { stamp.time });
@@ -337,8 +337,12 @@ pub(super) fn judge(
 }
 
 fn required(row: RowOutcome) -> (RowOutcome, Verdict) {
+    required_or(row, BootStatus::CONFIGURATION)
+}
+
+fn required_or(row: RowOutcome, status: BootStatus) -> (RowOutcome, Verdict) {
     let verdict = match row {
-        RowOutcome::Failed(_) => Verdict::Fail(BootStatus::CONFIGURATION),
+        RowOutcome::Failed(_) => Verdict::Fail(status),
         _ => Verdict::Next,
     };
     (row, verdict)

@@ -1,11 +1,14 @@
 //! Devices and strangers that do what they must not, one at a time: each is named, and the others keep running.
 
+use super::peer::Wrong;
 use super::*;
+use crate::sdo::request::SdoOperation;
 use crate::wire::emcy::{Emcy, EmcyCode, ErrorRegister};
 
 #[test]
 fn a_device_that_reboots_in_operation_is_told_at_once() {
     let mut rig = running(2);
+    rig.keep(&[2]);
     let now = rig.now;
     rig.device(1).reset(now);
     rig.until("boot-up", |rig| rig.count(|event| matches!(event, Event::Rebooted { .. })) > 0);
@@ -24,6 +27,7 @@ fn a_device_that_reboots_in_operation_is_told_at_once() {
 #[test]
 fn a_lost_heartbeat() {
     let mut rig = running(2);
+    rig.keep(&[2]);
     rig.device(1).no_heartbeat = true;
     let before = rig.now;
     rig.until("loss", |rig| rig.saw(&Event::HeartbeatLost { node: id(1) }));
@@ -45,6 +49,7 @@ fn a_lost_heartbeat() {
 #[test]
 fn a_device_that_leaves_operation_by_itself() {
     let mut rig = running(2);
+    rig.keep(&[2]);
     rig.device(1).state = NmtState::PRE_OPERATIONAL;
     let state = NmtState::PRE_OPERATIONAL;
     rig.until("loss", |rig| rig.saw(&Event::StateChanged { node: id(1), state }));
@@ -64,6 +69,74 @@ fn a_device_that_is_switched_off_while_it_is_configured() {
     assert_eq!(status, BootStatus::CONFIGURATION);
     assert!(step.ends_with("no answer within 500 ms"), "{step}");
     rig.comes_up(&[2]);
+}
+
+/// The whole boot-up of a device with all that there is to write, one access of it going wrong: how far it comes.
+#[test]
+fn every_step_that_goes_wrong() {
+    let mut config = network(2);
+    let data = SdoData::inline(&[8]).unwrap();
+    config.nodes[0].writes = vec![Write { object: Mux::new(0x6060, 0), data }];
+    config.nodes[0].stamp = Some(Stamp { date: 15_000, time: 36_000_000 });
+    config.sync = Some(SyncConfig { period_ns: 4_000_000, window_ns: 2_000_000, counter_overflow: 10 });
+    let good = {
+        let mut rig = beside(config.clone(), |_| {});
+        rig.comes_up(&[1]);
+        let text = |row: &report::ReportRow| row.to_string().split(": ").next().unwrap().to_string();
+        rig.master.node(id(1)).unwrap().report.iter().map(text).collect::<Vec<_>>()
+    };
+    let mut table = String::new();
+    for (at, step) in (1..).zip(&good) {
+        table += &format!("{step:<30}");
+        for wrong in [Wrong::Abort, Wrong::Silence, Wrong::Nonsense, Wrong::Stranger, Wrong::Reboot] {
+            let mut rig = beside(config.clone(), |device| device.objects.wrong = Some((at, wrong)));
+            let over = |rig: &Rig| matches!(rig.state(1), BootState::Failed | BootState::Operational);
+            rig.until("an end", over);
+            rig.kept();
+            let info = rig.master.node(id(1)).unwrap();
+            let end = match (info.state, info.status) {
+                (BootState::Operational, _) => "up".to_string(),
+                (_, Some(status)) => char::from(status.0).to_string(),
+                (_, None) => "twice".to_string(),
+            };
+            // What failed is named as what was done wrong.
+            if info.state == BootState::Failed {
+                let (_, named) = rig.failed();
+                assert!(named.starts_with(step), "{wrong:?} at {step}: {named}");
+            }
+            table += &format!(" {:<14}", format!("{wrong:?} {end}"));
+        }
+        table += "\n";
+    }
+    insta::assert_snapshot!(table);
+}
+
+/// Every identifier, with nothing and with eight bytes in it, as a stranger would send it.
+#[test]
+fn frames_with_any_identifier() {
+    let mut rig = running(2);
+    rig.keep(&[2]);
+    let mut table = String::new();
+    let mut last = String::new();
+    for number in 0..0x800_u16 {
+        // What only the other device sends would be the other device.
+        if [0x082, 0x182, 0x582, 0x702].contains(&number) {
+            continue;
+        }
+        let mut verdict = |data: &[u8]| {
+            rig.hear(Id::Standard(number), data).map_or_else(|error| error.to_string(), |()| "taken".into())
+        };
+        let verdicts = format!("{}; {}", verdict(&[]), verdict(&[0; 8]));
+        if verdicts != last {
+            table += &format!("from {number:03X}: {verdicts}\n");
+            last = verdicts;
+        }
+        if number % 16 == 0 {
+            rig.run_ms(1);
+        }
+    }
+    rig.kept();
+    insta::assert_snapshot!(table);
 }
 
 #[test]
@@ -117,6 +190,7 @@ fn an_abort_at_each_step_is_named() {
 #[test]
 fn an_answer_with_a_wrong_toggle_or_length() {
     let mut rig = running(2);
+    rig.keep(&[2]);
     rig.device(1).mute = true;
     rig.master.sdo_submit(id(1), SdoRequest::upload(Mux::new(0x1008, 0)), Priority::Normal).unwrap();
     rig.run_ms(5);
@@ -136,9 +210,32 @@ fn an_answer_with_a_wrong_toggle_or_length() {
 }
 
 #[test]
+fn a_wrong_toggle_in_the_answer_to_a_segment() {
+    let mut rig = running(2);
+    rig.keep(&[2]);
+    rig.device(1).mute = true;
+    let text = SdoData::inline(b"longer than one segment").unwrap();
+    rig.master.sdo_submit(id(1), SdoRequest::download(Mux::new(0x1008, 0), text), Priority::Normal).unwrap();
+    rig.run_ms(5);
+    assert_eq!(rig.hear(Id::Standard(0x581), &[0x60, 8, 0x10, 0, 0, 0, 0, 0]), Ok(()));
+    rig.run_ms(5);
+    assert_eq!(rig.hear(Id::Standard(0x581), &[0x30, 0, 0, 0, 0, 0, 0, 0]), Ok(()));
+    let failed = |event: &Event| {
+        let toggle = Err(SdoFailure::Protocol(AbortCode::TOGGLE));
+        matches!(event, Event::Sdo { outcome, .. } if outcome.result == toggle && outcome.operation == SdoOperation::Download)
+    };
+    assert_eq!(rig.count(failed), 1, "{:?}", rig.log);
+    rig.run_ms(5);
+    assert!(rig.sent.iter().any(|(_, frame)| frame.to_string() == "601#80 08 10 00 00 00 03 05"));
+    rig.kept();
+    rig.runs(&[1, 2]);
+}
+
+#[test]
 fn pdos_of_a_wrong_length() {
     for len in [5, 7] {
         let mut rig = running(2);
+        rig.keep(&[2]);
         rig.device(1).tpdo_len = Some(len);
         rig.run_ms(20);
         // Told once, not taken, and missed.
@@ -156,6 +253,7 @@ fn pdos_of_a_wrong_length() {
 #[test]
 fn malformed_frames_change_nothing() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     let frames: [(u16, &[u8], Refusal); 10] = [
         (0x701, &[], Refusal::Malformed),
         (0x701, &[5, 5], Refusal::Malformed),
@@ -182,6 +280,7 @@ fn malformed_frames_change_nothing() {
 #[test]
 fn a_device_that_is_not_in_the_list_is_told_once() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     for _ in 0..3 {
         assert_eq!(rig.hear(Id::Standard(0x705), &[0]), Err(Refusal::UnknownNode));
         assert_eq!(rig.hear(Id::Standard(0x185), &[0; 8]), Err(Refusal::UnknownNode));
@@ -195,6 +294,7 @@ fn a_device_that_is_not_in_the_list_is_told_once() {
 #[test]
 fn a_second_master_is_told() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     for (number, data) in [(0x000, &[1, 0][..]), (0x080, &[]), (0x201, &[0; 6]), (0x201, &[0; 6])] {
         assert_eq!(rig.hear(Id::Standard(number), data), Err(Refusal::SecondMaster));
     }
@@ -213,6 +313,7 @@ fn a_second_master_is_told() {
 #[test]
 fn a_storm_of_emcys_is_told_by_its_beginning_and_its_last_one() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     let emcy = |vendor| Emcy {
         code: EmcyCode(0x8611),
         register: ErrorRegister::GENERIC,
@@ -251,7 +352,7 @@ fn bus_off_and_back() {
     }
     rig.forget();
     rig.run_ms(100);
-    assert_eq!((rig.sent.len(), rig.master.wake_at()), (0, None));
+    assert_eq!((rig.sent.len(), rig.master.wake_at(), rig.master.next_sync()), (0, None, None));
     rig.master.bus_on(rig.now);
     rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
     assert!(rig.saw(&Event::BusOn));
@@ -261,6 +362,7 @@ fn bus_off_and_back() {
 #[test]
 fn frames_that_cannot_be_sent_are_told_once_a_period() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     for _ in 0..5 {
         rig.master.transmit_failed(Id::Standard(0x201));
     }
@@ -294,6 +396,7 @@ fn two_devices_with_one_node_id_answer_twice() {
 #[test]
 fn somebody_else_may_ask_a_device_in_operation() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     for _ in 0..20 {
         // The same as the last answer to the master.
         let answer = [0x60, 0x17, 0x10, 0, 0, 0, 0, 0];
@@ -306,6 +409,7 @@ fn somebody_else_may_ask_a_device_in_operation() {
 #[test]
 fn two_devices_with_one_node_id_send_twice() {
     let mut rig = running(2);
+    rig.keep(&[2]);
     // A second one comes, already in operation.
     let mut other = Device::new(id(1));
     other.objects.values = rig.device(1).objects.values.clone();
@@ -325,6 +429,7 @@ fn two_devices_with_one_node_id_send_twice() {
 #[test]
 fn somebody_has_the_masters_node_id() {
     let mut rig = running(2);
+    rig.keep(&[1, 2]);
     assert_eq!(rig.hear(Id::Standard(0x77F), &[5]), Err(Refusal::UnknownNode));
     assert!(rig.saw(&Event::DuplicateNode { node: id(127), sign: DuplicateSign::Answers }));
     rig.runs(&[1, 2]);
@@ -343,6 +448,7 @@ mod arbitrary {
             frames in prop::collection::vec((0..0x800_u16, prop::collection::vec(any::<u8>(), 0..9)), 1..60),
         ) {
             let mut rig = running(2);
+            rig.keep(&[2]);
             for (number, data) in frames {
                 if number & 0x7F != 2 {
                     let _ = rig.hear(Id::Standard(number), &data);

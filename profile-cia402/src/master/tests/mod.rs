@@ -66,6 +66,19 @@ struct Rig {
     cyclic: bool,
     /// Whether a frame of a device arrives.
     arrives: Box<dyn FnMut(&Frame) -> bool>,
+    /// Devices that must not notice anything.
+    kept: Vec<Kept>,
+    /// Periods in which that was looked at.
+    watched: usize,
+}
+
+/// A device that exchanges PDOs in every period, whatever the others do.
+struct Kept {
+    /// Among the devices of the rig.
+    place: usize,
+    number: u8,
+    syncs: usize,
+    received: usize,
 }
 
 fn rig(config: MasterConfig) -> Rig {
@@ -79,7 +92,26 @@ fn rig(config: MasterConfig) -> Rig {
         auto: true,
         cyclic: true,
         arrives: Box::new(|_| true),
+        kept: vec![],
+        watched: 0,
     }
+}
+
+/// Two drives, of which the second one is in operation and must stay so while the first one, which was not there yet, comes with
+/// what is done to it here.
+fn beside(config: MasterConfig, misdeed: impl FnOnce(&mut Device)) -> Rig {
+    let mut rig = rig(config);
+    rig.device(1).dead = true;
+    rig.master.start(rig.now);
+    rig.comes_up(&[2]);
+    rig.keep(&[2]);
+    rig.forget();
+    let now = rig.now;
+    let device = rig.device(1);
+    device.dead = false;
+    misdeed(device);
+    device.reset(now);
+    rig
 }
 
 /// A network whose drives are in operation, and the log empty.
@@ -138,6 +170,9 @@ impl Rig {
             }
             if self.master.wake_at().is_some_and(|at| self.now >= at) {
                 let sync = self.master.next_sync().is_some_and(|at| self.now >= at);
+                if sync {
+                    self.watch();
+                }
                 if sync && self.cyclic {
                     self.commit();
                 }
@@ -161,6 +196,43 @@ impl Rig {
             }
         }
         panic!("the network does not come to rest at {}", self.now);
+    }
+
+    /// From now on these devices must not notice anything.
+    fn keep(&mut self, numbers: &[u8]) {
+        for &number in numbers {
+            let place = self.devices.iter().position(|device| device.node == id(number)).unwrap();
+            let device = &self.devices[place];
+            let (syncs, received) = (device.syncs.len(), device.received.len());
+            self.kept.push(Kept { place, number, syncs, received });
+        }
+    }
+
+    /// Before each SYNC: what was sent and received in the period before.
+    fn watch(&mut self) {
+        for kept in &self.kept {
+            let (number, device) = (kept.number, &self.devices[kept.place]);
+            assert_eq!(self.state(number), BootState::Operational, "node {number} at {}", self.now);
+            let consumer = self.master.consumer(id(number), 1).unwrap();
+            let seen = (consumer.state, consumer.fresh, consumer.missed);
+            assert_eq!(
+                seen,
+                (ConsumerState::Good, true, 0),
+                "node {number} at {}: {:#?}",
+                self.now,
+                self.log
+            );
+            let (syncs, received) = (device.syncs.len() - kept.syncs, device.received.len() - kept.received);
+            assert_eq!(syncs, received, "RPDOs of node {number} at {}", self.now);
+            self.watched += 1;
+        }
+    }
+
+    /// The devices that were to be kept have not noticed anything: told by every period so far, and ten more.
+    fn kept(&mut self) {
+        let before = self.watched;
+        self.run_ms(40);
+        assert!(self.watched - before >= 9 * self.kept.len() && !self.kept.is_empty());
     }
 
     fn commit(&mut self) {

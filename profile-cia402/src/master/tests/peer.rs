@@ -16,12 +16,36 @@ pub struct Objects {
     /// Whether mappings can be changed.
     pub fixed_mapping: bool,
     pub writes: Vec<(Mux, u64)>,
+    /// Accesses so far, and which one of them goes wrong.
+    pub accesses: usize,
+    pub wrong: Option<(usize, Wrong)>,
+}
+
+/// What a device does instead of answering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wrong {
+    /// It ends the transfer.
+    Abort,
+    /// It says nothing.
+    Silence,
+    /// It answers with a command that there is not.
+    Nonsense,
+    /// It answers to something else.
+    Stranger,
+    /// It starts anew.
+    Reboot,
 }
 
 impl Objects {
     fn new(node: NodeId) -> Self {
-        let mut objects =
-            Self { values: BTreeMap::new(), refuse: BTreeMap::new(), fixed_mapping: false, writes: vec![] };
+        let mut objects = Self {
+            values: BTreeMap::new(),
+            refuse: BTreeMap::new(),
+            fixed_mapping: false,
+            writes: vec![],
+            accesses: 0,
+            wrong: None,
+        };
         let number = |value: u32| value.to_le_bytes().to_vec();
         objects.values.extend([
             (Mux::DEVICE_TYPE, number(0x0002_0192)),
@@ -79,6 +103,20 @@ impl Objects {
         self.values.insert(object, value.to_le_bytes()[..len].to_vec());
     }
 
+    /// One access more; whether it is the one to be refused.
+    fn count(&mut self) -> Result<(), AbortCode> {
+        self.accesses += 1;
+        match self.wrong {
+            Some((at, Wrong::Abort)) if at == self.accesses => Err(AbortCode::DEVICE_STATE),
+            _ => Ok(()),
+        }
+    }
+
+    /// What goes wrong with the access that was counted last.
+    fn now_wrong(&self) -> Option<Wrong> {
+        self.wrong.filter(|(at, _)| *at == self.accesses).map(|(_, wrong)| wrong)
+    }
+
     /// The rules for changing a mapping, as drives have them.
     fn may_write(&self, object: Mux) -> Result<(), AbortCode> {
         if let Some(&code) = self.refuse.get(&object) {
@@ -98,12 +136,14 @@ impl Objects {
 
 impl ObjectAccess for Objects {
     fn read(&mut self, object: Mux, into: &mut [u8]) -> Result<usize, AbortCode> {
+        self.count()?;
         let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
         into[..value.len()].copy_from_slice(value);
         Ok(value.len())
     }
 
     fn write_begins(&mut self, object: Mux, _: Option<u32>) -> Result<usize, AbortCode> {
+        self.count()?;
         let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
         self.may_write(object)?;
         Ok(value.len())
@@ -218,7 +258,17 @@ impl Device {
         } else if id == cob_id::sdo_request(self.node) && self.state.has_sdo() && !self.mute {
             self.server.handle(now, data, &mut self.objects).unwrap();
             while self.server.wake_at() == Some(MonotonicTime::ZERO) {
-                let answer = self.server.poll(now).unwrap();
+                let mut answer = self.server.poll(now).unwrap();
+                match self.objects.now_wrong() {
+                    None | Some(Wrong::Abort) => {}
+                    Some(Wrong::Silence) => continue,
+                    Some(Wrong::Nonsense) => answer[0] = 0xE7,
+                    Some(Wrong::Stranger) => answer[1..4].copy_from_slice(&[0xFF, 0x5F, 7]),
+                    Some(Wrong::Reboot) => {
+                        self.objects.wrong = None;
+                        return self.reset(now);
+                    }
+                }
                 self.send(now + self.answer_time, frame(cob_id::sdo_response(self.node), &answer));
             }
             let period = self.objects.number(Mux::PRODUCER_HEARTBEAT);
