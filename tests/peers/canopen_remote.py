@@ -262,7 +262,7 @@ for place in (1, 2):
     node.rpdo[place].stop()
 states.clear()
 node.nmt.state = "RESET"
-until("boot-up", lambda: states and states[0] == 0)
+until("boot-up", lambda: 0 in states)
 expect("defaults", node.sdo[0x607C].raw == 0 and node.sdo[0x1017].raw == 0)
 beat.stop()
 network.disconnect()

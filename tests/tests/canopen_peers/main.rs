@@ -4,6 +4,7 @@ mod bench;
 mod blocks;
 mod our_drive;
 mod our_master;
+mod recording;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,7 @@ const INTERFACE: &str = "vcan0";
 /// Names of the variables that tell a test inside which programs to use.
 const PYTHON: &str = "AXISBRIDGE_PYTHON";
 const BINARY: &str = "AXISBRIDGE_BINARY";
+const RECORDING: &str = "AXISBRIDGE_RECORDING";
 
 /// The kernel that these tests run in; they wait for a Python that shares one processor with them.
 fn kernel(python: &Path) -> Kernel {

@@ -4,6 +4,8 @@ use axisbridge::sys::can_socket::{CanSocket, Content, Options};
 use profile_generic::can::{Frame, Id};
 
 use super::*;
+use crate::recording::{Recording, compare_with_tshark};
+use axisbridge_tests::peer::tshark_or_skip;
 
 /// Starts our drive as a user does.
 fn drive(binary: &Path, arguments: &[&str]) -> Peer {
@@ -48,10 +50,73 @@ fn our_drive_follows_a_foreign_master() {
     assert!(drive.running.terminate(Duration::from_secs(5)).success(), "{}", drive.said());
 }
 
+/// Whether tshark saw in the recording what we did, and all that there should be.
+fn check_recording(test: &str, path: &Path) {
+    if !tshark_or_skip(test) {
+        return;
+    }
+    let kinds = compare_with_tshark(path);
+    let all = [
+        "EMCY 0000",
+        "EMCY 7305",
+        "EMCY 7500",
+        "EMCY 8130",
+        "LSS",
+        "NMT enter pre-operational",
+        "NMT reset node",
+        "NMT start",
+        "NMT stop",
+        "PDO",
+        "SYNC",
+        "block segment down",
+        "block segment up",
+        "heartbeat boot-up",
+        "heartbeat operational",
+        "heartbeat pre-operational",
+        "heartbeat stopped",
+        "request abort",
+        "request block download",
+        "request block download end",
+        "request block received",
+        "request block upload",
+        "request block upload end",
+        "request block upload start",
+        "request download",
+        "request download segment",
+        "request upload",
+        "request upload segment",
+        "response abort",
+        "response block download",
+        "response block download end",
+        "response block received",
+        "response block upload",
+        "response block upload end",
+        "response download",
+        "response download segment",
+        "response upload",
+        "response upload segment",
+    ];
+    assert_eq!(kinds.keys().collect::<Vec<_>>(), all);
+    // Those of 1, 4, 5, 7, 8, 889, 890 and 4096 bytes, none of them sent twice.
+    assert_eq!((kinds["block segment down"], kinds["block segment up"]), (847, 847));
+}
+
 #[test]
 fn our_drive_does_what_a_foreign_library_expects_of_one() {
     let test = "our_drive::our_drive_does_what_a_foreign_library_expects_of_one";
-    let Some((python, binary)) = python_and_binary_inside(test) else { return };
+    if !is_inside() {
+        let Some(python) = python_outside(test) else { return };
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("canopen-peers");
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("library.pcapng");
+        let kernel = kernel(&python).environment(BINARY, axisbridge().as_os_str());
+        let kernel = kernel.writable(&folder).environment(RECORDING, path.as_os_str());
+        assert!(!kernel.inside(test), "there is only one guest");
+        check_recording(test, &path);
+        return;
+    }
+    let (python, binary) = (told(PYTHON), told(BINARY));
+    let recording = Recording::start(&told(RECORDING));
     let sheet = std::env::temp_dir().join("drive.eds");
     let sheet = sheet.to_str().unwrap();
     // Without a node-id; the library finds it by LSS and reads its objects from the data sheet that it writes.
@@ -75,4 +140,5 @@ fn our_drive_does_what_a_foreign_library_expects_of_one() {
         ],
     );
     assert!(drive.running.terminate(Duration::from_secs(5)).success(), "{}", drive.said());
+    recording.finish();
 }
