@@ -20,7 +20,7 @@ use super::recorder::{Recorder, Settings};
 use super::synth::Synthesizer;
 use super::writer::Writer;
 use crate::decode::{Options, decode};
-use crate::engine::port::{FRAME_MAX, SouthPort};
+use crate::engine::port::{EthernetPort, FRAME_MAX};
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC, drives};
 use crate::sys::clock::KernelTime;
 

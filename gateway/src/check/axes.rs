@@ -5,7 +5,8 @@ use profile_generic::scaling::UnitKind;
 
 use crate::config::Written;
 use crate::config::file::AxisTable;
-use crate::engine::build::{needs, scaling};
+use crate::engine::build::scaling;
+use crate::engine::build::sercos::needs;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::mapping::{
@@ -20,7 +21,6 @@ const PERCENT: f64 = 1e4;
 pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
     for (axis, table) in written.config.axes.iter().zip(&written.file.axis) {
         let table = table.get_ref();
-        let drive = &written.config.sercos.drives[axis.drive];
         let scaling = scaling(axis);
         let mut problem = |problem: Problem| findings.push(&written.text, problem);
         if mapping.cip_program(&scaling).is_none() {
@@ -31,6 +31,8 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
             );
             continue;
         }
+        // A CANopen drive is looked at with its bus.
+        let Some(drive) = written.config.sercos_drive(axis) else { continue };
         let mut needs = needs(axis, drive);
         if !drive.set_scaling {
             let what = format!("the scaling of the drive `{}` is its own", drive.name);

@@ -3,8 +3,9 @@
 use profile_sercos::master::config::{CONNECTION_IDNS_MAX, CONNECTION_LEN_MAX};
 use profile_sercos::master::layout::{ConnectionNeed, CyclicLayout, LayoutError, SlaveNeed, Timing};
 
-use crate::config::Written;
-use crate::engine::build::{Host, master_config, needs};
+use crate::config::{DriveAt, Written};
+use crate::engine::build::Host;
+use crate::engine::build::sercos::{master_config, needs};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem};
 use crate::mapping::{DriveFacts, Mapping};
@@ -15,10 +16,12 @@ const CONTROL_BYTES: u16 = 2;
 /// Lays out the telegrams as the master would with drives that need no time of their own.
 pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
     let config = &written.config;
-    let mut slaves = vec![SlaveNeed::default(); config.sercos.drives.len()];
+    let (Some(bus), Some(file)) = (&config.sercos, &written.file.south.sercos) else { return };
+    let mut slaves = vec![SlaveNeed::default(); bus.drives.len()];
     for (axis, table) in config.axes.iter().zip(&written.file.axis) {
         let table = table.get_ref();
-        let drive = &config.sercos.drives[axis.drive];
+        let DriveAt::Sercos { drive: place } = axis.drive else { continue };
+        let drive = &bus.drives[place];
         // An axis that has no telegram is told of where its program is made.
         let Ok(telegram) = mapping.telegram(&needs(axis, drive), &DriveFacts::new()) else { continue };
         let both = [
@@ -42,11 +45,11 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
             }
             let need = ConnectionNeed { instance, slave_produces, len };
             // Two of eight.
-            let _ = slaves[axis.drive].connections.try_push(need);
+            let _ = slaves[place].connections.try_push(need);
         }
     }
     // The address of the master does not matter here.
-    let master = master_config(config, Host { mac: [2, 0, 0, 0, 0, 1], incarnation: 0 });
+    let master = master_config(bus, Host { mac: [2, 0, 0, 0, 0, 1], incarnation: 0 });
     let timing = Timing {
         cycle_ns: master.cycle_ns,
         mst_jitter_ns: master.mst_jitter_ns,
@@ -56,7 +59,7 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
         gap_adjustable: false,
         hot_plug_in_all: master.hot_plug_in_all,
     };
-    let sercos = &written.file.south.sercos;
+    let sercos = file.get_ref();
     let problem = match CyclicLayout::default().compute(&timing, slaves.iter().map(Some)) {
         Ok(()) => return,
         Err(error @ LayoutError::Cycle { .. }) => {

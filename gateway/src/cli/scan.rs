@@ -9,8 +9,9 @@ use profile_sercos::master::config::{MasterConfig, Ports};
 use super::progress::Progress;
 use super::{CliError, ScanArguments, print, signal};
 use crate::config::{Config, Link};
-use crate::engine::build::{Host, master_config};
-use crate::engine::port::SouthPort;
+use crate::engine::build::Host;
+use crate::engine::build::sercos::master_config;
+use crate::engine::port::EthernetPort;
 use crate::mapping::Mapping;
 use crate::runner::port::PacketPort;
 use crate::scan::{self, Bus, Scanner};
@@ -30,25 +31,34 @@ const LIMIT: DurationNs = DurationNs::from_secs(120);
 pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
     let config = arguments.config.as_deref().map(Config::load).transpose()?;
     let mapping = Mapping::embedded()?;
-    let link = match (&config, &arguments.interface) {
-        (Some(config), _) => config.sercos.link.clone(),
+    let sercos = match &config {
+        Some(config) => Some(
+            config
+                .sercos
+                .as_ref()
+                .ok_or("expected [south.sercos] in the configuration: the scan is of SERCOS III")?,
+        ),
+        None => None,
+    };
+    let link = match (sercos, &arguments.interface) {
+        (Some(sercos), _) => sercos.link.clone(),
         (None, Some(name)) => Link::Interface { name: name.clone(), ring: arguments.ring.clone() },
         // clap lets nothing else through.
         (None, None) => return Err("expected --config FILE or --interface IF".into()),
     };
-    let (mut south, mac): (Box<dyn SouthPort>, _) = match (&link, &config) {
+    let (mut south, mac): (Box<dyn EthernetPort>, _) = match (&link, config.as_ref().zip(sercos)) {
         (Link::Interface { name, ring }, _) => {
             let port = PacketPort::open(name, ring.as_deref())?;
             let mac = port.mac();
             (Box::new(port), mac)
         }
-        (Link::InProcess { .. }, Some(config)) => {
-            (Box::new(InProcessDrives::of(config, None)), SIMULATED_MAC)
+        (Link::InProcess { .. }, Some((config, sercos))) => {
+            (Box::new(InProcessDrives::of(config, sercos, None)), SIMULATED_MAC)
         }
         (Link::InProcess { .. }, None) => return Err("there are no drives in this process".into()),
     };
-    let master = match &config {
-        Some(config) => master_config(config, Host { mac, incarnation: 1 }),
+    let master = match sercos {
+        Some(sercos) => master_config(sercos, Host { mac, incarnation: 1 }),
         None => MasterConfig {
             ports: if link.has_ring() { Ports::Both } else { Ports::One },
             ..MasterConfig::new(mac, CYCLE_NS)
@@ -110,7 +120,8 @@ fn report(bus: &Bus, mapping: &Mapping, link: &Link, interface: &str, config: Op
 
 /// Where the bus is another one than the configuration says.
 fn differences(bus: &Bus, config: &Config) -> Vec<String> {
-    let drives = &config.sercos.drives;
+    let Some(sercos) = &config.sercos else { return Vec::new() };
+    let drives = &sercos.drives;
     let missing = drives.iter().filter(|drive| bus.slaves.iter().all(|slave| slave.address != drive.address));
     let missing = missing.map(|drive| {
         format!("drive \"{}\" of the configuration, address {}, is not there", drive.name, drive.address)

@@ -19,8 +19,8 @@ use super::file::{
 };
 use super::rated;
 use super::{
-    AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, Identity, Limits, Link,
-    LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
+    AXES_MAX, Axis, AxisFunction, AxisKind, Config, DEVICES_MAX, Device, Drive, DriveAt, Identity, Limits,
+    Link, LogLevel, Modbus, Sercos, StoppingAction, TimeSource,
 };
 use crate::mapping::{CaptureMode, ETHERNET_IP, networks};
 use crate::sys::realtime::{self, PRIORITY_MAX};
@@ -46,7 +46,7 @@ const DEFAULT_REVISION: (u8, u8) = (1, 1);
 const DEFAULT_PRODUCT_NAME: &str = "Axisbridge";
 
 /// A link name that stands for simulated drives.
-const IN_PROCESS: &str = "in-process";
+pub(super) const IN_PROCESS: &str = "in-process";
 
 /// Checks a file.
 pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
@@ -66,6 +66,11 @@ pub(super) struct Checker {
 }
 
 impl Checker {
+    /// A problem of more than one place.
+    pub(super) fn push(&mut self, problem: Problem) {
+        self.problems.push(problem);
+    }
+
     pub(super) fn report<T>(
         &mut self,
         span: Range<usize>,
@@ -93,7 +98,7 @@ impl Checker {
     }
 
     /// Reports every value that has come before.
-    fn unique<T: PartialEq + Display>(&mut self, what: &str, values: &[Spanned<T>]) {
+    pub(super) fn unique<T: PartialEq + Display>(&mut self, what: &str, values: &[Spanned<T>]) {
         for (index, value) in values.iter().enumerate() {
             if let Some(first) = values[..index].iter().find(|earlier| earlier.get_ref() == value.get_ref()) {
                 self.duplicate(&format!("{what} `{}`", value.get_ref()), first.span(), value.span());
@@ -133,8 +138,17 @@ impl Checker {
         }
         let settings_file = settings_file.map(path);
 
-        let sercos = self.sercos(&file.south.sercos);
-        let cycle_time = sercos.as_ref().map_or(DurationNs(0), |sercos| sercos.cycle_time);
+        let south = &file.south;
+        let realtime = self.realtime(south.realtime.as_ref());
+        let sercos = match &south.sercos {
+            Some(table) => self.sercos(table.get_ref()).map(Some),
+            None => Some(None),
+        };
+        let can = self.can(south);
+        let drives = self.drives(file);
+        let cycles = sercos.iter().flatten().map(|sercos| sercos.cycle_time);
+        let cycles = cycles.chain(can.iter().flatten().map(|can| can.cycle_time));
+        let cycle_time = cycles.min().unwrap_or(DurationNs::ZERO);
 
         self.unique("the device name", &names(&file.device, |device| &device.name));
         self.unique("the listen address", &names(&file.device, |device| &device.listen));
@@ -150,7 +164,7 @@ impl Checker {
             .axis
             .iter()
             .zip(&owners)
-            .map(|(axis, owner)| self.axis(axis.get_ref(), *owner, &file.south.sercos.drive))
+            .map(|(axis, owner)| self.axis(axis.get_ref(), *owner, &drives))
             .collect();
         self.instances(&file.axis, &owners);
 
@@ -164,7 +178,9 @@ impl Checker {
             settings_file,
             devices: devices.into_iter().collect::<Option<_>>()?,
             axes: axes.into_iter().collect::<Option<_>>()?,
+            realtime: realtime?,
             sercos: sercos?,
+            can: can?,
         })
     }
 
@@ -202,7 +218,7 @@ impl Checker {
         }
     }
 
-    fn count<T>(&mut self, tables: &[Spanned<T>], what: &str, most: usize) {
+    pub(super) fn count<T>(&mut self, tables: &[Spanned<T>], what: &str, most: usize) {
         if let Some(excess) = tables.get(most) {
             self.report_as::<()>(
                 code::TOO_MANY,
@@ -435,13 +451,14 @@ impl Checker {
         &mut self,
         table: &AxisTable,
         device: Option<usize>,
-        drives: &[Spanned<DriveTable>],
+        drives: &[(&Spanned<String>, DriveAt)],
     ) -> Option<Axis> {
         let name = self.name("axis", &table.name);
         let instance = self.number(&table.instance, "the instance", 1..=255);
-        let drive = drives.iter().position(|drive| drive.get_ref().name.get_ref() == table.drive.get_ref());
+        let drive =
+            drives.iter().find(|(name, _)| name.get_ref() == table.drive.get_ref()).map(|(_, at)| *at);
         if drive.is_none() {
-            self.unknown("drive", &table.drive, drives.iter().map(|drive| drive.get_ref().name.get_ref()));
+            self.unknown("drive", &table.drive, drives.iter().map(|(name, _)| name.get_ref()));
         }
         let function = self.function(table);
         let kind = match table.unit.get_ref().as_str() {
@@ -624,7 +641,7 @@ impl Checker {
     }
 
     /// An optional value above zero in fine units.
-    fn positive(
+    pub(super) fn positive(
         &mut self,
         value: Option<&Spanned<f64>>,
         what: &str,
@@ -643,7 +660,7 @@ impl Checker {
     }
 
     /// A value in fine units, rounded to the nearest.
-    fn fine(&mut self, value: &Spanned<f64>, what: &str, scale: Option<Ratio>) -> Option<i64> {
+    pub(super) fn fine(&mut self, value: &Spanned<f64>, what: &str, scale: Option<Ratio>) -> Option<i64> {
         match scale?.apply_f64(*value.get_ref(), Rounding::Nearest) {
             Ok(fine) => Some(fine),
             Err(_) => self.report_as(
@@ -653,6 +670,21 @@ impl Checker {
                 "expected a number that fits 64 bits in units of 1e-9",
             ),
         }
+    }
+
+    /// The drives of all buses by their names.
+    fn drives<'a>(&mut self, file: &'a File) -> Vec<(&'a Spanned<String>, DriveAt)> {
+        let south = &file.south;
+        let sercos = south.sercos.iter().flat_map(|table| table.get_ref().drive.iter().enumerate());
+        let mut drives: Vec<_> =
+            sercos.map(|(drive, table)| (&table.get_ref().name, DriveAt::Sercos { drive })).collect();
+        for (bus, table) in south.can.iter().enumerate() {
+            let all = table.get_ref().drive.iter().enumerate();
+            drives.extend(all.map(|(drive, table)| (&table.get_ref().name, DriveAt::Can { bus, drive })));
+        }
+        let names: Vec<_> = drives.iter().map(|(name, _)| (*name).clone()).collect();
+        self.unique("the drive name", &names);
+        drives
     }
 
     fn sercos(&mut self, table: &SercosTable) -> Option<Sercos> {
@@ -675,8 +707,6 @@ impl Checker {
             1..=65_535,
             DEFAULT_ALLOWED_LOSSES,
         );
-        let realtime = self.realtime(table.realtime.as_ref());
-        self.unique("the drive name", &names(&table.drive, |drive| &drive.name));
         self.unique("the SERCOS address", &names(&table.drive, |drive| &drive.address));
         let drives: Vec<_> = table.drive.iter().map(|drive| self.drive(drive.get_ref())).collect();
         let later = || table.drive.iter().filter_map(|drive| drive.get_ref().hot_plug.as_ref());
@@ -700,7 +730,6 @@ impl Checker {
                 Some(true) => AddressPolicy::Assign,
                 Some(false) | None => AddressPolicy::Refuse,
             },
-            realtime: realtime?,
             drives: drives.into_iter().collect::<Option<_>>()?,
         })
     }
@@ -735,7 +764,7 @@ impl Checker {
 
     /// The name of an interface, `None` for drives in the process.
     #[expect(clippy::option_option, reason = "the outer one says that there is an error, as everywhere here")]
-    fn interface(&mut self, name: &Spanned<String>) -> Option<Option<String>> {
+    pub(super) fn interface(&mut self, name: &Spanned<String>) -> Option<Option<String>> {
         let text = name.get_ref();
         if text == IN_PROCESS {
             return Some(None);
@@ -838,7 +867,7 @@ impl Checker {
     }
 
     /// A name that other parts of the file refer to.
-    fn name(&mut self, what: &str, name: &Spanned<String>) -> Option<String> {
+    pub(super) fn name(&mut self, what: &str, name: &Spanned<String>) -> Option<String> {
         let text = name.get_ref();
         let good = text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
         if good && (1..=NAME_LEN_MAX).contains(&text.len()) {
@@ -865,7 +894,7 @@ impl Checker {
         )
     }
 
-    fn time_span(&mut self, text: &Spanned<String>) -> Option<DurationNs> {
+    pub(super) fn time_span(&mut self, text: &Spanned<String>) -> Option<DurationNs> {
         match duration::parse(text.get_ref()) {
             Some(time) => Some(time),
             None => self.report(
@@ -902,7 +931,7 @@ impl Checker {
         }
     }
 
-    fn number<T: TryFrom<i64>>(
+    pub(super) fn number<T: TryFrom<i64>>(
         &mut self,
         value: &Spanned<i64>,
         what: &str,
@@ -920,7 +949,7 @@ impl Checker {
         }
     }
 
-    fn number_or<T: TryFrom<i64>>(
+    pub(super) fn number_or<T: TryFrom<i64>>(
         &mut self,
         value: Option<&Spanned<i64>>,
         what: &str,
@@ -935,12 +964,12 @@ impl Checker {
 }
 
 /// Axis units to units of 1e-9.
-const NANO: Option<Ratio> = Ratio::new(1_000_000_000, 1);
+pub(super) const NANO: Option<Ratio> = Ratio::new(1_000_000_000, 1);
 
 /// Percent to parts per million.
 const PERCENT_TO_PPM: Option<Ratio> = Ratio::new(10_000, 1);
 
 /// One key of every table of a list, with its place.
-fn names<T, V: Clone>(tables: &[Spanned<T>], key: impl Fn(&T) -> &Spanned<V>) -> Vec<Spanned<V>> {
+pub(super) fn names<T, V: Clone>(tables: &[Spanned<T>], key: impl Fn(&T) -> &Spanned<V>) -> Vec<Spanned<V>> {
     tables.iter().map(|table| key(table.get_ref()).clone()).collect()
 }

@@ -201,12 +201,17 @@ impl LimitsTable {
     }
 }
 
-/// `[south]`
+/// `[south]`: at least one bus.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SouthTable {
+    /// What to ask of the kernel for the cycle thread, which serves all buses; refusals are reported and do not stop the box.
+    pub realtime: Option<RealtimeTable>,
     /// The SERCOS III bus.
-    pub sercos: SercosTable,
+    pub sercos: Option<Spanned<SercosTable>>,
+    /// CAN buses with CANopen drives, at most 4.
+    #[serde(default)]
+    pub can: Vec<Spanned<CanTable>>,
 }
 
 /// `[south.sercos]`
@@ -234,13 +239,11 @@ pub struct SercosTable {
     /// Give free addresses to slaves that have none or share one, so that the bus can run (S-0-1040); else they are told, and the
     /// bus stays in phase 2. Such slaves take part without an axis. Default: false.
     pub assign_addresses: Option<bool>,
-    /// What to ask of the kernel for the cycle thread; refusals are reported and do not stop the box.
-    pub realtime: Option<RealtimeTable>,
     /// The drives, at least one.
     pub drive: Vec<Spanned<DriveTable>>,
 }
 
-/// `[south.sercos.realtime]`
+/// `[south.realtime]`
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RealtimeTable {
@@ -275,4 +278,63 @@ pub struct DriveTable {
     /// Whether it may be plugged in while the bus is in operation: the bus runs without it, and its place in the
     /// telegrams is kept. At least one drive has to be there from the start. Default: false.
     pub hot_plug: Option<Spanned<bool>>,
+}
+
+/// `[[south.can]]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CanTable {
+    /// CAN interface of the bus, such as `"can0"`, or `"in-process"` for simulated drives.
+    pub interface: Spanned<String>,
+    /// Bits per second: 10000 to 1000000. What the drives send in a cycle is checked against it. Default: 1000000.
+    pub bit_rate: Option<Spanned<i64>>,
+    /// Set the interface to this bit rate and bring it up; else it is taken as it is. Default: false.
+    pub set_bit_rate: Option<bool>,
+    /// Time from one SYNC to the next: `500 us` to `1 s`, in whole 100 microseconds.
+    pub cycle_time: Spanned<String>,
+    /// Node-id of the box, 1 to 127, of its own. Default: 127.
+    pub node: Option<Spanned<i64>>,
+    /// Time between two heartbeats, of the box and of the drives, `10 ms` to `10 s`; one that stays away for three times as
+    /// long is missed. Default: `"100 ms"`.
+    pub heartbeat: Option<Spanned<String>>,
+    /// How many TPDOs in a row may be missing before an axis stops, 1 to 1000. Default: 3.
+    pub allowed_losses: Option<Spanned<i64>>,
+    /// The drives, at least one.
+    pub drive: Vec<Spanned<CanDriveTable>>,
+}
+
+/// `[[south.can.drive]]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CanDriveTable {
+    /// Name, unique among drives.
+    pub name: Spanned<String>,
+    /// Node-id of its device, 1 to 127.
+    pub node: Spanned<i64>,
+    /// Which axis of the device it is, 0 to 7; unique in the device. Default: 0.
+    pub axis: Option<Spanned<i64>>,
+    /// What the axis is to be used for: `"position"`, `"velocity"`, `"torque"`; set-points of others are not sent.
+    /// Default: all three.
+    pub modes: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Which actual values beside the position are sent in every cycle: `"velocity"`, `"torque"`, each of which makes the
+    /// bus fuller. Default: both.
+    pub actual_values: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Whether its statusword tells by bit 12 that it follows command values. Default: true.
+    pub acknowledges: Option<bool>,
+    /// Millimetres that a linear axis makes in a turn of its motor; needed for a linear axis whose drive counts turns.
+    pub millimetres_per_turn: Option<Spanned<f64>>,
+    /// What its counts are, for a drive whose factor group does not say it, or says it wrong. Default: what the drive says.
+    pub counts: Option<CountsTable>,
+}
+
+/// `counts` of a `[[south.can.drive]]`; each is left to the drive where it is not given.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CountsTable {
+    /// Position counts in an axis unit.
+    pub position: Option<Spanned<f64>>,
+    /// Velocity counts in an axis unit per second, such as 600 where a count is 0.1 revolutions per minute.
+    pub velocity: Option<Spanned<f64>>,
+    /// Acceleration counts in an axis unit per second squared.
+    pub acceleration: Option<Spanned<f64>>,
 }

@@ -4,6 +4,7 @@
 //! types below, in which every reference is an index and every value is in range, or into [`Findings`]
 //! that show each fault at its line.
 
+mod can;
 mod check;
 mod connection_format;
 pub(crate) mod duration;
@@ -13,8 +14,13 @@ mod rated;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
+use profile_cia402::wire::NodeId;
 use profile_cip::wire::motion::Format;
-use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
+use profile_generic::can::timing::BitRate;
+use profile_generic::image::Signal;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::{Acceleration, Position, Quantity, Torque, Velocity};
+use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
 
@@ -52,8 +58,12 @@ pub struct Config {
     pub devices: Vec<Device>,
     /// All axes, in the order of the file.
     pub axes: Vec<Axis>,
+    /// What to ask of the kernel for the cycle thread.
+    pub realtime: realtime::Request,
     /// The SERCOS III bus behind.
-    pub sercos: Sercos,
+    pub sercos: Option<Sercos>,
+    /// The CAN buses behind.
+    pub can: Vec<Can>,
 }
 
 impl Config {
@@ -78,6 +88,34 @@ impl Config {
         match Written::parse(source, name, &mut findings) {
             Some(written) => Ok(written.config),
             None => Err(findings),
+        }
+    }
+
+    /// The shortest cycle of the buses.
+    #[must_use]
+    pub fn cycle_time(&self) -> DurationNs {
+        let sercos = self.sercos.iter().map(|sercos| sercos.cycle_time);
+        sercos.chain(self.can.iter().map(|can| can.cycle_time)).min().unwrap_or(DurationNs::ZERO)
+    }
+
+    /// The SERCOS drive of an axis; `None` when it is on another bus.
+    #[must_use]
+    pub fn sercos_drive(&self, axis: &Axis) -> Option<&Drive> {
+        match axis.drive {
+            DriveAt::Sercos { drive } => self.sercos.as_ref()?.drives.get(drive),
+            DriveAt::Can { .. } => None,
+        }
+    }
+
+    /// The CANopen drive of an axis and its bus; `None` when it is on another kind of bus.
+    #[must_use]
+    pub fn can_drive(&self, axis: &Axis) -> Option<(&Can, &CanDrive)> {
+        match axis.drive {
+            DriveAt::Sercos { .. } => None,
+            DriveAt::Can { bus, drive } => {
+                let bus = self.can.get(bus)?;
+                Some((bus, bus.drives.get(drive)?))
+            }
         }
     }
 
@@ -257,8 +295,8 @@ pub struct Axis {
     pub instance: u8,
     /// Index in [`Config::devices`].
     pub device: usize,
-    /// Index in [`Sercos::drives`]; no two axes share one.
-    pub drive: usize,
+    /// Its drive; no two axes share one.
+    pub drive: DriveAt,
     /// What it is.
     pub function: AxisFunction,
     /// Rotary or linear.
@@ -386,8 +424,6 @@ pub struct Sercos {
     pub allowed_losses: u16,
     /// What to do about slaves that have no address or share one.
     pub addresses: AddressPolicy,
-    /// What to ask of the kernel for the cycle thread.
-    pub realtime: realtime::Request,
     /// The drives on it.
     pub drives: Vec<Drive>,
 }
@@ -407,6 +443,77 @@ pub struct Drive {
     pub rated: Option<Rated>,
     /// Whether it may be plugged in while the bus is in operation.
     pub hot_plug: bool,
+}
+
+/// Where a drive is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum DriveAt {
+    /// On the SERCOS III bus.
+    Sercos {
+        /// Index in [`Sercos::drives`].
+        drive: usize,
+    },
+    /// On a CAN bus.
+    Can {
+        /// Index in [`Config::can`].
+        bus: usize,
+        /// Index in [`Can::drives`].
+        drive: usize,
+    },
+}
+
+/// A CAN bus with CANopen drives.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Can {
+    /// How it is reached.
+    pub link: CanLink,
+    /// Its bit rate.
+    pub bit_rate: BitRate,
+    /// Time from one SYNC to the next (1006).
+    pub cycle_time: DurationNs,
+    /// Node-id of the box.
+    pub node: NodeId,
+    /// Time between two heartbeats (1017), ms.
+    pub heartbeat_ms: u16,
+    /// TPDOs in a row that may be missing.
+    pub allowed_losses: u16,
+    /// The drives on it.
+    pub drives: Vec<CanDrive>,
+}
+
+/// How a CAN bus is reached.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CanLink {
+    /// Simulated drives inside this process.
+    InProcess,
+    /// An interface of the host.
+    Interface {
+        /// Its name.
+        name: String,
+        /// Whether its bit rate is set.
+        set_bit_rate: bool,
+    },
+}
+
+/// A CANopen drive, or one axis of a device with several.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CanDrive {
+    /// Name, unique among drives.
+    pub name: String,
+    /// Its device.
+    pub node: NodeId,
+    /// Which axis of the device, from 0.
+    pub axis: u16,
+    /// What it is used for, the mode at start first.
+    pub modes: Vec<OperatingMode>,
+    /// Actual values that are not sent in every cycle.
+    pub left_out: Vec<Signal>,
+    /// Whether its statusword tells that it follows command values.
+    pub acknowledges: bool,
+    /// Nanounits of a linear axis in a nanoturn.
+    pub way_of_a_turn: Option<Ratio>,
+    /// Generic units in one count, where the drive is not to be asked.
+    pub counts: Vec<(Quantity, Ratio)>,
 }
 
 #[cfg(test)]

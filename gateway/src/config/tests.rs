@@ -87,7 +87,7 @@ fn defaults_are_those_of_the_documentation() {
             name: "x".to_owned(),
             instance: 1,
             device: 0,
-            drive: 0,
+            drive: DriveAt::Sercos { drive: 0 },
             function: AxisFunction::Drive,
             kind: AxisKind::Rotary,
             motion_resolution: 1_000_000,
@@ -103,7 +103,7 @@ fn defaults_are_those_of_the_documentation() {
     assert_eq!(config.axes[1].limits.position_max, Some(Position(2_000_000_000)));
     assert_eq!(
         config.sercos,
-        Sercos {
+        Some(Sercos {
             link: Link::InProcess { ring: false },
             cycle_time: DurationNs(2_000_000),
             master_mac: None,
@@ -111,12 +111,6 @@ fn defaults_are_those_of_the_documentation() {
             cp0_stable_cycles: 100,
             allowed_losses: 5,
             addresses: AddressPolicy::Refuse,
-            realtime: realtime::Request {
-                priority: Some(80),
-                cpu: None,
-                lock_memory: true,
-                stay_awake: false,
-            },
             drives: vec![
                 Drive {
                     name: "a".to_owned(),
@@ -135,8 +129,13 @@ fn defaults_are_those_of_the_documentation() {
                     hot_plug: false
                 },
             ],
-        }
+        })
     );
+    assert_eq!(
+        config.realtime,
+        realtime::Request { priority: Some(80), cpu: None, lock_memory: true, stay_awake: false }
+    );
+    assert!(config.can.is_empty());
     assert_eq!(
         config.axes_of(0).map(|(index, axis)| (index, axis.instance)).collect::<Vec<_>>(),
         [(0, 1), (1, 2)]
@@ -150,7 +149,7 @@ fn values_given_are_taken() {
         .replace("serial_number = 3", "serial_number = 0xFFFF_FFFF\nrevision = \"127.255\"\nproduct_name = \"P\"")
         .replace("axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\"]\npower_structure_class_id = 7\nupdate_period = { min = \"4 ms\", max = \"4 ms\" }")
         .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
-        .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\nassign_addresses = true\ncp0_stable_cycles = 1\nallowed_losses = 65535\nrealtime = { priority = 0, cpu = 3, lock_memory = false, stay_awake = true }")
+        .replace("cycle_time = \"2 ms\"", "cycle_time = \"62.5 us\"\nmaster_mac = \"02:00:00:00:00:Af\"\njitter = \"15.625 us\"\nassign_addresses = true\ncp0_stable_cycles = 1\nallowed_losses = 65535\n").replace("[south.sercos]", "[south]\nrealtime = { priority = 0, cpu = 3, lock_memory = false, stay_awake = true }\n[south.sercos]")
         .replace("in-process", "enp3s0")
         .replace("address = 2", "address = 511\nset_scaling = true\nacknowledges = false\nrated_torque = \"2.5 Nm\"\nhot_plug = true");
     let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
@@ -183,14 +182,14 @@ fn values_given_are_taken() {
             following_error: Some(Position(100_000_000)),
         }
     );
-    let sercos = &config.sercos;
+    let sercos = config.sercos.as_ref().unwrap();
     assert_eq!(sercos.link, Link::Interface { name: "enp3s0".to_owned(), ring: None });
     assert_eq!((sercos.cycle_time, sercos.jitter), (DurationNs(62_500), DurationNs(15_625)));
     assert_eq!(sercos.master_mac, Some([2, 0, 0, 0, 0, 0xAF]));
     assert_eq!((sercos.cp0_stable_cycles, sercos.allowed_losses), (1, 65_535));
     assert_eq!(sercos.addresses, AddressPolicy::Assign);
     assert_eq!(
-        sercos.realtime,
+        config.realtime,
         realtime::Request { priority: None, cpu: Some(3), lock_memory: false, stay_awake: true }
     );
     assert_eq!((sercos.drives[1].address, sercos.drives[1].set_scaling), (511, true));
@@ -208,7 +207,7 @@ fn one_drive_at_least_is_there_from_the_start() {
     assert!(error.contains("every drive has `hot_plug = true`"), "{error}");
     assert!(error.contains("expected at least one drive without it"), "{error}");
     let one = both.replacen("hot_plug = true", "hot_plug = false", 1);
-    let drives = Config::parse(&one, "box.toml").unwrap().sercos.drives;
+    let drives = Config::parse(&one, "box.toml").unwrap().sercos.unwrap().drives;
     assert_eq!(drives.iter().map(|drive| drive.hot_plug).collect::<Vec<_>>(), [false, true]);
 }
 
@@ -292,7 +291,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
         "master_mac = \"01:00:5e:00:00:01\"\n[[south.sercos.drive]]",
     ),
     ("jitter", "[[south.sercos.drive]]", "jitter = \"1 ms\"\n[[south.sercos.drive]]"),
-    ("priority", "[[south.sercos.drive]]", "realtime = { priority = 100 }\n[[south.sercos.drive]]"),
+    ("priority", "[south.sercos]", "[south]\nrealtime = { priority = 100 }\n[south.sercos]"),
     ("connection_format", "[device.identity]", "connection_format = \"fixd\"\n[device.identity]"),
     ("fixed_format_for_two_axes", "[device.identity]", "connection_format = \"fixed\"\n[device.identity]"),
     ("log_level", "[[device]]", "[log]\nlevel = \"loud\"\n[[device]]"),
@@ -410,7 +409,7 @@ fn the_guide_describes_every_key() {
             "the_box" => "`[box]`".to_owned(),
             "time" | "log" | "modbus" | "mappings" => format!("`[{key}]`"),
             "device" | "axis" => format!("`[[{key}]]`"),
-            "south" | "sercos" => "`[south.sercos]`".to_owned(),
+            "south" => "`[south]`".to_owned(),
             key => format!("`{key}`"),
         };
         assert!(guide.contains(&shown), "docs/guide.md does not describe {shown}");

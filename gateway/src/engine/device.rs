@@ -24,8 +24,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use super::access::{Access, AccessFailure, Refusal};
 use super::axis::{AxisChannel, StopSettings};
-use super::bus::sercos::SercosBus;
-use super::bus::{Answer, Purpose};
+use super::bus::{Answer, Buses, Purpose};
 use super::notice::Notice;
 use super::port::{FRAME_MAX, NorthPort};
 use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping, SequenceAttributes};
@@ -399,10 +398,10 @@ impl DeviceChannel {
     }
 
     /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
-    pub fn attributes(&mut self, mapping: &Mapping, axes: &[AxisChannel], bus: &mut SercosBus) {
+    pub fn attributes(&mut self, mapping: &Mapping, axes: &[AxisChannel], buses: &mut Buses) {
         for _ in 0..ACCESSES_PER_CYCLE {
             let Some(access) = self.device.poll_attribute_access() else { break };
-            if let Err(status) = self.access(&access, axes, bus, &mapping.cip.sequence) {
+            if let Err(status) = self.access(&access, axes, buses, &mapping.cip.sequence) {
                 self.device.complete_attribute(access.ticket, Err(status));
             }
         }
@@ -412,7 +411,7 @@ impl DeviceChannel {
         &mut self,
         access: &AttributeAccess,
         axes: &[AxisChannel],
-        bus: &mut SercosBus,
+        buses: &mut Buses,
         sequence: &SequenceAttributes,
     ) -> Result<(), GeneralStatus> {
         let place =
@@ -462,7 +461,7 @@ impl DeviceChannel {
                     attribute: access.id,
                     write,
                 };
-                if bus.access(member.axis, &request, purpose) {
+                if buses.access(member.axis, &request, purpose) {
                     member.note_write(access, sequence);
                     Ok(())
                 } else {

@@ -9,7 +9,7 @@
 //! virtual time. After start it neither allocates, locks, logs nor waits: what people should know leaves as a
 //! [`Notice`] through a bounded queue. Commissioning is start: it compiles the programs of the drives and allocates
 //! before their cyclic operation begins. Drives that come later are commissioned beside it, by the
-//! [`bus::commissioner`].
+//! [`bus::sercos::commissioner`].
 
 pub mod access;
 pub mod axis;
@@ -21,29 +21,31 @@ pub mod port;
 
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
-use profile_sercos::master::event::{Output, Refusal};
 
 use self::axis::AxisChannel;
-use self::bus::Purpose;
 use self::bus::sercos::SercosBus;
+use self::bus::{Bus, Buses, Purpose};
 use self::device::DeviceChannel;
 use self::notice::Notice;
-use self::port::{FRAME_MAX, NorthPort, SouthPort};
+use self::port::{NorthPort, SouthPort};
 use crate::latest::Publisher;
 use crate::mapping::Mapping;
 use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
 
-/// Frames taken from the bus in one cycle: eight telegrams on two ports, and as many strays.
-const FRAMES_PER_CYCLE: usize = 32;
+/// Most buses of a box.
+pub const BUSES_MAX: usize = 8;
 
-/// Longest time between two cycles, so that the north side is served when the bus is silent.
+/// Time between two calls while no bus has anything to do by itself, so that the north side is served.
 const IDLE_INTERVAL: DurationNs = DurationNs::from_millis(1);
+
+/// Rather than call so shortly before a cycle of a bus, the engine sleeps until that.
+const QUIET_BEFORE_CYCLE: DurationNs = DurationNs::from_micros(250);
 
 /// The engine.
 #[derive(Debug)]
 pub struct Engine {
     mapping: Mapping,
-    bus: SercosBus,
+    buses: Buses,
     devices: Vec<DeviceChannel>,
     axes: Vec<AxisChannel>,
     /// The generic state and fault of each axis that was told last.
@@ -54,8 +56,8 @@ pub struct Engine {
     cycle_time: DurationNs,
     started: Option<MonotonicTime>,
     due: Option<MonotonicTime>,
-    /// When telegrams were sent last.
-    sent_at: Option<SystemTime>,
+    /// When each bus began its last cycle.
+    sent_at: [Option<SystemTime>; BUSES_MAX],
     stopping: bool,
 }
 
@@ -64,8 +66,8 @@ pub struct Engine {
 pub struct Parts {
     /// The mapping tables.
     pub mapping: Mapping,
-    /// The bus.
-    pub bus: SercosBus,
+    /// The buses.
+    pub buses: Buses,
     /// The motion devices.
     pub devices: Vec<DeviceChannel>,
     /// All axes.
@@ -80,10 +82,10 @@ impl Engine {
     /// An engine of these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { mapping, bus, devices, axes, notices, publisher } = parts;
+        let Parts { mapping, buses, devices, axes, notices, publisher } = parts;
         let mut status = BoxStatus::STARTING;
-        let cycle_ns = bus.master().config().cycle_ns;
-        status.cycle_time_ns = cycle_ns;
+        let cycle_time = buses.iter().map(Bus::cycle_time).min().unwrap_or(IDLE_INTERVAL);
+        status.cycle_time_ns = u32::try_from(cycle_time.as_nanos()).unwrap_or(u32::MAX);
         status.axis_count = u8::try_from(axes.len()).unwrap_or(u8::MAX);
         for channel in &devices {
             let several = channel.axis_states().count() > 1;
@@ -98,17 +100,17 @@ impl Engine {
         let told = axes.iter().map(|axis| (axis.state(), false)).collect();
         Self {
             mapping,
-            bus,
+            buses,
             devices,
             told,
             axes,
             notices,
             publisher,
             status,
-            cycle_time: DurationNs(i64::from(cycle_ns)),
+            cycle_time,
             started: None,
             due: None,
-            sent_at: None,
+            sent_at: [None; BUSES_MAX],
             stopping: false,
         }
     }
@@ -130,10 +132,16 @@ impl Engine {
         &self.devices
     }
 
-    /// The bus.
+    /// The buses.
     #[must_use]
-    pub fn bus(&self) -> &SercosBus {
-        &self.bus
+    pub fn buses(&self) -> &Buses {
+        &self.buses
+    }
+
+    /// The SERCOS bus, where there is one.
+    #[must_use]
+    pub fn sercos(&self) -> Option<&SercosBus> {
+        self.buses.sercos()
     }
 
     /// The status as it was published last.
@@ -149,7 +157,7 @@ impl Engine {
         }
     }
 
-    /// Ends operation: the axes stop as on a lost command, then the bus goes down. [`Self::is_stopped`] tells when.
+    /// Ends operation: the axes stop as on a lost command, then the buses go down. [`Self::is_stopped`] tells when.
     pub fn stop(&mut self, now: MonotonicTime, system: SystemTime) {
         self.stopping = true;
         for axis in &mut self.axes {
@@ -157,64 +165,88 @@ impl Engine {
         }
     }
 
-    /// Whether every axis is without torque and the bus is down after [`Self::stop`].
+    /// Whether every axis is without torque and every bus is down after [`Self::stop`].
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.stopping && self.bus.master().phase().is_none()
+        self.stopping && self.buses.iter().all(Bus::is_stopped)
     }
 
-    /// One cycle. `north` has a port for each device. Returns when the next one is due.
+    /// One call of the cycle. `north` has a port for each device, `south` one for each bus. Returns when the next one is due.
+    ///
+    /// A bus whose cycle is about to begin has its axes do a step: they take what their drives sent in the cycle that ends,
+    /// and give what they are to do in the next one. Calls in between serve the north side and what is beside the cycle.
     pub fn cycle(
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
         north: &mut [&mut dyn NorthPort],
-        south: &mut dyn SouthPort,
+        south: &mut [SouthPort<'_>],
     ) -> MonotonicTime {
         let started = *self.started.get_or_insert(now);
         self.count_lateness(now);
-        self.collect(now, south);
-        let stepped = self.bus.take_cycle();
-        if stepped {
-            // The drives capture their values when the telegrams pass them.
-            let sampled = self.sent_at.unwrap_or(system);
-            for (number, axis) in self.axes.iter_mut().enumerate() {
-                axis.from_drive(now, system, sampled, self.bus.feedback(number));
+        let mut due = [false; BUSES_MAX];
+        let mut stepped = [false; BUSES_MAX];
+        for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
+            bus.receive(now, port);
+            due[place] = bus.is_due(now);
+            stepped[place] = due[place] && bus.take_cycle();
+        }
+        for (number, axis) in self.axes.iter_mut().enumerate() {
+            let place = self.buses.of(number);
+            if stepped[place] {
+                // The drives capture their values when the telegrams pass them.
+                let sampled = self.sent_at[place].unwrap_or(system);
+                axis.from_drive(now, system, sampled, self.buses.get(place).feedback(number));
             }
         }
-        self.run_bus(now, system);
+        self.run_buses(now, system);
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
             channel.receive(now, system, &mut **port);
         }
         {
-            let Self { devices, mapping, axes, bus, notices, .. } = self;
+            let Self { devices, mapping, axes, buses, notices, .. } = self;
             for channel in devices {
                 channel.exchange(now, system, mapping, axes, &mut |notice| tell(notices, notice));
-                channel.attributes(mapping, axes, bus);
+                channel.attributes(mapping, axes, buses);
             }
         }
-        let acts_at = system + self.cycle_time;
         for (number, axis) in self.axes.iter_mut().enumerate() {
-            self.bus.command(number, |telegram| axis.to_drive(now, system, acts_at, telegram));
+            let place = self.buses.of(number);
+            if due[place] {
+                let bus = self.buses.get_mut(place);
+                let acts_at = system + bus.cycle_time();
+                bus.command(number, &mut |telegram| axis.to_drive(now, system, acts_at, telegram));
+            }
         }
-        if self.send(now, south) {
-            self.sent_at = Some(system);
+        for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
+            let sent = bus.send(now, port);
+            self.status.counters.send_failures += sent.failures;
+            if sent.cycle {
+                self.sent_at[place] = Some(system);
+            }
         }
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
             channel.transmit(now, system, &mut **port);
         }
         if self.stopping && !self.axes.iter().any(AxisChannel::may_have_torque) {
-            self.bus.stop();
+            self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
         self.tell_changes();
         self.publish(now, started);
-        let idle = now + IDLE_INTERVAL.max(self.cycle_time);
-        let due = match self.bus.master().wake_at() {
-            Some(wake) if wake <= idle => wake,
-            _ => now + IDLE_INTERVAL,
-        };
+        let due = self.next_due(now);
         self.due = Some(due);
         due
+    }
+
+    /// When the next call is due.
+    fn next_due(&self, now: MonotonicTime) -> MonotonicTime {
+        let wake = self.buses.iter().filter_map(Bus::wake_at).min();
+        let patience = self.buses.iter().map(Bus::patience).min().unwrap_or(IDLE_INTERVAL);
+        let idle = now + IDLE_INTERVAL.max(patience);
+        match wake {
+            Some(wake) if wake <= idle + QUIET_BEFORE_CYCLE => wake,
+            _ => now + IDLE_INTERVAL,
+        }
     }
 
     fn count_lateness(&mut self, now: MonotonicTime) {
@@ -227,65 +259,50 @@ impl Engine {
         }
     }
 
-    /// Takes what came back from the bus.
-    fn collect(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) {
-        let mut buffer = [0; FRAME_MAX];
-        for _ in 0..FRAMES_PER_CYCLE {
-            let Some((port, length)) = south.receive(&mut buffer) else { break };
-            // A refused frame is counted by the master and changes nothing.
-            let _ = self.bus.master_mut().handle_frame(now, port, &buffer[..length]);
-        }
-    }
-
-    fn run_bus(&mut self, now: MonotonicTime, system: SystemTime) {
-        let Self { mapping, bus, devices, axes, notices, .. } = self;
-        bus.set_idle(devices.iter().all(|channel| channel.device().connection().is_none()));
-        bus.run(
-            now,
-            system,
-            mapping,
-            axes,
-            &mut |axes, answer| match answer.purpose {
-                Purpose::Attribute { .. } => {
-                    for channel in devices.iter_mut() {
-                        if channel.answer(&answer, axes) {
-                            break;
+    fn run_buses(&mut self, now: MonotonicTime, system: SystemTime) {
+        let Self { mapping, buses, devices, axes, notices, .. } = self;
+        let idle = devices.iter().all(|channel| channel.device().connection().is_none());
+        for bus in buses.iter_mut() {
+            bus.set_idle(idle);
+            bus.run(
+                now,
+                system,
+                mapping,
+                axes,
+                &mut |axes, answer| match answer.purpose {
+                    Purpose::Attribute { .. } => {
+                        for channel in devices.iter_mut() {
+                            if channel.answer(&answer, axes) {
+                                break;
+                            }
                         }
                     }
-                }
-                Purpose::Diagnosis => {
-                    let word = answer.result.as_ref().ok().and_then(|(data, _)| unsigned(data));
-                    axes[answer.axis].diagnostic_word(now, system, answer.item, word);
-                }
-                Purpose::Capture(access, generation) => {
-                    let result = answer.result.as_ref().map(|(data, _)| data.as_slice());
-                    axes[answer.axis].capture_answer(access, generation, result.map_err(|failure| *failure));
-                }
-                Purpose::Procedure(access, generation) => {
-                    axes[answer.axis].procedure_answer(
-                        now,
-                        access,
-                        generation,
-                        answer.result.map(|(_, progress)| progress),
-                    );
-                }
-                // Whether it helped shows in the drive's status word.
-                Purpose::FaultReset => {}
-            },
-            &mut |notice| tell(notices, notice),
-        );
-    }
-
-    /// Sends the telegrams that are due; `false` when none was.
-    fn send(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) -> bool {
-        let mut any = false;
-        while let Some(Output::Transmit { port, frame }) = self.bus.master_mut().poll(now) {
-            if !south.send(now, port, frame) {
-                self.status.counters.send_failures += 1;
-            }
-            any = true;
+                    Purpose::Diagnosis => {
+                        let word = answer.result.as_ref().ok().and_then(|(data, _)| unsigned(data));
+                        axes[answer.axis].diagnostic_word(now, system, answer.item, word);
+                    }
+                    Purpose::Capture(access, generation) => {
+                        let result = answer.result.as_ref().map(|(data, _)| data.as_slice());
+                        axes[answer.axis].capture_answer(
+                            access,
+                            generation,
+                            result.map_err(|failure| *failure),
+                        );
+                    }
+                    Purpose::Procedure(access, generation) => {
+                        axes[answer.axis].procedure_answer(
+                            now,
+                            access,
+                            generation,
+                            answer.result.map(|(_, progress)| progress),
+                        );
+                    }
+                    // Whether it helped shows in the drive's status word.
+                    Purpose::FaultReset => {}
+                },
+                &mut |notice| tell(notices, notice),
+            );
         }
-        any
     }
 
     fn tell_changes(&mut self) {
@@ -304,15 +321,16 @@ impl Engine {
     }
 
     fn publish(&mut self, now: MonotonicTime, started: MonotonicTime) {
-        let master = self.bus.master();
-        let statistics = master.statistics();
         let status = &mut self.status;
-        status.phase = master.phase().map_or(PHASE_NONE, |phase| phase.0);
+        status.phase = self.buses.iter().find_map(Bus::phase).unwrap_or(PHASE_NONE);
         status.uptime = now.since(started);
         status.connections = 0;
-        status.counters.cycles = statistics.cycles;
-        status.counters.lost_telegrams = statistics.at_missing;
-        status.counters.refused_frames = Refusal::ALL.iter().map(|reason| statistics.refused(*reason)).sum();
+        (status.counters.cycles, status.counters.lost_telegrams, status.counters.refused_frames) = (0, 0, 0);
+        for counts in self.buses.iter().map(Bus::counts) {
+            status.counters.cycles += counts.cycles;
+            status.counters.lost_telegrams += counts.lost;
+            status.counters.refused_frames += counts.refused;
+        }
         status.counters.lost_updates = 0;
         for channel in &self.devices {
             let device = channel.device();
@@ -338,10 +356,11 @@ impl Engine {
             }
         }
         let was_up = !matches!(status.state, BoxState::STARTING | BoxState::PHASE_UP);
-        status.state = match (self.stopping, status.phase, status.connections) {
+        let up = self.buses.iter().all(Bus::is_up);
+        status.state = match (self.stopping, up, status.connections) {
             (true, ..) => BoxState::STOPPING,
-            (_, 4, 0) => BoxState::READY,
-            (_, 4, _) => BoxState::RUNNING,
+            (_, true, 0) => BoxState::READY,
+            (_, true, _) => BoxState::RUNNING,
             _ if was_up => BoxState::BUS_LOST,
             _ => BoxState::PHASE_UP,
         };

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use profile_cia402::master::event::Event as CanEvent;
+use profile_cia402::wire::NodeId;
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::fault_log::{LogEntry, LogKind};
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
@@ -11,7 +13,8 @@ use profile_sercos::master::event::Event;
 use profile_sercos::master::topology::Topology;
 
 use super::axis::Loss;
-use super::bus::commissioning::StepFailure;
+use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
+use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
 
 /// How much a notice matters.
@@ -75,6 +78,38 @@ pub enum Notice {
         /// The axis.
         axis: u8,
     },
+    /// The master of a CAN bus.
+    Can {
+        /// The bus, from 0 among those of CAN.
+        bus: u8,
+        /// What it tells.
+        event: CanEvent,
+    },
+    /// A step of the commissioning of a CANopen drive failed; its device is left out.
+    NodeCommissioning {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// What failed.
+        failure: ObjectFailure,
+    },
+    /// The drive of a CANopen device does not fit; the device is left out.
+    NodeProgram {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// Why.
+        error: Misfit,
+    },
+    /// Steps failed that may fail, at a CANopen drive.
+    ObjectsPassedOver {
+        /// The axis.
+        axis: u8,
+        /// What failed, in the order of the plan.
+        failures: Vec<ObjectFailure>,
+    },
     /// An axis changed its generic state.
     State {
         /// The axis.
@@ -137,6 +172,7 @@ impl Notice {
             Self::State { .. }
             | Self::AxisState { .. }
             | Self::PassedOver { .. }
+            | Self::ObjectsPassedOver { .. }
             | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
             | Self::Node { fault: NodeFault::NONE, alarm: NodeAlarm::NONE, .. }
             | Self::Sercos(
@@ -152,7 +188,17 @@ impl Notice {
                 | Event::AwaitingApplication { .. }
                 | Event::Connection { .. }
                 | Event::Svc { .. },
-            ) => Severity::Info,
+            )
+            | Self::Can {
+                event:
+                    CanEvent::AwaitingApplication { .. }
+                    | CanEvent::Operational { .. }
+                    | CanEvent::NetworkOperational
+                    | CanEvent::BusOn
+                    | CanEvent::PdoBack { .. }
+                    | CanEvent::Sdo { .. },
+                ..
+            } => Severity::Info,
             _ => Severity::Warning,
         }
     }
@@ -161,10 +207,13 @@ impl Notice {
     #[must_use]
     pub fn axis(&self) -> Option<u8> {
         match self {
-            Self::Sercos(_) | Self::Retry | Self::Node { .. } => None,
+            Self::Sercos(_) | Self::Can { .. } | Self::Retry | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
             | Self::PassedOver { axis, .. }
+            | Self::NodeCommissioning { axis, .. }
+            | Self::NodeProgram { axis, .. }
+            | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
             | Self::Difference { axis, .. }
             | Self::Ends { axis }
@@ -191,7 +240,21 @@ impl fmt::Display for Notice {
                     "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
                 )
             }
-            Self::PassedOver { failures, .. } => passed_over(f, failures),
+            Self::Can { bus, event } => write!(f, "CAN bus {}: {event}", bus + 1),
+            Self::NodeCommissioning { node, failure, .. } => {
+                write!(f, "commissioning of node {node} failed: {failure}; it is left out")
+            }
+            Self::NodeProgram { node, error, .. } => {
+                write!(f, "node {node} cannot be used: {error}; it is left out")
+            }
+            Self::PassedOver { failures, .. } => {
+                let all = failures.iter().map(|failure| (failure.what, failure.idn, failure.failure));
+                passed_over(f, &all.collect::<Vec<_>>())
+            }
+            Self::ObjectsPassedOver { failures, .. } => {
+                let all = failures.iter().map(|failure| (failure.what, failure.object, failure.failure));
+                passed_over(f, &all.collect::<Vec<_>>())
+            }
             Self::Program { address, error, .. } => {
                 write!(f, "the drive with SERCOS address {address} cannot be used: {error}; it is left out")
             }
@@ -215,22 +278,25 @@ impl fmt::Display for Notice {
 
 /// `commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; writing S-0-0079: ...`: what failed
 /// alike stands together.
-fn passed_over(f: &mut fmt::Formatter<'_>, failures: &[StepFailure]) -> fmt::Result {
+fn passed_over<I, F>(f: &mut fmt::Formatter<'_>, failures: &[(&str, I, F)]) -> fmt::Result
+where
+    I: fmt::Display,
+    F: fmt::Display + PartialEq,
+{
     f.write_str("commissioning goes on without ")?;
-    let alike =
-        |one: &StepFailure, other: &StepFailure| (one.what, one.failure) == (other.what, other.failure);
+    let alike = |one: &(&str, I, F), other: &(&str, I, F)| (one.0, &one.2) == (other.0, &other.2);
     let mut between = "";
     for (at, first) in failures.iter().enumerate() {
         if failures[..at].iter().any(|earlier| alike(earlier, first)) {
             continue;
         }
-        write!(f, "{between}{}", first.what)?;
+        write!(f, "{between}{}", first.0)?;
         let mut comma = "";
-        for failure in failures[at..].iter().filter(|failure| alike(failure, first)) {
-            write!(f, "{comma} {}", failure.idn)?;
+        for (_, item, _) in failures[at..].iter().filter(|failure| alike(failure, first)) {
+            write!(f, "{comma} {item}")?;
             comma = ",";
         }
-        write!(f, ": {}", first.failure)?;
+        write!(f, ": {}", first.2)?;
         between = "; ";
     }
     Ok(())

@@ -1,9 +1,10 @@
 //! What the engine sends through and receives from: sockets in the box, queues in the virtual-time tests.
 //!
-//! Both are non-blocking and called from the cycle: they neither wait nor allocate.
+//! All are non-blocking and called from the cycle: they neither wait nor allocate.
 
 use std::net::SocketAddrV4;
 
+use profile_generic::can::Frame;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 
@@ -20,10 +21,49 @@ pub trait NorthPort {
 }
 
 /// The Ethernet ports of the SERCOS III master.
-pub trait SouthPort {
+pub trait EthernetPort {
     /// The next frame that came: the port it came in on and its length in `buffer`.
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)>;
 
     /// Sends a frame now or not at all; `false` when it could not be sent.
     fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool;
+}
+
+/// What comes from a CAN controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanInput {
+    /// A frame of another station.
+    Frame(Frame),
+    /// The controller is off the bus, or its interface is down.
+    BusOff,
+    /// It is back.
+    BusOn,
+}
+
+/// What came of a frame to be sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanSent {
+    /// It is in the transmit queue.
+    Sent,
+    /// The queue is full: it can be tried again when the bus has carried something.
+    Full,
+    /// It will not be sent.
+    Failed,
+}
+
+/// A CAN controller.
+pub trait CanPort {
+    /// What came next.
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput>;
+
+    /// Hands a frame to the transmit queue.
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent;
+}
+
+/// The port of one bus.
+pub enum SouthPort<'a> {
+    /// Of SERCOS III.
+    Ethernet(&'a mut dyn EthernetPort),
+    /// Of CAN.
+    Can(&'a mut dyn CanPort),
 }

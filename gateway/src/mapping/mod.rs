@@ -293,6 +293,14 @@ impl Mapping {
         self.cia402.steps(plan, axis, facts)
     }
 
+    /// What the telegrams of an axis carry at most, of a CiA 402 drive that lacks nothing.
+    ///
+    /// # Errors
+    /// A mode has no row.
+    pub fn cia402_telegram(&self, axis: &Cia402Axis) -> Result<Telegram, Cia402Error> {
+        self.cia402.telegram_room(axis)
+    }
+
     /// The program of an axis on the CiA 402 side, once its drive was asked.
     ///
     /// # Errors

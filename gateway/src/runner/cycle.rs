@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::port::UdpPort;
+use super::port::{OpenPort, UdpPort};
 use crate::engine::Engine;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock::{self, SystemClock};
@@ -18,8 +18,8 @@ pub struct Setup {
     pub engine: Engine,
     /// A port for each device.
     pub north: Vec<UdpPort>,
-    /// The bus.
-    pub south: Box<dyn SouthPort + Send>,
+    /// The port of each bus.
+    pub south: Vec<OpenPort>,
     /// What to ask of the kernel.
     pub realtime: realtime::Request,
 }
@@ -78,13 +78,14 @@ fn run(setup: Setup, stop: &AtomicBool) {
     let clock = SystemClock::detect();
     let mut ports: Vec<&mut dyn NorthPort> =
         north.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
+    let mut buses: Vec<SouthPort<'_>> = south.iter_mut().map(OpenPort::port).collect();
     let mut stopping = false;
     loop {
         if stop.load(Ordering::Relaxed) && !stopping {
             stopping = true;
             engine.stop(clock::monotonic_now(), clock.now());
         }
-        let due = engine.cycle(clock::monotonic_now(), clock.now(), &mut ports, &mut *south);
+        let due = engine.cycle(clock::monotonic_now(), clock.now(), &mut ports, &mut buses);
         if engine.is_stopped() {
             return;
         }

@@ -27,22 +27,24 @@ use tracing::{info, warn};
 
 use self::cycle::{CycleThread, Setup};
 use self::indicators::{Change, Shown};
-use self::port::{PacketPort, UdpPort};
+use self::port::{CanSocketPort, OpenPort, PacketPort, UdpPort};
 use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{Config, Link};
-use crate::engine::build::{BuildError, Built, Host, build};
-use crate::engine::bus::commissioner::Commissioner;
+use crate::config::{Can, CanLink, Config, Link};
+use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::notice::{Notice, Severity};
-use crate::engine::port::SouthPort;
+use crate::engine::port::CanPort;
 use crate::host::HostPort;
 use crate::latest::Reader;
 use crate::mapping::Mapping;
 use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
+use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 use crate::simulate::setup::HOST_CLOCK;
 use crate::status::BoxStatus;
+use crate::sys::can_interface::{self, ConfigureError};
+use crate::sys::can_socket;
 use crate::sys::clock::{SystemClock, TimeScale, monotonic_now};
 use crate::sys::packet_socket::OpenError;
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
@@ -52,6 +54,9 @@ const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
 
 /// How often notices are taken from the cycle thread.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
+
+/// After how many milliseconds a CAN controller that is off the bus starts again by itself.
+const CAN_RESTART_MS: u32 = 100;
 
 /// How long a box that is asked to end waits for its axes to stop.
 const STOP_TIME_OUT: Duration = Duration::from_secs(5);
@@ -65,6 +70,12 @@ pub enum StartError {
     /// The SERCOS interface cannot be opened.
     #[error("{0}")]
     Interface(#[from] OpenError),
+    /// A CAN interface cannot be opened.
+    #[error("{0}")]
+    Can(#[from] can_socket::OpenError),
+    /// A CAN interface cannot be set to its bit rate.
+    #[error("{0}")]
+    BitRate(#[from] ConfigureError),
     /// The UDP port of a device is not to be had.
     #[error("{0}")]
     Bind(#[from] BindError),
@@ -127,12 +138,12 @@ pub fn start(
     capture: Option<&Path>,
     settings: &Arc<Store>,
 ) -> Result<RunningBox, StartError> {
-    let wire = match &config.sercos.link {
-        Link::Interface { name, ring } => Some(PacketPort::open(name, ring.as_deref())?),
-        Link::InProcess { .. } => None,
+    let wire = match config.sercos.as_ref().map(|sercos| &sercos.link) {
+        Some(Link::Interface { name, ring }) => Some(PacketPort::open(name, ring.as_deref())?),
+        Some(Link::InProcess { .. }) | None => None,
     };
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
-    let Built { mut engine, mut adapters, notices, status, commissioner } =
+    let Built { mut engine, mut adapters, notices, status, commissioners } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     // One host clock serves the box and, by the configuration's word, everybody else's time.
     let sync = SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 };
@@ -140,10 +151,16 @@ pub fn start(
 
     let (recorder, mut taps) = record(config, capture)?;
     let mut tap = || taps.pop();
-    let south: Box<dyn SouthPort + Send> = match wire {
-        Some(wire) => Box::new(wire.recorded(tap())),
-        None => Box::new(InProcessDrives::of(config, tap())),
-    };
+    let mut south = Vec::with_capacity(engine.buses().len());
+    if let Some(sercos) = &config.sercos {
+        south.push(OpenPort::Ethernet(match wire {
+            Some(wire) => Box::new(wire.recorded(tap())),
+            None => Box::new(InProcessDrives::of(config, sercos, tap())),
+        }));
+    }
+    for (number, can) in (0..).zip(&config.can) {
+        south.push(OpenPort::Can(can_port(can, tap().map(|tap| (tap, number)))?));
+    }
     let mut north = Vec::with_capacity(config.devices.len());
     let mut markers = Vec::with_capacity(config.devices.len());
     let ports: Vec<_> = config.devices.iter().map(|device| HostPort::find(device.listen)).collect();
@@ -222,19 +239,35 @@ pub fn start(
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_indicators(status.clone(), devices, axes, Arc::clone(&stop_notices)));
 
-    commission(commissioner)?;
-    let setup = Setup { engine, north, south, realtime: config.sercos.realtime };
+    commission(commissioners)?;
+    let setup = Setup { engine, north, south, realtime: config.realtime };
     let cycle = CycleThread::start(setup)
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
     Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
 }
 
+/// The port of a CAN bus.
+fn can_port(config: &Can, tap: Option<(Tap, u8)>) -> Result<Box<dyn CanPort + Send>, StartError> {
+    let CanLink::Interface { name, set_bit_rate } = &config.link else {
+        return Ok(Box::new(InProcessCan::of(config, tap)));
+    };
+    if *set_bit_rate {
+        let settings = can_interface::Settings {
+            bit_rate: Some(config.bit_rate),
+            restart_ms: Some(CAN_RESTART_MS),
+            ..can_interface::Settings::default()
+        };
+        can_interface::configure(name, &settings)?;
+    }
+    Ok(Box::new(CanSocketPort::open(name)?.recorded(tap)))
+}
+
 /// Runs the commissioning of drives that come later, until the cycle thread has gone.
-fn commission(mut commissioner: Commissioner) -> Result<(), StartError> {
+fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
     let run = move || {
-        while !commissioner.is_abandoned() {
-            commissioner.poll();
+        while !commissioners.is_abandoned() {
+            commissioners.poll();
             std::thread::sleep(COMMISSION_INTERVAL);
         }
     };
@@ -280,16 +313,25 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
     let mut settings = Settings::new(path);
     settings.north =
         config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
-    settings.south = match &config.sercos.link {
-        Link::Interface { name, ring } => [name.clone(), ring.as_deref().unwrap_or("not used").to_owned()],
-        Link::InProcess { ring } => {
+    settings.south = match config.sercos.as_ref().map(|sercos| &sercos.link) {
+        Some(Link::Interface { name, ring }) => {
+            [name.clone(), ring.as_deref().unwrap_or("not used").to_owned()]
+        }
+        Some(Link::InProcess { ring }) => {
             let one = if *ring { "simulated SERCOS III ring" } else { "simulated SERCOS III line" };
             [one, if *ring { one } else { "not used" }].map(str::to_owned)
         }
+        None => ["not used"; 2].map(str::to_owned),
     };
+    let can = config.can.iter().map(|bus| match &bus.link {
+        CanLink::InProcess => "simulated CAN".to_owned(),
+        CanLink::Interface { name, .. } => name.clone(),
+    });
+    settings.can = can.collect();
     settings.depth = 4096;
-    // The bus, and for each device its I/O and its explicit side.
-    let (recorder, taps) = Recorder::start(settings, 1 + 2 * config.devices.len())
+    // The buses, and for each device its I/O and its explicit side.
+    let buses = usize::from(config.sercos.is_some()) + config.can.len();
+    let (recorder, taps) = Recorder::start(settings, buses + 2 * config.devices.len())
         .map_err(|source| StartError::Recording { path: path.display().to_string(), source })?;
     Ok((Some(recorder), taps))
 }

@@ -27,7 +27,7 @@ pub use questions::QUESTIONS;
 pub use report::{json, text};
 pub use starter::starter;
 
-use crate::engine::port::{FRAME_MAX, SouthPort};
+use crate::engine::port::{EthernetPort, FRAME_MAX};
 
 /// Slaves up to which two telegrams are enough in CP1 and CP2; more need four and longer cycles.
 const SLAVES_FEW: u16 = 255;
@@ -171,7 +171,7 @@ impl Scanner {
     }
 
     /// Everything that can be done at this moment; whether the scan is over.
-    pub fn step(&mut self, now: MonotonicTime, south: &mut dyn SouthPort) -> bool {
+    pub fn step(&mut self, now: MonotonicTime, south: &mut dyn EthernetPort) -> bool {
         let mut buffer = [0; FRAME_MAX];
         for _ in 0..FRAMES_PER_STEP {
             let Some((port, length)) = south.receive(&mut buffer) else { break };

@@ -9,7 +9,7 @@ use profile_sercos::master::event::Port;
 use profile_sercos::police::court::Court;
 
 use super::*;
-use crate::config::{AxisKind, Config, Link};
+use crate::config::{AxisKind, Config, DriveAt, Link};
 use crate::mapping::Mapping;
 use crate::simulate::drives::{DriveNetwork, SIMULATED_MAC, drives};
 
@@ -35,7 +35,7 @@ impl Judged {
     }
 }
 
-impl SouthPort for Judged {
+impl EthernetPort for Judged {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
         let (port, frame) = self.returned.pop_front()?;
         buffer[..frame.len()].copy_from_slice(&frame);
@@ -52,7 +52,7 @@ impl SouthPort for Judged {
     }
 }
 
-fn scan_of(south: &mut dyn SouthPort) -> Bus {
+fn scan_of(south: &mut dyn EthernetPort) -> Bus {
     let mut scanner = Scanner::new(config()).unwrap();
     let mut now = MonotonicTime::ZERO;
     for _ in 0..100_000 {
@@ -82,10 +82,17 @@ fn the_starter_is_a_configuration_of_the_drives_that_were_found() {
     let starter = starter(&bus, &wire()).unwrap();
     insta::assert_snapshot!("two_drives_starter", starter);
     let config = Config::parse(&starter, "starter.toml").unwrap_or_else(|error| panic!("{error}"));
-    let addresses: Vec<_> = config.sercos.drives.iter().map(|drive| drive.address).collect();
+    let addresses: Vec<_> =
+        config.sercos.as_ref().unwrap().drives.iter().map(|drive| drive.address).collect();
     let kinds: Vec<_> = config.axes.iter().map(|axis| (axis.instance, axis.drive, axis.kind)).collect();
     assert_eq!(addresses, [7, 3]);
-    assert_eq!(kinds, [(1, 0, AxisKind::Rotary), (2, 1, AxisKind::Linear)]);
+    assert_eq!(
+        kinds,
+        [
+            (1, DriveAt::Sercos { drive: 0 }, AxisKind::Rotary),
+            (2, DriveAt::Sercos { drive: 1 }, AxisKind::Linear)
+        ]
+    );
 }
 
 #[test]
@@ -94,7 +101,10 @@ fn the_same_address_twice_is_told_and_gets_no_axis() {
     assert_eq!(bus.findings, ["slave at position 1 and slave at position 3 both have address 7"]);
     assert_eq!(bus.slaves.len(), 3);
     let config = Config::parse(&starter(&bus, &wire()).unwrap(), "starter.toml").unwrap();
-    assert_eq!(config.sercos.drives.iter().map(|drive| drive.address).collect::<Vec<_>>(), [5]);
+    assert_eq!(
+        config.sercos.as_ref().unwrap().drives.iter().map(|drive| drive.address).collect::<Vec<_>>(),
+        [5]
+    );
     assert_eq!(starter(&scan([(0, UnitKind::Rotary)]), &wire()), None);
 }
 
@@ -108,7 +118,7 @@ fn more_slaves_than_two_telegrams_hold_are_scanned_again_with_four() {
 /// A port from which nothing comes back.
 struct Nobody;
 
-impl SouthPort for Nobody {
+impl EthernetPort for Nobody {
     fn receive(&mut self, _: &mut [u8]) -> Option<(Port, usize)> {
         None
     }

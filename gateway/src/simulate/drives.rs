@@ -15,8 +15,8 @@ use profile_sercos::wire::scp::ScpEntry;
 
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
-use crate::config::{AxisKind, Config};
-use crate::engine::port::{FRAME_MAX, SouthPort};
+use crate::config::{AxisKind, Config, DriveAt, Sercos};
+use crate::engine::port::{EthernetPort, FRAME_MAX};
 use crate::sys::clock;
 use crate::sys::link::LinkState;
 use crate::sys::packet_socket::{self, PacketSocket};
@@ -154,19 +154,21 @@ impl InProcessDrives {
 
     /// The drives of a configuration, each for the axis it is to move.
     #[must_use]
-    pub fn of(config: &Config, tap: Option<Tap>) -> Self {
-        let kind =
-            |drive: usize| match config.axes.iter().find(|axis| axis.drive == drive).map(|axis| axis.kind) {
+    pub fn of(config: &Config, sercos: &Sercos, tap: Option<Tap>) -> Self {
+        let kind = |drive: usize| {
+            let at = DriveAt::Sercos { drive };
+            match config.axes.iter().find(|axis| axis.drive == at).map(|axis| axis.kind) {
                 Some(AxisKind::Linear) => UnitKind::Linear,
                 _ => UnitKind::Rotary,
-            };
-        let addresses = config.sercos.drives.iter().enumerate();
+            }
+        };
+        let addresses = sercos.drives.iter().enumerate();
         let addresses = addresses.map(|(number, drive)| (drive.address, kind(number)));
-        Self::new(drives(addresses, config.sercos.link.has_ring()), tap)
+        Self::new(drives(addresses, sercos.link.has_ring()), tap)
     }
 }
 
-impl SouthPort for InProcessDrives {
+impl EthernetPort for InProcessDrives {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
         let (port, length) = self.returned.pop(buffer)?;
         if let Some(tap) = self.tap.as_mut() {

@@ -2,6 +2,7 @@
 //!
 //! The protocol engines live in the profile crates; here they get sockets, a clock and a program.
 
+pub mod can_bus;
 pub mod can_drive;
 pub mod controller;
 pub mod drives;

@@ -10,8 +10,9 @@ use profile_sercos::wire::layout::Layout;
 
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
-use crate::engine::port::NorthPort;
+use crate::engine::port::{NorthPort, SouthPort};
 use crate::mapping::{AttributeTable, CipProgram, CipScaling, DriveFacts, DriveProgram, Mapping, SercosAxis};
+use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 
 /// Virtual time in which the drives must be ready: 511 of them take less.
@@ -98,8 +99,11 @@ impl Stage {
     /// The configuration makes no box, or a drive does not come to cyclic operation with it.
     pub fn rehearse(config: &Config, mapping: Mapping) -> Result<Self, StageError> {
         let host = Host { mac: SIMULATED_MAC, incarnation: 1 };
-        let Built { mut engine, mut notices, .. } = build(config, mapping.clone(), host)?;
-        let mut south = InProcessDrives::of(config, None);
+        let Built { mut engine, mut notices, mut commissioners, .. } = build(config, mapping.clone(), host)?;
+        let mut sercos = config.sercos.as_ref().map(|sercos| InProcessDrives::of(config, sercos, None));
+        let mut can: Vec<_> = config.can.iter().map(|bus| InProcessCan::of(bus, None)).collect();
+        let mut south: Vec<SouthPort<'_>> = sercos.iter_mut().map(|port| SouthPort::Ethernet(port)).collect();
+        south.extend(can.iter_mut().map(|port| SouthPort::Can(port)));
         let mut ports: Vec<Silent> = config.devices.iter().map(|_| Silent).collect();
         let mut ports: Vec<&mut dyn NorthPort> =
             ports.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
@@ -108,18 +112,22 @@ impl Stage {
         let ready = |engine: &crate::engine::Engine| engine.axes().iter().all(|axis| axis.south().is_some());
         while !ready(&engine) && now.since(START) < LIMIT {
             now = engine.cycle(now, SystemTime(now.0), &mut ports, &mut south).max(now + DurationNs(1));
+            commissioners.poll();
             while let Ok(notice) = notices.pop() {
                 told.push(notice.to_string());
             }
         }
         let mut axes = Vec::with_capacity(config.axes.len());
-        let master = engine.bus().master();
         for ((number, axis), channel) in config.axes.iter().enumerate().zip(engine.axes()) {
-            let drive = &config.sercos.drives[axis.drive];
-            let slave = master.slave_by_address(drive.address);
+            let on_sercos = config.sercos_drive(axis).zip(engine.sercos());
+            let (drive, bus) = on_sercos.ok_or_else(|| StageError::Drive {
+                axis: axis.name.clone(),
+                told: "it is not on SERCOS III".to_owned(),
+            })?;
+            let slave = bus.master().slave_by_address(drive.address);
             let scaling = scaling(axis);
             let (Some(south), Some(slave), Some((needs, facts)), Some(attributes)) =
-                (channel.south(), slave, engine.bus().drive(number), mapping.attribute_table(&scaling))
+                (channel.south(), slave, bus.drive(number), mapping.attribute_table(&scaling))
             else {
                 let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
                 return Err(StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() });
@@ -141,7 +149,8 @@ impl Stage {
             });
         }
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
-        Ok(Self { axes, layout: master.layout().to_wire(topology), mapping })
+        let layout = engine.sercos().map(|bus| bus.master().layout().to_wire(topology)).unwrap_or_default();
+        Ok(Self { axes, layout, mapping })
     }
 
     /// The same axes and drives with other tables.

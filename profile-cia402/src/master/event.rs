@@ -171,6 +171,68 @@ pub enum Event {
     },
 }
 
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AwaitingApplication { node, kept: false } => write!(f, "node {node} is the right one"),
+            Self::AwaitingApplication { node, kept: true } => {
+                write!(f, "node {node} is the right one and still in operation")
+            }
+            Self::MappingAdopted { node, direction, number } => {
+                write!(f, "node {node} keeps its own mapping of {direction} {number}")
+            }
+            Self::Operational { node } => write!(f, "node {node} is in operation"),
+            Self::BootFailed { node, status, step, .. } => {
+                write!(f, "node {node} does not come up")?;
+                if let Some(status) = status {
+                    write!(f, ": {status}")?;
+                }
+                match step {
+                    Some(step) => write!(f, ": {step}"),
+                    None => Ok(()),
+                }
+            }
+            Self::NetworkOperational => f.write_str("all mandatory nodes are in operation"),
+            Self::Rebooted { node, operational: true } => {
+                write!(f, "node {node} has restarted while it was in operation")
+            }
+            Self::Rebooted { node, operational: false } => write!(f, "node {node} has restarted"),
+            Self::HeartbeatLost { node } => write!(f, "the heartbeat of node {node} is gone"),
+            Self::StateChanged { node, state } => write!(f, "node {node} has left operation: it is {state}"),
+            Self::Emcy { node, emcy } => write!(f, "node {node}: {emcy}"),
+            Self::EmcyStorm { node } => {
+                write!(f, "node {node} sends more emergency messages than are told one by one")
+            }
+            Self::PdoLost { node, number } => {
+                write!(f, "TPDO {number} of node {node} is missing more often than permitted")
+            }
+            Self::PdoBack { node, number } => write!(f, "TPDO {number} of node {node} comes again"),
+            Self::PdoLength { node, number, expected, found } => {
+                write!(
+                    f,
+                    "TPDO {number} of node {node}: expected {expected} bytes, got {found}; it is not taken"
+                )
+            }
+            Self::DuplicateNode { node, sign } => {
+                let sign = match sign {
+                    DuplicateSign::BootUps => "two boot-up messages in a row",
+                    DuplicateSign::Answers => "two answers to one question",
+                    DuplicateSign::Pdos => "two of each TPDO",
+                };
+                write!(f, "two devices seem to have node-id {node}: {sign}")
+            }
+            Self::UnknownNode { node } => write!(f, "node {node} is there and not in the list"),
+            Self::SecondMaster { id, .. } => {
+                write!(f, "somebody else sends {id}, which only the master may send")
+            }
+            Self::BusOff => f.write_str("the controller is off the bus"),
+            Self::BusOn => f.write_str("the controller is back on the bus"),
+            Self::TransmitFailed { id } => write!(f, "frame {id} could not be sent"),
+            Self::Sdo { outcome, .. } => write!(f, "{outcome}"),
+        }
+    }
+}
+
 /// Why a frame was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Refusal {

@@ -4,10 +4,12 @@
 
 use axisbridge::config::Config;
 use axisbridge::engine::axis::{AxisChannel, Limits};
-use axisbridge::engine::build::master_config;
-use axisbridge::engine::bus::commissioner::Commissioner;
+use axisbridge::engine::build::sercos::master_config;
 use axisbridge::engine::bus::sercos::SercosBus;
+use axisbridge::engine::bus::sercos::commissioner::Commissioner;
+use axisbridge::engine::bus::{AnyBus, Buses};
 use axisbridge::engine::notice::Notice;
+use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{Engine, Parts};
 use axisbridge::latest;
 use axisbridge::mapping::{AxisUnits, CaptureMode, CipScaling, SercosAxis};
@@ -69,7 +71,8 @@ impl GenericRig {
         prepare: impl FnOnce(&mut SercosAxis, &mut DriveNetwork),
     ) -> Self {
         let config = Config::parse(BOX, "box.toml").expect("the configuration is sound");
-        let mut master = master_config(&config, HOST);
+        let sercos = config.sercos.as_ref().expect("the box has a SERCOS bus");
+        let mut master = master_config(sercos, HOST);
         master.slaves = [SlaveConfig { address: ADDRESS, connections: Connections::new(), hot_plug: None }]
             .into_iter()
             .collect();
@@ -98,10 +101,11 @@ impl GenericRig {
         // No drive comes later.
         let (_, commissioner) = Commissioner::new(super::mapping(), 0, []);
         let (publisher, status) = latest::latest(BoxStatus::STARTING);
+        let bus = SercosBus::new(master, vec![(0, ADDRESS, needs)], commissioner)
+            .expect("the master's configuration is sound");
         let engine = Engine::new(Parts {
             mapping,
-            bus: SercosBus::new(master, vec![(ADDRESS, needs)], commissioner)
-                .expect("the master's configuration is sound"),
+            buses: Buses::new(vec![AnyBus::Sercos(Box::new(bus))], vec![0]),
             devices: Vec::new(),
             axes: vec![axis],
             notices: producer,
@@ -223,7 +227,7 @@ impl GenericRig {
             self.command.sequence += 1;
         }
         self.engine.axes_mut()[0].from_north(self.now, system, &self.command);
-        self.due = self.engine.cycle(self.now, system, &mut [], &mut self.south);
+        self.due = self.engine.cycle(self.now, system, &mut [], &mut [SouthPort::Ethernet(&mut self.south)]);
         self.line.handle_time(self.now);
         while let Some(mut frame) = self.south.outbound.pop_front() {
             if self.cable && self.line.round_trip(self.now, frame.as_mut_slice()) {

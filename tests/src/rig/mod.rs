@@ -22,17 +22,20 @@ use std::cell::Cell;
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::rc::Rc;
 
+use arrayvec::ArrayVec;
 use axisbridge::config::Config;
-use axisbridge::engine::Engine;
-use axisbridge::engine::build::{Built, Host, build};
-use axisbridge::engine::bus::commissioner::Commissioner;
+use axisbridge::engine::build::{Built, Commissioners, Host, build};
+use axisbridge::engine::bus::sercos::SercosBus;
 use axisbridge::engine::notice::Notice;
+use axisbridge::engine::port::SouthPort;
+use axisbridge::engine::{BUSES_MAX, Engine};
 use axisbridge::latest::Reader;
 use axisbridge::mapping::Mapping;
 use axisbridge::north::AdapterEnd;
+use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::simulate::setup;
-use axisbridge::status::BoxStatus;
+use axisbridge::status::{BoxState, BoxStatus};
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
@@ -143,6 +146,8 @@ pub struct Rig {
     pub notices: Vec<Notice>,
     /// The drives.
     pub line: DriveNetwork,
+    /// The CAN buses with their drives.
+    pub can: Vec<InProcessCan>,
     /// The police over the line.
     pub court: Court,
     /// What was seen of each drive.
@@ -165,7 +170,7 @@ pub struct Rig {
     now: MonotonicTime,
     clock: Rc<Cell<MonotonicTime>>,
     engine_due: MonotonicTime,
-    commissioner: Commissioner,
+    commissioners: Commissioners,
     link: AdapterEnd,
     notice_queue: rtrb::Consumer<Notice>,
     status: Reader<BoxStatus>,
@@ -190,8 +195,9 @@ impl Rig {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
-        let (engine, adapter, link, notice_queue, status, commissioner) = assemble(&config);
+        let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&config);
         let line = drives(settings.drives.iter().copied(), false);
+        let can = config.can.iter().map(|bus| InProcessCan::of(bus, None)).collect();
         Self {
             controller: None,
             events: Vec::new(),
@@ -200,6 +206,7 @@ impl Rig {
             notices: Vec::new(),
             watched: vec![Watched::default(); line.slaves().len()],
             line,
+            can,
             court: Court::new(START),
             knobs: settings.knobs,
             tamper_command: None,
@@ -213,7 +220,7 @@ impl Rig {
             now: START,
             clock: Rc::new(Cell::new(START)),
             engine_due: START,
-            commissioner,
+            commissioners,
             link,
             notice_queue,
             status,
@@ -229,7 +236,7 @@ impl Rig {
     #[must_use]
     pub fn ready(settings: Settings) -> Self {
         let mut rig = Self::new(settings);
-        rig.run_until(DurationNs::from_secs(20), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig.run_until(DurationNs::from_secs(20), "the buses up", |rig| rig.status().state == BoxState::READY);
         rig
     }
 
@@ -390,13 +397,22 @@ impl Rig {
     /// as they are.
     pub fn restart_box(&mut self) {
         self.drop_stream();
-        let (engine, adapter, link, notice_queue, status, commissioner) = assemble(&self.config);
-        (self.engine, self.adapter, self.link, self.commissioner) = (engine, adapter, link, commissioner);
+        let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&self.config);
+        (self.engine, self.adapter, self.link, self.commissioners) = (engine, adapter, link, commissioners);
         (self.notice_queue, self.status) = (notice_queue, status);
         self.north = NorthQueue::default();
         self.south = SouthQueue::default();
         // A box takes longer to start; the last telegrams of the old one are through by then.
         self.engine_due = self.now + STEP_MAX;
+    }
+
+    /// The SERCOS bus of the box.
+    ///
+    /// # Panics
+    /// Without one.
+    #[must_use]
+    pub fn sercos(&self) -> &SercosBus {
+        self.engine.sercos().expect("a SERCOS bus")
     }
 
     /// The status that the box publishes.
@@ -469,8 +485,10 @@ impl Rig {
         self.now = self.engine_due.max(self.now);
         self.deliver();
         let (now, system) = (self.now, self.system());
-        let Self { engine, engine_due, north, south, .. } = self;
-        let result = around(&mut || *engine_due = engine.cycle(now, system, &mut [north], south));
+        let Self { engine, engine_due, north, south, can, config, .. } = self;
+        let mut ports = ports_of(config, south, can);
+        let result = around(&mut || *engine_due = engine.cycle(now, system, &mut [north], &mut ports));
+        drop(ports);
         self.after_cycle();
         self.control();
         self.explicit();
@@ -505,13 +523,12 @@ impl Rig {
     #[must_use]
     pub fn torque_free(&self) -> bool {
         use profile_generic::state::Report as R;
-        let free = |place: usize| {
-            matches!(
-                self.drive(place).actual().report,
-                R::NotReady | R::AwaitingPower | R::Ready | R::Faulted | R::Silent
-            )
-        };
-        (0..self.line.slaves().len()).all(free)
+        let free =
+            |report: R| matches!(report, R::NotReady | R::AwaitingPower | R::Ready | R::Faulted | R::Silent);
+        let drives = self.config.sercos.as_ref().map_or(0, |_| self.line.slaves().len());
+        let axes = self.can.iter().flat_map(InProcessCan::nodes).flat_map(|node| node.application().axes());
+        (0..drives).all(|place| free(self.drive(place).actual().report))
+            && axes.into_iter().all(|axis| free(axis.actual().report))
     }
 
     // ---- one step -------------------------------------------------------------------------------
@@ -532,13 +549,14 @@ impl Rig {
 
     fn cycle(&mut self) {
         let (now, system) = (self.now, self.system());
-        self.engine_due = self.engine.cycle(now, system, &mut [&mut self.north], &mut self.south);
+        let Self { engine, engine_due, north, south, can, config, .. } = self;
+        *engine_due = engine.cycle(now, system, &mut [north], &mut ports_of(config, south, can));
         self.after_cycle();
     }
 
     /// The line answers, the network takes the device's datagrams, and the watchers look.
     fn after_cycle(&mut self) {
-        self.commissioner.poll();
+        self.commissioners.poll();
         self.line.handle_time(self.now);
         let line = self.cable.then_some(&mut self.line);
         let tamper = &mut self.tamper_frame;
@@ -679,13 +697,27 @@ impl Drop for Rig {
     }
 }
 
-type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>, Commissioner);
+/// The ports of the buses in the order of the engine's.
+fn ports_of<'a>(
+    config: &Config,
+    south: &'a mut SouthQueue,
+    can: &'a mut [InProcessCan],
+) -> ArrayVec<SouthPort<'a>, BUSES_MAX> {
+    let mut ports = ArrayVec::new();
+    if config.sercos.is_some() {
+        ports.push(SouthPort::Ethernet(south));
+    }
+    ports.extend(can.iter_mut().map(|bus| SouthPort::Can(bus)));
+    ports
+}
+
+type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>, Commissioners);
 
 fn assemble(config: &Config) -> Assembled {
-    let Built { mut engine, adapters, notices, status, commissioner } =
+    let Built { mut engine, adapters, notices, status, commissioners } =
         build(config, mapping(), HOST).expect("the configuration makes a box");
     engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });
     let (config, link) = adapters.into_iter().next().expect("one device");
     let adapter = Adapter::new(config).expect("the adapter's configuration is sound");
-    (engine, adapter, link, notices, status, commissioner)
+    (engine, adapter, link, notices, status, commissioners)
 }

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
-use axisbridge::engine::port::{FRAME_MAX, NorthPort, SouthPort};
+use axisbridge::engine::port::{EthernetPort, FRAME_MAX, NorthPort};
 use axisbridge::simulate::drives::DriveNetwork;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
@@ -124,7 +124,7 @@ impl SouthQueue {
     }
 }
 
-impl SouthPort for SouthQueue {
+impl EthernetPort for SouthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
         let frame = self.inbound.pop_front()?;
         let bytes = frame.as_slice();

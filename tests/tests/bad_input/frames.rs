@@ -61,7 +61,7 @@ fn a_broken_telegram_is_counted_and_costs_one_cycle_of_feedback() {
     ];
     for (reason, spoil) in cases {
         let mut rig = spoiled(spoil);
-        let statistics = *rig.engine.bus().master().statistics();
+        let statistics = *rig.sercos().master().statistics();
         for other in Refusal::ALL {
             assert_eq!(statistics.refused(other), u64::from(other == reason), "{reason:?}: {other:?}");
         }
@@ -82,7 +82,7 @@ fn strays_on_the_bus_are_counted_and_change_nothing() {
     for (number, frame) in (1..).zip(frames) {
         rig.inject_frame(frame);
         rig.run_for(millis(4));
-        assert_eq!(rig.engine.bus().master().statistics().refused(Refusal::NotSercos), number);
+        assert_eq!(rig.sercos().master().statistics().refused(Refusal::NotSercos), number);
     }
     // A storm of them does not keep the telegrams of the cycle from being taken for long.
     for _ in 0..40 {
@@ -106,7 +106,7 @@ fn a_line_whose_answers_are_all_broken_stops_the_axes_with_south_silence() {
     for axis in rig.engine.axes() {
         assert_eq!(axis.fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
     }
-    assert!(rig.engine.bus().master().statistics().refused(Refusal::Crc) > 2);
+    assert!(rig.sercos().master().statistics().refused(Refusal::Crc) > 2);
     rig.run_until(millis(1_000), "no torque", Rig::torque_free);
     rig.tamper_frame = None;
     // Nothing starts by itself when the answers are good again.

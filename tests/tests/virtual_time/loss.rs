@@ -226,7 +226,7 @@ fn a_box_that_ends_leaves_drives_without_torque_and_a_silent_bus() {
         let took = rig.run_until(millis(2_000), "the end", |rig| rig.engine.is_stopped());
         assert!(took < millis(200), "{action:?}: {took}");
         assert!(at_rest(&rig) && rig.torque_free(), "{action:?}");
-        assert_eq!(rig.engine.bus().master().phase(), None);
+        assert_eq!(rig.sercos().master().phase(), None);
         assert_eq!(rig.watched.iter().map(|drive| drive.on).collect::<Vec<_>>(), [false, false]);
     }
 }

@@ -1,6 +1,7 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
 mod attributes;
+mod can;
 mod drive_profile;
 mod events;
 mod faults;

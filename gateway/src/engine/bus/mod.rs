@@ -1,13 +1,18 @@
 //! The buses behind the engine: what they have in common.
 
-pub mod commissioner;
-pub mod commissioning;
+pub mod can;
 pub mod sercos;
 
-use super::access::{AccessFailure, Data, Progress};
+use profile_generic::state::Action;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+use super::access::{Access, AccessFailure, Data, Operation, Progress};
+use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
 use super::axis::procedure::ProcedureAccess;
-use crate::mapping::Item;
+use super::notice::Notice;
+use super::port::SouthPort;
+use crate::mapping::{Item, Mapping};
 
 /// What an access to a drive was for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,4 +60,227 @@ pub struct Received<'a> {
     pub fresh: bool,
     /// Whether the drive takes part: it was heard, and has not been lost for longer than its connection bears.
     pub alive: bool,
+}
+
+/// What was sent in one call.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// Whether a cycle of the bus has begun with it.
+    pub cycle: bool,
+    /// Frames that could not be sent.
+    pub failures: u64,
+}
+
+/// What a bus has counted since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Cycles.
+    pub cycles: u64,
+    /// Cyclic telegrams that did not come back in time.
+    pub lost: u64,
+    /// Frames that were not taken.
+    pub refused: u64,
+}
+
+/// A bus, as the engine sees it. Axes go by their numbers in the box.
+pub trait Bus {
+    /// Time from one cycle to the next.
+    fn cycle_time(&self) -> DurationNs;
+
+    /// How long the engine may sleep at most while the bus has nothing to do by itself: what comes in has to wait so long.
+    fn patience(&self) -> DurationNs;
+
+    /// When it has to do something by itself.
+    fn wake_at(&self) -> Option<MonotonicTime>;
+
+    /// Whether a cycle is about to begin: then its axes have a step to do.
+    fn is_due(&self, now: MonotonicTime) -> bool;
+
+    /// Whether every drive that answers at all is in cyclic operation.
+    fn is_up(&self) -> bool;
+
+    /// SERCOS communication phase, of a bus that has phases.
+    fn phase(&self) -> Option<u8>;
+
+    /// What it has counted.
+    fn counts(&self) -> Counts;
+
+    /// Takes what has come in.
+    fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>);
+
+    /// Whether a cycle was sent since the last call: then there is feedback to be taken.
+    fn take_cycle(&mut self) -> bool;
+
+    /// What the drive of an axis sent in the cycle that has just ended; `None` without a drive in cyclic operation.
+    fn feedback(&self, axis: usize) -> Option<Received<'_>>;
+
+    /// Tells whether no controller is connected: only then a bus that works may be taken down for a drive that does not.
+    fn set_idle(&mut self, idle: bool);
+
+    /// Handles what has happened on the bus and drives the commissioning on. `answer` gets what accesses came to, `notice`
+    /// what people should know.
+    fn run(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    );
+
+    /// Lets an axis fill its values for the next cycle; what it gives back says whether they may be sent.
+    fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool);
+
+    /// Asks something of the drive of an axis; `false` when it is not there or too much waits.
+    fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool;
+
+    /// Sends what is due.
+    fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent;
+
+    /// Ends operation.
+    fn stop(&mut self, now: MonotonicTime);
+
+    /// Whether it has ended.
+    fn is_stopped(&self) -> bool;
+}
+
+/// The buses of a box, and which of them each axis is on.
+#[derive(Debug, Default)]
+pub struct Buses {
+    list: Vec<AnyBus>,
+    /// The bus of each axis.
+    of: Vec<usize>,
+}
+
+/// A bus of any kind.
+#[derive(Debug)]
+pub enum AnyBus {
+    /// SERCOS III.
+    Sercos(Box<sercos::SercosBus>),
+    /// CANopen.
+    Can(Box<can::CanBus>),
+}
+
+impl AnyBus {
+    /// What all of them can do.
+    #[must_use]
+    pub fn get(&self) -> &dyn Bus {
+        match self {
+            Self::Sercos(bus) => &**bus,
+            Self::Can(bus) => &**bus,
+        }
+    }
+
+    /// The same.
+    pub fn get_mut(&mut self) -> &mut dyn Bus {
+        match self {
+            Self::Sercos(bus) => &mut **bus,
+            Self::Can(bus) => &mut **bus,
+        }
+    }
+}
+
+impl Buses {
+    /// These buses; `of` has for each axis the place of its bus.
+    ///
+    /// # Panics
+    /// When an axis is on a bus that is not there.
+    #[must_use]
+    pub fn new(list: Vec<AnyBus>, of: Vec<usize>) -> Self {
+        assert!(of.iter().all(|bus| *bus < list.len()), "every axis is on a bus");
+        Self { list, of }
+    }
+
+    /// The SERCOS bus, where there is one.
+    #[must_use]
+    pub fn sercos(&self) -> Option<&sercos::SercosBus> {
+        self.list.iter().find_map(|bus| match bus {
+            AnyBus::Sercos(bus) => Some(&**bus),
+            AnyBus::Can(_) => None,
+        })
+    }
+
+    /// The CANopen buses.
+    pub fn can(&self) -> impl Iterator<Item = &can::CanBus> {
+        self.list.iter().filter_map(|bus| match bus {
+            AnyBus::Can(bus) => Some(&**bus),
+            AnyBus::Sercos(_) => None,
+        })
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// The bus in a place.
+    #[must_use]
+    pub fn get(&self, place: usize) -> &dyn Bus {
+        self.list[place].get()
+    }
+
+    /// The same.
+    pub fn get_mut(&mut self, place: usize) -> &mut dyn Bus {
+        self.list[place].get_mut()
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = &dyn Bus> {
+        self.list.iter().map(AnyBus::get)
+    }
+
+    /// The same.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut dyn Bus> {
+        self.list.iter_mut().map(AnyBus::get_mut)
+    }
+
+    /// The place of the bus of an axis.
+    #[must_use]
+    pub fn of(&self, axis: usize) -> usize {
+        self.of[axis]
+    }
+
+    /// Asks something of the drive of an axis; `false` when it is not there or too much waits.
+    pub fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
+        let place = self.of[axis];
+        self.get_mut(place).access(axis, access, purpose)
+    }
+}
+
+/// What an axis wants of its drive beside the cycle: the words that tell the cause of a fault or warning, its fault reset,
+/// captures and procedures, one access of each at a time.
+fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Access, Purpose) -> bool) {
+    if axis.wants_drive_reset() {
+        let sent = match axis.south().and_then(|program| program.command_of(Action::ResetFault)) {
+            Some(item) => access(&Access::new(item, Operation::Command).urgent(), Purpose::FaultReset),
+            None => true,
+        };
+        // Else too many accesses wait, and the next cycle tries again.
+        if sent {
+            axis.drive_reset_sent();
+        }
+    }
+    if let Some(item) = axis.wants_word(now)
+        && access(&Access::read(item).urgent(), Purpose::Diagnosis)
+    {
+        axis.word_asked(now, item);
+    }
+    if let Some((wanted, part, generation)) = axis.capture_access()
+        && access(&wanted, Purpose::Capture(part, generation))
+    {
+        axis.capture_sent(part);
+    }
+    if let Some((wanted, part, generation)) = axis.procedure_access(now)
+        && access(&wanted, Purpose::Procedure(part, generation))
+    {
+        axis.procedure_sent(part);
+    }
 }

@@ -45,6 +45,8 @@ pub struct Cia402Axis {
     pub parameters: Vec<(Parameter, i64)>,
     /// The drive's statusword does not tell whether it follows command values.
     pub silent: bool,
+    /// Actual values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
+    pub left_out: Vec<Signal>,
 }
 
 impl Cia402Axis {
@@ -123,6 +125,9 @@ pub enum Cia402Error {
     Full(&'static str),
 }
 
+/// Signals, and where they stand in their telegram.
+type Places<'a> = Vec<(&'a SignalRule, u16)>;
+
 impl Cia402Tables {
     /// The modes of an axis, with what they are in the drive. The mode of operation that 6502 names first in the row counts;
     /// a drive without 6502 is believed to have the first.
@@ -163,24 +168,10 @@ impl Cia402Tables {
     ) -> Result<DriveProgram, Cia402Error> {
         let chosen = self.chosen(axis, facts)?;
         let item = |object| axis.item(object).ok_or(Cia402Error::Axis(axis.axis));
-        let words = &self.words;
-        let head = WORD_BYTES + MODE_BYTES;
-        let mut telegram = Telegram {
-            command: vec![item(words.control)?, item(words.mode)?],
-            feedback: vec![item(words.status)?, item(words.mode_shown)?],
-            command_bytes: head,
-            feedback_bytes: head,
-        };
+        let (telegram, places) = self.telegram(axis, &chosen, facts)?;
         let mut fields = Vec::new();
-        for (to_drive, items, bytes) in [
-            (true, &mut telegram.command, &mut telegram.command_bytes),
-            (false, &mut telegram.feedback, &mut telegram.feedback_bytes),
-        ] {
-            for rule in self.signals_of(&chosen, to_drive, facts)? {
-                items.push(item(rule.value.object)?);
-                fields.push(self.field(rule, *bytes, axis, facts)?);
-                *bytes += octets(rule.value.width);
-            }
+        for (rule, at) in places {
+            fields.push(self.field(rule, at, axis, facts)?);
         }
         let mut program = DriveProgram::new(telegram, false);
         program.mode_octets = Some([WORD_BYTES, WORD_BYTES]);
@@ -203,7 +194,7 @@ impl Cia402Tables {
             program.modes.try_push(entry).map_err(|_| Cia402Error::Full("the table of modes"))?;
         }
         self.words(axis, &chosen, &mut program)?;
-        let error = item(words.error)?;
+        let error = item(self.words.error)?;
         for row in &self.faults {
             let row = FaultRow { word: error, ..*row };
             program.faults.try_push(row).map_err(|_| Cia402Error::Full("the table of faults"))?;
@@ -219,9 +210,50 @@ impl Cia402Tables {
         Ok(program)
     }
 
+    /// What the telegrams carry at most, of a drive that lacks nothing.
+    ///
+    /// # Errors
+    /// A mode has no row.
+    pub(in crate::mapping) fn telegram_room(&self, axis: &Cia402Axis) -> Result<Telegram, Cia402Error> {
+        let facts = ObjectFacts::new();
+        let chosen = self.chosen(axis, &facts)?;
+        Ok(self.telegram(axis, &chosen, &facts)?.0)
+    }
+
+    /// What the telegrams carry, and where the signals stand in them.
+    fn telegram(
+        &self,
+        axis: &Cia402Axis,
+        chosen: &[(&ModeRule, &DriveMode)],
+        facts: &ObjectFacts,
+    ) -> Result<(Telegram, Places<'_>), Cia402Error> {
+        let item = |object| axis.item(object).ok_or(Cia402Error::Axis(axis.axis));
+        let words = &self.words;
+        let head = WORD_BYTES + MODE_BYTES;
+        let mut telegram = Telegram {
+            command: vec![item(words.control)?, item(words.mode)?],
+            feedback: vec![item(words.status)?, item(words.mode_shown)?],
+            command_bytes: head,
+            feedback_bytes: head,
+        };
+        let mut places = Vec::new();
+        for (to_drive, items, bytes) in [
+            (true, &mut telegram.command, &mut telegram.command_bytes),
+            (false, &mut telegram.feedback, &mut telegram.feedback_bytes),
+        ] {
+            for rule in self.signals_of(axis, chosen, to_drive, facts)? {
+                items.push(item(rule.value.object)?);
+                places.push((rule, *bytes));
+                *bytes += octets(rule.value.width);
+            }
+        }
+        Ok((telegram, places))
+    }
+
     /// The signals of all modes, each once, in the order of the modes.
     fn signals_of(
         &self,
+        axis: &Cia402Axis,
         chosen: &[(&ModeRule, &DriveMode)],
         to_drive: bool,
         facts: &ObjectFacts,
@@ -230,7 +262,8 @@ impl Cia402Tables {
         for signal in chosen.iter().flat_map(|(rule, _)| if to_drive { &rule.command } else { &rule.actual })
         {
             let Some(rule) = self.signal(*signal) else { continue };
-            if rules.iter().any(|known| known.signal == *signal) {
+            let unwanted = !rule.refuse && axis.left_out.contains(signal);
+            if unwanted || rules.iter().any(|known| known.signal == *signal) {
                 continue;
             }
             match facts.is_missing(rule.value.object) {

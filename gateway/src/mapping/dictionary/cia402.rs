@@ -4,6 +4,7 @@ use super::cia402_codes::{Cia402CodeSet, resolve_codes};
 use super::cia402_objects::{Cia402Object, Cia402Sub, resolve_objects};
 use super::documents::{Document, Documents, once};
 use crate::finding::Findings;
+use crate::mapping::Item;
 use crate::mapping::format::Name;
 use crate::mapping::load::Tables;
 use crate::mapping::resolver::Resolver;
@@ -86,6 +87,14 @@ impl Cia402Dictionary {
     /// The row of a sub-object; 0 is that of a variable.
     pub fn sub(&self, index: u16, sub: u8) -> Option<&Cia402Sub> {
         self.object(index)?.sub(sub)
+    }
+
+    /// Bytes of an item's value, on whatever axis it is; `None` where nobody says, and for what fills no whole bytes.
+    pub fn len_of(&self, item: Item) -> Option<u8> {
+        let Item::Object(object) = item else { return None };
+        let (row, _) = self.object_of_axis(object.index)?;
+        let bits = row.sub(object.sub)?.data_type?.bits()?;
+        u8::try_from(bits / 8).ok().filter(|bytes| *bytes > 0)
     }
 
     /// All sets of codes, bits and states.

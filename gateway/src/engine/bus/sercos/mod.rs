@@ -4,12 +4,17 @@
 //! connections follow from that; in CP3 it is told its modes and asked its scaling, its program follows from that.
 //! Compiling programs allocates; it happens before the cyclic operation of CP4 begins.
 
+pub mod commissioner;
+pub mod commissioning;
+
 use arrayvec::ArrayVec;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
-use profile_sercos::master::event::{Event, HotPlugRefusal, SlaveId, Ticket};
+use profile_sercos::master::event::{
+    Event, HotPlugRefusal, Output, Refusal as FrameRefusal, SlaveId, Ticket,
+};
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
 use profile_sercos::wire::data_status::{CommandState, DataStatus};
 use profile_sercos::wire::header::Phase;
@@ -17,12 +22,13 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use super::commissioner::{CommissionerEnd, Done, Job, Run};
-use super::commissioning::{Commissioning, StepFailure};
-use super::{Answer, Purpose, Received};
+use self::commissioner::{CommissionerEnd, Done, Job, Run};
+use self::commissioning::{Commissioning, StepFailure};
+use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
+use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
@@ -43,6 +49,9 @@ const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
 const REFUSED_MAX: usize = 64;
+
+/// Frames taken from the bus in one cycle: eight telegrams on two ports, and as many strays.
+const FRAMES_PER_CYCLE: usize = 32;
 
 /// Service channel accesses of one drive that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 4;
@@ -66,6 +75,8 @@ enum Stage {
 /// The drive of one axis.
 #[derive(Debug)]
 struct Drive {
+    /// Number of the axis.
+    axis: usize,
     address: u16,
     needs: SercosAxis,
     /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
@@ -106,14 +117,14 @@ pub struct SercosBus {
 }
 
 impl SercosBus {
-    /// A bus whose master goes for CP4. `drives` are the SERCOS address and the needs of each axis; the commissioner
-    /// knows the same.
+    /// A bus whose master goes for CP4. `drives` are the number of each axis, its SERCOS address and its needs; the
+    /// commissioner knows the same.
     ///
     /// # Errors
     /// What the master finds wrong with its configuration.
     pub fn new(
         config: MasterConfig,
-        drives: Vec<(u16, SercosAxis)>,
+        drives: Vec<(usize, u16, SercosAxis)>,
         commissioner: CommissionerEnd,
     ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
@@ -125,7 +136,8 @@ impl SercosBus {
             .collect();
         let mut master = Master::new(config)?;
         master.set_target_phase(Phase::CP4);
-        let drive = |(address, needs)| Drive {
+        let drive = |(axis, address, needs)| Drive {
+            axis,
             address,
             needs,
             allowed_losses,
@@ -162,131 +174,11 @@ impl SercosBus {
     /// What the drive of an axis is needed for, and what it has told of itself.
     #[must_use]
     pub fn drive(&self, axis: usize) -> Option<(&SercosAxis, &DriveFacts)> {
-        self.drives.get(axis).map(|drive| (&drive.needs, &drive.facts))
+        self.drive_of(axis).map(|drive| (&drive.needs, &drive.facts))
     }
 
-    /// The master, for its frames.
-    pub fn master_mut(&mut self) -> &mut Master {
-        &mut self.master
-    }
-
-    /// Tells whether no controller is connected: only then a bus that works may be taken down for a drive that does not.
-    pub fn set_idle(&mut self, idle: bool) {
-        self.idle = idle;
-    }
-
-    /// Ends the telegrams by way of CP0.
-    pub fn stop(&mut self) {
-        self.wanted = None;
-        self.master.stop();
-    }
-
-    /// Whether a cycle was sent since the last call: then the axes have one step to do.
-    pub fn take_cycle(&mut self) -> bool {
-        let cycles = self.master.statistics().cycles;
-        std::mem::replace(&mut self.cycles_seen, cycles) != cycles
-    }
-
-    /// What the drive of an axis sent in the cycle that has just ended; `None` before CP4 and without a drive.
-    #[must_use]
-    pub fn feedback(&self, axis: usize) -> Option<Received<'_>> {
-        let drive = self.drives.get(axis)?;
-        if self.master.phase() != Some(Phase::CP4) {
-            return None;
-        }
-        let consumer = self.master.consumer(drive.there()?, FEEDBACK_CONNECTION)?;
-        // Without the ATs of this cycle what is there is that of the last one.
-        Some(Received {
-            data: consumer.data,
-            fresh: consumer.fresh && self.master.cycle_complete(),
-            alive: matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning),
-        })
-    }
-
-    /// Lets an axis fill its values for the next cycle.
-    pub fn command(&mut self, axis: usize, fill: impl FnOnce(Option<&mut [u8]>) -> bool) {
-        let slave = self.drives.get(axis).and_then(Drive::there);
-        let Some(slave) = slave else {
-            fill(None);
-            return;
-        };
-        if fill(self.master.producer(slave, COMMAND_CONNECTION)) {
-            self.master.commit(slave, COMMAND_CONNECTION);
-        } else {
-            self.master.withdraw(slave, COMMAND_CONNECTION);
-        }
-    }
-
-    /// Sends a request over the drive's service channel; `false` when the drive is not there or too many wait.
-    pub fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
-        let Some(request) = request(access) else { return false };
-        let Some(drive) = self.drives.get_mut(axis) else { return false };
-        let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
-        match self.master.svc_submit(slave, request) {
-            Ok(ticket) => {
-                drive.accesses.push((ticket, purpose));
-                true
-            }
-            Err(_) => false,
-        }
-    }
-
-    /// Handles the master's events and drives the commissioning on. `answer` gets what accesses came to, `notice` what
-    /// people should know.
-    pub fn run(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        mapping: &Mapping,
-        axes: &mut [AxisChannel],
-        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
-        notice: &mut dyn FnMut(Notice),
-    ) {
-        while let Some(event) = self.master.poll_event() {
-            match event {
-                Event::Svc { ticket, outcome } => self.outcome(ticket, outcome, axes, answer),
-                event => {
-                    self.event(now, system, mapping, axes, &event, notice);
-                    notice(Notice::Sercos(event));
-                }
-            }
-        }
-        self.commission(mapping, axes, notice);
-        self.let_join(now, system, axes, notice);
-        self.diagnose(now, axes);
-        self.capture(axes);
-        self.carry_out(now, axes);
-        let alone =
-            self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
-        let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = self.idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
-        if alone || (free && (self.returned || rescan)) {
-            self.returned = false;
-            self.lost_since = None;
-            self.planned = true;
-            self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
-            for slave in self.drives.iter().filter_map(|drive| drive.slave) {
-                self.master.withdraw(slave, COMMAND_CONNECTION);
-            }
-            self.lose_all(now, system, axes);
-            self.master.set_target_phase(Phase::CP0);
-        }
-        for (drive, axis) in self.drives.iter().zip(axes.iter()) {
-            let Some(slave) = drive.slave.filter(|_| !axis.may_have_torque()) else { continue };
-            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
-            if self.master.consumer(slave, FEEDBACK_CONNECTION).is_some_and(failed) {
-                // Too many losses in a row; without torque there is nothing to lose by listening again.
-                self.master.reset_consumer(slave, FEEDBACK_CONNECTION);
-            }
-        }
-        if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
-            let due = *self.retry_at.get_or_insert(now + RETRY_PAUSE);
-            if now >= due {
-                self.retry_at = None;
-                notice(Notice::Retry);
-                self.master.set_target_phase(Phase::CP4);
-            }
-        }
+    fn drive_of(&self, axis: usize) -> Option<&Drive> {
+        self.drives.iter().find(|drive| drive.axis == axis)
     }
 
     fn event(
@@ -306,16 +198,14 @@ impl SercosBus {
             Event::SlaveReturned { .. } => self.returned = true,
             Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
                 self.exclude_refused();
-                for axis in 0..self.drives.len() {
-                    self.begin(axis, mapping, notice);
+                for place in 0..self.drives.len() {
+                    self.begin(place, mapping, notice);
                 }
             }
             Event::AwaitingApplication { phase } => {
                 self.exclude_refused();
-                for (axis, drive) in self.drives.iter_mut().enumerate() {
-                    if drive.slave.is_some() {
-                        drive.plan(axis, mapping, phase.0, notice);
-                    }
+                for drive in self.drives.iter_mut().filter(|drive| drive.slave.is_some()) {
+                    drive.plan(mapping, phase.0, notice);
                 }
             }
             Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
@@ -385,17 +275,16 @@ impl SercosBus {
         slave: SlaveId,
         axes: &mut [AxisChannel],
     ) {
-        for (drive, axis) in self.drives.iter_mut().zip(axes) {
-            if drive.slave == Some(slave) {
-                drive.lose();
-                axis.lose_south(now, system);
-            }
+        for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(slave)) {
+            drive.lose();
+            axes[drive.axis].lose_south(now, system);
         }
     }
 
     fn lose_all(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
-        for (drive, axis) in self.drives.iter_mut().zip(axes) {
+        for drive in &mut self.drives {
             drive.lose();
+            let axis = &mut axes[drive.axis];
             if self.planned {
                 axis.leave_south(now, system);
             } else {
@@ -405,18 +294,18 @@ impl SercosBus {
     }
 
     /// Starts the commissioning of a drive in CP2.
-    fn begin(&mut self, axis: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
-        let drive = &mut self.drives[axis];
+    fn begin(&mut self, place: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
+        let drive = &mut self.drives[place];
         let found = self.master.slave_by_address(drive.address);
         drive.slave = found.filter(|slave| !self.refused.contains(slave));
         drive.facts = DriveFacts::new();
         drive.passed_over.clear();
         if drive.slave.is_some() {
-            drive.plan(axis, mapping, Phase::CP2.0, notice);
+            drive.plan(mapping, Phase::CP2.0, notice);
         } else {
             drive.stage = Stage::Absent;
             if !drive.hot_plug {
-                notice(Notice::DriveMissing { axis: index(axis), address: drive.address });
+                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.address });
             }
         }
     }
@@ -424,7 +313,8 @@ impl SercosBus {
     fn commission(&mut self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
         let Some(phase) = self.master.state().awaits() else { return };
         let mut busy = false;
-        for (axis, drive) in self.drives.iter_mut().enumerate() {
+        for drive in &mut self.drives {
+            let axis = drive.axis;
             let (Stage::Commissioning(work), Some(slave)) = (&mut drive.stage, drive.slave) else { continue };
             work.poll(&mut self.master, slave);
             if !work.is_done() {
@@ -444,12 +334,12 @@ impl SercosBus {
                     notice(Notice::Commissioning { axis: index(axis), address: drive.address, failure });
                     false
                 }
-                None if phase == Phase::CP2 => drive.connect(axis, mapping, &mut self.master, slave, notice),
+                None if phase == Phase::CP2 => drive.connect(mapping, &mut self.master, slave, notice),
                 None => {
                     for difference in drive.facts.differences(&mapping.dictionaries.sercos) {
                         notice(Notice::Difference { axis: index(axis), difference });
                     }
-                    drive.take(axis, mapping, axes, notice)
+                    drive.take(mapping, axes, notice)
                 }
             };
             if !taken {
@@ -472,19 +362,19 @@ impl SercosBus {
 
     /// A slave is on its way in by hot plug: the drive of an axis, or one that nobody asked for.
     fn begin_joining(&mut self, slave: SlaveId, address: u16, phase: Phase) {
-        let Some(axis) = self.drives.iter().position(|drive| drive.address == address) else {
+        let Some(place) = self.drives.iter().position(|drive| drive.address == address) else {
             // It takes part without connections.
             let _ = self.master.proceed_hot_plug(slave);
             return;
         };
-        let drive = &mut self.drives[axis];
+        let drive = &mut self.drives[place];
         if phase == Phase::CP2 {
             self.refused.retain(|refused| *refused != slave);
             drive.runs = drive.runs.wrapping_add(1);
         }
         drive.slave = Some(slave);
         drive.stage = Stage::Joining { ticket: None };
-        let run = drive.run(axis);
+        let run = drive.run(place);
         if !self.commissioner.push(Job::Begin(run, phase)) {
             // It is tried again after a while.
             drive.lose();
@@ -517,18 +407,18 @@ impl SercosBus {
                 }
                 continue;
             };
-            let axis = usize::from(run.axis);
-            let joining = self.drives.get(axis).filter(|drive| {
-                drive.run(axis) == run && matches!(drive.stage, Stage::Joining { ticket: None })
+            let place = usize::from(run.place);
+            let joining = self.drives.get(place).filter(|drive| {
+                drive.run(place) == run && matches!(drive.stage, Stage::Joining { ticket: None })
             });
-            let Some(slave) = joining.and_then(|drive| drive.slave) else {
+            let Some((axis, slave)) = joining.and_then(|drive| Some((drive.axis, drive.slave?))) else {
                 self.commissioner.push(Job::Unused(done));
                 continue;
             };
             let through = match done {
                 Done::Submit(run, request) => {
                     match self.master.svc_submit(slave, request) {
-                        Ok(sent) => self.drives[axis].stage = Stage::Joining { ticket: Some(sent) },
+                        Ok(sent) => self.drives[place].stage = Stage::Joining { ticket: Some(sent) },
                         Err((_, request)) => {
                             self.commissioner.push(Job::Unsent(run, request));
                             let _ = self.master.exclude(slave);
@@ -551,7 +441,7 @@ impl SercosBus {
                 let _ = self.master.proceed_hot_plug(slave);
             } else {
                 let _ = self.master.exclude(slave);
-                self.drives[axis].lose();
+                self.drives[place].lose();
                 axes[axis].leave_south(now, system);
             }
         }
@@ -566,62 +456,15 @@ impl SercosBus {
         reason: HotPlugRefusal,
         axes: &mut [AxisChannel],
     ) {
-        let Some(axis) = self.drives.iter().position(|drive| drive.address == address) else { return };
-        if matches!(self.drives[axis].stage, Stage::Joining { .. }) {
-            self.drives[axis].lose();
-            axes[axis].leave_south(now, system);
+        let Some(drive) = self.drives.iter_mut().find(|drive| drive.address == address) else { return };
+        if matches!(drive.stage, Stage::Joining { .. }) {
+            drive.lose();
+            axes[drive.axis].leave_south(now, system);
         }
         use HotPlugRefusal as R;
         if matches!(reason, R::Misfit(_) | R::Several | R::NoTelegram) {
             // Nothing but a new scan brings it in.
             self.lost_since.get_or_insert(now);
-        }
-    }
-
-    /// Reads the diagnostic words of drives that show an error or a warning, and sends their fault resets.
-    fn diagnose(&mut self, now: MonotonicTime, axes: &mut [AxisChannel]) {
-        for (axis, channel) in axes.iter_mut().enumerate() {
-            if channel.wants_drive_reset() {
-                let command = profile_generic::state::Action::ResetFault;
-                let sent = match channel.south().and_then(|program| program.command_of(command)) {
-                    Some(item) => {
-                        let access = Access::new(item, Operation::Command).urgent();
-                        self.access(axis, &access, Purpose::FaultReset)
-                    }
-                    None => true,
-                };
-                // Else too many accesses wait, and the next cycle tries again.
-                if sent {
-                    channel.drive_reset_sent();
-                }
-            }
-            if let Some(item) = channel.wants_word(now)
-                && self.access(axis, &Access::read(item).urgent(), Purpose::Diagnosis)
-            {
-                channel.word_asked(now, item);
-            }
-        }
-    }
-
-    /// Carries on with captures over the service channels: one access of each drive at a time.
-    fn capture(&mut self, axes: &mut [AxisChannel]) {
-        for (axis, channel) in axes.iter_mut().enumerate() {
-            if let Some((wanted, access, generation)) = channel.capture_access()
-                && self.access(axis, &wanted, Purpose::Capture(access, generation))
-            {
-                channel.capture_sent(access);
-            }
-        }
-    }
-
-    /// Carries on with procedures over the service channels: one access of each drive at a time.
-    fn carry_out(&mut self, now: MonotonicTime, axes: &mut [AxisChannel]) {
-        for (axis, channel) in axes.iter_mut().enumerate() {
-            if let Some((wanted, access, generation)) = channel.procedure_access(now)
-                && self.access(axis, &wanted, Purpose::Procedure(access, generation))
-            {
-                channel.procedure_sent(access);
-            }
         }
     }
 
@@ -635,15 +478,15 @@ impl SercosBus {
         // An access may be answered only after its drive was lost.
         let asked = |drive: &Drive| drive.accesses.iter().any(|(known, _)| *known == ticket);
         let own = |drive: &Drive| drive.slave == Some(ticket.slave);
-        let axis = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
-        let Some(axis) = axis else { return };
-        let drive = &mut self.drives[axis];
+        let place = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
+        let Some(place) = place else { return };
+        let drive = &mut self.drives[place];
         if let Stage::Joining { ticket: sent } = &mut drive.stage
             && *sent == Some(ticket)
         {
             *sent = None;
             // Room was made sure of before the request was sent.
-            let run = drive.run(axis);
+            let run = drive.run(place);
             self.commissioner.push(Job::Outcome(run, outcome));
             return;
         }
@@ -652,35 +495,202 @@ impl SercosBus {
         {
             return;
         }
-        let Some(place) = drive.accesses.iter().position(|(known, _)| *known == ticket) else {
+        let Some(asked) = drive.accesses.iter().position(|(known, _)| *known == ticket) else {
             self.commissioner.push(Job::Spent(outcome));
             return;
         };
-        let (_, purpose) = drive.accesses.remove(place);
-        answer(axes, Answer { axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
+        let (_, purpose) = drive.accesses.remove(asked);
+        answer(axes, Answer { axis: drive.axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
+    }
+}
+
+impl Bus for SercosBus {
+    fn cycle_time(&self) -> DurationNs {
+        DurationNs(i64::from(self.master.config().cycle_ns))
+    }
+
+    /// The master's next cycle is all that happens by itself.
+    fn patience(&self) -> DurationNs {
+        self.cycle_time()
+    }
+
+    fn wake_at(&self) -> Option<MonotonicTime> {
+        self.master.wake_at()
+    }
+
+    fn is_due(&self, now: MonotonicTime) -> bool {
+        // Before CP4 there is no cycle to keep to.
+        self.master.phase() != Some(Phase::CP4) || self.master.wake_at().is_none_or(|at| now >= at)
+    }
+
+    fn is_up(&self) -> bool {
+        self.master.phase() == Some(Phase::CP4)
+    }
+
+    fn phase(&self) -> Option<u8> {
+        self.master.phase().map(|phase| phase.0)
+    }
+
+    fn counts(&self) -> Counts {
+        let statistics = self.master.statistics();
+        Counts {
+            cycles: statistics.cycles,
+            lost: statistics.at_missing,
+            refused: FrameRefusal::ALL.iter().map(|reason| statistics.refused(*reason)).sum(),
+        }
+    }
+
+    fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
+        let SouthPort::Ethernet(port) = port else { return };
+        let mut buffer = [0; FRAME_MAX];
+        for _ in 0..FRAMES_PER_CYCLE {
+            let Some((port, length)) = port.receive(&mut buffer) else { break };
+            // A refused frame is counted by the master and changes nothing.
+            let _ = self.master.handle_frame(now, port, &buffer[..length]);
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
+        let mut sent = Sent::default();
+        let SouthPort::Ethernet(ethernet) = port else { return sent };
+        while let Some(Output::Transmit { port, frame }) = self.master.poll(now) {
+            sent.failures += u64::from(!ethernet.send(now, port, frame));
+            sent.cycle = true;
+        }
+        sent
+    }
+
+    fn set_idle(&mut self, idle: bool) {
+        self.idle = idle;
+    }
+
+    fn stop(&mut self, _now: MonotonicTime) {
+        self.wanted = None;
+        self.master.stop();
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.master.phase().is_none()
+    }
+
+    fn take_cycle(&mut self) -> bool {
+        let cycles = self.master.statistics().cycles;
+        std::mem::replace(&mut self.cycles_seen, cycles) != cycles
+    }
+
+    fn feedback(&self, axis: usize) -> Option<Received<'_>> {
+        let drive = self.drive_of(axis)?;
+        if self.master.phase() != Some(Phase::CP4) {
+            return None;
+        }
+        let consumer = self.master.consumer(drive.there()?, FEEDBACK_CONNECTION)?;
+        // Without the ATs of this cycle what is there is that of the last one.
+        Some(Received {
+            data: consumer.data,
+            fresh: consumer.fresh && self.master.cycle_complete(),
+            alive: matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning),
+        })
+    }
+
+    fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
+        let slave = self.drive_of(axis).and_then(Drive::there);
+        let Some(slave) = slave else {
+            fill(None);
+            return;
+        };
+        if fill(self.master.producer(slave, COMMAND_CONNECTION)) {
+            self.master.commit(slave, COMMAND_CONNECTION);
+        } else {
+            self.master.withdraw(slave, COMMAND_CONNECTION);
+        }
+    }
+
+    fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
+        let Some(request) = request(access) else { return false };
+        let Some(drive) = self.drives.iter_mut().find(|drive| drive.axis == axis) else { return false };
+        let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
+        match self.master.svc_submit(slave, request) {
+            Ok(ticket) => {
+                drive.accesses.push((ticket, purpose));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn run(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        while let Some(event) = self.master.poll_event() {
+            match event {
+                Event::Svc { ticket, outcome } => self.outcome(ticket, outcome, axes, answer),
+                event => {
+                    self.event(now, system, mapping, axes, &event, notice);
+                    notice(Notice::Sercos(event));
+                }
+            }
+        }
+        self.commission(mapping, axes, notice);
+        self.let_join(now, system, axes, notice);
+        for place in 0..self.drives.len() {
+            let axis = self.drives[place].axis;
+            ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
+        }
+        let alone =
+            self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
+        let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
+        let rescan = self.idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
+        if alone || (free && (self.returned || rescan)) {
+            self.returned = false;
+            self.lost_since = None;
+            self.planned = true;
+            self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
+            for slave in self.drives.iter().filter_map(|drive| drive.slave) {
+                self.master.withdraw(slave, COMMAND_CONNECTION);
+            }
+            self.lose_all(now, system, axes);
+            self.master.set_target_phase(Phase::CP0);
+        }
+        for drive in &self.drives {
+            let axis = &axes[drive.axis];
+            let Some(slave) = drive.slave.filter(|_| !axis.may_have_torque()) else { continue };
+            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
+            if self.master.consumer(slave, FEEDBACK_CONNECTION).is_some_and(failed) {
+                // Too many losses in a row; without torque there is nothing to lose by listening again.
+                self.master.reset_consumer(slave, FEEDBACK_CONNECTION);
+            }
+        }
+        if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
+            let due = *self.retry_at.get_or_insert(now + RETRY_PAUSE);
+            if now >= due {
+                self.retry_at = None;
+                notice(Notice::Retry);
+                self.master.set_target_phase(Phase::CP4);
+            }
+        }
     }
 }
 
 impl Drive {
     /// Gives the axis the program of its drive, once all is known of it.
-    fn take(
-        &self,
-        axis: usize,
-        mapping: &Mapping,
-        axes: &mut [AxisChannel],
-        notice: &mut dyn FnMut(Notice),
-    ) -> bool {
+    fn take(&self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
         match mapping.sercos_program(&self.needs, &self.facts) {
             Ok(program) => {
                 // A drive that works modulo has a longest step from one position command to the next.
                 if self.needs.modulo && program.position_step().is_none() {
-                    notice(Notice::Ends { axis: index(axis) });
+                    notice(Notice::Ends { axis: index(self.axis) });
                 }
-                axes[axis].set_south(program);
+                axes[self.axis].set_south(program);
                 true
             }
             Err(error) => {
-                notice(Notice::Program { axis: index(axis), address: self.address, error });
+                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
                 false
             }
         }
@@ -691,11 +701,11 @@ impl Drive {
         self.stage = Stage::Absent;
     }
 
-    fn plan(&mut self, axis: usize, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
+    fn plan(&mut self, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
         match mapping.commissioning(&self.needs, phase, &self.facts) {
             Ok(plan) => self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan))),
             Err(error) => {
-                notice(Notice::Program { axis: index(axis), address: self.address, error });
+                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
                 self.lose();
             }
         }
@@ -704,7 +714,6 @@ impl Drive {
     /// Sets up the two connections of the drive from what it has told in CP2.
     fn connect(
         &mut self,
-        axis: usize,
         mapping: &Mapping,
         master: &mut Master,
         slave: SlaveId,
@@ -713,7 +722,7 @@ impl Drive {
         match connections(mapping, &self.needs, &self.facts, self.allowed_losses) {
             Ok(connections) => master.set_connections(slave, connections).is_ok(),
             Err(error) => {
-                notice(Notice::Program { axis: index(axis), address: self.address, error });
+                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
                 false
             }
         }
@@ -724,8 +733,9 @@ impl Drive {
         self.slave.filter(|_| !matches!(self.stage, Stage::Joining { .. }))
     }
 
-    fn run(&self, axis: usize) -> Run {
-        Run { axis: index(axis), number: self.runs }
+    /// Its work for the commissioner, from its place among the drives.
+    fn run(&self, place: usize) -> Run {
+        Run { place: index(place), number: self.runs }
     }
 }
 

@@ -15,18 +15,18 @@ use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 
 use super::commissioning::{Commissioning, StepFailure};
-use super::sercos::connections;
+use super::connections;
 use crate::engine::notice::Notice;
 use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis};
 
 /// Messages under way in each direction.
 const QUEUE: usize = 64;
 
-/// Which commissioning of which axis a message belongs to.
+/// Which commissioning of which drive a message belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
-    /// The axis.
-    pub axis: u8,
+    /// Place of the drive among those of the bus.
+    pub place: u8,
     /// Counts the times that its drive came; what belongs to an earlier time is not used.
     pub number: u32,
 }
@@ -91,6 +91,8 @@ impl CommissionerEnd {
 /// One drive.
 #[derive(Debug)]
 struct Work {
+    /// Number of its axis.
+    axis: u8,
     address: u16,
     needs: SercosAxis,
     facts: DriveFacts,
@@ -115,20 +117,21 @@ pub struct Commissioner {
 }
 
 impl Commissioner {
-    /// A commissioner for these drives, address and needs of each axis, and the cycle thread's end.
+    /// A commissioner for these drives, number, address and needs of each axis, and the cycle thread's end.
     #[must_use]
     pub fn new(
         mapping: Mapping,
         allowed_losses: u16,
-        drives: impl IntoIterator<Item = (u16, SercosAxis)>,
+        drives: impl IntoIterator<Item = (usize, u16, SercosAxis)>,
     ) -> (Self, CommissionerEnd) {
         let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
         let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
-        let work = |(address, needs)| Work {
+        let work = |(axis, address, needs)| Work {
+            axis: u8::try_from(axis).unwrap_or(u8::MAX),
             address,
             needs,
             facts: DriveFacts::new(),
-            run: Run { axis: 0, number: 0 },
+            run: Run { place: 0, number: 0 },
             phase: Phase::CP2,
             plan: None,
             passed_over: Vec::new(),
@@ -154,7 +157,7 @@ impl Commissioner {
             match job {
                 Job::Begin(run, phase) => self.begin(run, phase),
                 Job::Outcome(run, outcome) => {
-                    let work = self.drives.get_mut(usize::from(run.axis)).filter(|work| work.run == run);
+                    let work = self.drives.get_mut(usize::from(run.place)).filter(|work| work.run == run);
                     if let Some(work) = work
                         && let Some(plan) = &mut work.plan
                     {
@@ -162,7 +165,7 @@ impl Commissioner {
                     }
                 }
                 Job::Unsent(run, _) => {
-                    let work = self.drives.get_mut(usize::from(run.axis)).filter(|work| work.run == run);
+                    let work = self.drives.get_mut(usize::from(run.place)).filter(|work| work.run == run);
                     work.into_iter().for_each(|work| work.plan = None);
                 }
                 Job::Spent(_) | Job::Unused(_) => {}
@@ -178,7 +181,7 @@ impl Commissioner {
     }
 
     fn begin(&mut self, run: Run, phase: Phase) {
-        let Some(work) = self.drives.get_mut(usize::from(run.axis)) else { return };
+        let Some(work) = self.drives.get_mut(usize::from(run.place)) else { return };
         (work.run, work.phase) = (run, phase);
         if phase == Phase::CP2 {
             work.facts = DriveFacts::new();
@@ -187,7 +190,7 @@ impl Commissioner {
         match self.mapping.commissioning(&work.needs, phase.0, &work.facts) {
             Ok(plan) => work.plan = Some(Commissioning::new(plan)),
             Err(error) => {
-                let notice = Notice::Program { axis: run.axis, address: work.address, error };
+                let notice = Notice::Program { axis: work.axis, address: work.address, error };
                 self.waiting.push_back(Done::Failed(run, notice));
             }
         }
@@ -207,7 +210,7 @@ impl Commissioner {
             if !plan.is_done() {
                 continue;
             }
-            let (axis, address) = (run.axis, work.address);
+            let (axis, address) = (work.axis, work.address);
             let failed = plan.failure();
             work.passed_over.append(&mut plan.take_passed_over());
             if (failed.is_some() || work.phase != Phase::CP2) && !work.passed_over.is_empty() {

@@ -1,5 +1,8 @@
 //! From a configuration to an engine and the adapters beside it.
 
+pub mod can;
+pub mod sercos;
+
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::net::Ipv4Addr;
 use std::sync::Arc;
@@ -15,23 +18,20 @@ use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::target::motion_device::DeviceConfig;
 use profile_cip::wire::motion::Format;
 use profile_generic::fault::Reaction;
-use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
-use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConfig};
-use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
-use super::bus::commissioner::Commissioner;
-use super::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
+use super::bus::can::commissioner::Misfit;
+use super::bus::{self, AnyBus, Buses};
 use super::device::{DeviceChannel, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
-use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, StoppingAction};
+use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, DriveAt, StoppingAction};
 use crate::eds;
 use crate::latest::{self, Reader};
-use crate::mapping::{AxisUnits, CipScaling, Mapping, Reference, SercosAxis};
+use crate::mapping::{CipScaling, Mapping};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
 
@@ -40,12 +40,6 @@ const NOTICES: usize = 1024;
 
 /// Largest connection sizes that a device takes, with the sequence count.
 const CONNECTION_SIZE_MAX: u16 = 1400;
-
-/// Most slaves of a SERCOS III network.
-const SLAVES_MAX: u16 = 511;
-
-/// Slaves that may be on the bus without being configured: they are told of instead of keeping the bus down.
-const SPARE_SLAVES: u16 = 16;
 
 /// What a device needs from the start of a D-to-C update to its transmission.
 const TRANSMISSION_PROCESSING_NS: u64 = 100_000;
@@ -62,7 +56,7 @@ pub struct Built {
     /// The status of the box.
     pub status: Reader<BoxStatus>,
     /// What commissions drives that come later: to be polled beside the cycle.
-    pub commissioner: Commissioner,
+    pub commissioners: Commissioners,
 }
 
 /// Why a configuration makes no box.
@@ -71,6 +65,22 @@ pub enum BuildError {
     /// The master cannot work so.
     #[error("SERCOS master: {0}")]
     Master(#[from] profile_sercos::master::config::ConfigError),
+    /// A CANopen master cannot work so.
+    #[error("CANopen master of `{bus}`: {error}")]
+    Can {
+        /// The bus.
+        bus: String,
+        /// Why.
+        error: profile_cia402::master::config::ConfigError,
+    },
+    /// A CANopen drive does not fit its PDOs, or has a mode that the tables do not have.
+    #[error("axis {name}: {error}")]
+    CanDrive {
+        /// The axis.
+        name: String,
+        /// Why.
+        error: Misfit,
+    },
     /// A device cannot work so.
     #[error("device {name}: {error}")]
     Device {
@@ -103,7 +113,7 @@ pub struct Host {
 /// # Errors
 /// See [`BuildError`].
 pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, BuildError> {
-    let (bus, commissioner) = bus(config, host, &mapping)?;
+    let (buses, commissioners) = buses(config, host, &mapping)?;
     let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
     let mut devices = Vec::with_capacity(config.devices.len());
     let mut adapters = Vec::with_capacity(config.devices.len());
@@ -115,7 +125,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel = DeviceChannel::new(
             number,
-            device_config(device, &members, &mapping, config.sercos.cycle_time),
+            device_config(device, &members, &mapping, config.cycle_time()),
             device_end,
             &scalings,
             &mapping,
@@ -126,62 +136,51 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     }
     let (producer, notices) = rtrb::RingBuffer::new(NOTICES);
     let (publisher, status) = latest::latest(BoxStatus::STARTING);
-    let engine = Engine::new(Parts { mapping, bus, devices, axes, notices: producer, publisher });
-    Ok(Built { engine, adapters, notices, status, commissioner })
+    let engine = Engine::new(Parts { mapping, buses, devices, axes, notices: producer, publisher });
+    Ok(Built { engine, adapters, notices, status, commissioners })
 }
 
-/// The SERCOS III master of a configuration.
-#[must_use]
-pub fn master_config(config: &Config, host: Host) -> MasterConfig {
-    let sercos = &config.sercos;
-    let ns = |span: profile_generic::time::DurationNs| u32::try_from(span.as_nanos()).unwrap_or(u32::MAX);
-    let mut master = MasterConfig::new(sercos.master_mac.unwrap_or(host.mac), ns(sercos.cycle_time));
-    master.ports = if sercos.link.has_ring() { Ports::Both } else { Ports::One };
-    master.addresses = sercos.addresses;
-    master.mst_jitter_ns = ns(sercos.jitter);
-    master.stable_cycles = sercos.cp0_stable_cycles;
-    master.mst_losses = sercos.allowed_losses;
-    // The connection's own limit stops the axis; the master need not give up on the slave before.
-    master.slave_valid_misses = sercos.allowed_losses.max(master.slave_valid_misses);
-    // Which connections a drive needs is known once it has told what it can.
-    let slave = |drive: &crate::config::Drive| SlaveConfig {
-        address: drive.address,
-        connections: Connections::new(),
-        hot_plug: None,
-    };
-    master.slaves = sercos.drives.iter().map(slave).collect();
-    master.slaves_max =
-        u16::try_from(sercos.drives.len()).unwrap_or(SLAVES_MAX).saturating_add(SPARE_SLAVES).min(SLAVES_MAX);
-    master.setup_cycle_ns = master.setup_cycle_ns.max(master.setup_cycle_min_ns());
-    master
-}
-
-fn bus(config: &Config, host: Host, mapping: &Mapping) -> Result<(SercosBus, Commissioner), BuildError> {
-    let drives: Vec<_> = config
-        .axes
-        .iter()
-        .map(|axis| {
-            let drive = &config.sercos.drives[axis.drive];
-            (drive.address, needs(axis, drive))
-        })
-        .collect();
-    let mut master = master_config(config, host);
-    for (axis, (address, needs)) in config.axes.iter().zip(&drives) {
-        let slave = master.slaves.iter_mut().find(|slave| slave.address == *address);
-        if let Some(slave) = slave.filter(|_| config.sercos.drives[axis.drive].hot_plug) {
-            slave.hot_plug = Some(room(needs, mapping));
-        }
+/// The buses of a configuration in the order of their ports: SERCOS first, then those of CAN.
+fn buses(config: &Config, host: Host, mapping: &Mapping) -> Result<(Buses, Commissioners), BuildError> {
+    let mut list = Vec::new();
+    let mut commissioners = Commissioners::default();
+    if let Some(table) = &config.sercos {
+        let (bus, commissioner) = sercos::bus(config, table, host, mapping)?;
+        list.push(AnyBus::Sercos(Box::new(bus)));
+        commissioners.sercos = Some(commissioner);
     }
-    let (commissioner, end) = Commissioner::new(mapping.clone(), master.mst_losses, drives.iter().cloned());
-    Ok((SercosBus::new(master, drives, end)?, commissioner))
+    let first = list.len();
+    for place in 0..config.can.len() {
+        let (bus, commissioner) = can::bus(config, place, mapping)?;
+        list.push(AnyBus::Can(Box::new(bus)));
+        commissioners.can.push(commissioner);
+    }
+    let of = config.axes.iter().map(|axis| match axis.drive {
+        DriveAt::Sercos { .. } => 0,
+        DriveAt::Can { bus, .. } => first + bus,
+    });
+    Ok((Buses::new(list, of.collect()), commissioners))
 }
 
-/// What the telegrams keep for a drive that may come later: the longest connections that it can need.
-fn room(needs: &SercosAxis, mapping: &Mapping) -> SlaveNeed {
-    let (command, feedback) = mapping.telegram_room(needs);
-    let need = |instance, slave_produces, len| ConnectionNeed { instance, slave_produces, len };
-    let connections = [need(COMMAND_CONNECTION, false, command), need(FEEDBACK_CONNECTION, true, feedback)];
-    SlaveNeed { connections: connections.into_iter().collect(), ..SlaveNeed::default() }
+/// What commissions drives beside the cycle.
+#[derive(Debug, Default)]
+pub struct Commissioners {
+    sercos: Option<bus::sercos::commissioner::Commissioner>,
+    can: Vec<bus::can::commissioner::Commissioner>,
+}
+
+impl Commissioners {
+    /// Whether the cycle thread has gone.
+    #[must_use]
+    pub fn is_abandoned(&self) -> bool {
+        self.sercos.iter().all(|one| one.is_abandoned()) && self.can.iter().all(|one| one.is_abandoned())
+    }
+
+    /// Does what there is to do, without waiting.
+    pub fn poll(&mut self) {
+        self.sercos.iter_mut().for_each(|one| one.poll());
+        self.can.iter_mut().for_each(|one| one.poll());
+    }
 }
 
 fn kind(axis: &Axis) -> UnitKind {
@@ -191,9 +190,8 @@ fn kind(axis: &Axis) -> UnitKind {
     }
 }
 
-/// What the commissioning has to achieve.
-#[must_use]
-pub fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
+/// Limits that the drive itself holds.
+fn parameters(axis: &Axis) -> Vec<(Parameter, i64)> {
     let limits = &axis.limits;
     let mut parameters = Vec::new();
     let mut limit =
@@ -203,25 +201,7 @@ pub fn needs(axis: &Axis, drive: &crate::config::Drive) -> SercosAxis {
     limit(Parameter::TORQUE_LIMIT_POSITIVE, limits.torque.map(|value| value.0));
     limit(Parameter::TORQUE_LIMIT_NEGATIVE, limits.torque.map(|value| -value.0));
     limit(Parameter::POSITION_ERROR_TOLERANCE, limits.following_error.map(|value| value.0));
-    SercosAxis {
-        units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: drive.rated },
-        // A drive that is only looked at is set up in one mode, because its telegram belongs to one; it is never on.
-        modes: match axis.function {
-            AxisFunction::Drive => [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
-                .into_iter()
-                .map(ModeSelection::from)
-                .collect(),
-            AxisFunction::Encoder | AxisFunction::Converter => {
-                [OperatingMode::Position.into()].into_iter().collect()
-            }
-        },
-        // Positions of a linear drive reach for hundreds of kilometres.
-        modulo: axis.kind == AxisKind::Rotary && axis.unwind_counts.is_some(),
-        set_scaling: drive.set_scaling,
-        silent: !drive.acknowledges,
-        parameters,
-        captures: axis.events,
-    }
+    parameters
 }
 
 /// The controller's counts as the configuration has them; a controller may set others.

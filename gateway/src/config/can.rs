@@ -1,0 +1,254 @@
+//! The CAN buses of a configuration.
+
+use profile_cia402::wire::NodeId;
+use profile_generic::can::timing::BitRate;
+use profile_generic::image::Signal;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::Quantity;
+use profile_generic::ratio::Ratio;
+use profile_generic::time::DurationNs;
+
+use super::check::{Checker, NANO, names};
+use super::file::{CanDriveTable, CanTable, CountsTable, SouthTable};
+use super::{Can, CanDrive, CanLink, duration};
+use crate::finding::registry as code;
+use crate::finding::{Problem, Spanned};
+
+/// CAN buses of one box.
+const BUSES_MAX: usize = 4;
+const BIT_RATES: core::ops::RangeInclusive<i64> = 10_000..=1_000_000;
+const DEFAULT_BIT_RATE: u32 = 1_000_000;
+const CYCLE_NS: core::ops::RangeInclusive<i64> = 500_000..=1_000_000_000;
+const CYCLE_STEP_NS: i64 = 100_000;
+const NODES: core::ops::RangeInclusive<i64> = 1..=127;
+const DEFAULT_NODE: u8 = 127;
+const HEARTBEAT_MS: core::ops::RangeInclusive<i64> = 10..=10_000;
+const DEFAULT_HEARTBEAT_MS: u16 = 100;
+const DEFAULT_ALLOWED_LOSSES: u16 = 3;
+const AXES: core::ops::RangeInclusive<i64> = 0..=7;
+
+/// What an axis can be used for.
+const MODES: [(&str, OperatingMode); 3] = [
+    ("position", OperatingMode::Position),
+    ("velocity", OperatingMode::Velocity),
+    ("torque", OperatingMode::Torque),
+];
+
+/// Actual values that can be left out.
+const ACTUAL_VALUES: [(&str, Signal); 2] =
+    [("velocity", Signal::VelocityActual), ("torque", Signal::TorqueActual)];
+
+impl Checker {
+    /// All CAN buses. Without any bus there is nothing behind the box.
+    pub(super) fn can(&mut self, south: &SouthTable) -> Option<Vec<Can>> {
+        if south.sercos.is_none() && south.can.is_empty() {
+            // The table itself has no place in the file where it is empty.
+            return self.report(
+                0..0,
+                "there is no bus behind the box",
+                "expected [south.sercos] or [[south.can]]",
+            );
+        }
+        self.count(&south.can, "CAN buses", BUSES_MAX);
+        let real: Vec<_> =
+            names(&south.can, |bus| &bus.interface).into_iter().filter(|name| self.is_real(name)).collect();
+        self.unique("the CAN interface", &real);
+        let buses: Vec<_> = south.can.iter().map(|bus| self.can_bus(bus.get_ref())).collect();
+        buses.into_iter().collect()
+    }
+
+    fn is_real(&mut self, name: &Spanned<String>) -> bool {
+        name.get_ref() != super::check::IN_PROCESS
+    }
+
+    fn can_bus(&mut self, table: &CanTable) -> Option<Can> {
+        let link = self.interface(&table.interface).map(|name| match name {
+            None => CanLink::InProcess,
+            Some(name) => CanLink::Interface { name, set_bit_rate: table.set_bit_rate.unwrap_or(false) },
+        });
+        let bit_rate = self.number_or(table.bit_rate.as_ref(), "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
+        let cycle_time = self.sync_time(&table.cycle_time);
+        let node = self.number_or(table.node.as_ref(), "the node-id of the box", NODES, DEFAULT_NODE);
+        let heartbeat_ms = self.heartbeat(table.heartbeat.as_ref());
+        let allowed_losses = self.number_or(
+            table.allowed_losses.as_ref(),
+            "the number of allowed losses",
+            1..=1000,
+            DEFAULT_ALLOWED_LOSSES,
+        );
+        if table.drive.is_empty() {
+            return self.report(
+                table.interface.span(),
+                format_args!("the CAN bus `{}` has no drives", table.interface.get_ref()),
+                "expected at least one [[south.can.drive]]",
+            );
+        }
+        self.can_places(table, node);
+        let drives: Vec<_> = table.drive.iter().map(|drive| self.can_drive(drive.get_ref())).collect();
+        Some(Can {
+            link: link?,
+            bit_rate: BitRate::classic(bit_rate?)?,
+            cycle_time: cycle_time?,
+            node: NodeId::new(node?).ok()?,
+            heartbeat_ms: heartbeat_ms?,
+            allowed_losses: allowed_losses?,
+            drives: drives.into_iter().collect::<Option<_>>()?,
+        })
+    }
+
+    /// Each axis of each device once, and no device with the number of the box.
+    fn can_places(&mut self, table: &CanTable, own: Option<u8>) {
+        let place = |drive: &Spanned<CanDriveTable>| {
+            let drive = drive.get_ref();
+            (*drive.node.get_ref(), drive.axis.as_ref().map_or(0, |axis| *axis.get_ref()))
+        };
+        for (index, drive) in table.drive.iter().enumerate() {
+            let node = &drive.get_ref().node;
+            if let Some(first) = table.drive[..index].iter().find(|earlier| place(earlier) == place(drive)) {
+                let (number, axis) = place(drive);
+                let problem = Problem::new(code::TWICE, node.span())
+                    .title(format!("axis {axis} of node {number} is used twice"));
+                let problem = problem.expected("expected each axis of a device once");
+                self.push(problem.related(first.get_ref().node.span(), "used here first"));
+            }
+            if own.is_some_and(|own| i64::from(own) == *node.get_ref()) {
+                self.report::<()>(
+                    node.span(),
+                    format_args!("node-id {} is that of the box", node.get_ref()),
+                    "expected another one, or another `node` of the bus",
+                );
+            }
+        }
+    }
+
+    fn sync_time(&mut self, text: &Spanned<String>) -> Option<DurationNs> {
+        let time = self.time_span(text)?;
+        if CYCLE_NS.contains(&time.0) && time.0 % CYCLE_STEP_NS == 0 {
+            return Some(time);
+        }
+        self.report(
+            text.span(),
+            format_args!("{} cannot be the cycle of a CAN bus", duration::show(time)),
+            "expected 500 us to 1 s in whole 100 microseconds",
+        )
+    }
+
+    fn heartbeat(&mut self, text: Option<&Spanned<String>>) -> Option<u16> {
+        let Some(text) = text else { return Some(DEFAULT_HEARTBEAT_MS) };
+        let time = self.time_span(text)?;
+        let ms = time.0 / 1_000_000;
+        if time.0 % 1_000_000 == 0 && HEARTBEAT_MS.contains(&ms) {
+            return u16::try_from(ms).ok();
+        }
+        self.report(
+            text.span(),
+            format_args!("{} cannot be the time between heartbeats", duration::show(time)),
+            "expected 10 ms to 10 s in whole milliseconds",
+        )
+    }
+
+    fn can_drive(&mut self, table: &CanDriveTable) -> Option<CanDrive> {
+        let name = self.name("drive", &table.name);
+        let node = self.number(&table.node, "the node-id", NODES);
+        let axis = self.number_or(table.axis.as_ref(), "the axis of the device", AXES, 0);
+        let modes = match &table.modes {
+            None => Some(MODES.iter().map(|(_, mode)| *mode).collect()),
+            Some(names) => self.words(names, "mode", &MODES),
+        };
+        if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
+            self.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");
+        }
+        let sent = match &table.actual_values {
+            None => Some(ACTUAL_VALUES.iter().map(|(_, signal)| *signal).collect::<Vec<_>>()),
+            Some(names) => self.words(names, "actual value", &ACTUAL_VALUES),
+        };
+        let left_out = sent.map(|sent| {
+            let all = ACTUAL_VALUES.iter().map(|(_, signal)| *signal);
+            all.filter(|signal| !sent.contains(signal)).collect()
+        });
+        let way_of_a_turn = match &table.millimetres_per_turn {
+            None => Some(None),
+            Some(value) => self.exact(value, "the way of a turn").map(Some),
+        };
+        let counts = match &table.counts {
+            None => Some(Vec::new()),
+            Some(counts) => self.counts(counts),
+        };
+        Some(CanDrive {
+            name: name?,
+            node: NodeId::new(node?).ok()?,
+            axis: axis?,
+            modes: modes?,
+            left_out: left_out?,
+            acknowledges: table.acknowledges.unwrap_or(true),
+            way_of_a_turn: way_of_a_turn?,
+            counts: counts?,
+        })
+    }
+
+    /// Words of a list, each once.
+    fn words<T: Copy>(
+        &mut self,
+        names: &Spanned<Vec<Spanned<String>>>,
+        what: &str,
+        known: &[(&str, T)],
+    ) -> Option<Vec<T>> {
+        self.unique(&format!("the {what}"), names.get_ref());
+        let words: Vec<_> = names
+            .get_ref()
+            .iter()
+            .map(|name| {
+                let found = known.iter().find(|(word, _)| *word == name.get_ref()).map(|(_, value)| *value);
+                found.or_else(|| {
+                    let all: Vec<_> = known.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+                    self.report_as(
+                        code::UNKNOWN_WORD,
+                        name.span(),
+                        format_args!("unknown {what} `{}`", name.get_ref()),
+                        format_args!("expected one of {}", all.join(", ")),
+                    )
+                })
+            })
+            .collect();
+        words.into_iter().collect()
+    }
+
+    /// A number above 0 with up to nine decimals as an exact ratio.
+    fn exact(&mut self, value: &Spanned<f64>, what: &str) -> Option<Ratio> {
+        let nano = self.fine(value, what, NANO)?;
+        match Ratio::new(nano, NANO?.num()).filter(|_| nano > 0) {
+            Some(ratio) => Some(ratio),
+            None => self.report_as(
+                code::OUT_OF_RANGE,
+                value.span(),
+                format_args!("{what} is {}", value.get_ref()),
+                "expected a number above 0",
+            ),
+        }
+    }
+
+    fn counts(&mut self, table: &CountsTable) -> Option<Vec<(Quantity, Ratio)>> {
+        let all = [
+            (Quantity::Position, &table.position),
+            (Quantity::Velocity, &table.velocity),
+            (Quantity::Acceleration, &table.acceleration),
+        ];
+        let mut counts = Vec::new();
+        for (quantity, value) in all {
+            let Some(value) = value else { continue };
+            // Generic units in a count: 10^9 over the counts in a unit.
+            let per_unit = self.exact(value, "the number of counts")?;
+            let ratio = per_unit.inverse().and_then(|inverse| NANO?.then(inverse));
+            let Some(ratio) = ratio else {
+                return self.report_as(
+                    code::OUT_OF_RANGE,
+                    value.span(),
+                    format_args!("{} counts have no exact ratio", value.get_ref()),
+                    "expected a number with fewer digits",
+                );
+            };
+            counts.push((quantity, ratio));
+        }
+        Some(counts)
+    }
+}

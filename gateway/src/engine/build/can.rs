@@ -1,0 +1,137 @@
+//! The CANopen buses of a configuration.
+
+use profile_cia402::master::config::{
+    HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, SyncConfig,
+};
+use profile_cia402::wire::NodeId;
+use profile_generic::mode::{ModeSelection, OperatingMode};
+
+use super::{BuildError, kind, parameters};
+use crate::config::{Axis, AxisFunction, Can, CanDrive, CanLink, Config, DriveAt};
+use crate::engine::bus::can::CanBus;
+use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, pdos};
+use crate::engine::bus::can::layout::{AxisPdos, SpareIds};
+use crate::mapping::{AxisUnits, Cia402Axis, Mapping, Reference};
+
+/// Heartbeats that may be missing.
+const HEARTBEATS: u16 = 3;
+
+/// Cycle time for which one SDO frame a cycle is let go, nanoseconds: with 10 ms there are five.
+const SDO_INTERVAL_NS: i64 = 2_000_000;
+
+/// Most SDO frames in a cycle.
+const SDO_FRAMES_MAX: i64 = 8;
+
+/// A network: its master, and the axes of its devices.
+#[derive(Debug)]
+pub struct Network {
+    /// What the master is told.
+    pub master: MasterConfig,
+    /// The axes of each device.
+    pub devices: Vec<(NodeId, Vec<AxisSetup>)>,
+}
+
+/// The network of a CAN bus, with PDOs as drives that lack nothing need them.
+///
+/// # Errors
+/// An axis has no PDOs for what it needs.
+pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Network, BuildError> {
+    let bus = &config.can[place];
+    let mut taken: Vec<NodeId> = bus.drives.iter().map(|drive| drive.node).collect();
+    taken.push(bus.node);
+    let mut spare = SpareIds::new(taken);
+    let mut nodes: Vec<NodeConfig> = Vec::new();
+    let mut devices: Vec<(NodeId, Vec<AxisSetup>)> = Vec::new();
+    for (number, drive) in bus.drives.iter().enumerate() {
+        if !nodes.iter().any(|known| known.node == drive.node) {
+            nodes.push(node(bus, drive.node));
+        }
+        let at = DriveAt::Can { bus: place, drive: number };
+        let Some((number, axis)) = config.axes.iter().enumerate().find(|(_, axis)| axis.drive == at) else {
+            continue;
+        };
+        let misfit = |error| BuildError::CanDrive { name: axis.name.clone(), error };
+        let needs = needs(axis, bus, drive);
+        let axis_pdos = AxisPdos::new(drive.axis, bus.allowed_losses, &mut spare)
+            .ok_or_else(|| misfit(Misfit::Identifiers))?;
+        let telegram = mapping.cia402_telegram(&needs).map_err(|error| misfit(error.into()))?;
+        let both = pdos(mapping, &axis_pdos, &telegram.command, &telegram.feedback).map_err(misfit)?;
+        if let Some(known) = nodes.iter_mut().find(|known| known.node == drive.node) {
+            let [(receive, _), (transmit, _)] = both;
+            known.rpdos.extend(receive);
+            known.tpdos.extend(transmit);
+        }
+        let setup = AxisSetup { axis: number, needs, pdos: axis_pdos };
+        match devices.iter_mut().find(|(node, _)| *node == drive.node) {
+            Some((_, axes)) => axes.push(setup),
+            None => devices.push((drive.node, vec![setup])),
+        }
+    }
+    let cycle_ns = bus.cycle_time.as_nanos();
+    let sdo_frames = (cycle_ns / SDO_INTERVAL_NS).clamp(1, SDO_FRAMES_MAX);
+    let master = MasterConfig {
+        nodes,
+        sync: Some(SyncConfig {
+            period_ns: u32::try_from(cycle_ns).unwrap_or(u32::MAX),
+            window_ns: 0,
+            counter_overflow: 0,
+        }),
+        heartbeat: Some(MasterHeartbeat {
+            node: bus.node,
+            producer_ms: bus.heartbeat_ms,
+            timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
+        }),
+        sdo_frames_per_cycle: u8::try_from(sdo_frames).unwrap_or(1),
+        ..MasterConfig::default()
+    };
+    Ok(Network { master, devices })
+}
+
+fn node(bus: &Can, node: NodeId) -> NodeConfig {
+    NodeConfig {
+        heartbeat: Some(HeartbeatConfig {
+            producer_ms: bus.heartbeat_ms,
+            timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
+        }),
+        ..NodeConfig::new(node)
+    }
+}
+
+/// A CANopen bus, and what commissions its drives.
+pub(super) fn bus(
+    config: &Config,
+    place: usize,
+    mapping: &Mapping,
+) -> Result<(CanBus, Commissioner), BuildError> {
+    let Network { master, devices } = network(config, place, mapping)?;
+    let (commissioner, end) = Commissioner::new(mapping.clone(), devices.iter().cloned());
+    let number = u8::try_from(place).unwrap_or(u8::MAX);
+    let name = match &config.can[place].link {
+        CanLink::InProcess => "in-process",
+        CanLink::Interface { name, .. } => name,
+    };
+    let bus = CanBus::new(number, master, &devices, end)
+        .map_err(|error| BuildError::Can { bus: name.to_owned(), error })?;
+    Ok((bus, commissioner))
+}
+
+/// What the commissioning has to achieve.
+#[must_use]
+pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
+    let modes: &[OperatingMode] = match axis.function {
+        AxisFunction::Drive => &drive.modes,
+        // What is only looked at has its position looked at.
+        AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
+    };
+    Cia402Axis {
+        units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: None },
+        axis: drive.axis,
+        modes: modes.iter().copied().map(ModeSelection::from).collect(),
+        way_of_a_turn: drive.way_of_a_turn,
+        counts: drive.counts.clone(),
+        cycle: bus.cycle_time,
+        parameters: parameters(axis),
+        silent: !drive.acknowledges,
+        left_out: drive.left_out.clone(),
+    }
+}

@@ -1,0 +1,406 @@
+//! The commissioning of CANopen drives: beside the cycle thread, because it allocates, and because a drive can come while
+//! others move.
+//!
+//! ```text
+//! cycle thread                          commissioner, on a thread of its own
+//!   Begin ---------------------------->  for each axis of the device: what is asked, what follows from that, its program
+//!   <------------------- Submit { request }, several at a time
+//!   Outcome, Unsent ------------------>
+//!   <------------------- Program of each axis, then Pdos; or Failed
+//! ```
+//!
+//! What was made for a device that has gone again comes back as [`Job::Unused`] and is freed here.
+
+use std::collections::VecDeque;
+
+use profile_cia402::master::config::{Direction, PdoConfig};
+use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
+use profile_cia402::wire::{Mux, NodeId};
+
+use super::layout::{AxisPdos, NoRoom, Spread, object};
+use crate::engine::notice::Notice;
+use crate::mapping::{
+    Cia402Axis, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep, Plan,
+};
+
+/// Messages under way in each direction.
+const QUEUE: usize = 128;
+
+/// Requests to one device that wait for their answers.
+pub const WINDOW: usize = 8;
+
+/// Which commissioning of which device a message belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// Place of the device among those of the bus.
+    pub device: u8,
+    /// Counts the times that it came; what belongs to an earlier time is not used.
+    pub number: u32,
+}
+
+/// What the cycle thread wants.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+pub enum Job {
+    /// A device can be set up.
+    Begin(Run),
+    /// What came of a request.
+    Outcome(Run, SdoOutcome),
+    /// A request that could not be made.
+    Unsent(Run, SdoRequest),
+    /// What came of a request that nobody waits for any more.
+    Spent(SdoOutcome),
+    /// Something that is not needed any more.
+    Unused(Done),
+}
+
+/// What the commissioner has done.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+pub enum Done {
+    /// A request to the device.
+    Submit(Run, SdoRequest),
+    /// The program of an axis, by its place in the device, and how its values are spread over RPDOs and TPDOs.
+    Program(Run, u8, DriveProgram, [Spread; 2]),
+    /// The RPDOs and TPDOs of the device: it is through.
+    Pdos(Run, Vec<PdoConfig>, Vec<PdoConfig>),
+    /// The device cannot be used.
+    Failed(Run, Notice),
+    /// Something that people should know.
+    Told(Notice),
+}
+
+impl Done {
+    /// What it belongs to.
+    #[must_use]
+    pub fn run(&self) -> Option<Run> {
+        match self {
+            Self::Submit(run, _) | Self::Program(run, ..) | Self::Pdos(run, ..) | Self::Failed(run, _) => {
+                Some(*run)
+            }
+            Self::Told(_) => None,
+        }
+    }
+}
+
+/// The cycle thread's end.
+#[derive(Debug)]
+pub struct CommissionerEnd {
+    jobs: rtrb::Producer<Job>,
+    done: rtrb::Consumer<Done>,
+}
+
+impl CommissionerEnd {
+    /// Hands a job over; `false` when there is no room, and it is dropped.
+    pub fn push(&mut self, job: Job) -> bool {
+        self.jobs.push(job).is_ok()
+    }
+
+    /// Whether a job can be handed over now.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        !self.jobs.is_full()
+    }
+
+    /// What is done.
+    pub fn pop(&mut self) -> Option<Done> {
+        self.done.pop().ok()
+    }
+}
+
+/// An axis of a device.
+#[derive(Debug, Clone)]
+pub struct AxisSetup {
+    /// Number of the axis in the box.
+    pub axis: usize,
+    /// What its drive is needed for.
+    pub needs: Cia402Axis,
+    /// The PDOs that it may have.
+    pub pdos: AxisPdos,
+}
+
+/// A step that the drive did not take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{what} {object}: {failure}")]
+pub struct StepFailure {
+    /// What was tried.
+    pub what: &'static str,
+    /// The object.
+    pub object: Object,
+    /// Why it failed.
+    pub failure: SdoFailure,
+}
+
+/// Why a drive cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Misfit {
+    /// It does not fit the tables.
+    #[error("{0}")]
+    Program(#[from] Cia402Error),
+    /// Its values do not fit its PDOs.
+    #[error("{0}")]
+    Room(#[from] NoRoom),
+    /// More devices with several axes than there are free identifiers.
+    #[error("no identifiers are left for its PDOs: expected fewer devices with several axes")]
+    Identifiers,
+    /// Nobody says how long a value is.
+    #[error("the dictionary has no length for {0}")]
+    Length(Item),
+}
+
+/// One device.
+#[derive(Debug)]
+struct Work {
+    node: NodeId,
+    axes: Vec<AxisSetup>,
+    run: Run,
+    /// The axis that is being set up, and what is done with it; `None` when nothing is.
+    at: Option<(usize, Plan)>,
+    facts: ObjectFacts,
+    /// Steps that are to come, and those that were sent, in order.
+    steps: VecDeque<ObjectStep>,
+    sent: VecDeque<ObjectStep>,
+    passed_over: Vec<StepFailure>,
+    pdos: [Vec<PdoConfig>; 2],
+}
+
+/// Commissions the drives of a bus.
+#[derive(Debug)]
+pub struct Commissioner {
+    mapping: Mapping,
+    devices: Vec<Work>,
+    jobs: rtrb::Consumer<Job>,
+    done: rtrb::Producer<Done>,
+    /// What the queue had no room for.
+    waiting: VecDeque<Done>,
+}
+
+impl Commissioner {
+    /// A commissioner for these devices, and the cycle thread's end.
+    #[must_use]
+    pub fn new(
+        mapping: Mapping,
+        devices: impl IntoIterator<Item = (NodeId, Vec<AxisSetup>)>,
+    ) -> (Self, CommissionerEnd) {
+        let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
+        let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
+        let work = |(node, axes)| Work {
+            node,
+            axes,
+            run: Run { device: 0, number: 0 },
+            at: None,
+            facts: ObjectFacts::new(),
+            steps: VecDeque::new(),
+            sent: VecDeque::new(),
+            passed_over: Vec::new(),
+            pdos: [Vec::new(), Vec::new()],
+        };
+        let devices = devices.into_iter().map(work).collect();
+        let end = CommissionerEnd { jobs: jobs_in, done: done_out };
+        (Self { mapping, devices, jobs, done, waiting: VecDeque::new() }, end)
+    }
+
+    /// Whether the cycle thread has gone.
+    #[must_use]
+    pub fn is_abandoned(&self) -> bool {
+        self.jobs.is_abandoned()
+    }
+
+    /// Does what there is to do, without waiting.
+    pub fn poll(&mut self) {
+        while let Ok(job) = self.jobs.pop() {
+            let Self { mapping, devices, waiting, .. } = self;
+            match job {
+                Job::Begin(run) => {
+                    if let Some(work) = devices.get_mut(usize::from(run.device)) {
+                        work.begin(run, mapping, waiting);
+                    }
+                }
+                Job::Outcome(run, outcome) => {
+                    let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
+                    if let Some(work) = work {
+                        work.handle(&outcome, mapping, waiting);
+                    }
+                }
+                Job::Unsent(run, _) => {
+                    let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
+                    work.into_iter().for_each(Work::give_up);
+                }
+                Job::Spent(_) | Job::Unused(_) => {}
+            }
+        }
+        while let Some(done) = self.waiting.pop_front() {
+            if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
+                self.waiting.push_front(done);
+                return;
+            }
+        }
+    }
+}
+
+impl Work {
+    fn begin(&mut self, run: Run, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+        self.give_up();
+        self.run = run;
+        self.pdos = [Vec::new(), Vec::new()];
+        self.set_out(0, Plan::Ask, mapping, waiting);
+    }
+
+    fn give_up(&mut self) {
+        self.at = None;
+        self.steps.clear();
+        self.sent.clear();
+        self.passed_over.clear();
+    }
+
+    /// Begins a plan of an axis.
+    fn set_out(&mut self, place: usize, plan: Plan, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+        let Some(setup) = self.axes.get(place) else { return };
+        if plan == Plan::Ask {
+            self.facts = ObjectFacts::new();
+        }
+        match mapping.cia402_steps(plan, &setup.needs, &self.facts) {
+            Ok(steps) => {
+                self.at = Some((place, plan));
+                self.steps = steps.into();
+                self.go_on(mapping, waiting);
+            }
+            Err(error) => self.fail(place, error.into(), waiting),
+        }
+    }
+
+    fn fail(&mut self, place: usize, error: Misfit, waiting: &mut VecDeque<Done>) {
+        let axis = self.number(place);
+        waiting.push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
+        self.give_up();
+    }
+
+    fn number(&self, place: usize) -> u8 {
+        self.axes.get(place).map_or(u8::MAX, |setup| u8::try_from(setup.axis).unwrap_or(u8::MAX))
+    }
+
+    /// Sends what may be sent, and goes on to the next plan when this one is through.
+    fn go_on(&mut self, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+        while self.sent.len() < WINDOW
+            && let Some((place, _)) = self.at
+            && let Some(step) = self.steps.pop_front()
+        {
+            let Some(request) = request(&step, &self.axes[place].needs) else {
+                // A device without this axis has been told of already, by the axis that it does not have.
+                let axis = self.axes[place].needs.axis;
+                self.fail(place, Cia402Error::Axis(axis).into(), waiting);
+                return;
+            };
+            waiting.push_back(Done::Submit(self.run, request));
+            self.sent.push_back(step);
+        }
+        if let Some((place, plan)) = self.at
+            && self.sent.is_empty()
+        {
+            self.at = None;
+            self.through(place, plan, mapping, waiting);
+        }
+    }
+
+    fn through(&mut self, place: usize, plan: Plan, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+        if plan == Plan::Ask {
+            self.set_out(place, Plan::Tell, mapping, waiting);
+            return;
+        }
+        let axis = self.number(place);
+        if !self.passed_over.is_empty() {
+            let failures = std::mem::take(&mut self.passed_over);
+            waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
+        }
+        let setup = &self.axes[place];
+        let made = mapping
+            .cia402_program(&setup.needs, &self.facts)
+            .map_err(Misfit::from)
+            .and_then(|program| Ok((spread(mapping, setup, &program)?, program)));
+        let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
+            Ok(made) => made,
+            Err(error) => return self.fail(place, error, waiting),
+        };
+        self.pdos[0].extend(receive);
+        self.pdos[1].extend(transmit);
+        let which = u8::try_from(place).unwrap_or(u8::MAX);
+        waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
+        if place + 1 < self.axes.len() {
+            self.set_out(place + 1, Plan::Ask, mapping, waiting);
+        } else {
+            let [receive, transmit] = std::mem::take(&mut self.pdos);
+            waiting.push_back(Done::Pdos(self.run, receive, transmit));
+        }
+    }
+
+    fn handle(&mut self, outcome: &SdoOutcome, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+        let (Some(step), Some((place, _))) = (self.sent.pop_front(), self.at) else { return };
+        let (object, what, must) = match &step {
+            ObjectStep::Read { object, fail } => (*object, "reading", *fail),
+            ObjectStep::Write { object, fail, .. } => (*object, "writing", *fail),
+        };
+        match outcome.result {
+            Ok(()) => self.facts.note_data(object, outcome.data.as_slice()),
+            Err(failure) => {
+                if failure.is_absent() {
+                    self.facts.note_missing(object);
+                }
+                let object =
+                    self.axes[place].needs.item(object).and_then(super::layout::object).unwrap_or(object);
+                let failure = StepFailure { what, object, failure };
+                if must {
+                    let (axis, node) = (self.number(place), self.node);
+                    let notice = Notice::NodeCommissioning { axis, node, failure };
+                    waiting.push_back(Done::Failed(self.run, notice));
+                    self.give_up();
+                    return;
+                }
+                self.passed_over.push(failure);
+            }
+        }
+        self.go_on(mapping, waiting);
+    }
+}
+
+/// A step as the request that it is.
+fn request(step: &ObjectStep, needs: &Cia402Axis) -> Option<SdoRequest> {
+    let object = object(step.item(needs)?)?;
+    let mux = Mux::new(object.index, object.sub);
+    Some(match step {
+        ObjectStep::Read { .. } => SdoRequest::upload(mux),
+        ObjectStep::Write { bytes, .. } => SdoRequest::download(mux, SdoData::inline(bytes)?),
+    })
+}
+
+/// RPDOs and TPDOs of an axis whose telegrams are known.
+fn spread(
+    mapping: &Mapping,
+    setup: &AxisSetup,
+    program: &DriveProgram,
+) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
+    let telegram = &program.telegram;
+    pdos(mapping, &setup.pdos, &telegram.command, &telegram.feedback)
+}
+
+/// RPDOs and TPDOs that carry these items.
+///
+/// # Errors
+/// There is no room, or no length is known.
+pub fn pdos(
+    mapping: &Mapping,
+    pdos: &AxisPdos,
+    command: &[Item],
+    feedback: &[Item],
+) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
+    let values = |items: &[Item]| -> Result<Vec<(Object, u8)>, Misfit> {
+        let value = |item: &Item| {
+            let len = mapping.dictionaries.cia402.len_of(*item).ok_or(Misfit::Length(*item))?;
+            Ok((object(*item).ok_or(Misfit::Length(*item))?, len))
+        };
+        items.iter().map(value).collect()
+    };
+    Ok([
+        pdos.spread(Direction::Receive, &values(command)?)?,
+        pdos.spread(Direction::Transmit, &values(feedback)?)?,
+    ])
+}

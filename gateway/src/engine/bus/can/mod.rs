@@ -1,0 +1,668 @@
+//! The CANopen side of the engine: the master, and the drives on the way from their boot-up to the cycle.
+//!
+//! The master brings each device up by itself and waits for its application once the device is the right one. Then the
+//! [`commissioner`] asks its drives, and programs and PDOs follow from that; the master sets the PDOs up and starts the device.
+//! A device that comes back while others move goes the same way.
+//!
+//! What a drive is told goes out after SYNC and counts from the next one; what it tells was captured at SYNC.
+
+pub mod commissioner;
+pub mod layout;
+pub mod load;
+
+use arrayvec::ArrayVec;
+use profile_cia402::master::boot::BootState;
+use profile_cia402::master::config::{ConfigError, Direction, MasterConfig, PdoConfig};
+use profile_cia402::master::event::{Event, Output, Refusal as FrameRefusal, Ticket};
+use profile_cia402::master::{ConsumerState, Master, Priority};
+use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
+use profile_cia402::wire::{AbortCode, Mux, NodeId};
+use profile_generic::can::Frame;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+use self::commissioner::{AxisSetup, CommissionerEnd, Done, Job, Run, WINDOW};
+use self::layout::{BYTES_MAX, PDOS_MAX, Spread};
+use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
+use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
+use crate::engine::axis::AxisChannel;
+use crate::engine::notice::Notice;
+use crate::engine::port::{CanInput, CanSent, SouthPort};
+use crate::mapping::{Item, Mapping};
+
+/// Axes of one device.
+const AXES_MAX: usize = 8;
+
+/// Frames taken from the bus in one call: more than a bus at 1 Mbit/s carries in ten milliseconds.
+const FRAMES_PER_CALL: usize = 256;
+
+/// SDO accesses of one axis that wait for an answer at the same time.
+const ACCESSES_MAX: usize = 4;
+
+/// How long a frame waits for room in the transmit queue before it is offered again.
+const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
+
+/// Longest wait for what comes in: answers come at any time.
+const PATIENCE: DurationNs = DurationNs::from_millis(1);
+
+/// Pause before a device that could not be used is brought up anew; it doubles with every vain attempt.
+const RETRY_PAUSE: DurationNs = DurationNs::from_secs(10);
+
+/// Longest such pause.
+const RETRY_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
+
+/// Where a device is on its way.
+#[derive(Debug)]
+enum Stage {
+    /// The master brings it up, or it is not there.
+    Absent,
+    /// It is commissioned beside the cycle.
+    Commissioning {
+        /// The requests that are under way.
+        tickets: ArrayVec<Ticket, WINDOW>,
+    },
+    /// Programs and PDOs are known.
+    Ready,
+}
+
+/// The values of an axis, one way: the row that its program sees.
+#[derive(Debug)]
+struct Values {
+    spread: Spread,
+    row: [u8; BYTES_MAX],
+}
+
+impl Values {
+    fn new() -> Self {
+        Self { spread: Spread::default(), row: [0; BYTES_MAX] }
+    }
+
+    fn take(&mut self, spread: Spread) {
+        *self = Self { spread, row: [0; BYTES_MAX] };
+    }
+}
+
+/// The drive of one axis.
+#[derive(Debug)]
+struct Drive {
+    /// Number of the axis in the box.
+    axis: usize,
+    command: Values,
+    feedback: Values,
+    /// Whether every value came in the last cycle, and whether none is lost.
+    fresh: bool,
+    alive: bool,
+    accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
+}
+
+/// A device, with one drive or several.
+#[derive(Debug)]
+struct Device {
+    node: NodeId,
+    drives: ArrayVec<Drive, AXES_MAX>,
+    stage: Stage,
+    runs: u32,
+    retry_at: Option<MonotonicTime>,
+    retry_pause: DurationNs,
+}
+
+/// A frame that waits for room in the transmit queue.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    frame: Frame,
+    since: MonotonicTime,
+    /// When it is offered again.
+    again: MonotonicTime,
+}
+
+/// The bus.
+#[derive(Debug)]
+pub struct CanBus {
+    /// Its number among the CAN buses of the box.
+    number: u8,
+    master: Master,
+    cycle_time: DurationNs,
+    devices: Vec<Device>,
+    commissioner: CommissionerEnd,
+    cycles_seen: u64,
+    /// A frame for which the transmit queue had no room.
+    held: Option<Held>,
+    /// It was up since the bus was on last.
+    up: bool,
+    stopped: bool,
+}
+
+impl CanBus {
+    /// A bus that begins with the first call. `devices` have the axes of each device; the commissioner knows the same.
+    ///
+    /// # Errors
+    /// What the master finds wrong with its configuration.
+    pub fn new(
+        number: u8,
+        config: MasterConfig,
+        devices: &[(NodeId, Vec<AxisSetup>)],
+        commissioner: CommissionerEnd,
+    ) -> Result<Self, ConfigError> {
+        let cycle_time = DurationNs(config.sync.map_or(0, |sync| i64::from(sync.period_ns)));
+        let master = Master::new(config)?;
+        let drive = |setup: &AxisSetup| Drive {
+            axis: setup.axis,
+            command: Values::new(),
+            feedback: Values::new(),
+            fresh: false,
+            alive: false,
+            accesses: ArrayVec::new(),
+        };
+        let device = |(node, axes): &(NodeId, Vec<AxisSetup>)| Device {
+            node: *node,
+            drives: axes.iter().take(AXES_MAX).map(drive).collect(),
+            stage: Stage::Absent,
+            runs: 0,
+            retry_at: None,
+            retry_pause: RETRY_PAUSE,
+        };
+        Ok(Self {
+            number,
+            master,
+            cycle_time,
+            devices: devices.iter().map(device).collect(),
+            commissioner,
+            cycles_seen: 0,
+            held: None,
+            up: false,
+            stopped: false,
+        })
+    }
+
+    /// The master.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    fn is_operational(&self, device: &Device) -> bool {
+        matches!(device.stage, Stage::Ready)
+            && self.master.node(device.node).is_some_and(|info| info.state == BootState::Operational)
+    }
+
+    fn place(&self, axis: usize) -> Option<(usize, usize)> {
+        self.devices.iter().enumerate().find_map(|(device, known)| {
+            Some((device, known.drives.iter().position(|drive| drive.axis == axis)?))
+        })
+    }
+
+    /// Puts together what the TPDOs of the cycle that has ended have brought.
+    fn gather(&mut self) {
+        let Self { master, devices, .. } = self;
+        for device in devices {
+            let node = device.node;
+            for drive in &mut device.drives {
+                let Values { spread, row } = &mut drive.feedback;
+                let consumers: ArrayVec<_, PDOS_MAX> =
+                    spread.numbers().iter().filter_map(|number| master.consumer(node, *number)).collect();
+                let all = consumers.len() == spread.numbers().len() && !consumers.is_empty();
+                let good = |state| matches!(state, ConsumerState::Good | ConsumerState::Missing);
+                drive.alive = all && consumers.iter().all(|consumer| good(consumer.state));
+                drive.fresh = all && consumers.iter().all(|consumer| consumer.fresh);
+                for part in spread.parts() {
+                    let bytes =
+                        consumers.get(part.pdo).and_then(|pdo| pdo.data.get(part.at..part.at + part.len));
+                    if let (Some(bytes), Some(place)) = (bytes, row.get_mut(part.from..part.from + part.len))
+                    {
+                        place.copy_from_slice(bytes);
+                    }
+                }
+            }
+        }
+    }
+
+    fn event(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel], event: &Event) {
+        match event {
+            Event::AwaitingApplication { node, .. } => self.begin(now, *node),
+            Event::Operational { node } => {
+                if let Some(device) = self.devices.iter_mut().find(|device| device.node == *node) {
+                    (device.retry_at, device.retry_pause) = (None, RETRY_PAUSE);
+                }
+            }
+            Event::BootFailed { node, .. } => {
+                self.lose(now, system, *node, axes);
+                self.try_later(now, *node);
+            }
+            Event::Rebooted { node, .. }
+            | Event::HeartbeatLost { node }
+            | Event::StateChanged { node, .. } => self.lose(now, system, *node, axes),
+            Event::DuplicateNode { node, .. } => {
+                // Where the master stops it for that, it is lost; a device that only says its name twice is not.
+                let off = self.master.node(*node).is_some_and(|info| info.state == BootState::Off);
+                if off {
+                    self.lose(now, system, *node, axes);
+                    self.try_later(now, *node);
+                }
+            }
+            Event::BusOff => {
+                self.up = false;
+                self.held = None;
+                for place in 0..self.devices.len() {
+                    let node = self.devices[place].node;
+                    self.lose(now, system, node, axes);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A device waits for its application.
+    fn begin(&mut self, now: MonotonicTime, node: NodeId) {
+        let Some(place) = self.devices.iter().position(|device| device.node == node) else {
+            // A device without axes takes part as it is.
+            let _ = self.master.node_ready(node);
+            return;
+        };
+        let device = &mut self.devices[place];
+        device.runs = device.runs.wrapping_add(1);
+        let run = device.run(place);
+        if self.commissioner.push(Job::Begin(run)) {
+            device.stage = Stage::Commissioning { tickets: ArrayVec::new() };
+        } else {
+            self.give_up(now, place);
+        }
+    }
+
+    /// A device is gone, or has to begin anew.
+    fn lose(&mut self, now: MonotonicTime, system: SystemTime, node: NodeId, axes: &mut [AxisChannel]) {
+        for device in self.devices.iter_mut().filter(|device| device.node == node) {
+            device.stage = Stage::Absent;
+            for drive in &mut device.drives {
+                (drive.fresh, drive.alive) = (false, false);
+                axes[drive.axis].lose_south(now, system);
+            }
+        }
+    }
+
+    /// Stops a device that cannot be used, for now.
+    fn give_up(&mut self, now: MonotonicTime, place: usize) {
+        let device = &mut self.devices[place];
+        device.stage = Stage::Absent;
+        let node = device.node;
+        let _ = self.master.stop_node(now, node);
+        self.try_later(now, node);
+    }
+
+    fn try_later(&mut self, now: MonotonicTime, node: NodeId) {
+        if let Some(device) = self.devices.iter_mut().find(|device| device.node == node) {
+            device.retry_at = Some(now + device.retry_pause);
+            device.retry_pause = (device.retry_pause * 2).min(RETRY_PAUSE_MAX);
+        }
+    }
+
+    /// Tries devices again whose pause is over.
+    fn retry(&mut self, now: MonotonicTime) {
+        let Self { master, devices, .. } = self;
+        for device in devices {
+            if device.retry_at.is_some_and(|at| now >= at) {
+                device.retry_at = None;
+                // One that is on its way by itself, or in operation, needs no other try.
+                let _ = master.retry(now, device.node);
+            }
+        }
+    }
+
+    /// Takes what the commissioner has done.
+    fn commission(&mut self, now: MonotonicTime, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
+        // Each piece of work can make one job.
+        while self.commissioner.has_room()
+            && let Some(done) = self.commissioner.pop()
+        {
+            let Some(run) = done.run() else {
+                if let Done::Told(told) = done {
+                    notice(told);
+                }
+                continue;
+            };
+            let place = usize::from(run.device);
+            let wanted = self.devices.get(place).is_some_and(|device| {
+                device.run(place) == run && matches!(device.stage, Stage::Commissioning { .. })
+            });
+            if !wanted {
+                self.commissioner.push(Job::Unused(done));
+                continue;
+            }
+            let node = self.devices[place].node;
+            match done {
+                Done::Submit(run, request) => self.submit(now, place, run, request),
+                Done::Program(_, which, program, [command, feedback]) => {
+                    if let Some(drive) = self.devices[place].drives.get_mut(usize::from(which)) {
+                        drive.command.take(command);
+                        drive.feedback.take(feedback);
+                        axes[drive.axis].set_south(program);
+                    }
+                }
+                Done::Pdos(run, receive, transmit) => self.connect(now, place, run, receive, transmit),
+                Done::Failed(_, failed) => {
+                    notice(failed);
+                    self.give_up(now, place);
+                }
+                Done::Told(_) => {}
+            }
+            debug_assert_eq!(self.devices[place].node, node);
+        }
+    }
+
+    fn submit(&mut self, now: MonotonicTime, place: usize, run: Run, request: SdoRequest) {
+        let node = self.devices[place].node;
+        match self.master.sdo_submit(node, request, Priority::Normal) {
+            Ok(ticket) => {
+                if let Stage::Commissioning { tickets } = &mut self.devices[place].stage {
+                    // The commissioner has no more under way than there is room for.
+                    let _ = tickets.try_push(ticket);
+                }
+            }
+            Err((_, request)) => {
+                self.commissioner.push(Job::Unsent(run, request));
+                self.give_up(now, place);
+            }
+        }
+    }
+
+    /// The PDOs of a device are known: the master sets them up and starts it.
+    fn connect(
+        &mut self,
+        now: MonotonicTime,
+        place: usize,
+        run: Run,
+        receive: Vec<PdoConfig>,
+        transmit: Vec<PdoConfig>,
+    ) {
+        let node = self.devices[place].node;
+        let known = self.master.config().nodes.iter().find(|known| known.node == node);
+        let same = known.is_some_and(|known| {
+            (known.pdos(Direction::Receive), known.pdos(Direction::Transmit)) == (&receive, &transmit)
+        });
+        let taken = if same {
+            self.commissioner.push(Job::Unused(Done::Pdos(run, receive, transmit)));
+            true
+        } else {
+            // Only for a drive that lacks something that may be lacking, at its first boot-up: this allocates.
+            self.master.set_pdos(node, receive, transmit).is_ok()
+        };
+        if taken && self.master.node_ready(node).is_ok() {
+            self.devices[place].stage = Stage::Ready;
+        } else {
+            self.give_up(now, place);
+        }
+    }
+
+    fn outcome(
+        &mut self,
+        ticket: Ticket,
+        outcome: SdoOutcome,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+    ) {
+        for (place, device) in self.devices.iter_mut().enumerate() {
+            let run = device.run(place);
+            if let Stage::Commissioning { tickets } = &mut device.stage
+                && let Some(at) = tickets.iter().position(|known| *known == ticket)
+            {
+                tickets.remove(at);
+                self.commissioner.push(Job::Outcome(run, outcome));
+                return;
+            }
+            for drive in &mut device.drives {
+                if let Some(at) = drive.accesses.iter().position(|(known, _)| *known == ticket) {
+                    let (_, purpose) = drive.accesses.remove(at);
+                    let item = Item::object(outcome.object.index, outcome.object.sub);
+                    answer(axes, Answer { axis: drive.axis, purpose, item, result: reply(&outcome) });
+                    return;
+                }
+            }
+        }
+        self.commissioner.push(Job::Spent(outcome));
+    }
+}
+
+impl Device {
+    /// Its work for the commissioner, from its place among the devices.
+    fn run(&self, place: usize) -> Run {
+        Run { device: u8::try_from(place).unwrap_or(u8::MAX), number: self.runs }
+    }
+}
+
+impl Bus for CanBus {
+    fn cycle_time(&self) -> DurationNs {
+        self.cycle_time
+    }
+
+    fn patience(&self) -> DurationNs {
+        PATIENCE
+    }
+
+    fn wake_at(&self) -> Option<MonotonicTime> {
+        match self.held {
+            Some(held) => Some(held.again),
+            None => self.master.wake_at(),
+        }
+    }
+
+    fn is_due(&self, now: MonotonicTime) -> bool {
+        self.master.next_sync().is_none_or(|at| now >= at)
+    }
+
+    fn is_up(&self) -> bool {
+        self.up
+    }
+
+    fn phase(&self) -> Option<u8> {
+        None
+    }
+
+    fn counts(&self) -> Counts {
+        let statistics = self.master.statistics();
+        Counts {
+            cycles: statistics.syncs,
+            lost: statistics.pdos_missed,
+            refused: FrameRefusal::ALL.iter().map(|reason| statistics.refused(*reason)).sum(),
+        }
+    }
+
+    fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
+        let SouthPort::Can(port) = port else { return };
+        for _ in 0..FRAMES_PER_CALL {
+            match port.receive(now) {
+                // A refused frame is counted by the master and changes nothing.
+                Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
+                Some(CanInput::BusOff) => self.master.bus_off(now),
+                Some(CanInput::BusOn) => self.master.bus_on(now),
+                None => break,
+            }
+        }
+    }
+
+    fn take_cycle(&mut self) -> bool {
+        let cycles = self.master.statistics().syncs;
+        let taken = std::mem::replace(&mut self.cycles_seen, cycles) != cycles;
+        if taken {
+            self.gather();
+        }
+        taken
+    }
+
+    fn feedback(&self, axis: usize) -> Option<Received<'_>> {
+        let (device, drive) = self.place(axis)?;
+        let device = self.devices.get(device).filter(|device| self.is_operational(device))?;
+        let drive = device.drives.get(drive)?;
+        let data = drive.feedback.row.get(..drive.feedback.spread.len())?;
+        Some(Received { data, fresh: drive.fresh, alive: drive.alive })
+    }
+
+    fn set_idle(&mut self, _idle: bool) {}
+
+    fn run(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        _mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        if !self.stopped {
+            self.master.start(now);
+        }
+        // What was asked for and can be answered has room with the commissioner.
+        while self.commissioner.has_room()
+            && let Some(event) = self.master.poll_event()
+        {
+            match event {
+                Event::Sdo { ticket, outcome } => self.outcome(ticket, outcome, axes, answer),
+                event => {
+                    self.event(now, system, axes, &event);
+                    notice(Notice::Can { bus: self.number, event });
+                }
+            }
+        }
+        self.commission(now, axes, notice);
+        self.retry(now);
+        for device in 0..self.devices.len() {
+            if !self.is_operational(&self.devices[device]) {
+                continue;
+            }
+            for drive in 0..self.devices[device].drives.len() {
+                let axis = self.devices[device].drives[drive].axis;
+                ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
+            }
+        }
+        let mut states = self.master.nodes().map(|info| info.state);
+        self.up = match self.up {
+            true => !self.stopped,
+            false => {
+                !self.stopped
+                    && states.all(is_settled)
+                    && self.devices.iter().any(|device| self.is_operational(device))
+            }
+        };
+    }
+
+    fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
+        let place = self.place(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
+        let Some((device, drive)) = place else {
+            fill(None);
+            return;
+        };
+        let Self { master, devices, .. } = self;
+        let node = devices[device].node;
+        let Values { spread, row } = &mut devices[device].drives[drive].command;
+        let given = fill(row.get_mut(..spread.len()));
+        if !given {
+            spread.numbers().iter().for_each(|number| master.withdraw(node, *number));
+            return;
+        }
+        for part in spread.parts() {
+            let pdo = spread.numbers().get(part.pdo).and_then(|number| master.producer(node, *number));
+            let place = pdo.and_then(|pdo| pdo.get_mut(part.at..part.at + part.len));
+            if let (Some(place), Some(bytes)) = (place, row.get(part.from..part.from + part.len)) {
+                place.copy_from_slice(bytes);
+            }
+        }
+        for number in spread.numbers() {
+            master.commit(node, *number);
+        }
+    }
+
+    fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
+        let Some(request) = request(access) else { return false };
+        let place = self.place(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
+        let Some((device, drive)) = place else { return false };
+        let device = &mut self.devices[device];
+        let drive = &mut device.drives[drive];
+        let priority = if access.urgent { Priority::Urgent } else { Priority::Normal };
+        if drive.accesses.is_full() {
+            return false;
+        }
+        match self.master.sdo_submit(device.node, request, priority) {
+            Ok(ticket) => {
+                drive.accesses.push((ticket, purpose));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
+        let mut sent = Sent::default();
+        let SouthPort::Can(port) = port else { return sent };
+        let cycles = self.master.statistics().syncs;
+        loop {
+            let held = self.held.take().map(|held| (held.frame, held.since));
+            let next = held.or_else(|| self.master.poll(now).map(|Output::Transmit(frame)| (frame, now)));
+            let Some((frame, since)) = next else { break };
+            // What has waited for a whole cycle is old: no drive shall act on it.
+            let result = match now.since(since) > self.cycle_time {
+                true => CanSent::Failed,
+                false => port.send(now, &frame),
+            };
+            match result {
+                CanSent::Sent => {}
+                CanSent::Full => {
+                    self.held = Some(Held { frame, since, again: now + FULL_PAUSE });
+                    break;
+                }
+                CanSent::Failed => {
+                    sent.failures += 1;
+                    self.master.transmit_failed(frame.id());
+                }
+            }
+        }
+        sent.cycle = self.master.statistics().syncs != cycles;
+        sent
+    }
+
+    fn stop(&mut self, now: MonotonicTime) {
+        self.stopped = true;
+        self.master.stop(now);
+    }
+
+    fn is_stopped(&self) -> bool {
+        // The devices have been told, or cannot be.
+        self.stopped && !self.master.is_running() && (self.master.wake_at().is_none() && self.held.is_none())
+    }
+}
+
+/// Whether a device is where it stays until something happens.
+fn is_settled(state: BootState) -> bool {
+    use BootState as S;
+    matches!(state, S::Off | S::Retry | S::Operational | S::Lost | S::Failed)
+}
+
+/// The request that an access is; `None` for what no CANopen drive has.
+fn request(access: &Access) -> Option<SdoRequest> {
+    let object = layout::object(access.item)?;
+    let mux = Mux::new(object.index, object.sub);
+    match &access.operation {
+        Operation::Read => Some(SdoRequest::upload(mux)),
+        Operation::Write(data) => Some(SdoRequest::download(mux, SdoData::inline(data)?)),
+        Operation::Command | Operation::Start | Operation::Progress | Operation::Cancel => None,
+    }
+}
+
+/// What a request came to.
+fn reply(outcome: &SdoOutcome) -> Result<(Data, Progress), AccessFailure> {
+    outcome.result.map_err(failure)?;
+    let data = Data::try_from(outcome.data.as_slice()).map_err(|_| AccessFailure::Unanswered)?;
+    Ok((data, Progress::None))
+}
+
+/// What a failure of SDO is to those who do not know it.
+fn failure(failure: SdoFailure) -> AccessFailure {
+    let SdoFailure::Refused(code) = failure else { return AccessFailure::Unanswered };
+    AccessFailure::Refused(match code {
+        code if code.is_absent() => Refusal::Unknown,
+        AbortCode::READ_ONLY => Refusal::ReadOnly,
+        AbortCode::VALUE
+        | AbortCode::TOO_HIGH
+        | AbortCode::TOO_LOW
+        | AbortCode::LENGTH
+        | AbortCode::TOO_LONG
+        | AbortCode::TOO_SHORT => Refusal::Value,
+        _ => Refusal::Other,
+    })
+}

@@ -1,0 +1,181 @@
+//! Simulated CiA 402 drives inside this process, on a bus that takes as long for each frame as its bits do.
+//!
+//! Whenever the box looks at its port, everything happens on the bus that has happened up to then: arbitration, frames in
+//! both directions, and what the drives say to them.
+
+use std::collections::VecDeque;
+
+use profile_generic::can::Frame;
+use profile_generic::can::bus::{Bus, Output, QUEUE_DEFAULT, SendError, State, Station};
+use profile_generic::time::MonotonicTime;
+
+use super::can_drive::{DriveNode, drive};
+use crate::capture::recorder::Tap;
+use crate::config::Can;
+use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::sys::clock;
+
+/// Frames and events for the box that it has not taken yet: more than a bus carries between two calls.
+const INBOUND_MAX: usize = 1024;
+
+/// Frames that the box's transmit queue holds.
+const QUEUE: usize = 64;
+
+/// The bus as the box sees it.
+#[derive(Debug)]
+pub struct InProcessCan {
+    bus: Bus,
+    own: Station,
+    nodes: Vec<(Station, DriveNode)>,
+    inbound: VecDeque<CanInput>,
+    /// Up to when everything has happened.
+    reached: MonotonicTime,
+    /// The recording, and the number of the bus in it.
+    tap: Option<(Tap, u8)>,
+}
+
+impl InProcessCan {
+    /// A bus with these devices.
+    ///
+    /// # Panics
+    /// With more devices than a bus has room for.
+    #[must_use]
+    pub fn new(mut bus: Bus, devices: Vec<DriveNode>, tap: Option<(Tap, u8)>) -> Self {
+        let own = bus.add(QUEUE).expect("an empty bus has room");
+        let mut station = || bus.add(QUEUE_DEFAULT).expect("a bus has room for all its node-ids");
+        let nodes = devices.into_iter().map(|device| (station(), device)).collect();
+        let inbound = VecDeque::with_capacity(INBOUND_MAX);
+        Self { bus, own, nodes, inbound, reached: MonotonicTime::ZERO, tap }
+    }
+
+    /// The devices of a configuration, each with as many axes as it names.
+    ///
+    /// # Panics
+    /// Never with a checked configuration: a device has 1 to 8 axes.
+    #[must_use]
+    pub fn of(config: &Can, tap: Option<(Tap, u8)>) -> Self {
+        let mut devices: Vec<(profile_cia402::wire::NodeId, u8)> = Vec::new();
+        for known in &config.drives {
+            let axes = u8::try_from(known.axis + 1).unwrap_or(u8::MAX);
+            match devices.iter_mut().find(|(node, _)| *node == known.node) {
+                Some((_, most)) => *most = (*most).max(axes),
+                None => devices.push((known.node, axes)),
+            }
+        }
+        let devices =
+            devices.into_iter().map(|(node, axes)| drive(Some(node), axes).expect("1 to 8 axes")).collect();
+        Self::new(Bus::new(config.bit_rate), devices, tap)
+    }
+
+    /// The devices, in the order in which they were given.
+    pub fn nodes(&self) -> impl Iterator<Item = &DriveNode> {
+        self.nodes.iter().map(|(_, node)| node)
+    }
+
+    /// The same, to act on them from outside.
+    pub fn nodes_mut(&mut self) -> impl Iterator<Item = &mut DriveNode> {
+        self.nodes.iter_mut().map(|(_, node)| node)
+    }
+
+    /// The bus, to look at it or to disturb it.
+    pub fn bus_mut(&mut self) -> &mut Bus {
+        &mut self.bus
+    }
+
+    /// Pulls or plugs the cable of a device.
+    pub fn connect(&mut self, now: MonotonicTime, device: usize, connected: bool) {
+        let (station, _) = &self.nodes[device];
+        if connected {
+            self.bus.connect(now, *station);
+        } else {
+            self.bus.disconnect(now, *station);
+        }
+    }
+
+    /// Lets everything happen up to `now`.
+    pub fn advance(&mut self, now: MonotonicTime) {
+        if self.reached == MonotonicTime::ZERO {
+            // Nobody was there before the first look.
+            self.reached = now;
+        }
+        loop {
+            self.happen();
+            let nodes = self.nodes.iter().map(|(_, node)| node.wake_at());
+            let next = nodes.chain(self.bus.wake_at()).min().unwrap_or(MonotonicTime::MAX);
+            if next > now {
+                break;
+            }
+            self.reached = next.max(self.reached);
+            for (_, node) in &mut self.nodes {
+                node.handle_time(self.reached);
+            }
+        }
+        self.reached = self.reached.max(now);
+    }
+
+    /// What can happen without time passing.
+    fn happen(&mut self) {
+        let Self { bus, own, nodes, inbound, reached, .. } = self;
+        let now = *reached;
+        while let Some(output) = bus.poll(now) {
+            match output {
+                Output::Received { to, frame, .. } if to == *own => keep(inbound, CanInput::Frame(frame)),
+                Output::Received { to, frame, .. } => {
+                    if let Some((_, node)) = nodes.iter_mut().find(|(station, _)| *station == to) {
+                        node.handle_frame(now, &frame);
+                    }
+                }
+                Output::State { station, state: State::BusOff, .. } if station == *own => {
+                    keep(inbound, CanInput::BusOff);
+                }
+                Output::State { station, state: State::Active, .. } if station == *own => {
+                    keep(inbound, CanInput::BusOn);
+                }
+                Output::State { station, state: State::BusOff, .. } => {
+                    if let Some((_, node)) = nodes.iter_mut().find(|(known, _)| *known == station) {
+                        node.bus_off();
+                    }
+                }
+                Output::Sent { .. } | Output::State { .. } => {}
+            }
+        }
+        for (station, node) in nodes {
+            while let Some(frame) = node.poll(now) {
+                // What the queue has no room for is lost, as behind a network card.
+                let _ = bus.send(now, *station, &frame);
+            }
+        }
+    }
+}
+
+/// Keeps what the box has not taken yet; what there is no room for is lost.
+fn keep(inbound: &mut VecDeque<CanInput>, input: CanInput) {
+    if inbound.len() < INBOUND_MAX {
+        inbound.push_back(input);
+    }
+}
+
+impl CanPort for InProcessCan {
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        self.advance(now);
+        let input = self.inbound.pop_front()?;
+        if let (Some((tap, bus)), CanInput::Frame(frame)) = (&mut self.tap, &input) {
+            tap.can_frame(clock::realtime_now(), *bus, frame);
+        }
+        Some(input)
+    }
+
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        self.advance(now);
+        match self.bus.send(now, self.own, frame) {
+            Ok(()) => {
+                if let Some((tap, bus)) = &mut self.tap {
+                    tap.can_frame(clock::realtime_now(), *bus, frame);
+                }
+                CanSent::Sent
+            }
+            Err(SendError::Full) => CanSent::Full,
+            Err(SendError::BusOff | SendError::Disconnected | SendError::Fd) => CanSent::Failed,
+        }
+    }
+}
