@@ -20,6 +20,9 @@ const DATA_MAX: usize = 64;
 /// Periods in a row with a TPDO too many, which tell of a second device.
 const DOUBLES_MAX: u8 = 3;
 
+/// TPDOs that may still come after their period, at most.
+const OWED_MAX: u8 = 100;
+
 /// State of a consumer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConsumerState {
@@ -71,8 +74,10 @@ pub(super) struct TpdoEnd {
     syncs: u32,
     longest: DurationNs,
     deadline: Option<MonotonicTime>,
-    /// TPDOs that came in this period.
+    /// TPDOs that came in this period, without those that were due before.
     frames: u8,
+    /// TPDOs that did not come in their period, and may be on their way: what waits in a queue comes faster than it is due.
+    owed: u8,
     /// Periods in a row in which more than one came.
     doubles: u8,
     /// A wrong length has been told.
@@ -109,6 +114,7 @@ impl TpdoEnd {
             longest: DurationNs::from_millis(i64::from(pdo.deadline_ms)),
             deadline: None,
             frames: 0,
+            owed: 0,
             doubles: 0,
             length_told: false,
         };
@@ -142,7 +148,7 @@ impl TpdoEnd {
     pub fn stop(&mut self) {
         self.state = ConsumerState::Waiting;
         (self.fresh, self.late, self.missed, self.syncs) = (false, false, 0, 0);
-        (self.frames, self.doubles) = (0, 0);
+        (self.frames, self.owed, self.doubles) = (0, 0, 0);
         (self.at, self.deadline) = (None, None);
         self.length_told = false;
     }
@@ -155,7 +161,11 @@ impl TpdoEnd {
 
     /// Takes a value of the right length.
     pub fn take(&mut self, now: MonotonicTime, data: &[u8], late: bool) -> Taken {
-        self.frames = self.frames.saturating_add(1);
+        if self.frames > 0 && self.owed > 0 {
+            self.owed -= 1;
+        } else {
+            self.frames = self.frames.saturating_add(1);
+        }
         self.data[..self.len].copy_from_slice(&data[..self.len]);
         let back = self.state == ConsumerState::Lost;
         self.state = ConsumerState::Good;
@@ -172,6 +182,7 @@ impl TpdoEnd {
     /// One was due and did not come; `true` when that is the first one too many.
     fn miss(&mut self) -> bool {
         self.missed = self.missed.saturating_add(1);
+        self.owed = self.owed.saturating_add(1).min(OWED_MAX);
         if self.missed > self.allowed {
             return core::mem::replace(&mut self.state, ConsumerState::Lost) != ConsumerState::Lost;
         }
@@ -351,6 +362,43 @@ mod tests {
             end.sync();
             end.take(now, &[0; 2], false);
         }
+    }
+
+    #[test]
+    fn what_comes_late_is_no_second_sender() {
+        let mut end = end(1, 1);
+        let now = MonotonicTime::ZERO;
+        let mut take = |end: &mut TpdoEnd| end.take(now, &[0; 2], false);
+        let twice = |end: &mut TpdoEnd, take: &mut dyn FnMut(&mut TpdoEnd) -> Taken| {
+            end.sync();
+            [take(end), take(end)]
+        };
+        // The first one, then six that did not come in time, the last of them in the period in which the device comes back with two a
+        // period.
+        end.sync();
+        take(&mut end);
+        (0..6).for_each(|_| _ = end.sync());
+        assert_eq!(end.view().missed, 5);
+        assert_eq!(twice(&mut end, &mut take), [Taken::Back, Taken::Value]);
+        for _ in 0..5 {
+            assert_eq!(twice(&mut end, &mut take), [Taken::Value; 2]);
+        }
+        // A device that owes nothing more sends one; two senders are seen after three periods.
+        for _ in 0..2 {
+            assert_eq!(twice(&mut end, &mut take), [Taken::Value; 2]);
+        }
+        assert_eq!(twice(&mut end, &mut take), [Taken::Value, Taken::Double]);
+        // However long it was gone, what may come late is bounded.
+        end.stop();
+        take(&mut end);
+        (0..1_000).for_each(|_| _ = end.sync());
+        let periods = (0..).take_while(|_| twice(&mut end, &mut take)[1] != Taken::Double).count();
+        assert_eq!(periods, usize::from(OWED_MAX) + 2);
+        // Nothing of it is owed by a device that starts anew.
+        (0..10).for_each(|_| _ = end.sync());
+        end.start(now);
+        let periods = (0..).take_while(|_| twice(&mut end, &mut take)[1] != Taken::Double).count();
+        assert_eq!(periods, 2);
     }
 
     #[test]

@@ -132,7 +132,7 @@ fn network() -> MasterConfig {
         heartbeat: Some(MasterHeartbeat {
             node: NodeId::new(127).unwrap(),
             producer_ms: 100,
-            timeout_ms: 1_000,
+            timeout_ms: 1_500,
         }),
         sdo_timeout: DurationNs::from_secs(2),
         boot_up_time: DurationNs::from_secs(2),

@@ -157,7 +157,21 @@ fn a_drive_follows_in_the_cyclic_modes() {
     bench.command(Word::DisableVoltage, State::SwitchOnDisabled);
     let shown = bench.next();
     assert_eq!((shown.velocity, shown.torque), (0, 0));
-    assert_eq!(bench.emergencies(), []);
+
+    // The drive does nothing for a while and then answers what has queued up, several in a period: late, and no second drive.
+    let from = bench.enable(Mode::CYCLIC_POSITION).position;
+    bench.log.clear();
+    let missed = bench.master.statistics().pdos_missed;
+    bench.drive.running.signal("STOP");
+    for _ in 0..15 {
+        bench.period();
+    }
+    bench.drive.running.signal("CONT");
+    assert_eq!(bench.shown, None);
+    assert!(bench.master.statistics().pdos_missed >= missed + 2 * 10);
+    bench.set.position = from + 2_000;
+    bench.shows("target", |shown| shown.position.abs_diff(from + 2_000) <= 1);
+    assert_eq!(bench.log, []);
 }
 
 /// A set-point of pp: handed over by the rising edge of bit 4, acknowledged by bit 12.
@@ -342,7 +356,7 @@ fn heartbeats_are_lost_and_regained_both_ways() {
     comes_back(&mut bench);
 
     // The master falls silent: the drive stops by itself.
-    std::thread::sleep(Duration::from_secs(2));
+    std::thread::sleep(Duration::from_millis(2_500));
     assert!(bench.drive.has_said("fault reaction active -> fault"), "{}", bench.drive.said());
     bench.shows("fault", |shown| shown.state() == State::Fault);
     bench.until("EMCY", |bench| !bench.emergencies().is_empty());
