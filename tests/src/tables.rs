@@ -12,6 +12,7 @@ pub fn listing(mapping: &Mapping, stage: &Stage) -> String {
     let mut text = String::new();
     section(&mut text, "CIP Motion and the generic model", &numbers_only(&format!("{:?}", mapping.cip)));
     section(&mut text, "the generic model and SERCOS", &format!("{:?}", mapping.sercos));
+    section(&mut text, "the generic model and CiA 402", &format!("{:?}", mapping.cia402));
     for axis in &stage.axes {
         let attributes = mapping.attribute_table(&axis.scaling);
         section(&mut text, &format!("attributes of {}", axis.name), &format!("{attributes:?}"));

@@ -23,10 +23,11 @@ const REMARKS: [&str; 5] = ["source", "note", "examples", "reason", "name"];
 /// Set to see how many of the changes a frame of `tests/frames` shows, and which do not show in any.
 const SPLIT: &str = "AXISBRIDGE_TEST_SPLIT";
 
-/// The two mapping tables.
-const FILES: [(&str, &str); 2] = [
+/// The mapping tables.
+const FILES: [(&str, &str); 3] = [
     ("cip-generic.toml", include_str!("../../mappings/cip-generic.toml")),
     ("generic-sercos.toml", include_str!("../../mappings/generic-sercos.toml")),
+    ("generic-cia402.toml", include_str!("../../mappings/generic-cia402.toml")),
 ];
 
 /// A table with one change.
@@ -346,6 +347,11 @@ fn a_change_of_any_row_is_noticed() {
     println!("{} changes of rows", mutants.len());
     for noticed in [Noticed::Check, Noticed::Example, Noticed::Golden, Noticed::Listing, Noticed::Nobody] {
         println!("{:5} {noticed}", counts.get(&noticed).map_or(0, Vec::len));
+    }
+    for (file, (name, _)) in FILES.into_iter().enumerate() {
+        let of_file = |list: &Vec<&Mutant>| list.iter().filter(|mutant| mutant.file == file).count();
+        let counted: usize = counts.values().map(of_file).sum();
+        println!("{counted:5} of them in {name}, {} survivors", counts.get(&Noticed::Nobody).map_or(0, of_file));
     }
     let name = |mutant: &&Mutant| format!("{} {}", FILES[mutant.file].0, mutant.what);
     if std::env::var_os(SPLIT).is_some() {

@@ -13,6 +13,8 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     causes(mapping, findings);
     sercos_faults(mapping, findings);
     sercos_reports(mapping, findings);
+    cia402_faults(mapping, findings);
+    cia402_reports(mapping, findings);
 }
 
 fn causes(mapping: &Mapping, findings: &mut Findings) {
@@ -98,6 +100,43 @@ fn sercos_reports(mapping: &Mapping, findings: &mut Findings) {
             hides(other.pattern, rule.pattern)
                 && covers(other.acknowledges, rule.acknowledges)
                 && covers(other.procedure, rule.procedure)
+        });
+        if let Some(before) = hidden {
+            let problem = Problem::new(code::NEVER_REACHED, row.report.span()).key("report");
+            let problem = problem.title(format!("the row of the report `{}` never counts", rule.report));
+            let problem = problem.expected("whatever fits this row fits one before it");
+            findings.push(&file.text, problem.related(file.rows.report[before].report.span(), "this one"));
+        }
+    }
+}
+
+/// Codes have their rows, classes are for what is left of them.
+fn cia402_faults(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_cia402;
+    let codes = file.rows.fault.iter().flat_map(|row| row.codes.iter().map(|name| ("codes", name)));
+    let classes = file.rows.fault_class.iter().flat_map(|row| row.classes.iter().map(|name| ("classes", name)));
+    let places: Vec<_> = codes.chain(classes).collect();
+    let rules = mapping.cia402.faults();
+    for (at, (rule, (key, name))) in rules.iter().zip(&places).enumerate() {
+        let hidden = rules[..at].iter().position(|other| hides(other.pattern, rule.pattern));
+        if let Some(before) = hidden {
+            let problem = Problem::new(code::NEVER_REACHED, name.span()).key(*key);
+            let problem = problem.title(format!("`{}` never counts", name.get_ref()));
+            let problem = problem.expected("whatever fits it fits what stands before it");
+            findings.push(&file.text, problem.related(places[before].1.span(), "this one"));
+        }
+    }
+}
+
+fn cia402_reports(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_cia402;
+    let rules = mapping.cia402.reports();
+    for (at, (rule, row)) in rules.iter().zip(&file.rows.report).enumerate() {
+        let hidden = rules[..at].iter().position(|other| {
+            hides(other.pattern, rule.pattern)
+                && (other.follows.is_none() || other.follows == rule.follows)
+                && (other.modes.is_empty()
+                    || !rule.modes.is_empty() && rule.modes.iter().all(|mode| other.modes.contains(mode)))
         });
         if let Some(before) = hidden {
             let problem = Problem::new(code::NEVER_REACHED, row.report.span()).key("report");

@@ -32,7 +32,7 @@ pub fn page(outcome: &Outcome) -> String {
             &embedded
         }
     };
-    let files: Vec<&TableText> = vec![&texts.cip_generic, &texts.generic_sercos];
+    let files: Vec<&TableText> = vec![&texts.cip_generic, &texts.generic_sercos, &texts.generic_cia402];
     let mut page = String::from(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>Axisbridge mapping tables</title>\n",
     );
@@ -226,7 +226,8 @@ mod tests {
         let outcome = Outcome { texts: Some(texts.clone()), ..check(&Request::default()) };
         let page = page(&outcome);
         let rows = texts.cip_generic.text.matches("\n[[").count()
-            + texts.generic_sercos.text.matches("\n[[").count();
+            + texts.generic_sercos.text.matches("\n[[").count()
+            + texts.generic_cia402.text.matches("\n[[").count();
         assert!(page.matches("<tr id=").count() > rows, "{}", page.matches("<tr id=").count());
         assert!(page.contains("a &lt; b") && !page.contains("a < b"));
         assert!(page.contains("<h3>generic-sercos.parameter</h3>"));

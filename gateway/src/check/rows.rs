@@ -17,6 +17,7 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
 
 fn modes(mapping: &Mapping, findings: &mut Findings) {
     let (cip, sercos) = (&mapping.tables().cip_generic, &mapping.tables().generic_sercos);
+    let cia402 = &mapping.tables().generic_cia402;
     for row in &cip.rows.mode {
         let mode = row.mode.get_ref();
         let none = mode == OperatingMode::None.name();
@@ -28,6 +29,14 @@ fn modes(mapping: &Mapping, findings: &mut Findings) {
                 problem.expected("generic-sercos.toml has no [[mode]] row of it: it is refused"),
             );
         }
+        if !none && !cia402.rows.mode.iter().any(|other| other.mode.get_ref() == mode) {
+            let problem = Problem::new(code::MODE_UNSERVED, row.mode.span()).key("mode");
+            let problem = problem.title(format!("no CiA 402 drive has the operating mode `{mode}`"));
+            findings.push(
+                &cip.text,
+                problem.expected("generic-cia402.toml has no [[mode]] row of it: it is refused"),
+            );
+        }
     }
     for row in &sercos.rows.mode {
         let mode = row.mode.get_ref();
@@ -35,6 +44,14 @@ fn modes(mapping: &Mapping, findings: &mut Findings) {
             let problem = Problem::new(code::MODE_UNSERVED, row.mode.span()).key("mode");
             let problem = problem.title(format!("no controller asks for the operating mode `{mode}`"));
             findings.push(&sercos.text, problem.expected("cip-generic.toml has no [[mode]] row of it"));
+        }
+    }
+    for row in &cia402.rows.mode {
+        let mode = row.mode.get_ref();
+        if !cip.rows.mode.iter().any(|other| other.mode.get_ref() == mode) {
+            let problem = Problem::new(code::MODE_UNSERVED, row.mode.span()).key("mode");
+            let problem = problem.title(format!("no controller asks for the operating mode `{mode}`"));
+            findings.push(&cia402.text, problem.expected("cip-generic.toml has no [[mode]] row of it"));
         }
     }
 }
@@ -67,6 +84,22 @@ fn units(mapping: &Mapping, findings: &mut Findings) {
         if !modes.any(|name| name.get_ref() == signal) {
             let problem = Problem::new(code::UNUSED, row.signal.span()).key("signal");
             findings.push(&sercos.text, problem.expected("no [[mode]] row has it in a telegram"));
+        }
+    }
+    let cia402 = &mapping.tables().generic_cia402;
+    let objects = dictionaries.cia402.objects();
+    for name in cia402.rows.unit.iter().map(|row| &row.unit).chain(cia402.rows.scaling.iter().map(|row| &row.unit)) {
+        if !objects.iter().flat_map(|object| &object.subs).any(|sub| sub.unit == *name.get_ref()) {
+            let problem = Problem::new(code::UNUSED, name.span()).key("unit");
+            findings.push(&cia402.text, problem.expected("no object of the dictionary is in this unit"));
+        }
+    }
+    for row in &cia402.rows.signal {
+        let signal = row.signal.get_ref();
+        let mut modes = cia402.rows.mode.iter().flat_map(|mode| mode.command.iter().chain(&mode.actual));
+        if !modes.any(|name| name.get_ref() == signal) {
+            let problem = Problem::new(code::UNUSED, row.signal.span()).key("signal");
+            findings.push(&cia402.text, problem.expected("no [[mode]] row has it in a PDO"));
         }
     }
 }

@@ -4,14 +4,16 @@
 //! they lead to.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use profile_generic::fault::Reaction;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::{BasicDrive, DriveState, Event, Report, Request};
 
 use crate::finding::registry as code;
-use crate::finding::{Findings, Problem};
+use crate::finding::{Findings, Problem, Source};
 use crate::mapping::Mapping;
+use crate::mapping::format::Name;
 
 /// More situations than the machine has; a bound for whoever changes it.
 const SITUATIONS_MAX: usize = 20_000;
@@ -26,39 +28,52 @@ enum Happening {
     FaultGone,
 }
 
-/// Walks the machine, for drives that acknowledge and for those that do not.
+/// Walks the machine, for drives that acknowledge and for those that do not, of both profiles.
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     let tables = mapping.tables();
     let cip = &tables.cip_generic.rows;
-    let sercos = &tables.generic_sercos;
+    let (sercos, cia402) = (&tables.generic_sercos, &tables.generic_cia402);
     let requests = cip.request.iter().filter_map(|row| row.request.as_ref());
     let requests = requests.chain(cip.drive_action.iter().filter_map(|row| row.request.as_ref()));
     let mut requests: Vec<Request> = requests.filter_map(|name| Request::parse(name.get_ref())).collect();
     // Stop and Coast are what the stopping actions come to.
     requests.extend([Request::Stop, Request::Coast]);
-    for acknowledges in [true, false] {
-        let rows = sercos
-            .rows
-            .report
-            .iter()
-            .filter(|row| row.acknowledges.is_none_or(|wanted| wanted == acknowledges));
-        let mut reports: Vec<Report> = rows.filter_map(|row| Report::parse(row.report.get_ref())).collect();
-        // The box itself says so.
-        reports.extend([Report::Silent, Report::NotReady]);
-        let drives = if acknowledges { "acknowledges" } else { "does not acknowledge" };
-        let walk = Walk::new(&happenings(&requests, &reports));
-        for state in DriveState::ALL {
-            let (code, what) = match (walk.comes_in(*state), walk.comes_out(*state)) {
-                (false, _) => (code::NO_WAY_IN, "never comes to"),
-                (_, false) => (code::NO_WAY_OUT, "never comes back to `ready` from"),
-                _ => continue,
-            };
-            let missing = missing(&requests, &reports);
-            let problem = Problem::new(code, sercos.rows.mapping.span());
-            let problem =
-                problem.title(format!("an axis {what} the state `{state}`, with a drive that {drives}"));
-            findings.push(&sercos.text, problem.expected(format!("no row brings {missing}")));
-        }
+    for told in [true, false] {
+        let counts = |wanted: Option<bool>| wanted.is_none_or(|wanted| wanted == told);
+        let rows = sercos.rows.report.iter().filter(|row| counts(row.acknowledges));
+        let drives = if told { "acknowledges" } else { "does not acknowledge" };
+        let place = (&sercos.text, sercos.rows.mapping.span());
+        walk(&requests, rows.map(|row| &row.report), &format!("a drive that {drives}"), place, findings);
+        let rows = cia402.rows.report.iter().filter(|row| counts(row.follows));
+        let drives = if told { "tells" } else { "does not tell" };
+        let drives = format!("a CiA 402 drive that {drives} whether it follows");
+        let place = (&cia402.text, cia402.rows.mapping.span());
+        walk(&requests, rows.map(|row| &row.report), &drives, place, findings);
+    }
+}
+
+/// Walks the machine with what some drives report.
+fn walk<'r>(
+    requests: &[Request],
+    reports: impl Iterator<Item = &'r Name>,
+    drives: &str,
+    (text, span): (&Source, Range<usize>),
+    findings: &mut Findings,
+) {
+    let mut reports: Vec<Report> = reports.filter_map(|name| Report::parse(name.get_ref())).collect();
+    // The box itself says so.
+    reports.extend([Report::Silent, Report::NotReady]);
+    let walk = Walk::new(&happenings(requests, &reports));
+    for state in DriveState::ALL {
+        let (code, what) = match (walk.comes_in(*state), walk.comes_out(*state)) {
+            (false, _) => (code::NO_WAY_IN, "never comes to"),
+            (_, false) => (code::NO_WAY_OUT, "never comes back to `ready` from"),
+            _ => continue,
+        };
+        let missing = missing(requests, &reports);
+        let problem = Problem::new(code, span.clone());
+        let problem = problem.title(format!("an axis {what} the state `{state}`, with {drives}"));
+        findings.push(text, problem.expected(format!("no row brings {missing}")));
     }
 }
 

@@ -7,7 +7,7 @@ use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, StatusBits};
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
-    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, StateTable,
+    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field, StateTable,
     Trackers, Width,
 };
 use profile_generic::state::{Action, Report};
@@ -204,6 +204,21 @@ impl DriveProgram {
             position_step: None,
             acknowledges,
         }
+    }
+
+    /// The values to the drive, each with what carries it.
+    pub fn command_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
+        self.command.fields().zip(self.telegram.command.iter().skip(self.heads()).copied())
+    }
+
+    /// The values from the drive, each with what carries it.
+    pub fn feedback_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
+        self.feedback.fields().zip(self.telegram.feedback.iter().skip(self.heads()).copied())
+    }
+
+    /// What stands in front of the values: control or status word, and the operating mode where it has an octet of its own.
+    fn heads(&self) -> usize {
+        1 + usize::from(self.mode_octets.is_some())
     }
 
     /// Puts a command and its control into the telegram to the drive. `control` is what was sent last, `status` what the

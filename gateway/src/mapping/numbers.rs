@@ -97,16 +97,14 @@ impl Mapping {
     /// What every signal and parameter can hold that has a row on both sides, on an axis with this scaling and this program.
     pub fn row_numbers(&self, scaling: &CipScaling, program: &DriveProgram) -> Vec<RowNumbers> {
         let mut numbers = Vec::new();
-        let fields = program.command.fields().chain(program.feedback.fields());
-        for field in fields {
+        for (field, item) in program.command_fields().chain(program.feedback_fields()) {
             let Some(north) = self.north_of_signal(field.signal, scaling) else { continue };
             let is_command = field.signal.is_command();
             let Some(back) = field.conversion.inverse() else { continue };
             let (outward, inward) =
                 if is_command { (field.conversion, back) } else { (back, field.conversion) };
-            let Some(rule) = self.sercos.signal(field.signal) else { continue };
             let south = South {
-                item: rule.idn.into(),
+                item,
                 width: field.width,
                 outward,
                 inward,

@@ -25,7 +25,7 @@ pub use self::commissioning::{ObjectStep, Plan};
 pub use self::compile::{Cia402Axis, Cia402Error};
 pub use self::facts::ObjectFacts;
 
-use super::drive_program::FaultRow;
+use super::drive_program::{FaultRow, MAX_MODES};
 use super::item::Object;
 
 /// An object that holds a number, and what it measures.
@@ -100,7 +100,7 @@ pub(super) struct ActionRule {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct ReportRule {
+pub(crate) struct ReportRule {
     pub pattern: BitPattern,
     /// Modes that the drive shows; empty = any.
     pub modes: Vec<i8>,
@@ -177,6 +177,16 @@ pub struct Cia402Tables {
 impl Cia402Tables {
     pub(super) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
         self.signals.iter().find(|rule| rule.signal == signal)
+    }
+
+    /// The operating modes that drives have.
+    pub fn modes(&self) -> impl Iterator<Item = ModeSelection> + '_ {
+        self.modes.iter().map(|rule| rule.selection).take(MAX_MODES)
+    }
+
+    /// What statuswords say, the first that fits counts.
+    pub(crate) fn reports(&self) -> &[ReportRule] {
+        &self.reports
     }
 
     /// What error codes mean, the first that fits counts.
