@@ -1,7 +1,7 @@
 //! Everything that the mapping tables say, as text: what no frame shows stands in it.
 
-use axisbridge::mapping::Mapping;
-use axisbridge::translate::Stage;
+use axisbridge::mapping::{Mapping, Plan};
+use axisbridge::translate::{Behind, Stage};
 
 /// Phases in which drives are commissioned.
 const PHASES: [u8; 2] = [2, 3];
@@ -16,13 +16,21 @@ pub fn listing(mapping: &Mapping, stage: &Stage) -> String {
     for axis in &stage.axes {
         let attributes = mapping.attribute_table(&axis.scaling);
         section(&mut text, &format!("attributes of {}", axis.name), &format!("{attributes:?}"));
-        for phase in PHASES {
-            let plan = mapping.commissioning(&axis.needs, phase, &axis.facts);
-            section(
-                &mut text,
-                &format!("commissioning of {} in CP{phase}", axis.drive),
-                &format!("{plan:?}"),
-            );
+        match &axis.behind {
+            Behind::Sercos(drive) => {
+                for phase in PHASES {
+                    let plan = mapping.commissioning(&drive.needs, phase, &drive.facts);
+                    let title = format!("commissioning of {} in CP{phase}", axis.drive);
+                    section(&mut text, &title, &format!("{plan:?}"));
+                }
+            }
+            Behind::Can(drive) => {
+                for plan in [Plan::Ask, Plan::Tell] {
+                    let steps = mapping.cia402_steps(plan, &drive.needs, &drive.facts);
+                    let title = format!("commissioning of {}: {plan:?}", axis.drive);
+                    section(&mut text, &title, &format!("{steps:?}"));
+                }
+            }
         }
     }
     text

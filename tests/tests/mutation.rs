@@ -351,7 +351,10 @@ fn a_change_of_any_row_is_noticed() {
     for (file, (name, _)) in FILES.into_iter().enumerate() {
         let of_file = |list: &Vec<&Mutant>| list.iter().filter(|mutant| mutant.file == file).count();
         let counted: usize = counts.values().map(of_file).sum();
-        println!("{counted:5} of them in {name}, {} survivors", counts.get(&Noticed::Nobody).map_or(0, of_file));
+        println!(
+            "{counted:5} of them in {name}, {} survivors",
+            counts.get(&Noticed::Nobody).map_or(0, of_file)
+        );
     }
     let name = |mutant: &&Mutant| format!("{} {}", FILES[mutant.file].0, mutant.what);
     if std::env::var_os(SPLIT).is_some() {

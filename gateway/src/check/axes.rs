@@ -14,7 +14,8 @@ use crate::engine::build::sercos::needs;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::mapping::{
-    AxisUnits, Cia402Axis, CipScaling, DriveFacts, DriveProgram, Mapping, ObjectFacts, RowNumbers, SercosAxis, SercosError,
+    AxisUnits, Cia402Axis, CipScaling, DriveFacts, DriveProgram, Mapping, ObjectFacts, RowNumbers,
+    SercosAxis, SercosError,
 };
 
 /// Nanounits, and parts per million, in the unit in which a configuration has its limits.
@@ -240,7 +241,9 @@ fn sercos(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     };
     match made {
         Ok(program) => rows(mapping, scaling, &program, (&file.text, "idn"), place, findings),
-        Err(error) => none(scaling.kind, "", &error.to_string(), &file.text, file.rows.mapping.span(), findings),
+        Err(error) => {
+            none(scaling.kind, "", &error.to_string(), &file.text, file.rows.mapping.span(), findings)
+        }
     }
 }
 
@@ -255,7 +258,9 @@ fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
         units: AxisUnits { kind: scaling.kind, ..AxisUnits::default() },
         modes: mapping.cia402.modes().collect(),
         way_of_a_turn: Ratio::new(WAY_OF_A_TURN, 1),
-        counts: [Quantity::Position, Quantity::Velocity, Quantity::Acceleration].map(|of| (of, count)).to_vec(),
+        counts: [Quantity::Position, Quantity::Velocity, Quantity::Acceleration]
+            .map(|of| (of, count))
+            .to_vec(),
         ..Cia402Axis::default()
     };
     let place = |row: &RowNumbers| {
@@ -268,13 +273,27 @@ fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     match mapping.cia402_program(&axis, &ObjectFacts::new()) {
         Ok(program) => rows(mapping, scaling, &program, (&file.text, "object"), place, findings),
         Err(error) => {
-            none(scaling.kind, " with a CiA 402 drive", &error.to_string(), &file.text, file.rows.mapping.span(), findings);
+            none(
+                scaling.kind,
+                " with a CiA 402 drive",
+                &error.to_string(),
+                &file.text,
+                file.rows.mapping.span(),
+                findings,
+            );
         }
     }
 }
 
 /// No program can be made of the tables.
-fn none(kind: UnitKind, drive: &str, error: &str, text: &Source, span: Range<usize>, findings: &mut Findings) {
+fn none(
+    kind: UnitKind,
+    drive: &str,
+    error: &str,
+    text: &Source,
+    span: Range<usize>,
+    findings: &mut Findings,
+) {
     let problem = Problem::new(code::AXIS_TABLES, span);
     let problem = problem.title(format!("no program can be made for a {kind} axis{drive}"));
     findings.push(text, problem.expected(error));

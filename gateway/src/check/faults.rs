@@ -114,7 +114,8 @@ fn sercos_reports(mapping: &Mapping, findings: &mut Findings) {
 fn cia402_faults(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_cia402;
     let codes = file.rows.fault.iter().flat_map(|row| row.codes.iter().map(|name| ("codes", name)));
-    let classes = file.rows.fault_class.iter().flat_map(|row| row.classes.iter().map(|name| ("classes", name)));
+    let classes =
+        file.rows.fault_class.iter().flat_map(|row| row.classes.iter().map(|name| ("classes", name)));
     let places: Vec<_> = codes.chain(classes).collect();
     let rules = mapping.cia402.faults();
     for (at, (rule, (key, name))) in rules.iter().zip(&places).enumerate() {

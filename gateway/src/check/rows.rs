@@ -88,7 +88,9 @@ fn units(mapping: &Mapping, findings: &mut Findings) {
     }
     let cia402 = &mapping.tables().generic_cia402;
     let objects = dictionaries.cia402.objects();
-    for name in cia402.rows.unit.iter().map(|row| &row.unit).chain(cia402.rows.scaling.iter().map(|row| &row.unit)) {
+    for name in
+        cia402.rows.unit.iter().map(|row| &row.unit).chain(cia402.rows.scaling.iter().map(|row| &row.unit))
+    {
         if !objects.iter().flat_map(|object| &object.subs).any(|sub| sub.unit == *name.get_ref()) {
             let problem = Problem::new(code::UNUSED, name.span()).key("unit");
             findings.push(&cia402.text, problem.expected("no object of the dictionary is in this unit"));

@@ -7,8 +7,8 @@ use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, StatusBits};
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
-    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field, StateTable,
-    Trackers, Width,
+    ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
+    StateTable, Trackers, Width,
 };
 use profile_generic::state::{Action, Report};
 
@@ -216,6 +216,44 @@ impl DriveProgram {
         self.feedback.fields().zip(self.telegram.feedback.iter().skip(self.heads()).copied())
     }
 
+    /// Whether it is what leads the drive, or shows its state: no PDO may be without it.
+    pub fn is_head(&self, item: Item) -> bool {
+        let heads = |items: &[Item]| items.iter().take(self.heads()).any(|head| *head == item);
+        heads(&self.telegram.command) || heads(&self.telegram.feedback)
+    }
+
+    /// What leads the drive: the control word, and the operating mode where it has an octet of its own.
+    pub fn heads_of_command(&self) -> impl Iterator<Item = Item> + '_ {
+        self.telegram.command.iter().take(self.heads()).copied()
+    }
+
+    /// Where an item stands in the telegram to the drive, and in how many bytes.
+    pub fn place_of_command(&self, item: Item) -> Option<(usize, usize)> {
+        let at = self.mode_octets.map(|[at, _]| at);
+        place(item, &self.telegram.command, at, self.command_fields())
+    }
+
+    /// The same of the telegram from the drive.
+    pub fn place_of_feedback(&self, item: Item) -> Option<(usize, usize)> {
+        let at = self.mode_octets.map(|[_, at]| at);
+        let word = self.status_words.iter().find(|word| word.item == item);
+        let word = word.and_then(|word| Some((usize::from(word.offset?), word.width.bytes())));
+        place(item, &self.telegram.feedback, at, self.feedback_fields()).or(word)
+    }
+
+    /// A status that says this, for whoever has not heard the drive.
+    pub fn status_of(&self, report: Report) -> Option<u32> {
+        self.reports
+            .rows()
+            .find(|(pattern, _)| self.report(pattern.value) == report)
+            .map(|(row, _)| row.value)
+    }
+
+    /// Whether an item is a word that shows faults or warnings.
+    pub fn is_diagnostic(&self, item: Item) -> bool {
+        self.faults.iter().any(|row| row.word == item)
+    }
+
     /// What stands in front of the values: control or status word, and the operating mode where it has an octet of its own.
     fn heads(&self) -> usize {
         1 + usize::from(self.mode_octets.is_some())
@@ -243,6 +281,12 @@ impl DriveProgram {
         }
         self.command.encode(command, telegram, report);
         control
+    }
+
+    /// The operating mode in a control or a status, where the drive has an octet of its own for it.
+    pub fn mode_octet(&self, word: u32) -> Option<i8> {
+        let [_, _, mode, _] = word.to_le_bytes();
+        self.mode_octets.map(|_| i8::from_le_bytes([mode]))
     }
 
     /// The control after an action in a mode: the control word, and the operating mode above it where it has an octet of its
@@ -415,5 +459,22 @@ impl DriveProgram {
     /// Everything the drive keeps, by parameter.
     pub fn parameters(&self) -> &[ParameterEntry] {
         &self.parameters
+    }
+}
+
+/// Where an item stands in a telegram: word, mode, fields.
+fn place<'f>(
+    item: Item,
+    items: &[Item],
+    mode: Option<u16>,
+    mut fields: impl Iterator<Item = (&'f Field, Item)>,
+) -> Option<(usize, usize)> {
+    match (items.iter().position(|known| *known == item)?, mode) {
+        (0, _) => Some((0, usize::from(WORD_BYTES))),
+        (1, Some(mode)) => Some((usize::from(mode), 1)),
+        _ => {
+            let (field, _) = fields.find(|(_, known)| *known == item)?;
+            Some((usize::from(field.offset), field.width.bytes()))
+        }
     }
 }

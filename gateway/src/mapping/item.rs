@@ -13,6 +13,19 @@ pub struct Object {
     pub sub: u8,
 }
 
+impl Object {
+    /// Reads what the tables write: `607A:00`.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let (index, sub) = text.split_once(':')?;
+        let hex = |text: &str, len| text.len() == len && text.bytes().all(|digit| digit.is_ascii_hexdigit());
+        if !hex(index, 4) || !hex(sub, 2) {
+            return None;
+        }
+        Some(Self { index: u16::from_str_radix(index, 16).ok()?, sub: u8::from_str_radix(sub, 16).ok()? })
+    }
+}
+
 /// As the tables write it: `607A:00`.
 impl fmt::Display for Object {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,5 +1,7 @@
 //! Where a row of the mapping tables stands, for those who ask which row made a value.
 
+mod cia402;
+
 use core::fmt;
 
 use profile_generic::fault::FaultCause;

@@ -1,10 +1,9 @@
-//! Attributes and IDNs beside the cyclic data.
+//! Attributes, IDNs and objects beside the cyclic data.
 
-use profile_sercos::wire::idn::Idn;
-
+use super::stage::StageAxis;
 use super::tree::hex;
 use super::{Node, TranslateError, Translator, quantity};
-use crate::mapping::{Access, Backing, CipFault, ParameterEntry, ValueError};
+use crate::mapping::{Access, Backing, CipFault, Item, ParameterEntry, ValueError};
 
 impl Translator {
     /// The controller sets an attribute of an axis.
@@ -58,7 +57,7 @@ impl Translator {
                     .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
                 node.push(Node::new(format!("{parameter} {measured}")).by(row));
                 match axis.south.parameter(parameter) {
-                    Some(place) => node.push(self.written(place, value)),
+                    Some(place) => node.push(self.written(axis, place, value)),
                     None if reject => node.push(Node::new("the drive has no such parameter: refused")),
                     None => node.push(Node::new("the drive has no such parameter: stored only")),
                 }
@@ -67,8 +66,8 @@ impl Translator {
         Ok(node)
     }
 
-    fn written(&self, place: &ParameterEntry, value: i64) -> Node {
-        let row = self.stage.mapping.parameter_row(place.parameter);
+    fn written(&self, axis: &StageAxis, place: &ParameterEntry, value: i64) -> Node {
+        let row = axis.parameter_row(&self.stage.mapping, place.parameter);
         let name = self.named(place.item);
         match place.encode(value) {
             None => Node::new(format!("{name}: can only be read")).by(row),
@@ -79,42 +78,29 @@ impl Translator {
         }
     }
 
-    /// A drive gives element 7 of an IDN.
-    pub(super) fn idn(&mut self, number: usize, idn: Idn, bytes: &[u8]) -> Result<Node, TranslateError> {
+    /// A drive gives element 7 of an IDN, or an object.
+    pub(super) fn held(&mut self, number: usize, item: Item, bytes: &[u8]) -> Result<Node, TranslateError> {
         let axis = &self.stage.axes[number];
         let mapping = &self.stage.mapping;
-        let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(idn.into()), hex(bytes)));
+        let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(item), hex(bytes)));
         let word = match *bytes {
             [a, b] => Some(u32::from(u16::from_le_bytes([a, b]))),
             [a, b, c, d] => Some(u32::from_le_bytes([a, b, c, d])),
             _ => None,
         };
-        if let Some(word) = word.filter(|_| mapping.sercos.is_diagnostic(idn)) {
-            for (cause, reaction) in axis.south.faults(idn.into(), word) {
-                let mut fault = Node::new(format!("{cause}, reaction {reaction}"))
-                    .by(mapping.fault_row(idn, word, cause));
-                let seen = match axis.north.fault(cause) {
-                    Some(CipFault::Axis { fault_type, alarm_type, code }) => {
-                        let alarm = alarm_type
-                            .map_or_else(String::new, |kind| format!(", as an alarm of type {kind}"));
-                        format!("Axis Fault Type {fault_type}, code {code}{alarm}")
-                    }
-                    Some(CipFault::Node(code)) => format!("Node Fault Code {code}"),
-                    None => "no CIP exception".to_owned(),
-                };
-                fault.push(Node::new(seen).by(mapping.exception_row(cause)));
-                node.push(fault);
-            }
-            if node.children.is_empty() {
-                node.push(Node::new("nothing is wrong"));
-            }
+        let is_diagnostic = match item {
+            Item::Idn(idn) => mapping.sercos.is_diagnostic(idn),
+            Item::Object(_) => axis.south.is_diagnostic(item),
+        };
+        if let Some(word) = word.filter(|_| is_diagnostic) {
+            self.causes(number, item, word, &mut node);
             return Ok(node);
         }
-        for place in axis.south.parameters().iter().filter(|place| place.item == idn.into()) {
+        for place in axis.south.parameters().iter().filter(|place| place.item == item) {
             let Some(value) = place.decode(bytes) else {
                 let text = format!(
                     "{}: expected {} bytes, got {}",
-                    self.named(idn.into()),
+                    self.named(item),
                     place.width.bytes(),
                     bytes.len()
                 );
@@ -125,7 +111,7 @@ impl Translator {
                 .row()
                 .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
             let mut read = Node::new(format!("{} {measured}", place.parameter))
-                .by(mapping.parameter_row(place.parameter));
+                .by(axis.parameter_row(mapping, place.parameter));
             for entry in axis.attributes.entries() {
                 let Backing::Parameter { parameter, .. } = entry.backing else { continue };
                 if parameter != place.parameter {
@@ -152,5 +138,30 @@ impl Translator {
             node.push(Node::new("no row"));
         }
         Ok(node)
+    }
+
+    /// What a word says is wrong, and how the controller sees it.
+    pub(super) fn causes(&self, number: usize, item: Item, word: u32, node: &mut Node) {
+        let (axis, mapping) = (&self.stage.axes[number], &self.stage.mapping);
+        let mut any = false;
+        for (cause, reaction) in axis.south.faults(item, word) {
+            let mut fault = Node::new(format!("{cause}, reaction {reaction}"))
+                .by(axis.fault_row(mapping, item, word, cause));
+            let seen = match axis.north.fault(cause) {
+                Some(CipFault::Axis { fault_type, alarm_type, code }) => {
+                    let alarm =
+                        alarm_type.map_or_else(String::new, |kind| format!(", as an alarm of type {kind}"));
+                    format!("Axis Fault Type {fault_type}, code {code}{alarm}")
+                }
+                Some(CipFault::Node(code)) => format!("Node Fault Code {code}"),
+                None => "no CIP exception".to_owned(),
+            };
+            fault.push(Node::new(seen).by(mapping.exception_row(cause)));
+            node.push(fault);
+            any = true;
+        }
+        if !any {
+            node.push(Node::new("nothing is wrong"));
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! From the controller to the drive.
 
+use profile_cia402::eds::drive::Direction;
 use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
 use profile_generic::image::{AxisCommand, Signal};
@@ -7,9 +8,10 @@ use profile_generic::program::{ConversionReport, Field};
 use profile_generic::quantity::Position;
 use profile_generic::state::{Action, DriveState};
 
+use super::stage::{Behind, CanDrive, StageAxis};
 use super::tree::hex;
 use super::{Node, Translator, shown};
-use crate::mapping::{CyclicValues, Item};
+use crate::mapping::{Cia402Dictionary, CyclicValues, Item};
 
 /// The longest telegram of a drive.
 const TELEGRAM_MAX: usize = 256;
@@ -84,7 +86,7 @@ impl Translator {
             Some(machine) => {
                 let before = machine.state();
                 let transition = machine.request(asked);
-                state.take(transition.action);
+                state.take(transition.action, &axis.south);
                 format!(
                     "Axis Control {code} -> {asked}: {before} -> {}, action {}",
                     transition.next, transition.action
@@ -102,7 +104,11 @@ impl Translator {
             None => !refused,
             Some(machine) => machine.state() == DriveState::Operating && !refused,
         };
-        let action = if state.machine.is_none() { Action::Enable } else { state.action };
+        let action = match state.machine {
+            None => Action::Enable,
+            Some(_) if std::mem::take(&mut state.pulse) => Action::ResetFault,
+            Some(_) => state.action,
+        };
         if !led {
             // A drive that does not follow is shown its own position.
             let position = state.feedback.position;
@@ -116,28 +122,39 @@ impl Translator {
         let (control, status) = (state.control, state.status);
         let word = axis.south.encode(&command, action, control, status, &mut bytes[..len], &mut report);
         (state.control, state.command) = (word, command);
-        let mut node =
-            Node::new(format!("MDT of {}, connection 0, {len} bytes: {}", axis.drive, hex(&bytes[..len])));
+        let mut node = Node::new(sent(axis, &bytes[..len]));
         if !led {
             node.push(Node::new("the drive does not follow: set-points are withheld"));
         }
-        let mut telegram = axis.south.telegram.command.iter();
-        if let Some(idn) = telegram.next() {
-            let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(*idn), command.mode);
+        let selection = command.selection();
+        let mut heads = axis.south.telegram.command.iter();
+        if let Some(item) = heads.next() {
+            let text = format!(
+                "{} {:#06x}: action {action}, mode {}",
+                self.named(*item),
+                word & 0xFFFF,
+                command.mode
+            );
             node.push(
-                Node::new(text).by(mapping.action_row(action)).by(mapping.mode_row(command.selection())),
+                Node::new(text)
+                    .by(axis.action_row(mapping, action, status))
+                    .by(axis.mode_row(mapping, selection)),
             );
         }
-        for (field, idn) in axis.south.command.fields().zip(telegram) {
+        if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
+            let text = format!("{} {octet}: mode {}", self.named(*item), command.mode);
+            node.push(Node::new(text).by(axis.mode_row(mapping, selection)));
+        }
+        for (field, item) in axis.south.command_fields() {
             let value = command.get(field.signal).unwrap_or_default();
             let text = format!(
                 "{}: {} <- {} {}",
-                self.named(*idn),
-                raw(field, &bytes),
+                self.named(item),
+                raw(axis, field, &bytes),
                 field.signal,
                 shown(axis, field.signal, value)
             );
-            node.push(Node::new(text).by(mapping.signal_row(field.signal)));
+            node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
         }
         if report.saturated > 0 {
             node.push(Node::new(format!(
@@ -151,30 +168,60 @@ impl Translator {
     /// What stands in a telegram from the master, read back.
     pub(super) fn command_values(&self, number: usize, bytes: &[u8]) -> Node {
         let axis = &self.stage.axes[number];
-        let mut node =
-            Node::new(format!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes)));
-        let mut telegram = axis.south.telegram.command.iter();
-        if let (Some(idn), Some(word)) = (telegram.next(), bytes.first_chunk()) {
-            node.push(Node::new(format!("{} {:#06x}", self.named(*idn), u16::from_le_bytes(*word))));
+        let mut node = Node::new(sent(axis, bytes));
+        if let (Some(item), Some(word)) = (axis.south.telegram.command.first(), bytes.first_chunk()) {
+            node.push(Node::new(format!("{} {:#06x}", self.named(*item), u16::from_le_bytes(*word))));
         }
-        for (field, idn) in axis.south.command.fields().zip(telegram) {
-            let back = field.conversion.inverse().zip(integer(field, bytes));
-            let value = back.map_or_else(String::new, |(conversion, raw)| {
-                shown(axis, field.signal, conversion.convert(raw).value)
-            });
-            let text = format!("{}: {} = {} {value}", self.named(*idn), raw(field, bytes), field.signal);
-            node.push(Node::new(text).by(self.stage.mapping.signal_row(field.signal)));
+        for (field, item) in axis.south.command_fields() {
+            node.push(self.command_value(number, field, item, bytes));
         }
         node
     }
 
-    /// An IDN with its name.
-    pub(super) fn named(&self, item: Item) -> String {
-        match item.idn().and_then(|idn| self.stage.mapping.dictionaries.sercos.idn(idn)) {
-            Some(row) => format!("{item} {}", row.name),
-            None => item.to_string(),
-        }
+    /// A value of it.
+    pub(super) fn command_value(&self, number: usize, field: &Field, item: Item, bytes: &[u8]) -> Node {
+        let axis = &self.stage.axes[number];
+        let back = field.conversion.inverse().zip(integer(field, bytes));
+        let value = back.map_or_else(String::new, |(conversion, raw)| {
+            shown(axis, field.signal, conversion.convert(raw).value)
+        });
+        let text = format!("{}: {} = {} {value}", self.named(item), raw(axis, field, bytes), field.signal);
+        Node::new(text).by(axis.signal_row(&self.stage.mapping, field.signal))
     }
+
+    /// An IDN or object with its name.
+    pub(super) fn named(&self, item: Item) -> String {
+        let dictionaries = &self.stage.mapping.dictionaries;
+        let name = match item {
+            Item::Idn(idn) => dictionaries.sercos.idn(idn).map(|row| row.name.clone()),
+            Item::Object(object) => {
+                let index = Cia402Dictionary::on_first_axis(object.index);
+                let row = dictionaries.cia402.object(index);
+                row.map(|row| match row.sub(object.sub).map(|sub| sub.name.as_str()) {
+                    Some(sub) if object.sub > 0 && !sub.is_empty() => format!("{}, {sub}", row.name),
+                    _ => row.name.clone(),
+                })
+            }
+        };
+        name.map_or_else(|| item.to_string(), |name| format!("{item} {name}"))
+    }
+}
+
+/// What goes to a drive, in the frames that carry it.
+fn sent(axis: &StageAxis, bytes: &[u8]) -> String {
+    match &axis.behind {
+        Behind::Sercos(_) => {
+            format!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
+        }
+        Behind::Can(drive) => frames(&axis.drive, drive, Direction::Receive, bytes),
+    }
+}
+
+/// The PDOs of a drive with the values of its program.
+pub(super) fn frames(name: &str, drive: &CanDrive, direction: Direction, bytes: &[u8]) -> String {
+    let pdos = drive.pdos.iter().filter(|pdo| pdo.direction == direction);
+    let text = pdos.map(|pdo| format!("{pdo} {}", hex(&CanDrive::spread(pdo, bytes))));
+    format!("PDOs of {name}: {}", text.collect::<Vec<_>>().join(", "))
 }
 
 /// Set-points that a mode has no use for are zero, and the position is that of the axis, as in the cycle.
@@ -213,12 +260,18 @@ fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
     elements
 }
 
-/// The bytes of a field and the number in them.
-pub(super) fn raw(field: &Field, telegram: &[u8]) -> String {
+/// The bytes of a field, the number in them, and where they stand in which frame.
+pub(super) fn raw(axis: &StageAxis, field: &Field, telegram: &[u8]) -> String {
     let start = usize::from(field.offset);
     let bytes = telegram.get(start..start + field.width.bytes()).unwrap_or_default();
     let number = integer(field, telegram).map_or_else(String::new, |number| format!("{number} "));
-    format!("{number}({} at {start})", hex(bytes))
+    let way = if field.signal.is_command() { Direction::Receive } else { Direction::Transmit };
+    let place = match axis.can().map(|drive| drive.place(way, start)) {
+        None => start.to_string(),
+        Some(Some((pdo, at))) => format!("{at} of {}{}", pdo.kind(), pdo.number),
+        Some(None) => "no place".to_owned(),
+    };
+    format!("{number}({} at {place})", hex(bytes))
 }
 
 /// The number in a field; `None` for one that is not there, or no integer.

@@ -1,5 +1,6 @@
 //! From the drive to the controller.
 
+use profile_cia402::eds::drive::Direction;
 use profile_cip::wire::Writer;
 use profile_cip::wire::motion::codes::{AxisStateCode, AxisStatus, ControlMode};
 use profile_cip::wire::motion::{ActualBlock, ActualPosition, ActualValues, StatusValues};
@@ -8,10 +9,11 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::state::{Action, BasicDrive, Report, Request};
 
-use super::command::raw;
+use super::command::{frames, raw};
+use super::stage::Behind;
 use super::tree::hex;
 use super::{AxisState, Node, Translator, flags, shown};
-use crate::mapping::{CipValue, CyclicValues};
+use crate::mapping::{CipValue, CyclicValues, DriveProgram};
 
 /// Octets of the longest cyclic actual block that is made here.
 const BLOCK_MAX: usize = 64;
@@ -25,10 +27,13 @@ const ELEMENTS: [(u8, &str, Signal); 3] = [
 
 impl AxisState {
     /// Takes what the state machine wants of the drive.
-    pub(super) fn take(&mut self, action: Action) {
+    pub(super) fn take(&mut self, action: Action, drive: &DriveProgram) {
         match action {
-            // A reset is a procedure command; the control word stays without torque.
-            Action::ResetFault => self.action = Action::TorqueOff,
+            // A reset is a procedure command, or bits of one telegram; the control word stays without torque.
+            Action::ResetFault => {
+                self.action = Action::TorqueOff;
+                self.pulse = drive.command_of(Action::ResetFault).is_none();
+            }
             Action::None | Action::Reject => {}
             action => self.action = action,
         }
@@ -40,8 +45,13 @@ impl Translator {
     pub(super) fn feedback(&mut self, number: usize, bytes: &[u8]) -> Node {
         let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
         let mapping = &self.stage.mapping;
-        let mut node =
-            Node::new(format!("AT of {}, connection 1, {} bytes: {}", axis.drive, bytes.len(), hex(bytes)));
+        let came = match &axis.behind {
+            Behind::Sercos(_) => {
+                format!("AT of {}, connection 1, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
+            }
+            Behind::Can(drive) => frames(&axis.drive, drive, Direction::Transmit, bytes),
+        };
+        let mut node = Node::new(came);
         let mut report = ConversionReport::default();
         let needed = usize::from(axis.south.telegram.feedback_bytes);
         let Some(word) = axis.south.decode(bytes, false, &mut state.feedback, &mut state.south, &mut report)
@@ -56,36 +66,41 @@ impl Translator {
         let transition = machine.report(told);
         let next = machine.state();
         state.feedback.state = next;
-        state.take(transition.action);
+        state.take(transition.action, &axis.south);
         let state = &self.states[number];
-        let mut telegram = axis.south.telegram.feedback.iter();
-        if let Some(idn) = telegram.next() {
+        let mut heads = axis.south.telegram.feedback.iter();
+        if let Some(item) = heads.next() {
             let mode = axis.south.mode(word);
             let shown = mode.map_or_else(|| "none that was set up".to_owned(), |mode| mode.to_string());
-            let mut status = Node::new(format!("{} {word:#06x}: {told}, mode {shown}", self.named(*idn)))
-                .by(mapping.report_row(word, axis.silent))
-                .by(mode.and_then(|mode| mapping.mode_row(mode)));
+            let text = format!("{} {:#06x}: {told}, mode {shown}", self.named(*item), word & 0xFFFF);
+            let mut status = Node::new(text)
+                .by(axis.report_row(mapping, word))
+                .by(mode.and_then(|mode| axis.mode_row(mapping, mode)));
             let words = axis.south.status_words(bytes);
             for (idn, word) in &words {
                 status.push(Node::new(format!("{} {word:#06x}", self.named(*idn))));
             }
             let bits = axis.south.status_bits(word, &words);
             if !bits.is_empty() {
-                let rows = mapping.status_rows(word, &words, axis.silent);
+                let rows = axis.status_rows(mapping, word, &words);
                 status.push(Node::new(format!("status: {}", flags(bits.iter_names()))).by(rows));
             }
             node.push(status);
+            if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
+                let row = mode.and_then(|mode| axis.mode_row(mapping, mode));
+                node.push(Node::new(format!("{} {octet}: mode {shown}", self.named(*item))).by(row));
+            }
         }
-        for (field, idn) in axis.south.feedback.fields().zip(telegram) {
+        for (field, item) in axis.south.feedback_fields() {
             let Some(value) = state.feedback.get(field.signal) else { continue };
             let text = format!(
                 "{}: {} -> {} {}",
-                self.named(*idn),
-                raw(field, bytes),
+                self.named(item),
+                raw(axis, field, bytes),
                 field.signal,
                 shown(axis, field.signal, value)
             );
-            node.push(Node::new(text).by(mapping.signal_row(field.signal)));
+            node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
         }
         if bytes.len() < needed {
             node.push(Node::new(format!(

@@ -3,14 +3,19 @@
 //! ```text
 //! # what follows a number sign is a comment
 //! 06 02 10 00 ...                   a frame, a datagram or an update
-//! at drive-a 08 c0 00 00 ...        what a drive sent in a cycle, without C-CON
+//! at drive-a 08 c0 00 00 ...        what a SERCOS drive sent in a cycle, without C-CON
 //! idn drive-a S-0-0011 04 00        element 7 of a parameter, as the drive gives it
+//! can 183 27 16 08 00 ...           a CAN frame: a PDO or EMCY of a drive, SYNC
+//! object drive-c 603F:00 20 23      an object, as the drive gives it
 //! set turntable 473 00 00 20 41     the controller sets an attribute
 //! writes turntable 431 491          the attributes of the controller's cyclic write data
 //! restart                           forgets what the frames before have told
 //! ```
 
+use profile_generic::can::{Frame, Id};
 use profile_sercos::wire::idn::Idn;
+
+use crate::mapping::{Item, Object};
 
 /// The longest frame.
 const BYTES_MAX: usize = 1600;
@@ -28,14 +33,16 @@ pub enum Line<'t> {
         bytes: Vec<u8>,
     },
     /// A parameter of a drive.
-    Idn {
+    Held {
         /// Name of the drive.
         drive: &'t str,
         /// Which.
-        idn: Idn,
-        /// Element 7.
+        item: Item,
+        /// Element 7, or the value of the object.
         bytes: Vec<u8>,
     },
+    /// A CAN frame.
+    Can(Frame),
     /// What the frames before have told is forgotten.
     Restart,
     /// The list of an axis's cyclic write data.
@@ -83,8 +90,24 @@ impl<'t> Line<'t> {
             "idn" => {
                 let drive = words.expect("the name of a drive")?;
                 let word = words.expect("a parameter, as S-0-0011")?;
-                let idn = word.parse().map_err(|_| words.error(word, "a parameter, as S-0-0011"))?;
-                Self::Idn { drive, idn, bytes: words.bytes()? }
+                let idn: Idn = word.parse().map_err(|_| words.error(word, "a parameter, as S-0-0011"))?;
+                Self::Held { drive, item: idn.into(), bytes: words.bytes()? }
+            }
+            "object" => {
+                let drive = words.expect("the name of a drive")?;
+                let word = words.expect("an object, as 603F:00")?;
+                let object = Object::parse(word).ok_or_else(|| words.error(word, "an object, as 603F:00"))?;
+                Self::Held { drive, item: Item::Object(object), bytes: words.bytes()? }
+            }
+            "can" => {
+                let word = words.expect("an identifier, as 183")?;
+                let wanted = "an identifier of 11 bits in hexadecimal, as 183";
+                let id = u16::from_str_radix(word, 16).map_err(|_| words.error(word, wanted))?;
+                let bytes = words.bytes()?;
+                let frame = Frame::new(Id::Standard(id), &bytes);
+                Self::Can(
+                    frame.map_err(|_| words.error(word, "an identifier up to 7FF, and at most 8 bytes"))?,
+                )
             }
             "set" => {
                 let axis = words.expect("the name of an axis")?;
@@ -177,7 +200,11 @@ mod tests {
         assert_eq!(parse("06 02 1000 # a frame"), Some(Line::Frame(vec![6, 2, 0x10, 0])));
         assert_eq!(parse("at d 08c0"), Some(Line::Actual { drive: "d", bytes: vec![8, 0xC0] }));
         let idn = Idn::standard(11);
-        assert_eq!(parse("idn d S-0-0011 04 00"), Some(Line::Idn { drive: "d", idn, bytes: vec![4, 0] }));
+        let held = |item, bytes| Some(Line::Held { drive: "d", item, bytes });
+        assert_eq!(parse("idn d S-0-0011 04 00"), held(idn.into(), vec![4, 0]));
+        assert_eq!(parse("object d 603F:00 20 23 # I2t"), held(Item::object(0x603F, 0), vec![0x20, 0x23]));
+        let frame = Frame::new(Id::Standard(0x183), &[0x27, 6, 8]).unwrap();
+        assert_eq!(parse("can 183 2706 08"), Some(Line::Can(frame)));
         let set = Line::Set { axis: "a", attribute: 473, bytes: vec![0, 0, 0x20, 0x41] };
         assert_eq!(parse("set a 473 0x00002041"), Some(set));
         assert_eq!(
@@ -194,6 +221,14 @@ mod tests {
             ("06 0g", 4, "expected pairs of hexadecimal digits, got `0g`"),
             ("at", 3, "expected the name of a drive, got the end of the line"),
             ("idn d 11 00", 7, "expected a parameter, as S-0-0011, got `11`"),
+            ("object d 603F 00", 10, "expected an object, as 603F:00, got `603F`"),
+            ("can 18g 00", 5, "expected an identifier of 11 bits in hexadecimal, as 183, got `18g`"),
+            ("can 800 00", 5, "expected an identifier up to 7FF, and at most 8 bytes, got `800`"),
+            (
+                "can 183 000102030405060708",
+                5,
+                "expected an identifier up to 7FF, and at most 8 bytes, got `183`",
+            ),
             ("set a 65536 00", 7, "expected the number of an attribute, 0 to 65535, got `65536`"),
             ("writes a 431 x", 14, "expected the number of an attribute, 0 to 65535, got `x`"),
             ("writes", 7, "expected the name of an axis, got the end of the line"),

@@ -9,6 +9,7 @@ use profile_sercos::wire::describe::Names;
 use profile_sercos::wire::header::{Header, Phase};
 
 use super::{Line, LineError, Node, Stage, Translator};
+use crate::capture::can::{self, LINK_TYPE_CAN, Record};
 use crate::capture::reader::{ReadError, Reader};
 use crate::config::Config;
 use crate::decode::Decoder;
@@ -81,7 +82,7 @@ fn heading(line: &str) -> String {
     }
 }
 
-/// Translates the updates of CIP Motion connections and the cyclic SERCOS telegrams in a recording.
+/// Translates the updates of CIP Motion connections, the cyclic SERCOS telegrams, and PDOs and EMCY of CiA 402 drives in a recording.
 ///
 /// # Errors
 /// The recording cannot be read on.
@@ -95,6 +96,20 @@ pub fn translate_capture<R: Read>(
     let mut decoder = Decoder::new(names);
     let mut list = List::default();
     while let Some(frame) = reader.next_frame()? {
+        if frame.link_type == LINK_TYPE_CAN {
+            let record = can::parse(frame.data);
+            let translated = match &record {
+                Ok(Record::Frame(record)) => translator.can(record),
+                _ => None,
+            };
+            match (translated, record) {
+                (Some(translated), Ok(record)) => {
+                    list.push(format!("frame {} {record}", frame.number), translated)
+                }
+                _ => list.passed_over += 1,
+            }
+            continue;
+        }
         decoder.frame(&frame);
         let wanted = match packet::parse(frame.data) {
             Packet::Sercos => {

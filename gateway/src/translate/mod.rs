@@ -1,9 +1,9 @@
 //! Frames through the mapping tables: what the box makes of them, and which row of which file made each value.
 //!
 //! ```text
-//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT
-//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT
-//! Set attribute --AttributeTable--> generic parameter --DriveProgram--> element 7 of an IDN, and back
+//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT, RPDOs
+//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT, TPDOs
+//! Set attribute --AttributeTable--> generic parameter --DriveProgram--> element 7 of an IDN, object, and back
 //! diagnostic word --DriveProgram--> faults --CipProgram--> exceptions
 //! ```
 //!
@@ -13,11 +13,13 @@
 //! operating.
 
 mod access;
+mod can;
 mod command;
 mod feedback;
 mod frame;
 mod line;
 mod list;
+mod rows;
 mod stage;
 mod tree;
 mod written;
@@ -32,7 +34,7 @@ use profile_generic::quantity::{
     Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
 };
 use profile_generic::scaling::UnitKind;
-use profile_generic::state::{Action, BasicDrive};
+use profile_generic::state::{Action, BasicDrive, Report};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
 
@@ -41,7 +43,7 @@ use crate::mapping::CipTrackers;
 pub use frame::{FrameError, Recognised, recognise};
 pub use line::{Line, LineError};
 pub use list::{List, ListError, translate_capture, translate_list};
-pub use stage::{Stage, StageAxis, StageError};
+pub use stage::{Behind, CanDrive, CanMember, CanPart, CanPdo, SercosDrive, Stage, StageAxis, StageError};
 pub use tree::{Node, RowNames};
 
 /// Connection of a drive with its command values, and with its actual values.
@@ -61,6 +63,11 @@ struct AxisState {
     feedback: AxisFeedback,
     /// Attributes of the cyclic write data, in their order.
     writes: Vec<u16>,
+    /// The next telegram resets the drive.
+    pulse: bool,
+    /// What has come of the values of a drive on CANopen, and by which of its TPDOs.
+    came: Vec<u8>,
+    heard: Vec<u16>,
 }
 
 /// Translates frame after frame.
@@ -106,12 +113,16 @@ impl Translator {
             machine: None,
             action: Action::TorqueOff,
             control: 0,
-            status: 0,
+            // Before it was heard it counts as operating.
+            status: axis.south.status_of(Report::Operating).unwrap_or(0),
             north: axis.north.trackers(),
             south: axis.south.feedback.trackers(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             writes: Vec::new(),
+            pulse: false,
+            came: vec![0; usize::from(axis.south.telegram.feedback_bytes)],
+            heard: Vec::new(),
         });
         states.collect()
     }
@@ -138,10 +149,13 @@ impl Translator {
                 let axis = self.drive(drive)?;
                 Ok(self.feedback(axis, bytes))
             }
-            Line::Idn { drive, idn, bytes } => {
+            Line::Held { drive, item, bytes } => {
                 let axis = self.drive(drive)?;
-                self.idn(axis, *idn, bytes)
+                self.held(axis, *item, bytes)
             }
+            Line::Can(frame) => self.can(frame).unwrap_or_else(|| {
+                Err(TranslateError::Value(format!("{}: no PDO and no EMCY of a drive here", frame.id())))
+            }),
             Line::Restart => {
                 self.states = Self::unheard(&self.stage);
                 Ok(Node::new("restart"))
@@ -214,7 +228,7 @@ impl Translator {
         let data = frame.get(HEADER_LEN..).unwrap_or_default();
         let wanted = if kind == Kind::At { FEEDBACK_CONNECTION } else { COMMAND_CONNECTION };
         for axis in 0..self.stage.axes.len() {
-            let topology = self.stage.axes[axis].topology;
+            let Some(topology) = self.stage.axes[axis].sercos().map(|drive| drive.topology) else { continue };
             let places = self.stage.layout.devices.iter().find(|device| device.address == topology);
             let place = places.and_then(|device| {
                 device.connections.iter().find(|place| place.index == wanted && place.at.telegram == number)

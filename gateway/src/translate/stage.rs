@@ -3,10 +3,14 @@
 //! What is compiled depends on what the drives tell about themselves, their scaling before all. The simulated ones stand in
 //! for those of the machine.
 
+mod can;
+
 use std::net::SocketAddrV4;
 
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::wire::layout::Layout;
+
+pub use can::{CanDrive, CanMember, CanPart, CanPdo};
 
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
@@ -32,16 +36,8 @@ pub struct StageAxis {
     pub instance: u8,
     /// Name of its drive.
     pub drive: String,
-    /// SERCOS address of the drive.
-    pub address: u16,
-    /// Topology address of the drive.
-    pub topology: u16,
-    /// The drive's status word does not tell that it follows and is halted.
-    pub silent: bool,
-    /// What the drive is needed for.
-    pub needs: SercosAxis,
-    /// What the drive has told of itself.
-    pub facts: DriveFacts,
+    /// The drive, by its profile.
+    pub behind: Behind,
     /// The scaling of the controller.
     pub scaling: CipScaling,
     /// Its attributes.
@@ -52,6 +48,50 @@ pub struct StageAxis {
     pub south: DriveProgram,
 }
 
+/// What is behind an axis.
+#[derive(Debug, Clone)]
+pub enum Behind {
+    /// A SERCOS III drive.
+    Sercos(SercosDrive),
+    /// A CiA 402 drive on CANopen.
+    Can(CanDrive),
+}
+
+/// A SERCOS III drive.
+#[derive(Debug, Clone)]
+pub struct SercosDrive {
+    /// Its address.
+    pub address: u16,
+    /// Its topology address.
+    pub topology: u16,
+    /// Its status word does not tell that it follows and is halted.
+    pub silent: bool,
+    /// What it is needed for.
+    pub needs: SercosAxis,
+    /// What it has told of itself.
+    pub facts: DriveFacts,
+}
+
+impl StageAxis {
+    /// The drive, where it is a SERCOS drive.
+    #[must_use]
+    pub fn sercos(&self) -> Option<&SercosDrive> {
+        match &self.behind {
+            Behind::Sercos(drive) => Some(drive),
+            Behind::Can(_) => None,
+        }
+    }
+
+    /// The drive, where it is on CANopen.
+    #[must_use]
+    pub fn can(&self) -> Option<&CanDrive> {
+        match &self.behind {
+            Behind::Can(drive) => Some(drive),
+            Behind::Sercos(_) => None,
+        }
+    }
+}
+
 /// All axes of a configuration, and where each drive has its place in the telegrams.
 #[derive(Debug)]
 pub struct Stage {
@@ -59,7 +99,7 @@ pub struct Stage {
     pub mapping: Mapping,
     /// The axes in the order of the configuration.
     pub axes: Vec<StageAxis>,
-    /// The telegrams of CP4.
+    /// The SERCOS telegrams of CP4.
     pub layout: Layout,
 }
 
@@ -69,6 +109,14 @@ pub enum StageError {
     /// The configuration makes no box.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// A drive on CANopen cannot be led by its data sheet.
+    #[error("axis {axis}: the drive of its data sheet cannot be led: {told}")]
+    Sheet {
+        /// The axis.
+        axis: String,
+        /// Why.
+        told: String,
+    },
     /// A drive was not commissioned.
     #[error("axis {axis}: its simulated drive is not commissioned: {told}")]
     Drive {
@@ -137,11 +185,13 @@ impl Stage {
                 device: axis.device,
                 instance: axis.instance,
                 drive: drive.name.clone(),
-                address: drive.address,
-                topology: slave.topology_address(),
-                silent: !drive.acknowledges,
-                needs: needs.clone(),
-                facts: facts.clone(),
+                behind: Behind::Sercos(SercosDrive {
+                    address: drive.address,
+                    topology: slave.topology_address(),
+                    silent: !drive.acknowledges,
+                    needs: needs.clone(),
+                    facts: facts.clone(),
+                }),
                 scaling,
                 attributes,
                 north: channel.north().clone(),
@@ -160,9 +210,14 @@ impl Stage {
     pub fn with_mapping(&self, mapping: Mapping) -> Result<Self, StageError> {
         let axes = self.axes.iter().map(|axis| {
             let failed = |told: String| StageError::Drive { axis: axis.name.clone(), told };
-            let south = mapping
-                .sercos_program(&axis.needs, &axis.facts)
-                .map_err(|error| failed(error.to_string()))?;
+            let south = match &axis.behind {
+                Behind::Sercos(drive) => mapping
+                    .sercos_program(&drive.needs, &drive.facts)
+                    .map_err(|error| failed(error.to_string()))?,
+                Behind::Can(drive) => mapping
+                    .cia402_program(&drive.needs, &drive.facts)
+                    .map_err(|error| failed(error.to_string()))?,
+            };
             let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
             let north = mapping.cip_program(&axis.scaling).ok_or_else(no_ratio)?;
             let attributes = mapping.attribute_table(&axis.scaling).ok_or_else(no_ratio)?;
@@ -194,7 +249,9 @@ mod tests {
         let config = Config::parse(include_str!("../cli/demo.toml"), "demo.toml").unwrap();
         let stage = Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap();
         let seen: Vec<_> =
-            stage.axes.iter().map(|axis| (axis.instance, axis.address, axis.topology)).collect();
+            stage.axes.iter().filter_map(|axis| Some((axis.instance, axis.sercos()?))).collect();
+        let seen: Vec<_> =
+            seen.iter().map(|(instance, drive)| (*instance, drive.address, drive.topology)).collect();
         assert_eq!(seen, [(1, 1, 1), (2, 2, 2)]);
         let telegram = &stage.axes[0].south.telegram;
         assert_eq!(telegram.command[0].to_string(), "S-0-0134");

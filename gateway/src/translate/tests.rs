@@ -3,6 +3,8 @@ use profile_cip::wire::motion::{
     CommandBlock, CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter,
 };
 
+mod can;
+
 use super::*;
 use crate::config::Config;
 use crate::mapping::Mapping;

@@ -67,19 +67,9 @@ impl Cia402Tables {
 
     /// The value that an object of the dictionary holds, by its name in the files; for worked examples.
     pub(in crate::mapping) fn value_of(dictionaries: &Dictionaries, text: &str) -> Option<Value> {
-        let object = parse(text)?;
+        let object = Object::parse(text)?;
         value(object, dictionaries.cia402.sub(object.index, object.sub)?)
     }
-}
-
-/// `607A:00`.
-fn parse(text: &str) -> Option<Object> {
-    let (index, sub) = text.split_once(':')?;
-    let hex = |text: &str, len| text.len() == len && text.bytes().all(|digit| digit.is_ascii_hexdigit());
-    if !hex(index, 4) || !hex(sub, 2) {
-        return None;
-    }
-    Some(Object { index: u16::from_str_radix(index, 16).ok()?, sub: u8::from_str_radix(sub, 16).ok()? })
 }
 
 fn value(object: Object, row: &Cia402Sub) -> Option<Value> {
@@ -94,7 +84,7 @@ struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     fn object(&mut self, key: &str, name: &Name) -> Option<(Object, &'a Cia402Sub)> {
-        let Some(object) = parse(name.get_ref()) else {
+        let Some(object) = Object::parse(name.get_ref()) else {
             let message = format!("expected an object such as 607A:00, got `{}`", name.get_ref());
             self.resolver.error(code::UNKNOWN_NAME, name.span(), key, message);
             return None;

@@ -66,6 +66,12 @@ impl Cia402Dictionary {
         self.objects.get(at).filter(|row| (row.index..=row.last).contains(&index))
     }
 
+    /// The number that an object of any axis has on the first one.
+    pub fn on_first_axis(index: u16) -> u16 {
+        let axis = index.checked_sub(*PROFILE.start()).map_or(0, |above| above / AXIS_STEP);
+        if axis < AXES_MAX { index - axis * AXIS_STEP } else { index }
+    }
+
     /// The row of an object, and the axis of a multi-axis device it belongs to: 0x6840 is 0x6040 of axis 1.
     pub fn object_of_axis(&self, index: u16) -> Option<(&Cia402Object, u16)> {
         let axis = index.checked_sub(*PROFILE.start()).map_or(0, |above| above / AXIS_STEP);

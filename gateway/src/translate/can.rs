@@ -1,0 +1,130 @@
+//! Frames of a CAN bus: PDOs, EMCY, SYNC.
+
+use profile_cia402::eds::drive::Direction;
+use profile_cia402::wire::Function;
+use profile_cia402::wire::emcy::Emcy;
+use profile_generic::can::{Frame, Id};
+
+use super::stage::{CanDrive, CanPdo};
+use super::tree::hex;
+use super::{Node, TranslateError, Translator};
+use crate::mapping::Item;
+
+impl Translator {
+    /// Takes a frame of a CAN bus; `None` of one that says nothing of a drive.
+    pub(super) fn can(&mut self, frame: &Frame) -> Option<Result<Node, TranslateError>> {
+        let Id::Standard(id) = frame.id() else { return None };
+        if frame.is_remote() || frame.is_fd() {
+            return None;
+        }
+        let mut found = Vec::new();
+        for (number, axis) in self.stage.axes.iter().enumerate() {
+            let pdos = axis.can().map(|drive| drive.pdos.as_slice()).unwrap_or_default();
+            found.extend(pdos.iter().filter(|pdo| pdo.id == id).map(|pdo| (number, pdo.clone())));
+        }
+        if let [(_, first), ..] = found.as_slice() {
+            let mut node = Node::new(format!("{first}: {}", hex(frame.data())));
+            for (number, pdo) in &found {
+                let told = match pdo.direction {
+                    Direction::Receive => self.rpdo(*number, pdo, frame.data()),
+                    Direction::Transmit => self.tpdo(*number, pdo, frame.data()),
+                };
+                match told {
+                    Ok(told) => node.push(told),
+                    Err(error) => return Some(Err(error)),
+                }
+            }
+            return Some(Ok(node));
+        }
+        match Function::of(frame.id())? {
+            Function::Sync => {
+                self.states.iter_mut().for_each(|state| state.heard.clear());
+                Some(Ok(Node::new("SYNC")))
+            }
+            Function::Emcy(node) => self.emcy(node.get(), frame.data()),
+            _ => None,
+        }
+    }
+
+    /// What a drive is told, read back.
+    fn rpdo(&self, number: usize, pdo: &CanPdo, data: &[u8]) -> Result<Node, TranslateError> {
+        let axis = &self.stage.axes[number];
+        let mut node = Node::new(format!("axis {} on {}", axis.name, axis.drive));
+        let mut values = vec![0; usize::from(axis.south.telegram.command_bytes)];
+        if !CanDrive::gather(pdo, data, &mut values) {
+            return Err(short(pdo, data));
+        }
+        let there = |at: usize| pdo.parts.iter().any(|part| part.flat == at);
+        for item in axis.south.heads_of_command() {
+            let Some((at, len)) = axis.south.place_of_command(item).filter(|(at, _)| there(*at)) else {
+                continue;
+            };
+            let bytes = values.get(at..at + len).unwrap_or_default();
+            node.push(Node::new(match *bytes {
+                [low, high] => format!("{} {:#06x}", self.named(item), u16::from_le_bytes([low, high])),
+                [octet] => format!("{} {}", self.named(item), i8::from_le_bytes([octet])),
+                _ => format!("{} {}", self.named(item), hex(bytes)),
+            }));
+        }
+        for (field, item) in axis.south.command_fields().filter(|(field, _)| there(field.offset.into())) {
+            node.push(self.command_value(number, field, item, &values));
+        }
+        Ok(node)
+    }
+
+    /// What a drive tells: as a whole, once every PDO of it has come.
+    fn tpdo(&mut self, number: usize, pdo: &CanPdo, data: &[u8]) -> Result<Node, TranslateError> {
+        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
+        if !CanDrive::gather(pdo, data, &mut state.came) {
+            return Err(short(pdo, data));
+        }
+        // What comes again before the others belongs to the next cycle.
+        if state.heard.contains(&pdo.number) {
+            state.heard.clear();
+        }
+        state.heard.push(pdo.number);
+        let all = axis.can().map(|drive| drive.pdos.as_slice()).unwrap_or_default();
+        let wanted =
+            all.iter().filter(|known| known.direction == Direction::Transmit && !known.parts.is_empty());
+        let rest: Vec<String> = wanted
+            .filter(|known| !state.heard.contains(&known.number))
+            .map(|known| known.to_string())
+            .collect();
+        if !rest.is_empty() {
+            let text = format!("axis {} on {}: {} to come", axis.name, axis.drive, rest.join(", "));
+            return Ok(Node::new(text));
+        }
+        state.heard.clear();
+        let values = std::mem::take(&mut state.came);
+        let node = self.feedback(number, &values);
+        self.states[number].came = values;
+        Ok(node)
+    }
+
+    /// What a drive says is wrong.
+    fn emcy(&self, id: u8, data: &[u8]) -> Option<Result<Node, TranslateError>> {
+        let axes = self.stage.axes.iter().enumerate();
+        let of_node = axes.filter(|(_, axis)| axis.can().is_some_and(|drive| drive.node == id));
+        let of_node: Vec<_> =
+            of_node.map(|(number, axis)| (number, axis.name.clone(), axis.drive.clone())).collect();
+        let (_, _, drive) = of_node.first()?;
+        let emcy = match Emcy::parse(data) {
+            Ok(emcy) => emcy,
+            Err(error) => return Some(Err(TranslateError::Value(format!("EMCY of {drive}: {error}")))),
+        };
+        let mut node = Node::new(format!("EMCY of {drive}: {emcy}"));
+        for (number, name, _) in &of_node {
+            let mut axis = Node::new(format!("axis {name}"));
+            let words: Vec<Item> = self.stage.axes[*number].south.diagnostic_words(true).collect();
+            for word in words {
+                self.causes(*number, word, emcy.code.0.into(), &mut axis);
+            }
+            node.push(axis);
+        }
+        Some(Ok(node))
+    }
+}
+
+fn short(pdo: &CanPdo, data: &[u8]) -> TranslateError {
+    TranslateError::Value(format!("{pdo}: expected {} bytes, got {}", pdo.len, data.len()))
+}

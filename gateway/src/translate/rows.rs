@@ -1,0 +1,77 @@
+//! Which row of its table made a value of a drive, whatever its profile.
+
+use profile_generic::fault::FaultCause;
+use profile_generic::image::Signal;
+use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
+use profile_generic::state::Action;
+
+use super::stage::{Behind, StageAxis};
+use crate::mapping::{Cia402Dictionary, Item, Mapping, Origin};
+
+impl StageAxis {
+    pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
+        match &self.behind {
+            Behind::Sercos(_) => mapping.signal_row(signal),
+            Behind::Can(_) => mapping.object_signal_row(signal),
+        }
+    }
+
+    pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
+        match &self.behind {
+            Behind::Sercos(_) => mapping.mode_row(selection),
+            Behind::Can(_) => mapping.object_mode_row(selection),
+        }
+    }
+
+    /// `status` is what the drive has shown.
+    pub(super) fn action_row(&self, mapping: &Mapping, action: Action, status: u32) -> Option<Origin> {
+        match &self.behind {
+            Behind::Sercos(_) => mapping.action_row(action),
+            Behind::Can(_) => mapping.object_action_row(action, status),
+        }
+    }
+
+    pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
+        match &self.behind {
+            Behind::Sercos(drive) => mapping.report_row(status, drive.silent),
+            Behind::Can(drive) => mapping.object_report_row(status, drive.needs.silent),
+        }
+    }
+
+    pub(super) fn status_rows(&self, mapping: &Mapping, status: u32, words: &[(Item, u32)]) -> Vec<Origin> {
+        match &self.behind {
+            Behind::Sercos(drive) => mapping.status_rows(status, words, drive.silent),
+            Behind::Can(_) => {
+                let first = |item: &Item| match *item {
+                    Item::Object(object) => {
+                        Item::object(Cia402Dictionary::on_first_axis(object.index), object.sub)
+                    }
+                    item => item,
+                };
+                let words: Vec<_> = words.iter().map(|(item, word)| (first(item), *word)).collect();
+                mapping.object_status_rows(status, &words)
+            }
+        }
+    }
+
+    pub(super) fn fault_row(
+        &self,
+        mapping: &Mapping,
+        item: Item,
+        word: u32,
+        cause: FaultCause,
+    ) -> Option<Origin> {
+        match item {
+            Item::Idn(idn) => mapping.fault_row(idn, word, cause),
+            Item::Object(_) => mapping.object_fault_row(word),
+        }
+    }
+
+    pub(super) fn parameter_row(&self, mapping: &Mapping, parameter: Parameter) -> Option<Origin> {
+        match &self.behind {
+            Behind::Sercos(_) => mapping.parameter_row(parameter),
+            Behind::Can(_) => mapping.object_parameter_row(parameter),
+        }
+    }
+}
