@@ -157,7 +157,7 @@ impl Stage {
                 device: member.device,
                 instance: member.instance,
                 drive: member.drive.clone(),
-                scaling: member.scaling.clone(),
+                scaling: member.scaling,
             });
         }
         Ok(Self { mapping, axes, layout: Default::default() })
