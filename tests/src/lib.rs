@@ -4,6 +4,7 @@
 //! for network namespaces) goes through [`peer`]: on a user's machine a missing peer is a visible skip,
 //! in CI (`CI=true`) it is a failure.
 
+pub mod can_frames;
 pub mod can_kernel;
 pub mod expected;
 pub mod host;
