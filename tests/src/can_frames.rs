@@ -57,7 +57,12 @@ pub fn stage(mapping: Mapping) -> Result<Stage, StageError> {
     let members = [
         ("turntable", "drive-a", needs.clone(), scaling(UnitKind::Rotary, 1_000_000, None)),
         ("slide", "drive-b", spindle, scaling(UnitKind::Linear, 10_000, None)),
-        ("index", "drive-c", Cia402Axis { counts, ..needs }, scaling(UnitKind::Rotary, 360_000, Some(360_000))),
+        (
+            "index",
+            "drive-c",
+            Cia402Axis { counts, ..needs },
+            scaling(UnitKind::Rotary, 360_000, Some(360_000)),
+        ),
     ];
     let members = (1_u8..).zip(members).map(|(number, (name, drive, needs, scaling))| {
         let member = CanMember {

@@ -5,8 +5,12 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use allocation_counter::measure;
+use axisbridge::config::Config;
 use axisbridge::engine::notice::Notice;
+use axisbridge::mapping::{CyclicValues, Mapping};
 use axisbridge::simulate::drives::linear;
+use axisbridge::translate::Stage;
+use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
@@ -17,10 +21,15 @@ use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
+use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::FaultCause;
+use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
+use profile_generic::mode::OperatingMode;
+use profile_generic::program::ConversionReport;
 use profile_generic::quantity::Position;
 use profile_generic::scaling::UnitKind;
 use profile_generic::servo::Marks;
+use profile_generic::state::Action;
 use profile_sercos::master::event::Event as SercosEvent;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
@@ -43,6 +52,52 @@ fn weigh(rig: &mut Rig, cycles: u32, mut between: impl FnMut(&mut Rig, u32)) -> 
 fn the_scale_weighs() {
     let info = measure(|| drop(std::hint::black_box(Box::new(1_u64))));
     assert_eq!(info.count_total, 1);
+}
+
+/// Programs alone, as they are made for SERCOS and for CiA 402 drives: C-to-D to the telegram, telegram to D-to-C.
+#[test]
+fn translation_allocates_nothing() {
+    let mapping = Mapping::embedded().expect("the shipped tables");
+    let config =
+        Config::parse(include_str!("../frames/config.toml"), "config.toml").expect("a configuration");
+    let sercos = Stage::rehearse(&config, mapping.clone()).expect("its drives");
+    let can = can_frames::stage(mapping).expect("its drives");
+    for axis in sercos.axes.iter().chain(&can.axes) {
+        let values = CommandValues {
+            position: Some(CommandPosition::Float(123_456.5)),
+            velocity: Some(1.5),
+            torque: Some(10.0),
+            ..CommandValues::default()
+        };
+        let (mut trackers, mut south) = (axis.north.trackers(), axis.south.feedback.trackers());
+        let (mut command, mut feedback) = (AxisCommand::default(), AxisFeedback::default());
+        let (mut telegram, mut seen) = ([0; 128], CyclicValues::default());
+        let mut report = ConversionReport::default();
+        let info = measure(|| {
+            for mode in [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque] {
+                command.mode = mode;
+                axis.north.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+                for action in Action::ALL {
+                    for status in [0, 0x40, 0x21, 0x23, 0x27, 0x08_1037] {
+                        axis.south.encode(&command, *action, 0, status, &mut telegram, &mut report);
+                    }
+                }
+                axis.south.decode(&telegram, false, &mut feedback, &mut south, &mut report);
+                axis.north.encode(&feedback, 0b111, &mut seen);
+                for code in [0x2310, 0x8611, 0xFFFF] {
+                    for word in axis.south.diagnostic_words(true) {
+                        let causes = axis.south.faults(word, code);
+                        causes.for_each(|(cause, _)| {
+                            std::hint::black_box(axis.north.fault(cause));
+                        });
+                    }
+                }
+            }
+        });
+        assert_eq!(info.count_total, 0, "{}", axis.drive);
+        assert_eq!(report.saturated, 0, "{}", axis.drive);
+        assert!(feedback.get(Signal::PositionActual).is_some(), "{}: it was translated", axis.drive);
+    }
 }
 
 #[test]

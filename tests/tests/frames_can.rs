@@ -23,8 +23,7 @@ fn the_golden_texts_of_cia_402_drives_stand() {
     let (mut frames, mut rows, mut wrong) = (0, BTreeSet::new(), Vec::new());
     for path in &lists {
         let text = fs::read_to_string(path).expect("a list");
-        let list =
-            translate_list(&stage, &text).unwrap_or_else(|error| panic!("{}:{error}", path.display()));
+        let list = translate_list(&stage, &text).unwrap_or_else(|error| panic!("{}:{error}", path.display()));
         frames += list.frames.len();
         let mut found = String::new();
         for frame in &list.frames {
@@ -43,13 +42,7 @@ fn the_golden_texts_of_cia_402_drives_stand() {
             let line = expected.lines().zip(found.lines()).position(|(one, two)| one != two);
             let line = line.unwrap_or_else(|| expected.lines().count().min(found.lines().count()));
             let of = |text: &str| text.lines().nth(line).unwrap_or("the end").to_owned();
-            wrong.push(format!(
-                "{}:{}\n-{}\n+{}",
-                golden.display(),
-                line + 1,
-                of(&expected),
-                of(&found)
-            ));
+            wrong.push(format!("{}:{}\n-{}\n+{}", golden.display(), line + 1, of(&expected), of(&found)));
         }
     }
     println!("{frames} frames in {} lists, by {} rows", lists.len(), rows.len());

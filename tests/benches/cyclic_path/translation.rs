@@ -4,7 +4,8 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram};
+use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
+use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
@@ -25,6 +26,10 @@ const SWING: u16 = 1_000;
 const AMPLITUDE: f64 = 1_000_000.0;
 /// Actual Data Set: position, velocity, acceleration.
 const WANTED: u8 = 0b111;
+/// When the first update counts; the instant does not matter.
+const START: SystemTime = SystemTime(1_000_000_000_000);
+/// The status of a CiA 402 drive that operates and follows in csp: mode of operation, statusword.
+const CSP_OPERATING: u32 = 0x08_1037;
 /// Cycle of the bus; an update lasts two of them.
 const CYCLE: DurationNs = DurationNs::from_millis(2);
 
@@ -40,6 +45,7 @@ pub struct Axis {
     feedback: AxisFeedback,
     telegram: [u8; TELEGRAM_MAX],
     control: u32,
+    status: u32,
     saturated: u32,
     target: SystemTime,
     swing: Vec<CommandValues>,
@@ -47,17 +53,29 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// The turntable of the rig, with the programs that were compiled for it.
+    /// The turntable of the rig on a SERCOS drive, with the programs that were compiled for it.
     #[must_use]
     pub fn turntable() -> Self {
         let rig = Rig::ready(Settings::default());
         let axis = &rig.engine.axes()[0];
-        let (north, south) = (axis.north().clone(), axis.south().expect("it is commissioned").clone());
+        let south = axis.south().expect("it is commissioned").clone();
+        Self::new(axis.north().clone(), south, *axis.feedback(), 0)
+    }
+
+    /// The same on a CiA 402 drive.
+    #[must_use]
+    pub fn on_can() -> Self {
+        let stage = can_frames::stage(Mapping::embedded().expect("the shipped tables")).expect("its drives");
+        let axis = &stage.axes[0];
+        Self::new(axis.north.clone(), axis.south.clone(), AxisFeedback::default(), CSP_OPERATING)
+    }
+
+    fn new(north: CipProgram, south: DriveProgram, feedback: AxisFeedback, status: u32) -> Self {
         let period = DurationNs::from_micros(i64::from(UPDATE_PERIOD_US));
         let config =
             InterpolatorConfig { target_update: TargetUpdate::Interpolate, period, extrapolate_periods: 4 };
         let mut interpolator = FineInterpolator::new(config).expect("a sound configuration");
-        interpolator.start(Some(axis.feedback().position));
+        interpolator.start(Some(feedback.position));
         let mut axis = Self {
             trackers: north.trackers(),
             north,
@@ -66,11 +84,12 @@ impl Axis {
             interpolator,
             period,
             command: AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() },
-            feedback: *axis.feedback(),
+            feedback,
             telegram: [0; TELEGRAM_MAX],
             control: 0,
+            status,
             saturated: 0,
-            target: rig.system(),
+            target: START,
             swing: (0..SWING).map(values).collect(),
             next: 0,
         };
@@ -96,7 +115,7 @@ impl Axis {
             black_box(&self.command),
             Action::Enable,
             self.control,
-            0,
+            self.status,
             &mut self.telegram,
             &mut report,
         );
@@ -162,6 +181,15 @@ pub fn bench(criterion: &mut Criterion) {
     assert_eq!(axis.saturated, 0, "nothing was clamped");
     let telegram = [0; TELEGRAM_MAX];
     group.bench_function("at_bytes_to_values", |bencher| {
+        bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
+    });
+    let mut axis = Axis::on_can();
+    group.bench_function("generic_to_rpdo_bytes", |bencher| bencher.iter(|| axis.encode()));
+    group.bench_function("update_and_its_two_cycles_on_can", |bencher| bencher.iter(|| axis.update()));
+    assert_eq!(axis.saturated, 0, "nothing was clamped");
+    let mut telegram = [0; TELEGRAM_MAX];
+    telegram[..3].copy_from_slice(&CSP_OPERATING.to_le_bytes()[..3]);
+    group.bench_function("tpdo_bytes_to_values", |bencher| {
         bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
     });
     group.finish();
