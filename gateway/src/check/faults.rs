@@ -11,6 +11,7 @@ use crate::mapping::format::CipFaultRow;
 /// Looks at the faults of both sides, and at the rows of which the first that fits wins.
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     causes(mapping, findings);
+    exceptions(mapping, findings);
     sercos_faults(mapping, findings);
     sercos_reports(mapping, findings);
     cia402_faults(mapping, findings);
@@ -47,6 +48,31 @@ fn causes(mapping: &Mapping, findings: &mut Findings) {
         let problem =
             problem.expected("the controller cannot tell them apart").related(place, "the other one");
         findings.push(&file.text, problem.help("say `shared = true` in both rows where that is meant"));
+    }
+}
+
+/// Each standard exception is found by someone, or there is a reason.
+fn exceptions(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().cip_generic;
+    let Some(set) = mapping.dictionaries.cip.bits("Axis Exceptions") else { return };
+    for named in &set.codes {
+        let is = |bit: u8| u32::from(bit) == named.code;
+        let raised = mapping.raised_exceptions().any(is);
+        if raised || mapping.cip.unraised.iter().any(|(bit, _)| is(*bit)) {
+            continue;
+        }
+        let row =
+            file.rows.fault.iter().find(|row| {
+                row.exception.as_ref().is_some_and(|exception| *exception.get_ref() == named.name)
+            });
+        let span = row.map_or_else(|| file.rows.mapping.span(), |row| row.cause.span());
+        let problem = Problem::new(code::EXCEPTION_UNSAID, span);
+        let problem = problem.title(format!("nobody finds the exception `{}`", named.name));
+        findings.push(
+            &file.text,
+            problem
+                .expected("expected a [[fault]] row of a drive that leads to it, or a place in [[unraised]]"),
+        );
     }
 }
 

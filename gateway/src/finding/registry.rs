@@ -318,6 +318,10 @@ registry! {
         "`default` is at least as severe as `least`, neither is beyond Major Fault, and only an exception has them.",
         "[[cip-generic.fault]]\ncause = \"cooling_warning\"\nremove = [\"least\"]",
         "Correct `least` and `default`.";
+    EXCEPTION_UNSAID = 61 Warning "an exception that nobody finds":
+        "No row of a drive's table leads to the standard exception, neither the box nor the device finds it, and no [[unraised]] row says why: the controller would wait for it in vain.",
+        "[[cip-generic.unraised]]\nreason = \"The holding brake is the drive's own; no bit says that it slips.\"\nremove = true",
+        "Add the row that finds it, or name it in an [[unraised]] row.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table says already. Perhaps the table has caught up with it, perhaps something else was meant.",

@@ -212,6 +212,8 @@ pub struct CipTables {
     pub attributes: Vec<ServedAttribute>,
     /// What it does not serve, by attribute number, and why.
     pub rejected: Vec<(u16, String)>,
+    /// Bits of Axis Exceptions that nobody finds, and why.
+    pub unraised: Vec<(u8, String)>,
     units: Vec<(String, Quantity, CipUnit)>,
     pub(super) cyclic: Vec<CyclicElement>,
     pub(super) modes: [Option<OperatingMode>; 16],

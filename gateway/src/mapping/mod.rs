@@ -239,6 +239,16 @@ impl Mapping {
         (0..EXCEPTION_BITS).map(rule).collect()
     }
 
+    /// Bits of Axis Exceptions that the box, the device or a drive finds.
+    pub fn raised_exceptions(&self) -> impl Iterator<Item = u8> + '_ {
+        let by_drive = |cause| {
+            let rows = self.sercos.faults.iter().map(|row| row.cause);
+            rows.chain(self.cia402.faults().iter().map(|row| row.cause)).any(|known| known == cause)
+        };
+        let rows = self.cip.exceptions.iter().filter(|row| !row.manufacturer);
+        rows.filter(move |row| row.found_by.is_some() || by_drive(row.cause)).map(|row| row.bit)
+    }
+
     /// The attributes of an axis. `None` when a ratio of the scaling does not fit 64 bits.
     pub fn attribute_table(&self, scaling: &CipScaling) -> Option<AttributeTable> {
         AttributeTable::compile(&self.cip, scaling)

@@ -5,6 +5,7 @@ mod cia402_dictionary;
 mod cip_codes;
 mod cip_dictionary;
 mod cip_program;
+mod completeness;
 mod cyclic_axis;
 mod overlays;
 mod sercos_dictionary;

@@ -25,7 +25,7 @@ use crate::mapping::device_link::DRIVE_ACTIONS;
 use crate::mapping::dictionary::{Access, CipAttribute, Dictionaries, quantity};
 use crate::mapping::format::{
     CipAttributeRow, CipEventRow, CipFaultRow, CipGenericFile, CyclicRow, DisplacementUnitRow, Name,
-    RejectRow,
+    RejectRow, UnraisedRow,
 };
 use crate::mapping::generic_names::{
     capture_kind, cause, operating_mode, reaction, signal, status_bit, unit_kind,
@@ -70,6 +70,9 @@ impl CipTables {
         }
         for row in &rows.reject {
             builder.reject(row);
+        }
+        for row in &rows.unraised {
+            builder.unraised(row);
         }
         builder.finish(file)
     }
@@ -643,6 +646,17 @@ impl Builder<'_> {
                 self.resolver.error(code::TWICE, name.span(), "attributes", "the attribute is there twice");
             }
             self.tables.rejected.push((attribute.id, row.reason.get_ref().clone()));
+        }
+    }
+
+    fn unraised(&mut self, row: &UnraisedRow) {
+        self.resolver.reason(&row.reason);
+        for name in &row.exceptions {
+            let Some(bit) = self.bit("Axis Exceptions", "exceptions", name) else { continue };
+            if self.tables.unraised.iter().any(|(known, _)| *known == bit) {
+                self.resolver.error(code::TWICE, name.span(), "exceptions", "the exception is there twice");
+            }
+            self.tables.unraised.push((bit, row.reason.get_ref().clone()));
         }
     }
 

@@ -53,6 +53,8 @@ pub struct CipGenericFile {
     pub attribute: Vec<CipAttributeRow>,
     /// Attributes that are not served.
     pub reject: Vec<RejectRow>,
+    /// Exceptions that nobody finds.
+    pub unraised: Vec<UnraisedRow>,
 }
 
 /// An event and what brings it.
@@ -362,6 +364,16 @@ pub struct SequenceRow {
     pub flying_start: Name,
     /// Where it comes from.
     pub source: Source,
+}
+
+/// Standard exceptions that neither the box nor a drive finds, and why.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnraisedRow {
+    /// Why.
+    pub reason: Name,
+    /// The exceptions.
+    pub exceptions: Vec<Name>,
 }
 
 /// Attributes that the device does not have, and why.

@@ -90,6 +90,7 @@ const CIP_GENERIC: &[Section] = &[
     section("capture_status", &["status"]),
     section("attribute", &["attribute"]),
     section("reject", &["reason"]),
+    section("unraised", &["reason"]),
 ];
 
 const GENERIC_SERCOS: &[Section] = &[
