@@ -171,6 +171,10 @@ struct TranslateArguments {
     /// Axes, drives and tables of this configuration; without it, those of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
+    /// drives stand in for them.
+    #[arg(long, value_name = "FILE")]
+    values: Option<PathBuf>,
     /// Print one JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -185,6 +189,10 @@ struct SnapshotArguments {
     /// Axes, drives and tables of this configuration; without it, those of DIR/config.toml, or of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
+    /// drives stand in for them.
+    #[arg(long, value_name = "FILE")]
+    values: Option<PathBuf>,
     /// Make what is found now the golden texts.
     #[arg(long)]
     accept: bool,

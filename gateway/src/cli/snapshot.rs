@@ -45,7 +45,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<ExitCode, CliError> {
             format!("{}: expected files *.hex, *.pcap or *.pcapng, found none", folder.display()).into()
         );
     }
-    let stage = Arc::new(stage(&config)?);
+    let stage = Arc::new(stage(&config, arguments.values.as_deref())?);
     let mut tally = Tally::default();
     for path in &frames {
         let list = translated(&stage, &config, path)?;

@@ -33,6 +33,8 @@ struct Output<'a> {
     frames: &'a [Node],
     passed_over: usize,
     failed: usize,
+    /// Drives whose scaling is that of simulated ones.
+    simulated_scaling: Vec<&'a str>,
 }
 
 /// Translates and prints.
@@ -41,15 +43,27 @@ struct Output<'a> {
 /// A file is faulty, the drives are not commissioned with the configuration, the output cannot be written.
 pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
     let config = configuration(arguments.config.as_deref())?;
-    let stage = Arc::new(stage(&config)?);
+    let stage = Arc::new(stage(&config, arguments.values.as_deref())?);
     let list = match (&arguments.hex, &arguments.file) {
         (Some(hex), _) => translate_list(&stage, hex).map_err(|error| format!("--hex:{error}"))?,
         (None, Some(file)) => translated(&stage, &config, file)?,
         // clap lets nothing else through.
         (None, None) => return Err("expected FILE or --hex BYTES".into()),
     };
+    let simulated: Vec<&str> = stage.stand_ins().collect();
+    if !simulated.is_empty() && !arguments.json {
+        eprintln!(
+            "the scaling of {} is that of simulated drives; --values FILE gives that of the machine's",
+            simulated.join(", ")
+        );
+    }
     let text = if arguments.json {
-        let output = Output { frames: &list.frames, passed_over: list.passed_over, failed: list.failed };
+        let output = Output {
+            frames: &list.frames,
+            passed_over: list.passed_over,
+            failed: list.failed,
+            simulated_scaling: simulated,
+        };
         serde_json::to_string_pretty(&output)? + "\n"
     } else {
         text(&list, RowNames::Lines)
@@ -65,10 +79,24 @@ pub(super) fn configuration(path: Option<&Path>) -> Result<Config, CliError> {
     }
 }
 
-/// The programs of a configuration.
-pub(super) fn stage(config: &Config) -> Result<Stage, CliError> {
+/// The programs of a configuration, with drives that hold these values.
+pub(super) fn stage(config: &Config, values: Option<&Path>) -> Result<Stage, CliError> {
     let mapping = Mapping::load(config.mappings_dir.as_deref(), &config.overlays)?;
-    Ok(Stage::rehearse(config, mapping)?)
+    let stage = Stage::rehearse(config, mapping)?;
+    let Some(path) = values else { return Ok(stage) };
+    let shown = path.display();
+    let text = list(path)?;
+    Ok(stage.with_values(&text).map_err(|error| format!("{shown}:{error}"))?)
+}
+
+/// A list of lines.
+fn list(path: &Path) -> Result<String, CliError> {
+    let shown = path.display();
+    let length = std::fs::metadata(path).map_err(|error| format!("{shown}: {error}"))?.len();
+    if length > LIST_MAX {
+        return Err(format!("{shown}: expected a list of at most {LIST_MAX} bytes, got {length}").into());
+    }
+    Ok(std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?)
 }
 
 /// A list or a recording, as its first bytes say.
@@ -86,11 +114,7 @@ pub(super) fn translated(stage: &Arc<Stage>, config: &Config, path: &Path) -> Re
             translate_capture(stage, config, reader, &names).map_err(|error| format!("{shown}: {error}"))?
         );
     }
-    let length = std::fs::metadata(path).map_err(|error| format!("{shown}: {error}"))?.len();
-    if length > LIST_MAX {
-        return Err(format!("{shown}: expected a list of at most {LIST_MAX} bytes, got {length}").into());
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+    let text = list(path)?;
     Ok(translate_list(stage, &text).map_err(|error| format!("{shown}:{error}"))?)
 }
 

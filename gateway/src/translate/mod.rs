@@ -43,7 +43,9 @@ use crate::mapping::CipTrackers;
 pub use frame::{FrameError, Recognised, recognise};
 pub use line::{Line, LineError};
 pub use list::{List, ListError, translate_capture, translate_list};
-pub use stage::{Behind, CanDrive, CanMember, CanPart, CanPdo, SercosDrive, Stage, StageAxis, StageError};
+pub use stage::{
+    Behind, CanDrive, CanMember, CanPart, CanPdo, SercosDrive, Stage, StageAxis, StageError, ValuesError,
+};
 pub use tree::{Node, RowNames};
 
 /// Connection of a drive with its command values, and with its actual values.

@@ -4,6 +4,7 @@
 //! for those of the machine.
 
 mod can;
+mod values;
 
 use std::net::SocketAddrV4;
 
@@ -11,6 +12,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::wire::layout::Layout;
 
 pub use can::{CanDrive, CanMember, CanPart, CanPdo};
+pub use values::ValuesError;
 
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
@@ -38,6 +40,8 @@ pub struct StageAxis {
     pub drive: String,
     /// The drive, by its profile.
     pub behind: Behind,
+    /// Whether what is known of the drive's scaling is that of a simulated one.
+    pub stands_in: bool,
     /// The scaling of the controller.
     pub scaling: CipScaling,
     /// Its attributes.
@@ -112,6 +116,14 @@ pub enum StageError {
     /// A drive on CANopen cannot be led by its data sheet.
     #[error("axis {axis}: the drive of its data sheet cannot be led: {told}")]
     Sheet {
+        /// The axis.
+        axis: String,
+        /// Why.
+        told: String,
+    },
+    /// No program can be made for an axis.
+    #[error("axis {axis}: no program can be made: {told}")]
+    Program {
         /// The axis.
         axis: String,
         /// Why.
@@ -192,6 +204,7 @@ impl Stage {
                     needs: needs.clone(),
                     facts: facts.clone(),
                 }),
+                stands_in: !drive.set_scaling,
                 scaling,
                 attributes,
                 north: channel.north().clone(),
@@ -209,7 +222,7 @@ impl Stage {
     /// A program cannot be made with them.
     pub fn with_mapping(&self, mapping: Mapping) -> Result<Self, StageError> {
         let axes = self.axes.iter().map(|axis| {
-            let failed = |told: String| StageError::Drive { axis: axis.name.clone(), told };
+            let failed = |told: String| StageError::Program { axis: axis.name.clone(), told };
             let south = match &axis.behind {
                 Behind::Sercos(drive) => mapping
                     .sercos_program(&drive.needs, &drive.facts)

@@ -113,3 +113,28 @@ fn what_cannot_be_translated_says_why() {
         .collect();
     insta::assert_snapshot!(errors.join("\n"));
 }
+
+/// A drive whose scaling is another one than that of the simulated drive.
+#[test]
+fn the_values_of_the_machine_count() {
+    let config = Config::parse(include_str!("../cli/demo.toml"), "demo.toml").unwrap();
+    let stage = || Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap();
+    assert_eq!(stage().stand_ins().collect::<Vec<_>>(), ["drive-a", "drive-b"]);
+    // Rotational position in its own resolution: 3600 counts in a turn.
+    let values = "# scan\nidn drive-a S-0-0076 4a 00\nidn drive-a S-0-0079 10 0e 00 00\n";
+    let told = stage().with_values(values).unwrap();
+    assert_eq!(told.stand_ins().collect::<Vec<_>>(), ["drive-b"]);
+    let mut translator = Translator::new(told);
+    let shown = text(&translator.frame(&update(position(250_000))).unwrap());
+    assert!(shown.contains("S-0-0047 Position command value: 900 (84 03 00 00"), "{shown}");
+    let wrong = [
+        "at drive-a 00",
+        "idn drive-a 76 00",
+        "idn drive-x S-0-0076 00 00",
+        "object drive-a 608F:01 00 00 00 00",
+        "idn drive-a S-0-0076 03 00",
+    ];
+    let errors: Vec<_> =
+        wrong.iter().map(|values| stage().with_values(values).unwrap_err().to_string()).collect();
+    insta::assert_snapshot!(errors.join("\n"));
+}

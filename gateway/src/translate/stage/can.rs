@@ -152,6 +152,7 @@ impl Stage {
                 north: mapping.cip_program(&member.scaling).ok_or_else(no_ratio)?,
                 attributes: mapping.attribute_table(&member.scaling).ok_or_else(no_ratio)?,
                 behind: Behind::Can(behind),
+                stands_in: member.needs.counts.is_empty(),
                 south,
                 name: member.name.clone(),
                 device: member.device,
