@@ -6,7 +6,8 @@ use profile_cia402::drive::{ErrorCode, State, Statusword};
 use profile_cia402::lss::master::{LssReply, LssTask, Master as LssMaster, MasterConfig as LssConfig};
 use profile_cia402::master::boot::BootState;
 use profile_cia402::master::config::{
-    Expected, HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, PdoConfig, SyncConfig,
+    Expected, GuardingConfig, HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, PdoConfig,
+    SyncConfig,
 };
 use profile_cia402::master::event::{Event, Output};
 use profile_cia402::master::{ConsumerState, Master, Priority};
@@ -430,6 +431,39 @@ fn a_drive_that_goes_bus_off_stops_by_itself() {
     rig.undisturbed(1);
     rig.until("operation", |rig| rig.master.node(id(1)).unwrap().state == BootState::Operational);
     rig.undisturbed(1);
+}
+
+#[test]
+fn a_guarded_drive_beside_one_with_a_heartbeat() {
+    let mut config = network(2);
+    let guarding = GuardingConfig { guard_time_ms: 50, life_time_factor: 3 };
+    (config.nodes[0].heartbeat, config.nodes[0].guarding) = (None, Some(guarding));
+    // Nothing else tells the drive that the master is gone.
+    config.heartbeat = None;
+    let mut rig = rig(config, vec![node(Some(1), 1), node(Some(2), 2)]);
+    rig.master.start(rig.now);
+    rig.until("enabled drives", |rig| {
+        rig.axes.iter().all(|axis| axis.state == Some(State::OperationEnabled))
+    });
+    rig.log.clear();
+    rig.run_ms(2_000);
+    rig.undisturbed(0);
+    rig.undisturbed(1);
+    assert_eq!(rig.log, []);
+    // Requests do not reach the drive any more, which tells that and stops; answers do not come.
+    let (from, to) = (rig.at_master, rig.nodes[0].0);
+    let request = cob_id::error_control(id(1));
+    assert!(rig.bus.disturb(Disturbance::all(Effect::Lose).from(from).to(to).id(request)));
+    rig.until("loss", |rig| rig.saw(&Event::GuardingLost { node: id(1) }));
+    let code = |event: &Event| match event {
+        Event::Emcy { node, emcy } if *node == id(1) => Some(emcy.code.0),
+        _ => None,
+    };
+    rig.run_ms(400);
+    assert!(rig.log.iter().filter_map(code).any(|code| code == ErrorCode::HEARTBEAT.0), "{:#?}", rig.log);
+    assert!(rig.rests(0));
+    rig.undisturbed(1);
+    rig.bus.judge();
 }
 
 #[test]

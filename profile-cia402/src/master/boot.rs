@@ -1,11 +1,13 @@
 //! How a device comes up (CiA 302-2), and what can be wrong with it.
 //!
 //! ```text
-//! Off --> Resetting --> Identify --> Configure --> Await --> Map --> Control --> Ready --> Starting --> Operational
-//!                        |  ^   \____________________^        |        |                      |            |
-//!              no answer |  |      operational already         +--------+------- Failed <------+            |
-//!                        v  |                                                     ^                        |
-//!                       Retry -------- boot time over -----------------------------+        Lost <---------+
+//! Off --> Resetting --> Identify --> Program --> Configure --> Await --> Map --> Control --> Ready --> Starting --> Operational
+//!                        |  ^   \________________________________^        |        |                      |            |
+//!              no answer |  |      operational already                     +--------+------- Failed <------+            |
+//!                        v  |                                                                 ^                        |
+//!                       Retry -------- boot time over -----------------------------------------+        Lost <---------+
+//!
+//! Program --another program was downloaded and started--> Identify
 //!
 //! every state but Off and Resetting --boot-up--> Identify       Lost --after a while--> Resetting       every state --> Off
 //! ```
@@ -26,6 +28,8 @@ pub enum BootState {
     Identify,
     /// It did not answer; it is asked again after a while.
     Retry,
+    /// The program is compared, and downloaded where that is permitted.
+    Program,
     /// The configuration is compared and written.
     Configure,
     /// The application works.
@@ -65,7 +69,7 @@ pub enum BootEvent {
     NoAnswer,
     /// A step failed.
     Failed,
-    /// The application is through, or the start is permitted.
+    /// The application is through, the start is permitted, or a new program runs.
     Proceed,
     /// The heartbeat is gone or tells another state, or the bus is off.
     Lost,
@@ -73,11 +77,12 @@ pub enum BootEvent {
 
 impl BootState {
     /// All states.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Off,
         Self::Resetting,
         Self::Identify,
         Self::Retry,
+        Self::Program,
         Self::Configure,
         Self::Await,
         Self::Map,
@@ -102,7 +107,9 @@ impl BootState {
             (_, E::BootUp) => S::Identify,
             (S::Resetting | S::Retry, E::Elapsed) => S::Identify,
             (S::Identify, E::NoAnswer) => S::Retry,
-            (S::Identify, E::Done) => S::Configure,
+            (S::Identify, E::Done) => S::Program,
+            (S::Program, E::Done) => S::Configure,
+            (S::Program, E::Proceed) => S::Identify,
             (S::Identify, E::Kept) => S::Await,
             (S::Configure, E::Done) => S::Await,
             (S::Await, E::Proceed) => S::Map,
@@ -127,6 +134,12 @@ impl BootState {
         )
     }
 
+    /// Whether nothing is asked of the device.
+    #[must_use]
+    pub const fn is_out(self) -> bool {
+        matches!(self, Self::Off | Self::Lost | Self::Failed)
+    }
+
     /// Whether the heartbeat is watched.
     #[must_use]
     pub const fn supervises(self) -> bool {
@@ -141,6 +154,7 @@ impl fmt::Display for BootState {
             Self::Resetting => "resetting",
             Self::Identify => "identify",
             Self::Retry => "retry",
+            Self::Program => "program",
             Self::Configure => "configure",
             Self::Await => "await",
             Self::Map => "map",
@@ -155,8 +169,7 @@ impl fmt::Display for BootState {
 }
 
 profile_generic::open_code! {
-    /// Error status of a boot-up: a letter (CiA 302-2). This master does no node guarding and no program download: F to I never
-    /// come from it.
+    /// Error status of a boot-up: a letter (CiA 302-2).
     pub struct BootStatus(u8) {
         /// A: the device is not in the list of this network.
         NOT_LISTED = 0x41 => "A: not in the list of devices",

@@ -136,6 +136,17 @@ pub struct Write {
     pub data: SdoData,
 }
 
+/// The program that a device must have (1F55, 1F58).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProgramConfig {
+    /// What it must tell in 1F56:1, not 0.
+    pub identification: u32,
+    /// The program for a device that tells something else; `None` permits no download.
+    pub image: Option<SdoData>,
+    /// Longest time from the stop of the old program to the start of the new one.
+    pub time: DurationNs,
+}
+
 /// When a device was configured (1020, 1F26, 1F27).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
@@ -154,6 +165,16 @@ pub struct HeartbeatConfig {
     pub timeout_ms: u16,
 }
 
+/// Node guarding, for devices without a heartbeat: the master asks by a remote frame, and the device answers with its state and a
+/// bit that alternates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GuardingConfig {
+    /// Time between two requests (100C), ms.
+    pub guard_time_ms: u16,
+    /// Guard times without an answer after which the device is lost, or the master if no request comes (100D); at least 2.
+    pub life_time_factor: u8,
+}
+
 /// One device of the network (1F81 and following).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NodeConfig {
@@ -165,12 +186,16 @@ pub struct NodeConfig {
     pub keep_alive: bool,
     /// What it must be.
     pub expected: Expected,
+    /// The program that it must have; `None` is not compared.
+    pub program: Option<ProgramConfig>,
     /// If the device tells this in 1020, its configuration is not written again.
     pub stamp: Option<Stamp>,
     /// Its configuration, in the order of writing.
     pub writes: Vec<Write>,
     /// Its heartbeat; `None` leaves it as it is and watches nothing.
     pub heartbeat: Option<HeartbeatConfig>,
+    /// Node guarding, in place of a heartbeat.
+    pub guarding: Option<GuardingConfig>,
     /// PDOs that it receives.
     pub rpdos: Vec<PdoConfig>,
     /// PDOs that it transmits.
@@ -186,12 +211,23 @@ impl NodeConfig {
             mandatory: true,
             keep_alive: false,
             expected: Expected::default(),
+            program: None,
             stamp: None,
             writes: vec![],
             heartbeat: None,
+            guarding: None,
             rpdos: vec![],
             tpdos: vec![],
         }
+    }
+
+    /// How long it may say nothing of its state; `None` when it is not watched.
+    #[must_use]
+    pub fn silence_max(&self) -> Option<DurationNs> {
+        let guarding =
+            self.guarding.map(|guard| i64::from(guard.guard_time_ms) * i64::from(guard.life_time_factor));
+        let milliseconds = self.heartbeat.map(|heartbeat| heartbeat.timeout_ms.into()).or(guarding);
+        milliseconds.map(DurationNs::from_millis)
     }
 
     /// Its PDOs one way.
@@ -316,6 +352,24 @@ pub enum ConfigError {
         /// Time-out.
         timeout_ms: u16,
     },
+    /// Node guarding has no time, or one answer that is lost would be one too many.
+    #[error(
+        "node {node}: expected a guard time and a life time factor of at least 2, got {guard_time_ms} ms and {life_time_factor}"
+    )]
+    Guarding {
+        /// The device.
+        node: NodeId,
+        /// Guard time.
+        guard_time_ms: u16,
+        /// Life time factor.
+        life_time_factor: u8,
+    },
+    /// A device is watched in two ways.
+    #[error("node {0}: expected a heartbeat or node guarding, got both")]
+    TwoErrorControls(NodeId),
+    /// A program has no bytes, or no identification.
+    #[error("node {0}: expected a program with a software identification other than 0 and at least one byte")]
+    EmptyProgram(NodeId),
     /// A value to write has no bytes.
     #[error("node {node}: nothing to write to {object}")]
     EmptyWrite {
@@ -391,6 +445,21 @@ impl MasterConfig {
             }
             if let Some(heartbeat) = device.heartbeat {
                 check_heartbeat(node, heartbeat.producer_ms, heartbeat.timeout_ms)?;
+            }
+            if let Some(GuardingConfig { guard_time_ms, life_time_factor }) = device.guarding {
+                if device.heartbeat.is_some() {
+                    return Err(ConfigError::TwoErrorControls(node));
+                }
+                if guard_time_ms == 0 || life_time_factor < 2 {
+                    return Err(ConfigError::Guarding { node, guard_time_ms, life_time_factor });
+                }
+            }
+            let empty = |program: &ProgramConfig| {
+                let image = program.image.as_ref();
+                program.identification == 0 || image.is_some_and(|image| image.as_slice().is_empty())
+            };
+            if device.program.as_ref().is_some_and(empty) {
+                return Err(ConfigError::EmptyProgram(node));
             }
             if let Some(write) = device.writes.iter().find(|write| write.data.as_slice().is_empty()) {
                 return Err(ConfigError::EmptyWrite { node, object: write.object });
@@ -549,6 +618,18 @@ mod tests {
             }),
             said(|config| {
                 config.nodes[0].heartbeat = Some(HeartbeatConfig { producer_ms: 100, timeout_ms: 100 })
+            }),
+            said(|config| {
+                config.nodes[0].guarding = Some(GuardingConfig { guard_time_ms: 100, life_time_factor: 1 })
+            }),
+            said(|config| {
+                config.nodes[0].heartbeat = Some(HeartbeatConfig { producer_ms: 50, timeout_ms: 100 });
+                config.nodes[0].guarding = Some(GuardingConfig { guard_time_ms: 100, life_time_factor: 3 });
+            }),
+            said(|config| {
+                let time = DurationNs::from_secs(1);
+                let image = Some(SdoData::default());
+                config.nodes[0].program = Some(ProgramConfig { identification: 1, image, time });
             }),
             said(|config| {
                 config.nodes[0].writes =

@@ -2,6 +2,7 @@
 
 use super::boot::BootState;
 use super::*;
+use crate::wire::error_control::HEARTBEAT_LEN;
 use crate::wire::frame;
 use crate::wire::sync::Sync;
 
@@ -93,6 +94,17 @@ impl Master {
         }
     }
 
+    /// Asks the next device that is guarded for its state.
+    fn next_guarding(&mut self, now: MonotonicTime) -> Option<Frame> {
+        let mut stations = self.stations.iter_mut().zip(&self.config.nodes);
+        let (station, node) = stations.find(|(station, _)| station.guard_at.is_some_and(|at| now >= at))?;
+        let time = DurationNs::from_millis(node.guarding.map_or(0, |guard| guard.guard_time_ms).into());
+        // On a grid of its own, unless it was not called for longer.
+        let next = station.guard_at.unwrap_or(now) + time;
+        station.guard_at = (time > DurationNs::ZERO).then(|| if next > now { next } else { now + time });
+        Frame::remote(cob_id::error_control(station.node), HEARTBEAT_LEN).ok()
+    }
+
     /// NMT, error control, TIME and SDO, in this order.
     pub(super) fn next_other(&mut self, now: MonotonicTime) -> Option<Frame> {
         if let Some(command) = self.nmt_all.take() {
@@ -112,6 +124,9 @@ impl Master {
             self.next_heartbeat = now + DurationNs::from_millis(i64::from(own.producer_ms));
             self.heartbeat = Some(NmtState::OPERATIONAL);
             return Some(frame(cob_id::error_control(own.node), &Heartbeat::new(state).emit()));
+        }
+        if let Some(request) = self.next_guarding(now) {
+            return Some(request);
         }
         if let Some(time) = self.time.take() {
             return Some(frame(cob_id::TIME, &time.emit()));
@@ -147,7 +162,8 @@ impl Master {
         let client = station.client.wake_at().filter(|_| self.sdo_left > 0 || self.config.sync.is_none());
         let give_up = station.give_up.filter(|_| station.state == BootState::Retry);
         let pdos = station.tpdos.iter().filter_map(|end| end.deadline());
-        let times = [station.deadline, give_up, station.heartbeat_deadline, client];
+        let (heartbeat, guard) = (station.heartbeat_deadline, station.guard_at);
+        let times = [station.deadline, give_up, heartbeat, guard, station.pause, client];
         times.into_iter().flatten().chain(pdos).min()
     }
 }

@@ -59,6 +59,11 @@ pub enum Event {
         /// Number of the PDO.
         number: u16,
     },
+    /// The device has another program than it must, and is given it. It comes again when it runs.
+    ProgramDownload {
+        /// The device.
+        node: NodeId,
+    },
     /// The device is in operation.
     Operational {
         /// The device.
@@ -90,11 +95,16 @@ pub enum Event {
         /// The device.
         node: NodeId,
     },
+    /// The device does not answer to node guarding any more. It is stopped, and brought up again after a while.
+    GuardingLost {
+        /// The device.
+        node: NodeId,
+    },
     /// The device has left operation by itself, or by somebody else's command. It is brought up again after a while.
     StateChanged {
         /// The device.
         node: NodeId,
-        /// What its heartbeat tells.
+        /// What its heartbeat, or its answer to node guarding, tells.
         state: NmtState,
     },
     /// EMCY.
@@ -197,7 +207,11 @@ impl fmt::Display for Event {
                 write!(f, "node {node} has restarted while it was in operation")
             }
             Self::Rebooted { node, operational: false } => write!(f, "node {node} has restarted"),
+            Self::ProgramDownload { node } => {
+                write!(f, "node {node} has another program and is given its own")
+            }
             Self::HeartbeatLost { node } => write!(f, "the heartbeat of node {node} is gone"),
+            Self::GuardingLost { node } => write!(f, "node {node} does not answer to node guarding any more"),
             Self::StateChanged { node, state } => write!(f, "node {node} has left operation: it is {state}"),
             Self::Emcy { node, emcy } => write!(f, "node {node}: {emcy}"),
             Self::EmcyStorm { node } => {

@@ -24,6 +24,7 @@ mod cycle;
 mod ends;
 pub mod event;
 mod plan;
+mod program;
 mod queue;
 mod receive;
 pub mod report;
@@ -89,7 +90,7 @@ pub struct NodeInfo<'a> {
     pub node: NodeId,
     /// Where it is.
     pub state: BootState,
-    /// What its heartbeat told last.
+    /// What its heartbeat, or its answer to node guarding, told last.
     pub heartbeat: Option<NmtState>,
     /// 1000, once read.
     pub device_type: Option<u32>,
@@ -172,6 +173,8 @@ impl Master {
         if core::mem::replace(&mut self.running, true) {
             return;
         }
+        // Somebody has stopped the network to see to it.
+        self.stations.iter_mut().for_each(|station| station.programmed = false);
         self.begin(now);
         if self.config.heartbeat.is_some() {
             self.heartbeat = Some(NmtState::BOOT_UP);

@@ -7,6 +7,7 @@ use super::boot::{BootState, BootStatus};
 use super::config::{
     Direction, MappingPolicy, MasterConfig, MasterHeartbeat, NodeConfig, PdoConfig, SyncConfig,
 };
+use super::program::ProgramStep;
 use super::report::RowOutcome;
 use super::station::Station;
 use crate::sdo::request::{SdoFailure, SdoOutcome, SdoRequest};
@@ -44,6 +45,7 @@ pub(super) enum PdoStep {
 pub(super) enum Step {
     DeviceType,
     Identity(u8),
+    Program(ProgramStep),
     Date,
     Time,
     Write(usize),
@@ -59,6 +61,10 @@ pub(super) enum Step {
     Pdo(Direction, usize, PdoStep),
     MasterHeartbeat,
     Heartbeat,
+    /// A device whose heartbeat is on does not answer to guarding.
+    HeartbeatOff,
+    GuardTime,
+    LifeTimeFactor,
 }
 
 /// How to go on after a step.
@@ -70,6 +76,12 @@ pub(super) enum Verdict {
     Then(Step),
     /// With this one, which stands further behind.
     SkipTo(Step),
+    /// With this one, after a while, as long as there is time.
+    Again(Step),
+    /// With the next one: the download of a program begins.
+    Program,
+    /// As with a device that has just come.
+    Restart,
     /// All is done.
     Finish,
     /// Not at all.
@@ -80,7 +92,7 @@ pub(super) enum Verdict {
 pub(super) fn steps_max(node: &NodeConfig) -> usize {
     let pdos = [&node.rpdos, &node.tpdos].into_iter().flatten();
     let map: usize = pdos.map(|pdo| pdo.mapping.len() + 16).sum();
-    map + 4 + 2 * usize::from(DEFAULT_PDOS) + node.writes.len() + 8
+    map + 4 + 2 * usize::from(DEFAULT_PDOS) + node.writes.len() + ProgramStep::ALL.len()
 }
 
 /// Fills in the steps of a state.
@@ -96,6 +108,9 @@ pub(super) fn fill(
         BootState::Identify => {
             steps.push(Step::DeviceType);
             steps.extend((1..=4).map(Step::Identity));
+        }
+        BootState::Program if node.program.is_some() => {
+            steps.extend(ProgramStep::ALL.map(Step::Program));
         }
         BootState::Configure => {
             if node.stamp.is_some() {
@@ -129,6 +144,9 @@ pub(super) fn fill(
             }
             if node.heartbeat.is_some() {
                 steps.push(Step::Heartbeat);
+            }
+            if node.guarding.is_some() {
+                steps.extend([Step::HeartbeatOff, Step::GuardTime, Step::LifeTimeFactor]);
             }
         }
         _ => {}
@@ -203,6 +221,7 @@ pub(super) fn request(
     match step {
         Step::DeviceType => SdoRequest::upload(Mux::DEVICE_TYPE),
         Step::Identity(sub) => SdoRequest::upload(Mux::new(0x1018, sub)),
+        Step::Program(step) => step.request(node),
         Step::Date => SdoRequest::upload(Mux::CONFIGURATION_DATE),
         Step::Time => SdoRequest::upload(Mux::CONFIGURATION_TIME),
         Step::Write(place) => {
@@ -228,6 +247,11 @@ pub(super) fn request(
         }
         Step::Heartbeat => {
             number(Mux::PRODUCER_HEARTBEAT, node.heartbeat.map_or(0, |heartbeat| heartbeat.producer_ms), 2)
+        }
+        Step::HeartbeatOff => number(Mux::PRODUCER_HEARTBEAT, 0_u16, 2),
+        Step::GuardTime => number(Mux::GUARD_TIME, node.guarding.map_or(0, |guard| guard.guard_time_ms), 2),
+        Step::LifeTimeFactor => {
+            number(Mux::LIFE_TIME_FACTOR, node.guarding.map_or(0, |guard| guard.life_time_factor), 1)
         }
         Step::Pdo(direction, place, step) => {
             let Some(pdo) = node.pdos(direction).get(place) else {
@@ -308,6 +332,7 @@ pub(super) fn judge(
             station.identity[usize::from(sub - 1).min(3)] = value;
             compare(expected, value, status, optional_or(status))
         }
+        Step::Program(step) => step.judge(value, row, node, station),
         Step::Date | Step::Time => {
             let wanted = node.stamp.map(|stamp| if step == Step::Date { stamp.date } else { stamp.time });
             let same = value.is_some() && value == wanted;
@@ -317,7 +342,10 @@ pub(super) fn judge(
             (row, if finished { Verdict::Finish } else { verdict })
         }
         Step::StampDate | Step::StampTime | Step::PeriodOff | Step::Period | Step::Window => optional(),
-        Step::MasterHeartbeat => optional(),
+        Step::MasterHeartbeat | Step::HeartbeatOff => optional(),
+        // It answers nevertheless; that the master is lost it does not see then.
+        Step::GuardTime | Step::LifeTimeFactor if refused.is_some_and(SdoFailure::is_absent) => optional(),
+        Step::GuardTime | Step::LifeTimeFactor => required(row),
         Step::Write(_) | Step::Overflow | Step::Heartbeat => required(row),
         Step::OtherPdo(direction, number) => match value.map(CobId) {
             Some(id) if id.is_valid() => {

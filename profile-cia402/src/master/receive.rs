@@ -177,12 +177,19 @@ impl Master {
             self.take_boot_up(now, index);
             return Ok(());
         }
-        let timeout = self.config.nodes[index].heartbeat.map(|heartbeat| heartbeat.timeout_ms);
+        let config = &self.config.nodes[index];
         let station = &mut self.stations[index];
+        if config.guarding.is_some() {
+            // An answer that came before says nothing of now.
+            if station.guard_toggle.is_some_and(|toggle| toggle != heartbeat.toggle) {
+                return Err(Refusal::Unexpected);
+            }
+            station.guard_toggle = Some(!heartbeat.toggle);
+        }
         let state = heartbeat.state;
         station.heartbeat = Some(state);
         if station.state.supervises() {
-            station.heartbeat_deadline = timeout.map(|timeout| now + DurationNs::from_millis(timeout.into()));
+            station.heartbeat_deadline = config.silence_max().map(|longest| now + longest);
         }
         match (station.state, state) {
             (BootState::Operational, NmtState::OPERATIONAL) => {}
@@ -208,6 +215,9 @@ impl Master {
         if twice {
             self.tell_duplicate(index, DuplicateSign::BootUps);
         }
+        if self.stations[index].is_without_program() {
+            return;
+        }
         if !self.advance(now, index, BootEvent::BootUp) {
             return;
         }
@@ -215,6 +225,7 @@ impl Master {
             state,
             BootState::Resetting
                 | BootState::Identify
+                | BootState::Program
                 | BootState::Retry
                 | BootState::Lost
                 | BootState::Failed

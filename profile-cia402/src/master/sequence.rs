@@ -3,6 +3,7 @@
 use super::boot::BootState;
 use super::config::{MandatoryError, StartPolicy};
 use super::plan::{self, Step, Verdict};
+use super::program::{self, ProgramStep};
 use super::report::RowOutcome;
 use super::station::Work;
 use super::*;
@@ -19,6 +20,7 @@ impl Master {
         let station = &mut self.stations[index];
         (station.state, station.since, station.deadline) = (next, now, None);
         (station.at, station.again, station.proceed) = (0, None, false);
+        (station.pause, station.program_until) = (None, None);
         let kept = station.kept;
         plan::fill(&mut station.steps, next, config, node, kept);
         if last == BootState::Operational {
@@ -26,6 +28,9 @@ impl Master {
         }
         if !next.supervises() {
             station.heartbeat_deadline = None;
+        }
+        if event == BootEvent::BootUp || next.is_out() {
+            (station.guard_at, station.guard_toggle) = (None, None);
         }
         match next {
             BootState::Off => (station.give_up, station.kept) = (None, false),
@@ -35,6 +40,8 @@ impl Master {
                 (station.status, station.kept, station.heartbeat) = (None, false, None);
                 station.signs.clear();
                 (station.strays, station.last_answer) = (0, None);
+                // One that may stay in operation tells its state when it is asked, and has to be asked from then on.
+                station.guard_at = node.guarding.filter(|_| keep).map(|_| now);
                 station.deadline = Some(now + config.boot_up_time);
                 station.give_up = (config.boot_time > DurationNs::ZERO)
                     .then(|| now + config.boot_up_time + config.boot_time);
@@ -69,24 +76,21 @@ impl Master {
             }
             BootState::Map => station.adopted.clear(),
             BootState::Ready => {
-                let timeout =
-                    node.heartbeat.map(|heartbeat| DurationNs::from_millis(heartbeat.timeout_ms.into()));
-                station.heartbeat_deadline = timeout.map(|timeout| now + timeout);
+                station.heartbeat_deadline = node.silence_max().map(|longest| now + longest);
+                station.guard_at = node.guarding.map(|_| station.guard_at.unwrap_or(now));
             }
             BootState::Starting => {
                 station.nmt = Some(NmtCommand::START);
                 station.heartbeat = None;
                 // Heartbeats that tell another state do not count.
-                let timeout =
-                    node.heartbeat.map(|heartbeat| DurationNs::from_millis(heartbeat.timeout_ms.into()));
-                station.deadline = timeout.map(|timeout| now + timeout * 2);
+                station.deadline = node.silence_max().map(|longest| now + longest * 2);
             }
             BootState::Operational => {
                 station.tpdos.iter_mut().for_each(|end| end.start(now));
                 let node = station.node;
                 self.emit(Event::Operational { node });
             }
-            BootState::Control | BootState::Failed => {}
+            BootState::Program | BootState::Control | BootState::Failed => {}
         }
         self.check_complete();
         true
@@ -109,16 +113,27 @@ impl Master {
         self.mandatory_error(now, index);
     }
 
+    /// Nothing is heard of a device's state any more.
+    fn lose_sight(&mut self, now: MonotonicTime, index: usize) {
+        let node = self.stations[index].node;
+        let guarded = self.config.nodes[index].guarding.is_some();
+        let event = if guarded { Event::GuardingLost { node } } else { Event::HeartbeatLost { node } };
+        self.lose(now, index, event);
+    }
+
     /// A device that was set up is lost.
     pub(super) fn lose(&mut self, now: MonotonicTime, index: usize, event: Event) {
+        let guarded = self.config.nodes[index].guarding.is_some();
         let starting = self.stations[index].state == BootState::Starting;
         if starting {
-            self.fail(now, index, Some(BootStatus::NO_HEARTBEAT));
+            let status = if guarded { BootStatus::GUARDING } else { BootStatus::NO_HEARTBEAT };
+            self.fail(now, index, Some(status));
             // It may have started, and nobody sees it.
             self.stations[index].nmt = Some(NmtCommand::STOP);
             return;
         }
-        self.stations[index].status = Some(BootStatus::HEARTBEAT_LOST);
+        let status = if guarded { BootStatus::GUARDING } else { BootStatus::HEARTBEAT_LOST };
+        self.stations[index].status = Some(status);
         if self.advance(now, index, BootEvent::Lost) {
             self.emit(event);
             self.mandatory_error(now, index);
@@ -171,12 +186,14 @@ impl Master {
             Work::Application => station.queue.finish(outcome),
             Work::Step(step) => {
                 // The bytes of the configuration are needed for the next time.
-                let write = match step {
-                    Step::Write(place) => self.config.nodes[index].writes.get_mut(place),
+                let node = &mut self.config.nodes[index];
+                let place = match step {
+                    Step::Write(place) => node.writes.get_mut(place).map(|write| &mut write.data),
+                    Step::Program(ProgramStep::Download) => program::image(node),
                     _ => None,
                 };
-                if let Some(write) = write {
-                    write.data = core::mem::take(&mut outcome.data);
+                if let Some(place) = place {
+                    *place = core::mem::take(&mut outcome.data);
                 }
                 return Some((step, outcome));
             }
@@ -205,15 +222,15 @@ impl Master {
     /// Times that have run out.
     fn watch(&mut self, now: MonotonicTime, index: usize) {
         let station = &self.stations[index];
-        let (node, state) = (station.node, station.state);
+        let state = station.state;
         let over = |at: Option<MonotonicTime>| at.is_some_and(|at| now >= at);
         if over(station.heartbeat_deadline) {
-            self.lose(now, index, Event::HeartbeatLost { node });
+            self.lose_sight(now, index);
         } else if over(station.give_up) && state == BootState::Retry {
             self.fail(now, index, Some(BootStatus::NO_ANSWER));
         } else if over(station.deadline) {
             if state == BootState::Starting {
-                self.lose(now, index, Event::HeartbeatLost { node });
+                self.lose_sight(now, index);
             } else {
                 self.advance(now, index, BootEvent::Elapsed);
             }
@@ -248,6 +265,22 @@ impl Master {
                 station.at = place.unwrap_or(station.at).max(station.at);
             }
             Verdict::Finish => station.at = station.steps.len(),
+            Verdict::Again(_) if station.program_until.is_some_and(|until| now >= until) => {
+                station.failed = Some(plain);
+                self.fail(now, index, Some(BootStatus::PROGRAM_DOWNLOAD));
+            }
+            Verdict::Again(step) => {
+                (station.again, station.pause) = (Some(step), Some(now + self.config.retry_time));
+            }
+            Verdict::Program => {
+                let time = node.program.as_ref().map(|program| program.time);
+                station.program_until = time.map(|time| now + time);
+                let node = station.node;
+                self.emit(Event::ProgramDownload { node });
+            }
+            Verdict::Restart => {
+                self.advance(now, index, BootEvent::Proceed);
+            }
             Verdict::Fail(status) => {
                 let timeout = matches!(row.outcome, RowOutcome::Failed(SdoFailure::Timeout { .. }));
                 if timeout && station.state == BootState::Identify {
@@ -264,6 +297,9 @@ impl Master {
     fn ask(&mut self, now: MonotonicTime, index: usize) -> bool {
         let station = &mut self.stations[index];
         if station.work != Work::Free || !station.client.is_free() {
+            return false;
+        }
+        if station.pause.take_if(|pause| now >= *pause).is_none() && station.pause.is_some() {
             return false;
         }
         if let Some(step) = station.next_step() {
@@ -302,7 +338,9 @@ impl Master {
                 let keeps = operational && self.config.nodes[index].keep_alive;
                 if keeps { BootEvent::Kept } else { BootEvent::Done }
             }
-            BootState::Configure | BootState::Map | BootState::Control => BootEvent::Done,
+            BootState::Program | BootState::Configure | BootState::Map | BootState::Control => {
+                BootEvent::Done
+            }
             BootState::Await if station.proceed && station.is_quiet() => BootEvent::Proceed,
             BootState::Ready if self.may_start() => BootEvent::Proceed,
             BootState::Starting if self.has_started(index) => BootEvent::Done,
@@ -316,7 +354,7 @@ impl Master {
         let free = station.work == Work::Free && station.client.is_free();
         let steps = station.again.is_some() || station.at < station.steps.len();
         let requests = station.state.serves() && station.queue.is_waiting();
-        free && (steps || requests || self.next_event(index).is_some())
+        free && station.pause.is_none() && (steps || requests || self.next_event(index).is_some())
     }
 
     /// Whether devices that are ready are started.
@@ -333,11 +371,11 @@ impl Master {
                 .all(|(node, station)| !node.mandatory || ready(station))
     }
 
-    /// Whether a device that was started is in operation. One without a heartbeat is believed to be once the command is out.
+    /// Whether a device that was started is in operation. One that tells nothing is believed to be once the command is out.
     fn has_started(&self, index: usize) -> bool {
         let station = &self.stations[index];
         let told = station.heartbeat == Some(NmtState::OPERATIONAL);
-        let silent = self.config.nodes[index].heartbeat.is_none();
+        let silent = self.config.nodes[index].silence_max().is_none();
         station.nmt.is_none() && (told || silent)
     }
 

@@ -8,6 +8,7 @@ use super::config::{Direction, MasterConfig, NodeConfig, PDOS_MAX};
 use super::ends::{RpdoEnd, TpdoEnd};
 use super::event::DuplicateSign;
 use super::plan::{Step, steps_max};
+use super::program::ProgramStep;
 use super::queue::Queue;
 use super::report::ReportRow;
 use crate::sdo::client::{Client, ClientConfig};
@@ -78,6 +79,12 @@ pub(super) struct Station {
     pub at: usize,
     /// The step that goes before it.
     pub again: Option<Step>,
+    /// It does not go before this.
+    pub pause: Option<MonotonicTime>,
+    /// It was given a program.
+    pub programmed: bool,
+    /// When there is no more time for the download that is under way.
+    pub program_until: Option<MonotonicTime>,
     pub report: Vec<ReportRow>,
     /// The step that failed.
     pub failed: Option<ReportRow>,
@@ -101,6 +108,10 @@ pub(super) struct Station {
     /// What its heartbeat told last.
     pub heartbeat: Option<NmtState>,
     pub heartbeat_deadline: Option<MonotonicTime>,
+    /// Node guarding: the next request.
+    pub guard_at: Option<MonotonicTime>,
+    /// Node guarding: bit 7 of the next answer; `None` for any.
+    pub guard_toggle: Option<bool>,
     pub boot_up_at: Option<MonotonicTime>,
     /// Command and object of the last answer that was asked for, unless one may still come that was given up.
     pub last_answer: Option<[u8; 4]>,
@@ -126,6 +137,9 @@ impl Station {
             steps: Vec::new(),
             at: 0,
             again: None,
+            pause: None,
+            programmed: false,
+            program_until: None,
             report: Vec::with_capacity(REPORT_MAX),
             failed: None,
             status: None,
@@ -144,6 +158,8 @@ impl Station {
             rpdos: Vec::new(),
             heartbeat: None,
             heartbeat_deadline: None,
+            guard_at: None,
+            guard_toggle: None,
             boot_up_at: None,
             last_answer: None,
             strays: 0,
@@ -199,6 +215,12 @@ impl Station {
         let step = self.steps.get(self.at).copied()?;
         self.at += 1;
         Some(step)
+    }
+
+    /// Whether it has no program for the moment, and may start anew by itself.
+    pub fn is_without_program(&self) -> bool {
+        let started = Step::Program(ProgramStep::Start);
+        self.program_until.is_some() && !self.steps[..self.at].contains(&started)
     }
 
     /// Whether the application's requests are through.

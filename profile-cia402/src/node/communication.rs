@@ -15,6 +15,10 @@ pub const SYNC_ID: u16 = 0x1005;
 pub const CYCLE_PERIOD: u16 = 0x1006;
 /// Synchronous window length, microseconds.
 pub const SYNC_WINDOW: u16 = 0x1007;
+/// Guard time, ms.
+pub const GUARD_TIME: u16 = 0x100C;
+/// Life time factor.
+pub const LIFE_TIME_FACTOR: u16 = 0x100D;
 /// Store parameters.
 pub const STORE: u16 = 0x1010;
 /// Restore default parameters.
@@ -64,6 +68,8 @@ pub(super) fn define(dictionary: &mut Dictionary, config: &Config) {
     dictionary.variable(0x1008, Definition::text("Manufacturer device name", identity.name));
     dictionary.variable(0x1009, Definition::text("Manufacturer hardware version", identity.hardware));
     dictionary.variable(0x100A, Definition::text("Manufacturer software version", identity.software));
+    dictionary.variable(GUARD_TIME, new("Guard time", U16, 0));
+    dictionary.variable(LIFE_TIME_FACTOR, new("Life time factor", U8, 0));
     let groups = [
         "Save all parameters",
         "Save communication parameters",

@@ -16,6 +16,7 @@ pub mod drive;
 pub mod eds;
 pub mod errors;
 mod gate;
+mod guarding;
 pub mod nmt;
 pub mod pdo;
 
@@ -31,6 +32,7 @@ use self::consumer::{Change, Consumers};
 use self::dictionary::{Dictionary, Group};
 use self::errors::Errors;
 use self::gate::Gate;
+use self::guarding::Guarding;
 use self::nmt::Effect;
 use self::pdo::Pdo;
 use crate::drive::ErrorCode;
@@ -128,6 +130,7 @@ pub struct Node<A> {
     errors: Errors,
     consumers: Consumers,
     heartbeat_at: MonotonicTime,
+    guarding: Guarding,
     /// Last SYNC since the communication started.
     last_sync: Option<MonotonicTime>,
     sync_lost: bool,
@@ -178,6 +181,7 @@ impl<A: Application> Node<A> {
             errors: Errors::default(),
             consumers: Consumers::default(),
             heartbeat_at: MonotonicTime::ZERO,
+            guarding: Guarding::default(),
             last_sync: None,
             sync_lost: false,
             time: TimeOfDay::default(),
@@ -280,8 +284,12 @@ impl<A: Application> Node<A> {
     pub fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) {
         self.handle_time(now);
         let Id::Standard(_) = frame.id() else { return };
-        // No device here answers remote frames or speaks FD.
-        if frame.is_remote() || frame.is_fd() {
+        // No PDO is sent when it is asked for, and no device here speaks FD.
+        if frame.is_remote() {
+            self.handle_guarding(now, frame.id());
+            return;
+        }
+        if frame.is_fd() {
             return;
         }
         let data = frame.data();
@@ -368,6 +376,19 @@ impl<A: Application> Node<A> {
             || self.tpdos.iter().any(|pdo| pdo.valid && pdo.id == id)
     }
 
+    fn handle_guarding(&mut self, now: MonotonicTime, id: Id) {
+        let Some(node) = self.node.filter(|_| self.state != NmtState::BOOT_UP) else { return };
+        if id != cob_id::error_control(node) {
+            return;
+        }
+        if let Some((answer, back)) = self.guarding.request(now, self.state, &self.dictionary) {
+            if back {
+                self.errors.clear(ErrorCode::HEARTBEAT, COMMUNICATION, &mut self.dictionary);
+            }
+            self.send(id, &answer.emit());
+        }
+    }
+
     fn handle_nmt(&mut self, now: MonotonicTime, data: &[u8]) {
         match Nmt::parse(data) {
             Ok(nmt) if nmt.node.is_none() || nmt.node == self.node => {
@@ -429,6 +450,7 @@ impl<A: Application> Node<A> {
         self.boot_at = self.node.map(|_| now + self.config.boot_time);
         self.server.reset();
         self.waiting.clear();
+        self.guarding = Guarding::default();
         self.consumers = Consumers::default();
         self.consumers.refresh(&self.dictionary);
         for pdo in self.rpdos.iter_mut().chain(&mut self.tpdos) {
@@ -462,10 +484,14 @@ impl<A: Application> Node<A> {
         }
     }
 
-    /// Heartbeats of others, deadlines of RPDOs and SYNC.
+    /// Heartbeats of others, requests of node guarding, deadlines of RPDOs and SYNC.
     fn watch(&mut self, now: MonotonicTime) {
         while let Change::Lost(node) = self.consumers.poll(now) {
             self.errors.raise(ErrorCode::HEARTBEAT, node, &mut self.dictionary);
+            self.fail(now);
+        }
+        if self.state != NmtState::BOOT_UP && self.guarding.misses(now, &self.dictionary) {
+            self.errors.raise(ErrorCode::HEARTBEAT, COMMUNICATION, &mut self.dictionary);
             self.fail(now);
         }
         if !self.state.has_pdo() {

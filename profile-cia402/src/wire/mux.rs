@@ -22,6 +22,10 @@ impl Mux {
     pub const CYCLE_PERIOD: Self = Self::new(0x1006, 0);
     /// Synchronous window length, microseconds; 0 for the whole cycle.
     pub const SYNC_WINDOW: Self = Self::new(0x1007, 0);
+    /// Node guarding: time between two requests, ms; 0 for none.
+    pub const GUARD_TIME: Self = Self::new(0x100C, 0);
+    /// Node guarding: guard times without a request after which the master is lost; 0 for never.
+    pub const LIFE_TIME_FACTOR: Self = Self::new(0x100D, 0);
     /// COB-ID of EMCY; bit 31 when there is none.
     pub const EMCY_COB_ID: Self = Self::new(0x1014, 0);
     /// Time between two heartbeats, ms; 0 for none.

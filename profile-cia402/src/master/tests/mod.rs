@@ -3,7 +3,9 @@
 mod bad_input;
 mod boot_up;
 mod cyclic;
+mod guarding;
 mod peer;
+mod program;
 
 use std::collections::BTreeMap;
 

@@ -16,9 +16,78 @@ pub struct Objects {
     /// Whether mappings can be changed.
     pub fixed_mapping: bool,
     pub writes: Vec<(Mux, u64)>,
+    /// Its flash, if it has one.
+    pub flash: Option<Flash>,
     /// Accesses so far, and which one of them goes wrong.
     pub accesses: usize,
     pub wrong: Option<(usize, Wrong)>,
+}
+
+/// A program that can be written: 1F50 to 1F57. Its identification is its first four bytes.
+#[derive(Debug, Clone)]
+pub struct Flash {
+    pub image: Vec<u8>,
+    pub runs: bool,
+    /// Starts anew when it is stopped and when it is started, and does not answer that.
+    pub has_loader: bool,
+    /// Reads of 1F57 until it is written.
+    pub busy: u32,
+    /// Status in 1F57, bits 1 to 7.
+    pub status: u32,
+    /// What is written is not what runs then.
+    pub spoils: bool,
+    /// What was written to 1F51.
+    pub controls: Vec<u8>,
+    restart: bool,
+}
+
+impl Flash {
+    pub fn new(image: &[u8]) -> Self {
+        Self {
+            image: image.to_vec(),
+            runs: true,
+            has_loader: false,
+            busy: 0,
+            status: 0,
+            spoils: false,
+            controls: vec![],
+            restart: false,
+        }
+    }
+
+    fn read(&mut self, object: Mux) -> Option<Vec<u8>> {
+        Some(match object.index {
+            0x1F51 => vec![u8::from(self.runs)],
+            0x1F56 => self.image.iter().copied().chain([0; 4]).take(4).collect(),
+            0x1F57 => {
+                let busy = self.busy.min(1);
+                self.busy -= busy;
+                (busy | self.status << 1).to_le_bytes().to_vec()
+            }
+            _ => return None,
+        })
+    }
+
+    fn write(&mut self, object: Mux, data: &[u8]) -> Result<(), AbortCode> {
+        match (object.index, data) {
+            (0x1F51, [0 | 1]) => {
+                self.runs = data == [1];
+                self.restart = self.has_loader;
+                if self.runs && self.spoils {
+                    self.image = vec![0xBA, 0xD0];
+                }
+            }
+            (0x1F51, [3]) if self.runs => return Err(AbortCode::DEVICE_STATE),
+            (0x1F51, [3]) => self.image.clear(),
+            (0x1F50, _) if self.runs || !self.image.is_empty() => return Err(AbortCode::DEVICE_STATE),
+            (0x1F50, _) => self.image = data.to_vec(),
+            _ => return Err(AbortCode::VALUE),
+        }
+        if object.index == 0x1F51 {
+            self.controls.extend(data);
+        }
+        Ok(())
+    }
 }
 
 /// What a device does instead of answering.
@@ -43,6 +112,7 @@ impl Objects {
             refuse: BTreeMap::new(),
             fixed_mapping: false,
             writes: vec![],
+            flash: None,
             accesses: 0,
             wrong: None,
         };
@@ -60,6 +130,8 @@ impl Objects {
             (Mux::CONFIGURATION_TIME, number(0)),
             (Mux::consumer_heartbeat(1), number(0)),
             (Mux::PRODUCER_HEARTBEAT, vec![0; 2]),
+            (Mux::GUARD_TIME, vec![0; 2]),
+            (Mux::LIFE_TIME_FACTOR, vec![0]),
             (Mux::new(0x6060, 0), vec![0]),
             (Mux::new(0x1008, 0), b"A drive of the tests with a name of some length, for segments".to_vec()),
         ]);
@@ -137,6 +209,10 @@ impl Objects {
 impl ObjectAccess for Objects {
     fn read(&mut self, object: Mux, into: &mut [u8]) -> Result<usize, AbortCode> {
         self.count()?;
+        if let Some(value) = self.flash.as_mut().and_then(|flash| flash.read(object)) {
+            into[..value.len()].copy_from_slice(&value);
+            return Ok(value.len());
+        }
         let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
         into[..value.len()].copy_from_slice(value);
         Ok(value.len())
@@ -144,12 +220,19 @@ impl ObjectAccess for Objects {
 
     fn write_begins(&mut self, object: Mux, _: Option<u32>) -> Result<usize, AbortCode> {
         self.count()?;
+        if self.flash.is_some() && [0x1F50, 0x1F51].contains(&object.index) {
+            self.may_write(object)?;
+            return Ok(if object.index == 0x1F50 { 1_024 } else { 1 });
+        }
         let value = self.values.get(&object).ok_or(AbortCode::NO_OBJECT)?;
         self.may_write(object)?;
         Ok(value.len())
     }
 
     fn write(&mut self, object: Mux, data: &[u8]) -> Result<(), AbortCode> {
+        if let Some(flash) = self.flash.as_mut().filter(|_| [0x1F50, 0x1F51].contains(&object.index)) {
+            return flash.write(object, data);
+        }
         if data.len() != self.values[&object].len() {
             return Err(AbortCode::LENGTH);
         }
@@ -177,8 +260,13 @@ pub struct Device {
     pub dead: bool,
     /// Does not answer by SDO.
     pub mute: bool,
-    /// Does not send heartbeats.
+    /// Does not send heartbeats, and does not answer to guarding.
     pub no_heartbeat: bool,
+    /// Bit 7 of its next answer to guarding, and whether that stays as it is.
+    pub toggle: bool,
+    pub stuck: bool,
+    /// Requests of node guarding that came.
+    pub guarded: Vec<MonotonicTime>,
     /// Does not obey NMT start.
     pub lazy: bool,
     /// Time from a reset to its boot-up message; `None` for no message.
@@ -197,7 +285,7 @@ impl Device {
             node,
             state: NmtState::PRE_OPERATIONAL,
             objects: Objects::new(node),
-            server: Server::new(ServerConfig::default()),
+            server: Server::new(ServerConfig { capacity: 1_024, ..ServerConfig::default() }),
             out: VecDeque::new(),
             next_heartbeat: None,
             values: [0x27, 6, 1, 2, 3, 4, 5, 6],
@@ -206,6 +294,9 @@ impl Device {
             dead: false,
             mute: false,
             no_heartbeat: false,
+            toggle: false,
+            stuck: false,
+            guarded: vec![],
             lazy: false,
             boot_time: Some(DurationNs::from_millis(20)),
             boot_ups: 1,
@@ -226,7 +317,7 @@ impl Device {
         self.out.clear();
         self.objects.default_pdos(self.node);
         self.objects.set(Mux::PRODUCER_HEARTBEAT, 0);
-        self.next_heartbeat = None;
+        (self.next_heartbeat, self.toggle) = (None, false);
         if let Some(time) = self.boot_time {
             for turn in 0..self.boot_ups {
                 let boot_up = Heartbeat::new(NmtState::BOOT_UP);
@@ -241,6 +332,19 @@ impl Device {
             return;
         }
         let (id, data) = (frame_in.id(), frame_in.data());
+        if frame_in.is_remote() {
+            // Nobody answers while the boot-up message is still to come.
+            let boots = self.out.iter().any(|(_, frame)| frame.id() == id);
+            if id == cob_id::error_control(self.node) && !boots {
+                self.guarded.push(now);
+                let answer = Heartbeat { state: self.state, toggle: self.toggle };
+                if !self.no_heartbeat {
+                    self.toggle ^= !self.stuck;
+                    self.send(now + self.answer_time, frame(id, &answer.emit()));
+                }
+            }
+            return;
+        }
         if id == cob_id::NMT {
             let nmt = Nmt::parse(data).unwrap();
             if nmt.node.is_none_or(|node| node == self.node) {
@@ -257,6 +361,9 @@ impl Device {
             self.sync(now);
         } else if id == cob_id::sdo_request(self.node) && self.state.has_sdo() && !self.mute {
             self.server.handle(now, data, &mut self.objects).unwrap();
+            if self.objects.flash.as_mut().is_some_and(|flash| core::mem::take(&mut flash.restart)) {
+                return self.reset(now);
+            }
             while self.server.wake_at() == Some(MonotonicTime::ZERO) {
                 let mut answer = self.server.poll(now).unwrap();
                 match self.objects.now_wrong() {

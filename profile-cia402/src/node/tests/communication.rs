@@ -247,6 +247,67 @@ fn a_lost_master_stops_the_axis() {
     }
 }
 
+/// Asks for the state, and takes the answer.
+fn guard(rig: &mut Rig) -> Vec<Vec<u8>> {
+    rig.take();
+    let request = Frame::remote(Id::Standard(0x705), 1).unwrap();
+    rig.node.handle_frame(rig.now, &request);
+    rig.drain();
+    rig.take_of(0x705)
+}
+
+#[test]
+fn node_guarding_is_answered_with_a_bit_that_alternates() {
+    let mut rig = Rig::new(1);
+    assert_eq!([guard(&mut rig), guard(&mut rig), guard(&mut rig)], [[[0x7F]], [[0xFF]], [[0x7F]]]);
+    rig.nmt(NmtCommand::START);
+    assert_eq!([guard(&mut rig), guard(&mut rig)], [[[0x85]], [[0x05]]]);
+    rig.nmt(NmtCommand::STOP);
+    assert_eq!(guard(&mut rig), [[0x84]]);
+    // From 0 again.
+    rig.nmt(NmtCommand::RESET_COMMUNICATION);
+    assert_eq!(guard(&mut rig), Vec::<Vec<u8>>::new(), "not while it initialises");
+    rig.run(20);
+    assert_eq!(guard(&mut rig), [[0x7F]]);
+    // Somebody else is asked, or something else.
+    for id in [0x704, 0x185, 0x605] {
+        rig.node.handle_frame(rig.now, &Frame::remote(Id::Standard(id), 8).unwrap());
+    }
+    rig.drain();
+    assert_eq!(rig.take(), []);
+    // One that sends heartbeats is not guarded.
+    rig.set(0x1017, 0, 1_000).unwrap();
+    assert_eq!(guard(&mut rig), Vec::<Vec<u8>>::new());
+}
+
+/// Requests that stay away: 8130h, 1029h:1, and the axis by 6007h.
+#[test]
+fn a_master_that_does_not_ask_any_more_stops_the_axis() {
+    let mut rig = Rig::new(1);
+    rig.set(0x100C, 0, 50).unwrap();
+    rig.set(0x100D, 0, 3).unwrap();
+    rig.nmt(NmtCommand::START);
+    rig.enable(9);
+    rig.run(500);
+    assert_eq!(rig.state(), State::OperationEnabled, "watching begins with the first request");
+    for _ in 0..5 {
+        assert_eq!(guard(&mut rig).len(), 1);
+        rig.run(100);
+    }
+    assert_eq!((rig.node.state(), rig.state()), (NmtState::OPERATIONAL, State::OperationEnabled));
+    rig.run(49);
+    assert_eq!(rig.take_of(0x85), Vec::<Vec<u8>>::new(), "149 ms after the last one");
+    rig.run(2);
+    assert_eq!(rig.take_of(0x85)[0][..4], [0x30, 0x81, 0x11, 0]);
+    assert_eq!(rig.node.state(), NmtState::PRE_OPERATIONAL);
+    rig.run(300);
+    assert_eq!(rig.state(), State::Fault);
+    rig.node.handle_frame(rig.now, &Frame::remote(Id::Standard(0x705), 1).unwrap());
+    rig.drain();
+    let back = rig.take_of(0x85).last().map(|emcy| [emcy[0], emcy[1]]);
+    assert_eq!(back, Some([0, 0]), "it is back");
+}
+
 #[test]
 fn leaving_operational_stops_the_axis() {
     for command in [NmtCommand::STOP, NmtCommand::ENTER_PRE_OPERATIONAL, NmtCommand::RESET_COMMUNICATION] {

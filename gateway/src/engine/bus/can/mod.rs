@@ -229,6 +229,7 @@ impl CanBus {
             }
             Event::Rebooted { node, .. }
             | Event::HeartbeatLost { node }
+            | Event::GuardingLost { node }
             | Event::StateChanged { node, .. } => self.lose(now, system, *node, axes),
             Event::DuplicateNode { node, .. } => {
                 // Where the master stops it for that, it is lost; a device that only says its name twice is not.
