@@ -6,8 +6,9 @@
 //!            \--> Scan: one question per bit and part; silence means no
 //! ```
 //!
-//! No answer to most questions is a time-out, but silence is itself an answer in a scan. More than one device that answers at
-//! the same time sends the same frame: the bus carries it once.
+//! No answer to most questions is a time-out, but silence is itself an answer in a scan. All devices that answer a question of a
+//! scan send the same frame, not all at the same time: what comes late must not be taken for the answer to the next question. So
+//! each question of a scan has its whole time.
 
 use core::fmt;
 
@@ -24,7 +25,7 @@ use crate::wire::{Error, NodeId};
 pub struct MasterConfig {
     /// Longest time for an answer.
     pub timeout: DurationNs,
-    /// Time after which a question of a scan counts as answered with no. A scan asks 132 to 264 of them.
+    /// Time that each question of a scan has, within which every device must have answered; a scan asks 133 of them.
     pub scan_timeout: DurationNs,
 }
 
@@ -126,6 +127,8 @@ struct Scan {
     part: usize,
     /// What is asked: whether anybody is there, this bit, or whether all bits of the part are right.
     question: Question,
+    /// Somebody has said yes.
+    heard: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +139,8 @@ enum Question {
 }
 
 impl Scan {
-    const START: Self = Self { address: LssAddress([0; 4]), part: 0, question: Question::Anybody };
+    const START: Self =
+        Self { address: LssAddress([0; 4]), part: 0, question: Question::Anybody, heard: false };
 
     fn request(&self) -> LssRequest {
         let number = self.address.0[self.part];
@@ -152,9 +156,9 @@ impl Scan {
         }
     }
 
-    /// The next question after an answer, or the end.
-    fn next(mut self, yes: bool) -> Result<Self, Result<LssReply, LssFailure>> {
-        match (self.question, yes) {
+    /// The next question when the time of this one is over, or the end.
+    fn next(mut self) -> Result<Self, Result<LssReply, LssFailure>> {
+        match (self.question, core::mem::take(&mut self.heard)) {
             (Question::Anybody, false) => return Err(Ok(LssReply::Found(false))),
             (Question::Anybody, true) => self.question = Question::Bit(31),
             (Question::Bit(bit), yes) => {
@@ -269,6 +273,10 @@ impl Master {
     /// [`Error`] when it is none. Nothing changes.
     pub fn handle(&mut self, now: MonotonicTime, data: &[u8]) -> Result<bool, Error> {
         let response = LssResponse::parse(data)?;
+        if let (State::Scan(scan), LssResponse::Identified, None) = (&mut self.state, response, self.frame) {
+            scan.heard = true;
+            return Ok(true);
+        }
         let Some(reply) = self.reply(response) else { return Ok(false) };
         match reply {
             Some(outcome) => self.finish(outcome),
@@ -289,13 +297,6 @@ impl Master {
             _ => Err(LssFailure::Refused { error, specific }),
         };
         Some(match (self.state, self.task, response) {
-            (State::Scan(scan), _, R::Identified) => match scan.next(true) {
-                Ok(scan) => {
-                    self.state = State::Scan(scan);
-                    None
-                }
-                Err(outcome) => Some(outcome),
-            },
             (State::Inquire { known }, _, R::Inquired(part, number)) if part.index() == known => {
                 self.address.0[known] = number;
                 if known + 1 < Part::ALL.len() {
@@ -398,7 +399,7 @@ impl Master {
         let milliseconds = u32::try_from(self.wait().0 / 1_000_000).unwrap_or(u32::MAX);
         match (self.state, self.task) {
             (State::Pause, _) => self.finish(Ok(LssReply::Done)),
-            (State::Scan(scan), _) => match scan.next(false) {
+            (State::Scan(scan), _) => match scan.next() {
                 Ok(scan) => {
                     self.state = State::Scan(scan);
                     self.ask(now);

@@ -11,20 +11,20 @@ use profile_generic::time::DurationNs;
 use super::*;
 
 /// An SDO client on a socket.
-struct Channel {
+pub struct Channel {
     socket: CanSocket,
     client: Client,
 }
 
 impl Channel {
-    fn open() -> Self {
+    pub fn open() -> Self {
         let answers = Filter::exactly(Id::Standard(0x580 + u16::from(NODE)));
         let socket = CanSocket::open(INTERFACE, &Options { filters: vec![answers], own: false }).unwrap();
         let config = ClientConfig { timeout: DurationNs::from_secs(5), ..ClientConfig::default() };
         Self { socket, client: Client::new(config) }
     }
 
-    fn ask(&mut self, request: SdoRequest) -> SdoOutcome {
+    pub fn ask(&mut self, request: SdoRequest) -> SdoOutcome {
         self.client.start(monotonic_now(), request).unwrap();
         loop {
             while let Some(data) = self.client.poll(monotonic_now()) {

@@ -2,6 +2,7 @@
 
 mod bench;
 mod blocks;
+mod lss;
 mod our_drive;
 mod our_master;
 mod recording;

@@ -21,7 +21,7 @@ fn config(address: LssAddress, node: Option<NodeId>) -> SlaveConfig {
     SlaveConfig { address, node, bit_timings, storable: true }
 }
 
-/// A master and devices on one bus. Equal answers are one frame there.
+/// A master and devices on one bus. Equal answers at the same time are one frame there.
 struct Rig {
     master: Master,
     slaves: Vec<Slave>,
@@ -29,6 +29,8 @@ struct Rig {
     asked: usize,
     /// Answers of one kind that are lost.
     deaf: fn(&LssResponse) -> bool,
+    /// Each device answers so many milliseconds after the one before it in the list.
+    late: u64,
 }
 
 fn rig(slaves: Vec<SlaveConfig>) -> Rig {
@@ -38,6 +40,7 @@ fn rig(slaves: Vec<SlaveConfig>) -> Rig {
         now: 0,
         asked: 0,
         deaf: |_| false,
+        late: 0,
     }
 }
 
@@ -45,27 +48,30 @@ impl Rig {
     fn run(&mut self, task: LssTask) -> (Result<LssReply, LssFailure>, Vec<SlaveEvent>) {
         assert!(self.master.start(ms(self.now), task));
         let mut events = vec![];
+        let mut answers: Vec<(u64, [u8; LSS_LEN])> = vec![];
         for _ in 0..2_000 {
-            if let Some(frame) = self.master.poll(ms(self.now)) {
-                self.asked += 1;
-                let mut answers: Vec<[u8; LSS_LEN]> = vec![];
-                for slave in &mut self.slaves {
-                    events.extend(slave.handle(&frame).unwrap());
-                    answers.extend(slave.poll());
-                }
-                answers.dedup();
-                answers.retain(|answer| !(self.deaf)(&LssResponse::parse(answer).unwrap()));
-                for answer in answers {
+            answers.dedup();
+            answers.retain(|&(at, answer)| {
+                let lost = (self.deaf)(&LssResponse::parse(&answer).unwrap());
+                if at <= self.now && !lost {
                     self.master.handle(ms(self.now), &answer).unwrap();
                 }
+                at > self.now
+            });
+            if let Some(frame) = self.master.poll(ms(self.now)) {
+                self.asked += 1;
+                for (place, slave) in (0..).zip(&mut self.slaves) {
+                    events.extend(slave.handle(&frame).unwrap());
+                    answers.extend(slave.poll().map(|answer| (self.now + place * self.late, answer)));
+                }
+                continue;
             }
             if let Some(outcome) = self.master.take_outcome() {
                 return (outcome, events);
             }
-            match self.master.wake_at() {
-                Some(at) if at > ms(self.now) => self.now = at.0 / 1_000_000,
-                _ => {}
-            }
+            let wake = self.master.wake_at().map_or(self.now, |at| at.0 / 1_000_000);
+            let next = answers.iter().map(|&(at, _)| at).min().unwrap_or(u64::MAX);
+            self.now = wake.min(next).max(self.now);
         }
         panic!("{task:?} does not end");
     }
@@ -303,12 +309,11 @@ fn nobody_and_somebody_are_told_apart() {
     assert_eq!(rig.run(LssTask::Select(LssAddress([0; 4]))).0, Err(timeout));
 }
 
-#[test]
-fn a_scan_finds_every_device_without_a_node_id_one_after_the_other() {
+fn scan_all(late: u64) {
     let addresses = [ADDRESS, LssAddress([0x319, 0x0002_0192, 0x0001_0000, 1]), LssAddress([u32::MAX; 4])];
     let mut slaves: Vec<_> = addresses.iter().map(|&address| config(address, None)).collect();
     slaves.push(config(LssAddress([7; 4]), Some(node(100))));
-    let mut rig = rig(slaves);
+    let mut rig = Rig { late, ..rig(slaves) };
     let mut found = vec![];
     for number in 1..=3 {
         let LssReply::Address(address) = rig.reply(LssTask::Fastscan) else { panic!("nobody") };
@@ -322,10 +327,19 @@ fn a_scan_finds_every_device_without_a_node_id_one_after_the_other() {
     // Zero bits are tried first, so that the lowest numbers come first.
     assert_eq!(found, [addresses[1], addresses[0], addresses[2]]);
     assert_eq!(rig.reply(LssTask::Fastscan), LssReply::Found(false));
-    assert_eq!(
-        rig.slaves.iter().map(|slave| slave.node().unwrap().get()).collect::<Vec<_>>(),
-        [2, 1, 3, 100]
-    );
+    let nodes = rig.slaves.iter().map(|slave| slave.node().unwrap().get());
+    assert_eq!(nodes.collect::<Vec<_>>(), [2, 1, 3, 100]);
+}
+
+#[test]
+fn a_scan_finds_every_device_without_a_node_id_one_after_the_other() {
+    scan_all(0);
+}
+
+#[test]
+fn answers_that_come_one_after_the_other_belong_to_one_question() {
+    scan_all(1);
+    scan_all(9);
 }
 
 #[test]
