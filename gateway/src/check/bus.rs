@@ -16,7 +16,7 @@ const CONTROL_BYTES: u16 = 2;
 /// Lays out the telegrams as the master would with drives that need no time of their own.
 pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
     let config = &written.config;
-    let (Some(bus), Some(file)) = (&config.sercos, &written.file.south.sercos) else { return };
+    let (Some(bus), Some(file)) = (&config.sercos, &written.file.south.get_ref().sercos) else { return };
     let mut slaves = vec![SlaveNeed::default(); bus.drives.len()];
     for (axis, table) in config.axes.iter().zip(&written.file.axis) {
         let table = table.get_ref();

@@ -7,6 +7,7 @@
 mod attributes;
 mod axes;
 mod bus;
+mod can_bus;
 mod faults;
 mod page;
 mod rows;
@@ -65,6 +66,7 @@ pub fn check(request: &Request<'_>) -> Outcome {
         if let Some(written) = &written {
             axes::check(mapping, written, findings);
             bus::check(mapping, written, findings);
+            can_bus::check(mapping, written, findings);
         }
     }
     outcome.config = written.map(|written| written.config);

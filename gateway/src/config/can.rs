@@ -40,11 +40,11 @@ const ACTUAL_VALUES: [(&str, Signal); 2] =
 
 impl Checker {
     /// All CAN buses. Without any bus there is nothing behind the box.
-    pub(super) fn can(&mut self, south: &SouthTable) -> Option<Vec<Can>> {
+    pub(super) fn can(&mut self, table: &Spanned<SouthTable>) -> Option<Vec<Can>> {
+        let south = table.get_ref();
         if south.sercos.is_none() && south.can.is_empty() {
-            // The table itself has no place in the file where it is empty.
             return self.report(
-                0..0,
+                table.span(),
                 "there is no bus behind the box",
                 "expected [south.sercos] or [[south.can]]",
             );

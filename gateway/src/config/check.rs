@@ -138,13 +138,13 @@ impl Checker {
         }
         let settings_file = settings_file.map(path);
 
-        let south = &file.south;
+        let south = file.south.get_ref();
         let realtime = self.realtime(south.realtime.as_ref());
         let sercos = match &south.sercos {
             Some(table) => self.sercos(table.get_ref()).map(Some),
             None => Some(None),
         };
-        let can = self.can(south);
+        let can = self.can(&file.south);
         let drives = self.drives(file);
         let cycles = sercos.iter().flatten().map(|sercos| sercos.cycle_time);
         let cycles = cycles.chain(can.iter().flatten().map(|can| can.cycle_time));
@@ -315,11 +315,15 @@ impl Checker {
 
     fn unknown<'a>(&mut self, what: &str, name: &Spanned<String>, known: impl Iterator<Item = &'a String>) {
         let known: Vec<String> = known.map(|name| format!("`{name}`")).collect();
+        let expected = match known.is_empty() {
+            true => format!("expected one that is there: there is no {what}"),
+            false => format!("expected one of {}", known.join(", ")),
+        };
         self.report_as::<()>(
             code::CONFIG_REFERENCE,
             name.span(),
             format_args!("there is no {what} `{}`", name.get_ref()),
-            format_args!("expected one of {}", known.join(", ")),
+            expected,
         );
     }
 
@@ -674,7 +678,7 @@ impl Checker {
 
     /// The drives of all buses by their names.
     fn drives<'a>(&mut self, file: &'a File) -> Vec<(&'a Spanned<String>, DriveAt)> {
-        let south = &file.south;
+        let south = file.south.get_ref();
         let sercos = south.sercos.iter().flat_map(|table| table.get_ref().drive.iter().enumerate());
         let mut drives: Vec<_> =
             sercos.map(|(drive, table)| (&table.get_ref().name, DriveAt::Sercos { drive })).collect();

@@ -27,8 +27,8 @@ pub struct File {
     pub device: Vec<Spanned<DeviceTable>>,
     /// The axes, at least one, at most 16.
     pub axis: Vec<Spanned<AxisTable>>,
-    /// The bus behind.
-    pub south: SouthTable,
+    /// The buses behind.
+    pub south: Spanned<SouthTable>,
 }
 
 /// `[box]`
