@@ -101,7 +101,7 @@ fn a_script_moves_the_axes_of_a_box() {
 }
 
 fn moves_the_axes_of_a_box() {
-    let configuration = std::fs::read_to_string(example("../gateway/src/cli/demo.toml"))
+    let configuration = std::fs::read_to_string(example("../gateway/src/cli/demo/two-axes.toml"))
         .expect("the demonstration's configuration")
         .replace("127.0.0.2", BOX);
     let _box = start("script-box.toml", &configuration);

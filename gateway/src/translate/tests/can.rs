@@ -179,7 +179,8 @@ fn recordings_of_a_can_bus_are_translated() {
         file.extend([[0; 4], [0; 4], size, size].concat());
         file.extend(&record[..len]);
     }
-    let config = crate::config::Config::parse(include_str!("../../cli/demo.toml"), "demo.toml").unwrap();
+    let config =
+        crate::config::Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
     let reader = crate::capture::reader::Reader::new(file.as_slice()).unwrap();
     let names = profile_sercos::wire::describe::NoNames;
     let list = translate_capture(&stage, &config, reader, &names).unwrap();

@@ -1,12 +1,16 @@
 //! `axisbridge demo`: the whole chain in one process.
 //!
-//! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it a line of simulated SERCOS
-//! III drives inside the process that carries the very same frames as a wire.
+//! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
+//! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, or one of each.
+
+mod drives;
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+pub use self::drives::DriveKind;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
@@ -18,9 +22,10 @@ use crate::settings::Store;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
+use crate::status::BoxState;
 
-/// The demonstration's configuration; only the address is chosen by the caller.
-pub(super) const CONFIGURATION: &str = include_str!("demo.toml");
+/// The demonstration's configuration with SERCOS III drives; only the address is chosen by the caller.
+pub(in crate::cli) const CONFIGURATION: &str = include_str!("two-axes.toml");
 
 /// The address that stands in the configuration.
 const ADDRESS: &str = "127.0.0.2";
@@ -32,20 +37,20 @@ const UPDATE_PERIOD_US: u32 = 8_000;
 /// What each axis has: speed in units per second, reach in units, window in units.
 const AXES: [(f64, f64, f64); 2] = [(2.0, 600.0, 0.002), (40.0, 700.0, 0.02)];
 
-/// How long the bus may take to cyclic operation.
-const PHASE_UP_TIME_OUT: Duration = Duration::from_secs(20);
+/// How long the buses may take to cyclic operation.
+const START_TIME_OUT: Duration = Duration::from_secs(20);
 
-/// How often the phase-up is looked at.
-const LOOK_INTERVAL: Duration = Duration::from_millis(20);
-
-/// Cyclic operation.
+/// The last communication phase; what comes after has no number.
 const CYCLIC_PHASE: u8 = 4;
+
+/// How often the start is looked at.
+const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let stop = signal::stop_on_signals()?;
     let mut progress = Progress::new(arguments.json);
-    let text = CONFIGURATION.replace(ADDRESS, &arguments.listen.to_string());
+    let text = drives::configuration(&arguments.drives).replace(ADDRESS, &arguments.listen.to_string());
     let config = Config::parse(&text, "demo.toml")?;
     let mapping = Mapping::embedded()?;
     let seconds = f64::from(arguments.seconds);
@@ -59,11 +64,12 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let running = runner::start(&config, mapping.clone(), Some(&arguments.capture), &settings)
         .map_err(|error| in_use(error, arguments.listen))?;
     progress.step(&format!(
-        "gateway on {}, a simulated line of {} drives behind",
+        "gateway on {}, {} simulated drives behind: {}",
         arguments.listen,
-        config.axes.len()
+        config.axes.len(),
+        drives::title(&arguments.drives)
     ));
-    wait_for_phase(&running, &mut progress)?;
+    wait_until_ready(&running, &mut progress)?;
 
     let endpoints = endpoints(arguments.listen);
     let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
@@ -80,7 +86,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let status = running.status();
     let dropped = running.stop()?;
     progress.step(&format!(
-        "{} SERCOS cycles, {} late, {} telegrams lost",
+        "{} bus cycles, {} late, {} telegrams lost",
         status.counters.cycles, status.counters.late_cycles, status.counters.lost_telegrams
     ));
     if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
@@ -99,22 +105,25 @@ fn endpoints(listen: Ipv4Addr) -> Endpoints {
     Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last) }
 }
 
-fn wait_for_phase(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {
-    let end = Instant::now() + PHASE_UP_TIME_OUT;
+fn wait_until_ready(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {
+    let end = Instant::now() + START_TIME_OUT;
     let mut shown = None;
     loop {
-        let phase = running.status().phase;
-        if shown != Some(phase) && phase <= CYCLIC_PHASE {
-            progress.step(&format!("SERCOS communication phase {phase}"));
-            shown = Some(phase);
+        let status = running.status();
+        if shown != Some(status.phase) && status.phase <= CYCLIC_PHASE {
+            progress.step(&format!("SERCOS communication phase {}", status.phase));
+            shown = Some(status.phase);
         }
-        if phase == CYCLIC_PHASE {
+        if status.state == BoxState::READY {
+            progress.step("every drive is in cyclic operation");
             return Ok(());
         }
         if Instant::now() > end {
-            return Err(
-                format!("expected the bus in CP4 within {PHASE_UP_TIME_OUT:?}, it is in CP{phase}").into()
-            );
+            let state = status.state;
+            return Err(format!(
+                "expected every bus in operation within {START_TIME_OUT:?}, the box is {state}"
+            )
+            .into());
         }
         std::thread::sleep(LOOK_INTERVAL);
     }
