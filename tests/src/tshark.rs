@@ -55,7 +55,8 @@ impl Frame {
 
 /// openSAFETY has no mark in a frame: its dissector guesses, now and then in the payload of a SERCOS telegram, and then
 /// calls it malformed. None of our frames carry it.
-const NO_GUESSING: [&str; 2] = ["--disable-protocol", "opensafety"];
+/// Neither has CANopen: of all that may be on a CAN bus it is what ours carry.
+const NO_GUESSING: [&str; 4] = ["--disable-protocol", "opensafety", "-d", "can.subdissector,canopen"];
 
 /// Dissects a capture file with the display `filter` and further `arguments`.
 ///

@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use axisbridge::capture::reader::Reader;
+use axisbridge::capture::can::LINK_TYPE_CAN;
+use axisbridge::capture::reader::{LINK_TYPE_ETHERNET, Reader};
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 use axisbridge_tests::tshark::Frame;
 use axisbridge_tests::{expected, peer, tshark};
+use profile_cia402::wire::{Function, NodeId};
+use profile_generic::can::Id;
 
 /// Runs the demo for `seconds` with its own loopback addresses and returns its JSON object and its recording.
 fn demo(seconds: u32, listen: &str, name: &str) -> (serde_json::Value, PathBuf) {
@@ -60,14 +63,14 @@ fn judge(capture: &Path) {
     for frame in &cip {
         assert!(frame.has("cipm"), "frame {} is CIP Motion: {:?}", frame.number, frame.protocols);
         assert!(frame.field("cipm.data").is_none(), "frame {} has no surplus data", frame.number);
-        let bytes = &raw[frame.number - 1];
+        let bytes = &raw[frame.number - 1].1;
         let wanted = expected::cip_motion(bytes).unwrap_or_else(|| panic!("frame {} parses", frame.number));
         compare(frame, &wanted);
     }
     let mut phases = BTreeSet::new();
     let mut kinds = BTreeMap::<(u8, u8), Vec<usize>>::new();
     let mut telegrams = 0;
-    for (index, bytes) in raw.iter().enumerate().filter(|(_, bytes)| bytes[12..14] == [0x88, 0xCD]) {
+    for (index, (_, bytes)) in raw.iter().enumerate().filter(|(_, frame)| is_sercos(frame)) {
         telegrams += 1;
         phases.insert(bytes[15] & 0x8F);
         // A few telegrams of each kind in each phase, out and back: all of them would be a gigabyte of PDML.
@@ -82,21 +85,57 @@ fn judge(capture: &Path) {
     assert_eq!(sercos.len(), numbers.len());
     for frame in &sercos {
         assert!(frame.has("siii"), "frame {} is SERCOS III: {:?}", frame.number, frame.protocols);
-        compare(frame, &expected::sercos(&raw[frame.number - 1]));
+        compare(frame, &expected::sercos(&raw[frame.number - 1].1));
     }
     // CP0 to CP4 and the switch telegrams to each of CP1 to CP4.
     for phase in [0, 1, 2, 3, 4, 0x81, 0x82, 0x83, 0x84] {
         assert!(phases.contains(&phase), "phase byte {phase:#04x} was recorded: {phases:x?}");
     }
+    judge_can(capture, &raw);
     // tshark calls each phase-switch telegram an unknown phase, those of a foreign master too. Nothing else may be found.
     let mut findings = BTreeMap::<String, Vec<usize>>::new();
     for (number, message) in tshark::warnings(capture) {
-        let switching = raw[number - 1][12..14] == [0x88, 0xCD] && raw[number - 1][15] & 0x80 != 0;
+        let frame = &raw[number - 1];
+        let switching = is_sercos(frame) && frame.1[15] & 0x80 != 0;
         if !(switching && message.contains("CP is unknown")) {
             findings.entry(message).or_default().push(number);
         }
     }
     assert!(findings.is_empty(), "tshark finds fault: {findings:?}");
+}
+
+/// The CANopen frames of a recording: what they are and of whom, as tshark reads them and as we do.
+fn judge_can(capture: &Path, raw: &[(u16, Vec<u8>)]) {
+    let told = |frame: &Frame| {
+        let number = |name| frame.field(name).and_then(|field| field.show.strip_prefix("0x"));
+        let number = |name| u32::from_str_radix(number(name).unwrap_or("0"), 16).expect("a number");
+        (number("canopen.function_code"), number("canopen.node_id"))
+    };
+    // The boot of the node, and two seconds of its operation: all of it would take tshark half a minute.
+    let can: Vec<_> = raw.iter().enumerate().filter(|(_, (link, _))| *link == LINK_TYPE_CAN).collect();
+    assert!(can.len() > 2_000, "CAN frames were recorded: {}", can.len());
+    let last = can[2_000].0 + 1;
+    let tshark = tshark::dissect(capture, &format!("can and frame.number <= {last}"), &[]);
+    assert_eq!(tshark.len(), 2_001);
+    let mut kinds = Vec::new();
+    for (frame, (index, (_, bytes))) in tshark.iter().zip(&can) {
+        assert_eq!(frame.number, index + 1);
+        let identifier = u32::from_be_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        assert!(frame.has("canopen"), "frame {}: {:?}", frame.number, frame.protocols);
+        assert_eq!(told(frame), (identifier >> 7, identifier & 0x7F), "frame {}", frame.number);
+        let id = Id::Standard(u16::try_from(identifier).expect("a standard identifier"));
+        kinds.push(Function::of(id).expect("CANopen"));
+    }
+    let node = NodeId::new(2).expect("a node");
+    let sdo = [Function::SdoRequest(node), Function::SdoResponse(node)];
+    let pdo = [Function::Rpdo(1, node), Function::Tpdo(1, node)];
+    for kind in sdo.iter().chain(&pdo).chain(&[Function::Nmt, Function::Sync, Function::ErrorControl(node)]) {
+        assert!(kinds.contains(kind), "{kind}");
+    }
+}
+
+fn is_sercos((link, bytes): &(u16, Vec<u8>)) -> bool {
+    *link == LINK_TYPE_ETHERNET && bytes[12..14] == [0x88, 0xCD]
 }
 
 fn compare(frame: &Frame, wanted: &[expected::Expected]) {
@@ -108,12 +147,12 @@ fn compare(frame: &Frame, wanted: &[expected::Expected]) {
     }
 }
 
-/// All frames of a recording.
-fn frames(capture: &Path) -> Vec<Vec<u8>> {
+/// All frames of a recording, each with the type of its link.
+fn frames(capture: &Path) -> Vec<(u16, Vec<u8>)> {
     let mut reader = Reader::open(capture).expect("our own recording opens");
     let mut frames = Vec::new();
     while let Some(frame) = reader.next_frame().expect("our own recording reads") {
-        frames.push(frame.data.to_vec());
+        frames.push((frame.link_type, frame.data.to_vec()));
     }
     frames
 }
