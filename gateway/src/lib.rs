@@ -5,6 +5,7 @@ pub mod check;
 pub mod cli;
 pub mod config;
 pub mod decode;
+pub mod doctor;
 pub mod eds;
 pub mod engine;
 pub mod finding;

@@ -6,6 +6,7 @@ mod check;
 mod decode;
 mod demo;
 mod dictionary;
+mod doctor;
 mod eds;
 mod progress;
 mod report;
@@ -41,6 +42,8 @@ enum Command {
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
+    /// Look at this host: is it fit for the box, and for its cycles.
+    Doctor(DoctorArguments),
     /// Look at the south bus: who is there, and a configuration to begin with.
     Scan(ScanArguments),
     /// Print the frames of a capture file as an indented tree.
@@ -141,6 +144,20 @@ struct EdsArguments {
     /// Write each sheet into this folder as NAME.eds; without it the one sheet goes to standard output.
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
+}
+
+/// Arguments of `doctor`.
+#[derive(Debug, Args)]
+struct DoctorArguments {
+    /// The configuration of the box (TOML): its cycles, interfaces, addresses and real-time settings are tried.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// How long each cycle is tried, in seconds (1 to 3600).
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: u32,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Arguments of `scan`.
@@ -424,6 +441,7 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Translate(arguments) => translate::run(&arguments),

@@ -38,10 +38,10 @@ const DEFAULT_CLIENTS_MAX: u8 = 8;
 const DEFAULT_UPDATE_PERIOD_MIN: DurationNs = DurationNs::from_millis(1);
 const DEFAULT_UPDATE_PERIOD_MAX: DurationNs = DurationNs::from_millis(32);
 const DEFAULT_MOTION_RESOLUTION: u32 = 1_000_000;
-const DEFAULT_JITTER: DurationNs = DurationNs::from_micros(50);
+pub(crate) const DEFAULT_JITTER: DurationNs = DurationNs::from_micros(50);
 const DEFAULT_CP0_STABLE_CYCLES: u16 = 100;
-const DEFAULT_ALLOWED_LOSSES: u16 = 5;
-const DEFAULT_PRIORITY: u8 = 80;
+pub(crate) const DEFAULT_ALLOWED_LOSSES: u16 = 5;
+pub(crate) const DEFAULT_PRIORITY: u8 = 80;
 const DEFAULT_REVISION: (u8, u8) = (1, 1);
 const DEFAULT_PRODUCT_NAME: &str = "Axisbridge";
 

@@ -24,6 +24,8 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
 
+pub(crate) use check::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER, DEFAULT_PRIORITY};
+
 use crate::finding::{Findings, Source, deserialize, read_file, tree};
 use crate::mapping::{CaptureMode, Rated};
 use crate::sys::realtime;

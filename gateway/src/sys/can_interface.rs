@@ -195,7 +195,8 @@ pub fn restart(name: &str) -> Result<(), ConfigureError> {
 
 impl State {
     /// Whether it is set to this rate.
-    fn has(&self, rate: BitRate) -> bool {
+    #[must_use]
+    pub fn has(&self, rate: BitRate) -> bool {
         self.nominal == Some(rate.nominal())
             && self.fd == rate.is_fd()
             && (!self.fd || self.data == rate.data())

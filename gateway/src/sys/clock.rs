@@ -137,13 +137,24 @@ impl SystemClock {
     }
 }
 
+/// Whether somebody keeps the host's clock right: a daemon of PTP or NTP that has told the kernel so.
+#[must_use]
+pub fn is_disciplined() -> bool {
+    kernel_clock().is_some_and(|state| state.status & libc::STA_UNSYNC == 0)
+}
+
 /// The offset of TAI from UTC that the kernel holds, in seconds; `None` when it cannot be asked.
 fn tai_offset_s() -> Option<i32> {
+    kernel_clock().map(|state| state.tai)
+}
+
+/// What the kernel knows of its clock; `None` when it cannot be asked.
+fn kernel_clock() -> Option<libc::timex> {
     // SAFETY: `timex` is plain integers, for which all zeroes is a value; modes 0 only reads.
     let mut state: libc::timex = unsafe { std::mem::zeroed() };
     // SAFETY: `state` is a valid, writable `timex` that outlives the call.
     let result = unsafe { libc::adjtimex(&raw mut state) };
-    if result < 0 { None } else { Some(state.tai) }
+    if result < 0 { None } else { Some(state) }
 }
 
 fn read(clock: libc::clockid_t) -> u64 {

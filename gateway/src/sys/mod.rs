@@ -10,6 +10,7 @@ pub mod can_error;
 pub mod can_interface;
 pub mod can_socket;
 pub mod clock;
+pub mod ethtool;
 pub mod interfaces;
 pub mod link;
 pub mod packet_socket;
