@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use axisbridge::engine::bus::can::layout::{AxisPdos, SpareIds};
 use axisbridge::mapping::{AxisUnits, Cia402Axis, CipScaling, Mapping};
 use axisbridge::simulate::can_drive;
 use axisbridge::translate::{CanMember, Stage, StageError};
@@ -70,8 +71,9 @@ pub fn stage(mapping: Mapping) -> Result<Stage, StageError> {
             device: 0,
             instance: number,
             drive: drive.to_owned(),
-            node: number,
-            ids: Vec::new(),
+            node: NodeId::new(number).expect("a node-id"),
+            pdos: AxisPdos::new(0, 3, &mut SpareIds::new(Vec::new()))
+                .expect("the first axis has them by default"),
             needs,
             scaling,
         };

@@ -30,11 +30,19 @@ fn path(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")
 }
 
-/// The lines below a frame that say what a drive is told.
+/// What the tables make of a frame for each drive, as `drive: bytes`: the MDT values of one, and the first RPDO of the other.
 fn told(node: &serde_json::Value, found: &mut Vec<String>) {
     let line = node["text"].as_str().unwrap_or_default();
-    if line.starts_with("MDT of") {
-        found.push(line.to_owned());
+    if let Some((drive, rest)) = line.strip_prefix("MDT of ").and_then(|line| line.split_once(", connection"))
+    {
+        found.push(format!("{drive}: {}", rest.split_once("bytes: ").expect("bytes").1));
+    } else if let Some((drive, rest)) =
+        line.strip_prefix("PDOs of ").and_then(|line| line.split_once(": RPDO1 "))
+    {
+        let bytes = rest.split_once(") ").and_then(|(_, rest)| rest.split(',').next());
+        found.push(format!("{drive}: {}", bytes.expect("bytes")));
+    } else if let Some(bytes) = line.strip_prefix("RPDO1 (202): ") {
+        found.push(format!("drive-b: {bytes}"));
     }
     for child in node["children"].as_array().into_iter().flatten() {
         told(child, found);
@@ -59,7 +67,10 @@ fn translated_updates_are_what_the_box_sent() {
             if kind.starts_with("C-to-D") {
                 wanted.extend(lines);
             } else {
-                sent.extend(lines.into_iter().filter(|line| line.contains("bytes: 00 e0")));
+                // Led, by the first word: S-0-0134 and the controlword.
+                let led =
+                    |line: &String| line.starts_with("drive-a: 00 e0") || line.starts_with("drive-b: 0f 00");
+                sent.extend(lines.into_iter().filter(led));
             }
         }
         for drive in ["drive-a", "drive-b"] {

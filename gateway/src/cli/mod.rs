@@ -72,7 +72,7 @@ struct DemoArguments {
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.2")]
     listen: std::net::Ipv4Addr,
     /// What is behind the box, one axis on each; the last kind has the rest of the two axes.
-    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = "sercos,can")]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
     /// Where to write the recording of both sides.
     #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
@@ -191,6 +191,9 @@ struct TranslateArguments {
     /// Axes, drives and tables of this configuration; without it, those of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// The drives of the demonstration, as `demo` takes them.
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES, conflicts_with = "config")]
+    drives: Vec<demo::DriveKind>,
     /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
     /// drives stand in for them.
     #[arg(long, value_name = "FILE")]
@@ -209,6 +212,9 @@ struct SnapshotArguments {
     /// Axes, drives and tables of this configuration; without it, those of DIR/config.toml, or of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// The drives of the demonstration, as `demo` takes them.
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES, conflicts_with = "config")]
+    drives: Vec<demo::DriveKind>,
     /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
     /// drives stand in for them.
     #[arg(long, value_name = "FILE")]

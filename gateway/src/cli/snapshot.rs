@@ -38,7 +38,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<ExitCode, CliError> {
     let folder = &arguments.folder;
     let own = folder.join(CONFIGURATION);
     let path = arguments.config.clone().or_else(|| own.exists().then_some(own));
-    let config = configuration(path.as_deref())?;
+    let config = configuration(path.as_deref(), &arguments.drives)?;
     let (frames, golden) = files(folder)?;
     if frames.is_empty() {
         return Err(

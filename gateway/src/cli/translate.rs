@@ -9,6 +9,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::decode::DictionaryNames;
+use super::demo::{self, DriveKind};
 use super::{CliError, TranslateArguments, print};
 use crate::capture::reader::Reader;
 use crate::config::Config;
@@ -42,7 +43,7 @@ struct Output<'a> {
 /// # Errors
 /// A file is faulty, the drives are not commissioned with the configuration, the output cannot be written.
 pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
-    let config = configuration(arguments.config.as_deref())?;
+    let config = configuration(arguments.config.as_deref(), &arguments.drives)?;
     let stage = Arc::new(stage(&config, arguments.values.as_deref())?);
     let list = match (&arguments.hex, &arguments.file) {
         (Some(hex), _) => translate_list(&stage, hex).map_err(|error| format!("--hex:{error}"))?,
@@ -71,11 +72,11 @@ pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
     print(text, if list.failed > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// The configuration, or that of the demonstration.
-pub(super) fn configuration(path: Option<&Path>) -> Result<Config, CliError> {
+/// The configuration, or that of the demonstration with these drives.
+pub(super) fn configuration(path: Option<&Path>, drives: &[DriveKind]) -> Result<Config, CliError> {
     match path {
         Some(path) => Ok(Config::load(path)?),
-        None => Ok(Config::parse(super::demo::CONFIGURATION, "the configuration of the demonstration")?),
+        None => Ok(Config::parse(&demo::configuration(drives), "the configuration of the demonstration")?),
     }
 }
 

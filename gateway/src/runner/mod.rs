@@ -250,7 +250,7 @@ pub fn start(
 /// The port of a CAN bus.
 fn can_port(config: &Can, tap: Option<(Tap, u8)>) -> Result<Box<dyn CanPort + Send>, StartError> {
     let CanLink::Interface { name, set_bit_rate } = &config.link else {
-        return Ok(Box::new(InProcessCan::of(config, tap)));
+        return Ok(Box::new(InProcessCan::of(config, tap).in_host_time(config.cycle_time)));
     };
     if *set_bit_rate {
         let settings = can_interface::Settings {

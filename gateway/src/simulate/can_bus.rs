@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use profile_generic::can::Frame;
 use profile_generic::can::bus::{Bus, Output, QUEUE_DEFAULT, SendError, State, Station};
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::can_drive::{DriveNode, drive};
 use crate::capture::recorder::Tap;
@@ -30,8 +30,31 @@ pub struct InProcessCan {
     inbound: VecDeque<CanInput>,
     /// Up to when everything has happened.
     reached: MonotonicTime,
+    pauses: Option<Pauses>,
     /// The recording, and the number of the bus in it.
     tap: Option<(Tap, u8)>,
+}
+
+/// Host time in which nothing can have happened on the bus.
+#[derive(Debug)]
+struct Pauses {
+    cycle: DurationNs,
+    /// The last look at the port.
+    looked: MonotonicTime,
+    /// How much the bus is behind the host.
+    sum: DurationNs,
+}
+
+impl Pauses {
+    /// Bus time of a look at the port. Who looks each cycle, and then not for two, was paused for one of them or more.
+    fn bus_time(&mut self, now: MonotonicTime) -> MonotonicTime {
+        let gap = now.since(self.looked);
+        if self.looked != MonotonicTime::ZERO && gap > self.cycle * 2 {
+            self.sum = self.sum + (gap - self.cycle);
+        }
+        self.looked = self.looked.max(now);
+        now + -self.sum
+    }
 }
 
 impl InProcessCan {
@@ -45,7 +68,7 @@ impl InProcessCan {
         let mut station = || bus.add(QUEUE_DEFAULT).expect("a bus has room for all its node-ids");
         let nodes = devices.into_iter().map(|device| (station(), device)).collect();
         let inbound = VecDeque::with_capacity(INBOUND_MAX);
-        Self { bus, own, nodes, inbound, reached: MonotonicTime::ZERO, tap }
+        Self { bus, own, nodes, inbound, reached: MonotonicTime::ZERO, pauses: None, tap }
     }
 
     /// The devices of a configuration, each with as many axes as it names.
@@ -67,6 +90,17 @@ impl InProcessCan {
         Self::new(Bus::new(config.bit_rate), devices, tap)
     }
 
+    /// The same in the time of a host, which may pause, at this cycle of the box.
+    #[must_use]
+    pub fn in_host_time(self, cycle: DurationNs) -> Self {
+        let pauses = Pauses { cycle, looked: MonotonicTime::ZERO, sum: DurationNs::ZERO };
+        Self { pauses: Some(pauses), ..self }
+    }
+
+    fn bus_time(&mut self, now: MonotonicTime) -> MonotonicTime {
+        self.pauses.as_mut().map_or(now, |pauses| pauses.bus_time(now))
+    }
+
     /// The devices, in the order in which they were given.
     pub fn nodes(&self) -> impl Iterator<Item = &DriveNode> {
         self.nodes.iter().map(|(_, node)| node)
@@ -84,6 +118,7 @@ impl InProcessCan {
 
     /// Pulls or plugs the cable of a device.
     pub fn connect(&mut self, now: MonotonicTime, device: usize, connected: bool) {
+        let now = self.bus_time(now);
         let (station, _) = &self.nodes[device];
         if connected {
             self.bus.connect(now, *station);
@@ -157,6 +192,7 @@ fn keep(inbound: &mut VecDeque<CanInput>, input: CanInput) {
 
 impl CanPort for InProcessCan {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        let now = self.bus_time(now);
         self.advance(now);
         let input = self.inbound.pop_front()?;
         if let (Some((tap, bus)), CanInput::Frame(frame)) = (&mut self.tap, &input) {
@@ -166,6 +202,7 @@ impl CanPort for InProcessCan {
     }
 
     fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        let now = self.bus_time(now);
         self.advance(now);
         match self.bus.send(now, self.own, frame) {
             Ok(()) => {
@@ -177,5 +214,21 @@ impl CanPort for InProcessCan {
             Err(SendError::Full) => CanSent::Full,
             Err(SendError::BusOff | SendError::Disconnected | SendError::Fd) => CanSent::Failed,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bus_stands_still_while_nobody_can_look() {
+        let millis = |ms| MonotonicTime::ZERO + DurationNs::from_millis(ms);
+        let mut pauses =
+            Pauses { cycle: DurationNs::from_millis(2), looked: MonotonicTime::ZERO, sum: DurationNs::ZERO };
+        let looks = [100, 102, 102, 106, 110, 115, 117, 1_117, 1_119];
+        let found: Vec<_> = looks.into_iter().map(|look| pauses.bus_time(millis(look))).collect();
+        let expected = [100, 102, 102, 106, 110, 112, 114, 116, 118].map(millis);
+        assert_eq!(found, expected);
     }
 }

@@ -1,6 +1,6 @@
 //! Frames of a CAN bus: PDOs, EMCY, SYNC.
 
-use profile_cia402::eds::drive::Direction;
+use profile_cia402::master::config::Direction;
 use profile_cia402::wire::Function;
 use profile_cia402::wire::emcy::Emcy;
 use profile_generic::can::{Frame, Id};

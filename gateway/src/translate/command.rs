@@ -1,6 +1,6 @@
 //! From the controller to the drive.
 
-use profile_cia402::eds::drive::Direction;
+use profile_cia402::master::config::Direction;
 use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
 use profile_generic::image::{AxisCommand, Signal};

@@ -1,6 +1,6 @@
 //! From the drive to the controller.
 
-use profile_cia402::eds::drive::Direction;
+use profile_cia402::master::config::Direction;
 use profile_cip::wire::Writer;
 use profile_cip::wire::motion::codes::{AxisStateCode, AxisStatus, ControlMode};
 use profile_cip::wire::motion::{ActualBlock, ActualPosition, ActualValues, StatusValues};

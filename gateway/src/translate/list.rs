@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::sync::Arc;
 
+use profile_cia402::wire::cob_id;
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_sercos::wire::describe::Names;
@@ -99,7 +100,8 @@ pub fn translate_capture<R: Read>(
         if frame.link_type == LINK_TYPE_CAN {
             let record = can::parse(frame.data);
             let translated = match &record {
-                Ok(Record::Frame(record)) => translator.can(record),
+                // One each cycle, and nothing in it to read.
+                Ok(Record::Frame(record)) => translator.can(record).filter(|_| record.id() != cob_id::SYNC),
                 _ => None,
             };
             match (translated, record) {

@@ -178,21 +178,24 @@ impl Stage {
             }
         }
         let mut axes = Vec::with_capacity(config.axes.len());
+        for bus in 0..config.can.len() {
+            axes.extend(can::configured(config, bus, &mapping)?);
+        }
         for ((number, axis), channel) in config.axes.iter().enumerate().zip(engine.axes()) {
-            let on_sercos = config.sercos_drive(axis).zip(engine.sercos());
-            let (drive, bus) = on_sercos.ok_or_else(|| StageError::Drive {
-                axis: axis.name.clone(),
-                told: "it is not on SERCOS III".to_owned(),
-            })?;
+            let unready = || {
+                let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
+                StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() }
+            };
+            let south = channel.south().ok_or_else(unready)?;
+            let Some((drive, bus)) = config.sercos_drive(axis).zip(engine.sercos()) else { continue };
             let slave = bus.master().slave_by_address(drive.address);
             let scaling = scaling(axis);
-            let (Some(south), Some(slave), Some((needs, facts)), Some(attributes)) =
-                (channel.south(), slave, bus.drive(number), mapping.attribute_table(&scaling))
+            let (Some(slave), Some((needs, facts)), Some(attributes)) =
+                (slave, bus.drive(number), mapping.attribute_table(&scaling))
             else {
-                let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
-                return Err(StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() });
+                return Err(unready());
             };
-            axes.push(StageAxis {
+            let on_sercos = StageAxis {
                 name: axis.name.clone(),
                 device: axis.device,
                 instance: axis.instance,
@@ -209,8 +212,11 @@ impl Stage {
                 attributes,
                 north: channel.north().clone(),
                 south: south.clone(),
-            });
+            };
+            axes.push((number, on_sercos));
         }
+        axes.sort_by_key(|(number, _)| *number);
+        let axes = axes.into_iter().map(|(_, axis)| axis).collect();
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
         let layout = engine.sercos().map(|bus| bus.master().layout().to_wire(topology)).unwrap_or_default();
         Ok(Self { axes, layout, mapping })

@@ -13,11 +13,14 @@ pub enum DriveKind {
     Can,
 }
 
+/// What the demonstration moves when nothing is said.
+pub const DRIVES: &str = "sercos,can";
+
 /// Where the buses begin in the configuration.
 const SOUTH: &str = "[south.sercos]";
 
 /// The names of the drives in the configuration, and what a CANopen drive needs besides.
-const DRIVES: [(&str, &str); 2] = [("drive-a", ""), ("drive-b", "millimetres_per_turn = 5.0\n")];
+const NAMES: [(&str, &str); 2] = [("drive-a", ""), ("drive-b", "millimetres_per_turn = 5.0\n")];
 
 const REALTIME: &str = "\
 [south.realtime]
@@ -45,12 +48,12 @@ allowed_losses = 100
 /// The configuration with these kinds of drives, each axis on the next one; the last one has the rest.
 pub fn configuration(kinds: &[DriveKind]) -> String {
     let kind = |place: usize| kinds.get(place).or(kinds.last()).copied().unwrap_or(DriveKind::Sercos);
-    if DRIVES.iter().enumerate().all(|(place, _)| kind(place) == DriveKind::Sercos) {
+    if NAMES.iter().enumerate().all(|(place, _)| kind(place) == DriveKind::Sercos) {
         return CONFIGURATION.to_owned();
     }
     let head = CONFIGURATION.split(SOUTH).next().unwrap_or(CONFIGURATION);
     let mut text = format!("{head}{REALTIME}");
-    let of = |wanted| DRIVES.iter().enumerate().filter(move |(place, _)| kind(*place) == wanted);
+    let of = |wanted| NAMES.iter().enumerate().filter(move |(place, _)| kind(*place) == wanted);
     if of(DriveKind::Sercos).count() > 0 {
         text.push_str(SERCOS);
     }

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-pub use self::drives::DriveKind;
+pub use self::drives::{DRIVES, DriveKind, configuration};
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
@@ -25,7 +25,7 @@ use crate::simulate::setup;
 use crate::status::BoxState;
 
 /// The demonstration's configuration with SERCOS III drives; only the address is chosen by the caller.
-pub(in crate::cli) const CONFIGURATION: &str = include_str!("two-axes.toml");
+const CONFIGURATION: &str = include_str!("two-axes.toml");
 
 /// The address that stands in the configuration.
 const ADDRESS: &str = "127.0.0.2";

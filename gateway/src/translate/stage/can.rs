@@ -2,15 +2,20 @@
 
 use core::fmt;
 
-use profile_cia402::eds::DeviceDescription;
-use profile_cia402::eds::drive::Direction;
-use profile_cia402::eds::layout::{self, Wanted};
+use profile_cia402::eds::{self, DeviceDescription};
+use profile_cia402::master::config::Direction;
+use profile_cia402::wire::NodeId;
+use profile_cia402::wire::pdo::mapped_len;
+use profile_generic::can::Id;
 
 use super::{Behind, Stage, StageAxis, StageError};
-use crate::mapping::{
-    Cia402Axis, Cia402Dictionary, CipScaling, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep,
-    Plan,
-};
+use crate::config::Config;
+use crate::engine::build::can::network;
+use crate::engine::build::scaling;
+use crate::engine::bus::can::commissioner;
+use crate::engine::bus::can::layout::{AxisPdos, Part};
+use crate::mapping::{Cia402Axis, CipScaling, DriveProgram, Item, Mapping, ObjectFacts, ObjectStep, Plan};
+use crate::simulate::can_bus::InProcessCan;
 
 /// A CiA 402 drive, or one axis of it.
 #[derive(Debug, Clone)]
@@ -81,9 +86,9 @@ pub struct CanMember {
     /// Name of its drive.
     pub drive: String,
     /// The drive's node-id.
-    pub node: u8,
-    /// Identifiers of PDOs that have none by the data sheet: direction, number from 1, identifier.
-    pub ids: Vec<(Direction, u16, u16)>,
+    pub node: NodeId,
+    /// The PDOs that it may have.
+    pub pdos: AxisPdos,
     /// What it is needed for.
     pub needs: Cia402Axis,
     /// The scaling of the controller.
@@ -143,26 +148,63 @@ impl Stage {
         mapping: Mapping,
         members: impl IntoIterator<Item = (CanMember, &'d DeviceDescription)>,
     ) -> Result<Self, StageError> {
-        let mut axes = Vec::new();
-        for (member, sheet) in members {
-            let failed = |told: String| StageError::Sheet { axis: member.name.clone(), told };
-            let (behind, south) = lead(&mapping, &member, sheet).map_err(failed)?;
-            let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
-            axes.push(StageAxis {
-                north: mapping.cip_program(&member.scaling).ok_or_else(no_ratio)?,
-                attributes: mapping.attribute_table(&member.scaling).ok_or_else(no_ratio)?,
-                behind: Behind::Can(behind),
-                stands_in: member.needs.counts.is_empty(),
-                south,
-                name: member.name.clone(),
-                device: member.device,
-                instance: member.instance,
-                drive: member.drive.clone(),
-                scaling: member.scaling,
-            });
-        }
+        let axes = members.into_iter().map(|(member, sheet)| on_can(&mapping, member, sheet));
+        let axes = axes.collect::<Result<_, _>>()?;
         Ok(Self { mapping, axes, layout: Default::default() })
     }
+}
+
+/// The axes of a CAN bus of a configuration, each with its number there. Simulated drives stand in for those of the machine.
+///
+/// # Errors
+/// A simulated drive cannot be led as the configuration says.
+pub(super) fn configured(
+    config: &Config,
+    bus: usize,
+    mapping: &Mapping,
+) -> Result<Vec<(usize, StageAxis)>, StageError> {
+    let simulated = InProcessCan::of(&config.can[bus], None);
+    let mut axes = Vec::new();
+    for ((node, setups), device) in network(config, bus, mapping)?.devices.into_iter().zip(simulated.nodes())
+    {
+        for setup in setups {
+            let axis = &config.axes[setup.axis];
+            let failed = |told: String| StageError::Sheet { axis: axis.name.clone(), told };
+            let sheet = eds::read(device.eds()).map_err(|error| failed(error.to_string()))?.description;
+            let drive = config.can_drive(axis).map(|(_, drive)| drive.name.clone()).unwrap_or_default();
+            let member = CanMember {
+                name: axis.name.clone(),
+                device: axis.device,
+                instance: axis.instance,
+                drive,
+                node,
+                pdos: setup.pdos,
+                needs: setup.needs,
+                scaling: scaling(axis),
+            };
+            axes.push((setup.axis, on_can(mapping, member, &sheet)?));
+        }
+    }
+    Ok(axes)
+}
+
+/// An axis on the drive with this data sheet.
+fn on_can(mapping: &Mapping, member: CanMember, sheet: &DeviceDescription) -> Result<StageAxis, StageError> {
+    let failed = |told: String| StageError::Sheet { axis: member.name.clone(), told };
+    let (behind, south) = lead(mapping, &member, sheet).map_err(failed)?;
+    let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
+    Ok(StageAxis {
+        north: mapping.cip_program(&member.scaling).ok_or_else(no_ratio)?,
+        attributes: mapping.attribute_table(&member.scaling).ok_or_else(no_ratio)?,
+        behind: Behind::Can(behind),
+        stands_in: member.needs.counts.is_empty(),
+        south,
+        name: member.name,
+        device: member.device,
+        instance: member.instance,
+        drive: member.drive,
+        scaling: member.scaling,
+    })
 }
 
 /// What the box would find in a drive, and how it would lead it.
@@ -172,50 +214,30 @@ fn lead(
     sheet: &DeviceDescription,
 ) -> Result<(CanDrive, DriveProgram), String> {
     let (node, needs) = (member.node, &member.needs);
-    let mut facts = asked(mapping, node, needs, sheet)?;
-    let text = |error: crate::mapping::Cia402Error| error.to_string();
-    let mut program = mapping.cia402_program(needs, &facts).map_err(text)?;
-    let mut layout = derived(&program, node, sheet);
-    // What no PDO can carry is not there in the cycle; the program says whether it can do without.
-    for left in &layout.left_out {
-        let object = Object { index: left.wanted.index, sub: left.wanted.sub };
-        if program.is_head(Item::Object(object)) {
-            return Err(left.to_string());
+    let facts = asked(mapping, node.get(), needs, sheet)?;
+    let program = mapping.cia402_program(needs, &facts).map_err(|error| error.to_string())?;
+    let telegram = &program.telegram;
+    let both = commissioner::pdos(mapping, &member.pdos, &telegram.command, &telegram.feedback)
+        .map_err(|error| error.to_string())?;
+    let mut pdos = Vec::new();
+    for (direction, (configs, spread)) in [Direction::Receive, Direction::Transmit].into_iter().zip(both) {
+        for (place, config) in configs.iter().enumerate() {
+            let id = config.id(direction, node).and_then(|id| match id {
+                Id::Standard(id) => Some(id),
+                Id::Extended(_) => None,
+            });
+            let id = id.ok_or_else(|| format!("PDO {} has no identifier", config.number))?;
+            let part = |part: &Part| CanPart { at: part.at, flat: part.from, len: part.len };
+            pdos.push(CanPdo {
+                direction,
+                number: config.number,
+                id,
+                len: mapped_len(&config.mapping).unwrap_or(0),
+                parts: spread.parts().iter().filter(|part| part.pdo == place).map(part).collect(),
+            });
         }
-        facts.note_missing(Object { index: Cia402Dictionary::on_first_axis(object.index), ..object });
     }
-    if !layout.left_out.is_empty() {
-        program = mapping.cia402_program(needs, &facts).map_err(text)?;
-        layout = derived(&program, node, sheet);
-    }
-    let mut pdos = Vec::with_capacity(layout.pdos.len());
-    for pdo in &layout.pdos {
-        let number = pdo.number + 1;
-        let given = member.ids.iter().find(|(way, of, _)| (*way, *of) == (pdo.direction, number));
-        let id = given.map(|(.., id)| *id).or(pdo.cob_id.and_then(|id| u16::try_from(id).ok()));
-        let id = id.ok_or_else(|| format!("{} ({number}) has no identifier", pdo.direction))?;
-        let mut parts = Vec::new();
-        let mut at = 0;
-        for entry in &pdo.entries {
-            let len = usize::from(entry.bits).div_ceil(8);
-            let item = Item::object(entry.index, entry.sub);
-            let flat = match pdo.direction {
-                Direction::Receive => program.place_of_command(item),
-                Direction::Transmit => program.place_of_feedback(item),
-            };
-            if let Some((flat, width)) = flat {
-                if width != len {
-                    return Err(format!(
-                        "{item} has {len} bytes in the data sheet, {width} in the dictionary"
-                    ));
-                }
-                parts.push(CanPart { at, flat, len });
-            }
-            at += len;
-        }
-        pdos.push(CanPdo { direction: pdo.direction, number, id, len: at, parts });
-    }
-    Ok((CanDrive { node, needs: needs.clone(), facts, pdos }, program))
+    Ok((CanDrive { node: node.get(), needs: needs.clone(), facts, pdos }, program))
 }
 
 /// What a drive answers that has what its data sheet says, and takes what it is told.
@@ -244,17 +266,4 @@ fn asked(
         }
     }
     Ok(facts)
-}
-
-/// The PDOs for the values of a program.
-fn derived(program: &DriveProgram, node: u8, sheet: &DeviceDescription) -> layout::Layout {
-    let wanted = |item: &Item, must: bool| match item {
-        Item::Object(Object { index, sub }) if must => Some(Wanted::must(*index, *sub)),
-        Item::Object(Object { index, sub }) => Some(Wanted::may(*index, *sub)),
-        Item::Idn(_) => None,
-    };
-    let of = |items: &[Item]| -> Vec<Wanted> {
-        items.iter().filter_map(|item| wanted(item, program.is_head(*item))).collect()
-    };
-    layout::derive(sheet, node, &of(&program.telegram.command), &of(&program.telegram.feedback))
 }

@@ -1,7 +1,7 @@
 //! CiA 402 drives on CANopen: updates to RPDOs, TPDOs and EMCY to the device.
 
 use profile_cia402::eds;
-use profile_cia402::eds::drive::Direction;
+use profile_cia402::master::config::Direction;
 use profile_cia402::wire::NodeId;
 use profile_cip::wire::motion::codes::AxisControl;
 use profile_generic::mode::OperatingMode;
@@ -10,6 +10,7 @@ use profile_generic::time::DurationNs;
 
 use super::*;
 use crate::capture::can::{LINK_TYPE_CAN, RECORD_LEN_MAX, emit};
+use crate::engine::bus::can::layout::{AxisPdos, SpareIds};
 use crate::mapping::{Cia402Axis, CipScaling};
 use crate::simulate::can_drive;
 
@@ -24,13 +25,13 @@ fn stage() -> Stage {
         device: 0,
         instance,
         drive: format!("drive-{}", char::from(b'b' + instance)),
-        node: 3,
-        ids: vec![
-            (Direction::Receive, 65, 0x204),
-            (Direction::Receive, 66, 0x304),
-            (Direction::Transmit, 65, 0x184),
-            (Direction::Transmit, 66, 0x284),
-        ],
+        node: NodeId::new(3).unwrap(),
+        pdos: AxisPdos::new(
+            axis,
+            3,
+            &mut SpareIds::new((5..=127).filter_map(|id| NodeId::new(id).ok()).collect()),
+        )
+        .unwrap(),
         needs: Cia402Axis {
             axis,
             modes: MODES.into_iter().map(Into::into).collect(),
@@ -184,9 +185,9 @@ fn recordings_of_a_can_bus_are_translated() {
     let reader = crate::capture::reader::Reader::new(file.as_slice()).unwrap();
     let names = profile_sercos::wire::describe::NoNames;
     let list = translate_capture(&stage, &config, reader, &names).unwrap();
-    assert_eq!((list.frames.len(), list.passed_over, list.failed), (4, 1, 0));
-    let last = text(&list.frames[3]);
+    assert_eq!((list.frames.len(), list.passed_over, list.failed), (3, 2, 0));
+    let last = text(&list.frames[2]);
     assert!(last.starts_with("frame 4 283#00 10 00 00 F4 01\n"), "{last}");
     assert!(last.contains("position_actual 4.000000000 rev"), "{last}");
-    assert!(text(&list.frames[2]).contains("TPDO2 (283) to come"));
+    assert!(text(&list.frames[1]).contains("TPDO2 (283) to come"));
 }
