@@ -19,6 +19,8 @@ pub mod device;
 pub mod notice;
 pub mod port;
 
+use std::cell::RefCell;
+
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
@@ -262,6 +264,8 @@ impl Engine {
     fn run_buses(&mut self, now: MonotonicTime, system: SystemTime) {
         let Self { mapping, buses, devices, axes, notices, .. } = self;
         let idle = devices.iter().all(|channel| channel.device().connection().is_none());
+        // What an answer leads to is told beside what the bus tells, never while it does.
+        let notices = RefCell::new(notices);
         for bus in buses.iter_mut() {
             bus.set_idle(idle);
             bus.run(
@@ -280,6 +284,14 @@ impl Engine {
                     Purpose::Diagnosis => {
                         let word = answer.result.as_ref().ok().and_then(|(data, _)| unsigned(data));
                         axes[answer.axis].diagnostic_word(now, system, answer.item, word);
+                    }
+                    Purpose::OwnWords => {
+                        let data = answer.result.as_ref().ok().map(|(data, _)| data.as_slice());
+                        let said = axes[answer.axis].own_words_read(answer.item, data);
+                        let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
+                        if let Some(said) = said {
+                            tell(&mut notices.borrow_mut(), Notice::DriveSays { axis, said });
+                        }
                     }
                     Purpose::Capture(access, generation) => {
                         let result = answer.result.as_ref().map(|(data, _)| data.as_slice());
@@ -300,7 +312,7 @@ impl Engine {
                     // Whether it helped shows in the drive's status word.
                     Purpose::FaultReset => {}
                 },
-                &mut |notice| tell(notices, notice),
+                &mut |notice| tell(&mut notices.borrow_mut(), notice),
             );
         }
     }

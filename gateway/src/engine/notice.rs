@@ -12,7 +12,7 @@ use profile_generic::state::DriveState;
 use profile_sercos::master::event::Event;
 use profile_sercos::master::topology::Topology;
 
-use super::axis::Loss;
+use super::axis::{Loss, OwnWords};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
 use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
@@ -137,6 +137,13 @@ pub enum Notice {
         /// Why the command was lost, when that is the fault.
         loss: Option<Loss>,
     },
+    /// What a drive says in its own words of a fault or warning that it has.
+    DriveSays {
+        /// The axis.
+        axis: u8,
+        /// Number and text.
+        said: OwnWords,
+    },
     /// A fault or alarm came into the log of an axis, or ended there.
     Logged {
         /// The axis.
@@ -220,6 +227,7 @@ impl Notice {
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
             | Self::Fault { axis, .. }
+            | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
         }
@@ -267,6 +275,7 @@ impl fmt::Display for Notice {
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
             Self::Fault { fault, loss: None, .. } => write!(f, "{fault}"),
+            Self::DriveSays { said, .. } => own_words(f, said),
             Self::Logged { entry, cause, .. } => logged(f, entry, *cause),
             Self::Node { device, fault, alarm } => {
                 write!(f, "device {device}: {fault} ({}), {alarm} ({})", fault.0, alarm.0)
@@ -300,6 +309,15 @@ where
         between = "; ";
     }
     Ok(())
+}
+
+/// `the drive says 0xC00F0007 "overcurrent"`.
+fn own_words(f: &mut fmt::Formatter<'_>, said: &OwnWords) -> fmt::Result {
+    f.write_str("the drive says")?;
+    if let Some(number) = said.number {
+        write!(f, " {number:#010X}")?;
+    }
+    if said.text.is_empty() { Ok(()) } else { write!(f, " \"{}\"", said.text) }
 }
 
 /// `Axis Fault 54 (excessive_position_error): Major Fault ...`.

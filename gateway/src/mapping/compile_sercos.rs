@@ -419,6 +419,8 @@ impl DriveProgram {
         for row in &tables.faults {
             program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
         }
+        let own_words = tables.diagnosis.into_iter().flatten();
+        program.diagnosis.extend(own_words.filter(|idn| !facts.is_missing(*idn)).map(Item::from));
         for (action, idn) in &tables.commands {
             program
                 .commands

@@ -158,6 +158,7 @@ pub struct DriveProgram {
     pub(super) status_words: ArrayVec<Place, STATUS_WORDS_MAX>,
     pub(super) known_status: StatusBits,
     pub(super) faults: ArrayVec<FaultRow, MAX_FAULT_ROWS>,
+    pub(super) diagnosis: ArrayVec<Item, 2>,
     pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
     pub(super) captures: CaptureProgram,
     pub(super) parameters: Vec<ParameterEntry>,
@@ -197,6 +198,7 @@ impl DriveProgram {
             status_words: ArrayVec::new(),
             known_status: StatusBits::empty(),
             faults: ArrayVec::new(),
+            diagnosis: ArrayVec::new(),
             commands: ArrayVec::new(),
             captures: CaptureProgram::default(),
             parameters: Vec::new(),
@@ -422,6 +424,11 @@ impl DriveProgram {
         let rows =
             self.faults.iter().enumerate().filter(move |(at, row)| counts(row) && first(*at, row.word));
         rows.map(|(_, row)| row.word)
+    }
+
+    /// What the drive says of a fault or warning in its own words: number and text. Empty where it has neither.
+    pub fn diagnosis(&self) -> &[Item] {
+        &self.diagnosis
     }
 
     /// The procedure command that belongs to an action.

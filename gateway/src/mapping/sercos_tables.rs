@@ -162,6 +162,8 @@ pub struct SercosTables {
     pub(super) reports: Vec<ReportRule>,
     pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<FaultRow>,
+    /// What the drive says of them in its own words: number and text.
+    pub(super) diagnosis: Option<[Idn; 2]>,
     pub(super) parameters: Vec<ParameterRule>,
     pub(super) captures: Vec<CaptureRule>,
     /// The drive's lists of what its telegram, and the master's, may carry.

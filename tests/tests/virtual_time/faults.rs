@@ -1,6 +1,7 @@
 //! Something is wrong with a drive, or with a command.
 
 use axisbridge::engine::axis::STOP_TIME_OUT;
+use axisbridge::engine::notice::Notice;
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, both, in_motion, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AttributeSet, AxisSet, Failure, Step};
@@ -46,6 +47,8 @@ fn a_fault_of_one_drive_leaves_the_other_axis_moving_and_can_be_reset() {
     assert_eq!(rig.report().axes[0].state, Some(AxisStateCode::MAJOR_FAULTED));
     assert_eq!(rig.drive(0).actual().report, Report::Faulted);
     assert!(!rig.watched[0].on && rig.watched[1].on);
+    assert_eq!(drive_says(&rig, 0), ["the drive says 0xC00F0007 \"overcurrent error\""]);
+    assert_eq!(drive_says(&rig, 1), [""; 0]);
     assert!(rig.velocity(1) > 199 * NANO, "the slide goes on");
     rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT);
     let report = rig.run(millis(20_000));
@@ -180,6 +183,9 @@ fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
     rig.run_for(millis(100));
     let came = (AlarmType::AXIS, 6, 1);
     assert_eq!(alarms(&rig, 0), [came]);
+    // Number and text of the drive follow, once.
+    rig.run_for(millis(200));
+    assert_eq!(drive_says(&rig, 0), ["the drive says 0xC00E0002 \"motor overtemperature warning\""]);
     // Another one while the first stands: the status word does not change, the word is read again.
     rig.drive_mut(0).set_warnings(1 << 2 | 1 << 15);
     rig.run_for(millis(400));
@@ -201,6 +207,12 @@ fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
     assert_eq!((words.exceptions, words.alarms), ([0, 0], [0; 4]));
     let report = rig.run(millis(30_000));
     assert_eq!(report.failure, None, "{}", rig.log());
+}
+
+/// What was told of the drive's own words, in order.
+fn drive_says(rig: &Rig, axis: u8) -> Vec<String> {
+    let says = |notice: &&Notice| matches!(notice, Notice::DriveSays { axis: of, .. } if *of == axis);
+    rig.notices.iter().filter(says).map(ToString::to_string).collect()
 }
 
 /// Sets one element of Axis Exception Action.

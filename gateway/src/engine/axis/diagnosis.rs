@@ -13,6 +13,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use crate::mapping::Item;
 
+use super::own_words::Reading;
 use super::{AxisChannel, caused_by_controller};
 
 /// How long a fault of the drive waits for its cause to be read before it is reported without.
@@ -22,7 +23,7 @@ pub(super) const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
 const REREAD: DurationNs = DurationNs::from_millis(250);
 
 /// An answer that has not come after this is not waited for any longer: the drive may have been lost meanwhile.
-const ANSWER_TIME_OUT: DurationNs = DurationNs::from_secs(2);
+pub(super) const ANSWER_TIME_OUT: DurationNs = DurationNs::from_secs(2);
 
 /// Where the reading stands.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,11 +46,11 @@ struct Round {
 }
 
 impl AxisChannel {
-    fn shows_error(&self) -> bool {
+    pub(super) fn shows_error(&self) -> bool {
         matches!(self.feedback.report, Report::Faulted | Report::FaultReaction)
     }
 
-    fn shows_warning(&self) -> bool {
+    pub(super) fn shows_warning(&self) -> bool {
         self.feedback.status.contains(StatusBits::WARNING)
     }
 
@@ -134,6 +135,9 @@ impl AxisChannel {
         self.cause_wanted = None;
         let fault = Fault::new(cause, system).with_reaction(reaction).with_vendor_code(word);
         let new = self.faults.raise(fault, Origin::Drive);
+        if new {
+            self.own_words.want();
+        }
         if new || self.fault.is_none_or(|known| caused_by_controller(known.cause)) {
             self.take_fault(now, system, fault);
         }
@@ -164,12 +168,17 @@ impl AxisChannel {
         self.diagnosis.warning_found |= !shown.is_empty();
         for (cause, reaction) in shown {
             let fault = Fault::new(*cause, system).with_reaction(*reaction).with_vendor_code(word);
-            self.faults.raise(fault, Origin::Warning);
+            self.warn(fault);
         }
         if last && !self.diagnosis.warning_found {
             // It warns, and no row of the tables says of what.
-            let fault = Fault::new(FaultCause::DRIVE_WARNING, system).with_vendor_code(word);
-            self.faults.raise(fault, Origin::Warning);
+            self.warn(Fault::new(FaultCause::DRIVE_WARNING, system).with_vendor_code(word));
+        }
+    }
+
+    fn warn(&mut self, warning: Fault) {
+        if self.faults.raise(warning, Origin::Warning) {
+            self.own_words.want();
         }
     }
 
@@ -188,6 +197,7 @@ impl AxisChannel {
     /// The drive is gone, and with it what it was asked.
     pub(super) fn end_diagnosis(&mut self) {
         self.diagnosis = Diagnosis::default();
+        self.own_words = Reading::default();
         self.cause_wanted = None;
         self.faults.clear_all(Origin::Drive, |_| false);
         self.faults.clear_all(Origin::Warning, |_| false);

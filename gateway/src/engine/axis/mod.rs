@@ -16,12 +16,14 @@ mod history;
 mod hookup;
 mod image;
 mod north;
+mod own_words;
 pub mod procedure;
 mod sequence;
 mod set_point;
 mod trim;
 
 pub use self::hookup::HookupSettings;
+pub use self::own_words::OwnWords;
 
 use self::hookup::TestRun;
 use crate::mapping::{CipProgram, CipTrackers, DriveProgram};
@@ -172,6 +174,7 @@ pub struct AxisChannel {
     /// Everything that is wrong now.
     faults: FaultSet,
     diagnosis: diagnosis::Diagnosis,
+    own_words: own_words::Reading,
     loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
@@ -241,6 +244,7 @@ impl AxisChannel {
             fault: None,
             faults: FaultSet::new(),
             diagnosis: diagnosis::Diagnosis::default(),
+            own_words: own_words::Reading::default(),
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,

@@ -30,6 +30,8 @@ pub enum Purpose {
     },
     /// A diagnostic word, to find the cause of a fault or a warning.
     Diagnosis,
+    /// What the drive says in its own words, for people.
+    OwnWords,
     /// The drive's fault reset.
     FaultReset,
     /// Capturing events, with the generation of the axis's captures.
@@ -272,6 +274,11 @@ fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Acces
         && access(&Access::read(item).urgent(), Purpose::Diagnosis)
     {
         axis.word_asked(now, item);
+    }
+    if let Some(item) = axis.wants_own_words(now)
+        && access(&Access::read(item), Purpose::OwnWords)
+    {
+        axis.own_words_asked(now, item);
     }
     if let Some((wanted, part, generation)) = axis.capture_access()
         && access(&wanted, Purpose::Capture(part, generation))

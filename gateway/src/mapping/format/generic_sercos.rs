@@ -39,6 +39,8 @@ pub struct GenericSercosFile {
     pub status: Vec<SercosStatusRow>,
     /// Faults and warnings in the diagnostic words.
     pub fault: Vec<SercosFaultRow>,
+    /// What the drive says of them in its own words.
+    pub diagnosis: DiagnosisRow,
     /// Parameters.
     pub parameter: Vec<SercosParameterRow>,
     /// Which values a telegram may carry.
@@ -374,6 +376,18 @@ pub struct SercosFaultRow {
     pub cause: Name,
     /// Reaction, where it is not the usual one of the cause.
     pub reaction: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// Where a drive says in its own words what is wrong with it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnosisRow {
+    /// IDN of the text.
+    pub text: Name,
+    /// IDN of the number.
+    pub number: Name,
     /// Where it comes from.
     pub source: Source,
 }

@@ -20,12 +20,12 @@ use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::captures::{CaptureBy, CaptureRule};
 use crate::mapping::cip_tables::{CipTables, ExceptionRow};
-use crate::mapping::dictionary::{Dictionaries, IdnUnit, SercosIdn, Word, quantity};
+use crate::mapping::dictionary::{Dictionaries, IdnFormat, IdnUnit, SercosIdn, Word, quantity};
 use crate::mapping::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::mapping::format::{
-    CommissionRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow, ScalingMethodRow,
-    SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow, SercosSignalRow,
-    UnboundRow,
+    CommissionRow, DiagnosisRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow,
+    ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow,
+    SercosSignalRow, UnboundRow,
 };
 use crate::mapping::generic_names::{
     action, capture_kind, cause_and_reaction, directions, operating_mode, parameter, report, signal,
@@ -69,6 +69,7 @@ impl SercosTables {
         for row in &rows.fault {
             builder.fault(row);
         }
+        builder.diagnosis(&rows.diagnosis);
         for row in &rows.parameter {
             builder.parameter(row);
         }
@@ -515,6 +516,20 @@ impl<'a> Builder<'a> {
             }
             self.tables.faults.push(FaultRow { word: idn.into(), pattern, cause, reaction });
         }
+    }
+
+    fn diagnosis(&mut self, row: &DiagnosisRow) {
+        let text = self.idn("text", &row.text);
+        if let Some(idn) = text.filter(|idn| !idn.list || idn.format != Some(IdnFormat::Text)) {
+            let message = format!("expected a text, {} is none", idn.idn);
+            self.resolver.error(code::OUT_OF_RANGE, row.text.span(), "text", message);
+        }
+        let number = self.idn("number", &row.number);
+        if let Some(idn) = number.filter(|idn| idn.list || idn.format == Some(IdnFormat::Text)) {
+            let message = format!("expected a number, {} is a list", idn.idn);
+            self.resolver.error(code::OUT_OF_RANGE, row.number.span(), "number", message);
+        }
+        self.tables.diagnosis = number.zip(text).map(|(number, text)| [number.idn, text.idn]);
     }
 
     fn captures(&mut self, rows: &GenericSercosFile) {

@@ -42,6 +42,13 @@ const CASES: &[Case] = &[
         "idn = \"S-0-0047\"\ndirection",
         "idn = \"S-0-4047\"\ndirection",
     ),
+    ("diagnosis that is no text", |t| &mut t.generic_sercos, "text = \"S-0-0095\"", "text = \"S-0-0099\""),
+    (
+        "diagnosis that is no number",
+        |t| &mut t.generic_sercos,
+        "number = \"S-0-0390\"",
+        "number = \"S-0-0375\"",
+    ),
     ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\"\ndirection", "idn = \"S-47\"\ndirection"),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
     ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),

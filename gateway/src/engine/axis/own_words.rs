@@ -1,0 +1,123 @@
+//! What the drive says in its own words of a fault or warning that has come: a number and a text for people, read over the
+//! service channel one after the other.
+
+use arrayvec::ArrayString;
+use profile_generic::time::MonotonicTime;
+
+use super::AxisChannel;
+use super::diagnosis::ANSWER_TIME_OUT;
+use crate::engine::access::DATA_LEN;
+use crate::mapping::Item;
+
+/// Bytes of a text: a drive's octets may take two each.
+const TEXT_LEN: usize = 2 * DATA_LEN;
+
+/// Bytes of a number; what is longer is a text.
+const NUMBER_LEN: usize = 4;
+
+/// What a drive says.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct OwnWords {
+    /// Its number of the diagnosis.
+    pub number: Option<u32>,
+    /// Its text; empty when it has none, or one that is too long to be read here.
+    pub text: ArrayString<TEXT_LEN>,
+}
+
+/// Where the reading stands.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Reading {
+    /// Something has come since the last reading began.
+    wanted: bool,
+    /// Place of what is read, in the order of the program.
+    place: Option<usize>,
+    asked: Option<(Item, MonotonicTime)>,
+    said: OwnWords,
+}
+
+impl Reading {
+    pub(super) fn want(&mut self) {
+        self.wanted = true;
+    }
+}
+
+impl AxisChannel {
+    /// What should be read now, so that people are told what the drive says.
+    #[must_use]
+    pub fn wants_own_words(&self, now: MonotonicTime) -> Option<Item> {
+        let Reading { wanted, place, asked, .. } = self.own_words;
+        let waits = asked.is_some_and(|(_, since)| now.since(since) < ANSWER_TIME_OUT);
+        if waits || (place.is_none() && !wanted) {
+            return None;
+        }
+        self.south()?.diagnosis().get(place.unwrap_or(0)).copied()
+    }
+
+    /// What was wanted is on its way.
+    pub fn own_words_asked(&mut self, now: MonotonicTime, item: Item) {
+        let reading = &mut self.own_words;
+        if reading.place.is_none() {
+            *reading = Reading { place: Some(0), ..Reading::default() };
+        }
+        reading.asked = Some((item, now));
+    }
+
+    /// The drive has answered, or has nothing to say. Returns all that it said when that was the last of it, and the fault or
+    /// warning is still there.
+    pub fn own_words_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<OwnWords> {
+        self.own_words.asked.take_if(|(asked, _)| *asked == item)?;
+        let place = self.own_words.place? + 1;
+        let last = self.south().is_none_or(|program| place >= program.diagnosis().len());
+        let said = &mut self.own_words.said;
+        let number = data.filter(|data| place == 1 && matches!(data.len(), 2 | NUMBER_LEN));
+        match (number, data) {
+            (Some(data), _) => said.number = Some(little_endian(data)),
+            (None, Some(data)) => said.text = text(data),
+            (None, None) => {}
+        }
+        let said = *said;
+        self.own_words.place = (!last).then_some(place);
+        let there = self.shows_error() || self.shows_warning();
+        (last && there && said != OwnWords::default()).then_some(said)
+    }
+}
+
+fn little_endian(data: &[u8]) -> u32 {
+    data.iter().rev().fold(0, |number, octet| number << 8 | u32::from(*octet))
+}
+
+/// The characters of a text: of UTF-8 where it is that, else of ISO 8859-1, as older drives have it.
+fn text(data: &[u8]) -> ArrayString<TEXT_LEN> {
+    let mut text = ArrayString::new();
+    let mut push = |character: char| {
+        if !character.is_control() {
+            // There is room for every octet as the longest character that it can be.
+            let _ = text.try_push(character);
+        }
+    };
+    match core::str::from_utf8(data) {
+        Ok(utf8) => utf8.trim().chars().for_each(&mut push),
+        Err(_) => data.iter().map(|octet| char::from(*octet)).for_each(&mut push),
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_read_in_either_code_and_lose_what_is_no_character() {
+        assert_eq!(text(b"overcurrent\0 ").as_str(), "overcurrent");
+        assert_eq!(text("\u{dc}berstrom".as_bytes()).as_str(), "\u{dc}berstrom");
+        assert_eq!(text(b"\xdcberstrom").as_str(), "\u{dc}berstrom");
+        assert_eq!(text(&[0xFF; DATA_LEN]).chars().count(), DATA_LEN, "the longest text has room");
+        assert_eq!(text(b"").as_str(), "");
+    }
+
+    #[test]
+    fn numbers_are_read_with_two_and_with_four_octets() {
+        assert_eq!(little_endian(&[0x0B, 0x00, 0x0F, 0xC0]), 0xC00F_000B);
+        assert_eq!(little_endian(&[0x26, 0xF2]), 0xF226);
+    }
+}
