@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use profile_generic::image::Signal;
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
-use profile_generic::program::{Conversion, Field, Width};
+use profile_generic::program::{BitPattern, Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
@@ -16,7 +16,7 @@ use super::dictionary::{IdnUnit, SercosDictionary};
 use super::drive_facts::DriveFacts;
 use super::drive_program::{
     DriveProgram, MAX_MODES, ModeEntry, PROCEDURE_COMMANDS_MAX, PROCEDURES_MAX, ParameterEntry, Procedure,
-    StatusRow, Telegram, WORD_BYTES,
+    ProcedureBy, StatusRow, Telegram, WORD_BYTES,
 };
 use super::item::Item;
 use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
@@ -372,7 +372,15 @@ impl DriveProgram {
                 let fields = || program.command.fields().map(|field| field.signal);
                 let there = |signal: &&Signal| fields().any(|known| known == **signal);
                 let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
-                let entry = ModeEntry { selection: rule.selection, control, status, needs, carried };
+                let entry = ModeEntry {
+                    selection: rule.selection,
+                    control,
+                    status,
+                    bits: BitPattern::default(),
+                    handover: None,
+                    needs,
+                    carried,
+                };
                 program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
             }
         }
@@ -385,16 +393,11 @@ impl DriveProgram {
             if rule.commands.iter().any(|idn| facts.is_missing(*idn)) {
                 continue;
             }
+            let commands = rule.commands.iter().copied().map(Item::from).take(PROCEDURE_COMMANDS_MAX);
             let procedure = Procedure {
                 selection: rule.selection,
                 led_in: rule.led_in,
-                commands: rule
-                    .commands
-                    .iter()
-                    .copied()
-                    .map(Item::from)
-                    .take(PROCEDURE_COMMANDS_MAX)
-                    .collect(),
+                by: ProcedureBy::Commands(commands.collect()),
             };
             program
                 .procedures

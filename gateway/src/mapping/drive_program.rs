@@ -8,9 +8,10 @@ use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
     ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
-    StateTable, Trackers, Width,
+    MAX_FIELDS, StateTable, Trackers, Width,
 };
 use profile_generic::state::{Action, Report};
+use profile_generic::time::DurationNs;
 
 use super::capture_program::{CaptureProgram, Place};
 use super::item::Item;
@@ -23,6 +24,9 @@ pub const PROCEDURES_MAX: usize = 4;
 
 /// The most procedure commands of one of them.
 pub const PROCEDURE_COMMANDS_MAX: usize = 4;
+
+/// The most ways in which a status tells that a procedure has failed.
+pub const PROCEDURE_FAILURES_MAX: usize = 4;
 
 /// Bytes of the control and of the status word.
 pub(super) const WORD_BYTES: u16 = 2;
@@ -91,11 +95,41 @@ impl ParameterEntry {
     }
 }
 
+/// How a drive takes a target over: it is asked by bits of the control word and answers by bits of the status word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Handover {
+    /// The bits that ask.
+    pub ask: BitPattern,
+    /// The bits that answer.
+    pub taken: BitPattern,
+}
+
+/// What the drive is to do in a cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Order {
+    /// The action.
+    pub action: Action,
+    /// The mode that it is told in place of the chosen one.
+    pub told: Option<ModeSelection>,
+    /// It is asked to take its target over, or to carry out its procedure.
+    pub asks: bool,
+}
+
+impl From<Action> for Order {
+    fn from(action: Action) -> Self {
+        Self { action, told: None, asks: false }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ModeEntry {
     pub selection: ModeSelection,
     pub control: BitPattern,
     pub status: BitPattern,
+    /// Bits of the control word that belong to modes, as they stand in this one while the drive is in operation.
+    pub bits: BitPattern,
+    /// How it takes over what it goes to by itself, or is told to begin.
+    pub handover: Option<Handover>,
     /// Its signals without which it must not be chosen.
     pub needs: CommandSet,
     /// Its signals that the telegram carries.
@@ -129,8 +163,55 @@ pub struct Procedure {
     /// The mode in which the controller moves the axis while the first command is in process; the drive moves it where
     /// there is none.
     pub led_in: Option<ModeSelection>,
-    /// The commands in their order.
-    pub commands: ArrayVec<Item, PROCEDURE_COMMANDS_MAX>,
+    /// What it consists of.
+    pub by: ProcedureBy,
+}
+
+/// What a procedure consists of.
+#[derive(Debug, Clone)]
+pub enum ProcedureBy {
+    /// Procedure commands, in their order.
+    Commands(ArrayVec<Item, PROCEDURE_COMMANDS_MAX>),
+    /// A mode of its own that the drive ends by itself.
+    Mode(ModeProcedure),
+}
+
+/// A mode that a drive ends by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModeProcedure {
+    /// What a status shows in the mode.
+    pub shown: BitPattern,
+    /// What a status shows when it has ended well.
+    pub done: BitPattern,
+    /// What a status shows when it has failed; any of them.
+    pub failed: [Option<BitPattern>; PROCEDURE_FAILURES_MAX],
+    /// After this time it has failed as well.
+    pub time_out: DurationNs,
+}
+
+impl ModeProcedure {
+    /// Whether a status shows that it has failed.
+    #[must_use]
+    pub fn has_failed(&self, status: u32) -> bool {
+        self.shown.matches(status) && self.failed.iter().flatten().any(|pattern| pattern.matches(status))
+    }
+
+    /// Whether a status shows that it has ended well.
+    #[must_use]
+    pub fn is_done(&self, status: u32) -> bool {
+        self.shown.matches(status) && self.done.matches(status)
+    }
+}
+
+impl Procedure {
+    /// Its procedure commands.
+    #[must_use]
+    pub fn commands(&self) -> &[Item] {
+        match &self.by {
+            ProcedureBy::Commands(commands) => commands,
+            ProcedureBy::Mode(_) => &[],
+        }
+    }
 }
 
 /// The program of one axis: flat, without names, hashes or allocation in use.
@@ -165,6 +246,8 @@ pub struct DriveProgram {
     pub(super) rejected: Vec<Parameter>,
     pub(super) position_step: Option<i64>,
     pub(super) acknowledges: bool,
+    /// Set-point and target of the position stand in one place of the telegram.
+    pub(super) shares_target: bool,
 }
 
 /// A fault or warning in a diagnostic word.
@@ -205,12 +288,25 @@ impl DriveProgram {
             rejected: Vec::new(),
             position_step: None,
             acknowledges,
+            shares_target: false,
         }
     }
 
     /// The values to the drive, each with what carries it.
     pub fn command_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
-        self.command.fields().zip(self.telegram.command.iter().skip(self.heads()).copied())
+        // Two signals that stand in one place have one item.
+        let fields = self.command.fields().enumerate();
+        fields.filter_map(|(number, field)| {
+            let before = self.command.fields().take(number);
+            let mut places: ArrayVec<u16, MAX_FIELDS> = ArrayVec::new();
+            for offset in before.map(|field| field.offset) {
+                if !places.contains(&offset) {
+                    places.push(offset);
+                }
+            }
+            let place = places.iter().position(|offset| *offset == field.offset).unwrap_or(places.len());
+            Some((field, *self.telegram.command.get(self.heads() + place)?))
+        })
     }
 
     /// The values from the drive, each with what carries it.
@@ -267,13 +363,14 @@ impl DriveProgram {
     pub fn encode(
         &self,
         command: &AxisCommand,
-        action: Action,
+        order: impl Into<Order>,
         control: u32,
         status: u32,
         telegram: &mut [u8],
         report: &mut ConversionReport,
     ) -> u32 {
-        let control = self.control(action, command.selection(), control, status);
+        let order = order.into();
+        let control = self.control(order, command.selection(), control, status);
         let [low, high, mode, _] = control.to_le_bytes();
         if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
             bytes.copy_from_slice(&[low, high]);
@@ -281,8 +378,28 @@ impl DriveProgram {
         if let Some(octet) = self.mode_octets.and_then(|[at, _]| telegram.get_mut(usize::from(at))) {
             *octet = mode;
         }
-        self.command.encode(command, telegram, report);
+        let hidden = self.hidden(self.told(order, command.selection()), status);
+        let command = AxisCommand { present: command.present.difference(hidden), ..*command };
+        self.command.encode(&command, telegram, report);
         control
+    }
+
+    /// The mode that the drive is told.
+    fn told(&self, order: Order, selection: ModeSelection) -> Option<&ModeEntry> {
+        self.entry(order.told.or_else(|| self.shown_in(selection))?)
+    }
+
+    /// Where set-point and target of the position stand in one place: the one that does not count. A drive that does not show
+    /// yet that it goes to targets would follow one at once.
+    fn hidden(&self, told: Option<&ModeEntry>, status: u32) -> CommandSet {
+        let target = |entry: &ModeEntry| {
+            entry.carried.contains(CommandSet::TARGET_POSITION) && entry.status.matches(status)
+        };
+        match (self.shares_target, told.is_some_and(target)) {
+            (false, _) => CommandSet::empty(),
+            (true, true) => CommandSet::POSITION,
+            (true, false) => CommandSet::TARGET_POSITION,
+        }
     }
 
     /// The operating mode in a control or a status, where the drive has an octet of its own for it.
@@ -293,14 +410,45 @@ impl DriveProgram {
 
     /// The control after an action in a mode: the control word, and the operating mode above it where it has an octet of its
     /// own.
-    pub fn control(&self, action: Action, selection: ModeSelection, control: u32, status: u32) -> u32 {
+    pub fn control(
+        &self,
+        order: impl Into<Order>,
+        selection: ModeSelection,
+        control: u32,
+        status: u32,
+    ) -> u32 {
+        let order = order.into();
+        let Order { action, asks, .. } = order;
         let step = self.steps.iter().find(|step| step.action == action && step.when.matches(status));
         let control = match step {
             Some(step) => step.control.apply(control),
             None => self.actions.apply(action, control).unwrap_or(control),
         };
-        let entry = self.shown_in(selection).and_then(|shown| self.entry(shown));
-        entry.map_or(control, |entry| entry.control.apply(control))
+        let Some(entry) = self.told(order, selection) else { return control };
+        let control = entry.control.apply(control);
+        if entry.bits.mask == 0 {
+            return control;
+        }
+        let operates = matches!(action, Action::Enable | Action::Halt)
+            && matches!(self.report(status), Report::Operating | Report::Enabling | Report::Halted);
+        let ask = entry.handover.map_or(BitPattern::default(), |handover| handover.ask);
+        match (operates, asks) {
+            (true, true) => ask.apply(entry.bits.apply(control)),
+            (true, false) => entry.bits.apply(control),
+            // Bits of a mode mean nothing, or something else, before the drive is in operation.
+            (false, _) => BitPattern::new(entry.bits.mask, 0).apply(control),
+        }
+    }
+
+    /// How the drive takes over, step by step, what it goes to by itself in a mode.
+    pub fn handover(&self, selection: ModeSelection) -> Option<Handover> {
+        let entry = self.entry(selection).filter(|_| self.procedure(selection).is_none());
+        entry.and_then(|entry| entry.handover)
+    }
+
+    /// Whether a status shows the mode.
+    pub fn shows(&self, selection: ModeSelection, status: u32) -> bool {
+        self.entry(selection).is_some_and(|entry| entry.status.matches(status))
     }
 
     /// Takes the drive's telegram apart into report, mode, status bits and actual values. `led` is whether the drive carries
@@ -357,6 +505,11 @@ impl DriveProgram {
     pub fn has_mode(&self, selection: impl Into<ModeSelection>) -> bool {
         let selection = selection.into();
         self.entry(selection).is_some() || self.procedure(selection).is_some()
+    }
+
+    /// The mode in which the drive was set up.
+    pub fn first_mode(&self) -> Option<ModeSelection> {
+        self.modes.first().map(|entry| entry.selection)
     }
 
     /// The procedure that stands for a mode.

@@ -3,7 +3,7 @@
 use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{InterpolationSource, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Quantity;
 use profile_generic::scaling::UnitKind;
@@ -23,6 +23,12 @@ pub(super) fn signal(resolver: &mut Resolver<'_>, key: &str, name: &Name) -> Opt
 pub(super) fn operating_mode(resolver: &mut Resolver<'_>, name: &Name) -> Option<OperatingMode> {
     let known = OperatingMode::ALL.iter().map(|mode| mode.name());
     resolver.name("mode", name, "an operating mode", OperatingMode::parse, known)
+}
+
+/// Who makes the way, by name.
+pub(super) fn interpolation(resolver: &mut Resolver<'_>, name: &Name) -> Option<InterpolationSource> {
+    let known = InterpolationSource::ALL.iter().map(|source| source.name());
+    resolver.name("interpolation", name, "who makes the way", InterpolationSource::parse, known)
 }
 
 /// An action by name.

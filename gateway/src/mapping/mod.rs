@@ -76,7 +76,9 @@ pub use dictionary::{
     networks,
 };
 pub use drive_facts::{Difference, DriveFacts};
-pub use drive_program::{DriveProgram, FaultRow, MAX_MODES, ParameterEntry, Procedure, Telegram};
+pub use drive_program::{
+    DriveProgram, FaultRow, MAX_MODES, ModeProcedure, Order, ParameterEntry, Procedure, ProcedureBy, Telegram,
+};
 pub use item::{Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};

@@ -7,20 +7,29 @@ use profile_generic::parameter::Parameter;
 use profile_generic::state::Action;
 
 use super::stage::{Behind, StageAxis};
-use crate::mapping::{Cia402Dictionary, Item, Mapping, Origin};
+use crate::mapping::{Cia402Dictionary, Item, Mapping, Object, Origin};
 
 impl StageAxis {
     pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(_) => mapping.signal_row(signal),
-            Behind::Can(_) => mapping.object_signal_row(signal),
+            Behind::Can(_) => {
+                let mut fields = self.south.command_fields().chain(self.south.feedback_fields());
+                let (_, item) = fields.find(|(field, _)| field.signal == signal)?;
+                let Item::Object(object) = item else { return None };
+                let index = Cia402Dictionary::on_first_axis(object.index);
+                mapping.object_signal_row(signal, Object { index, ..object })
+            }
         }
     }
 
     pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(_) => mapping.mode_row(selection),
-            Behind::Can(_) => mapping.object_mode_row(selection),
+            Behind::Can(_) => {
+                let told = self.south.control(Action::None, selection, 0, 0);
+                mapping.object_mode_row(selection, self.south.mode_octet(told)?)
+            }
         }
     }
 
@@ -35,7 +44,7 @@ impl StageAxis {
     pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(drive) => mapping.report_row(status, drive.silent),
-            Behind::Can(drive) => mapping.object_report_row(status, drive.needs.silent),
+            Behind::Can(drive) => mapping.object_report_row(self.known(status), drive.needs.silent),
         }
     }
 
@@ -50,9 +59,14 @@ impl StageAxis {
                     item => item,
                 };
                 let words: Vec<_> = words.iter().map(|(item, word)| (first(item), *word)).collect();
-                mapping.object_status_rows(status, &words)
+                mapping.object_status_rows(self.known(status), &words)
             }
         }
+    }
+
+    /// A status without a mode of operation that the axis does not use: no row counts for it.
+    fn known(&self, status: u32) -> u32 {
+        if self.south.mode(status).is_some() { status } else { status & 0xFFFF }
     }
 
     pub(super) fn fault_row(

@@ -4,23 +4,28 @@
 
 use axisbridge::config::Config;
 use axisbridge::engine::axis::{AxisChannel, Limits};
+use axisbridge::engine::build::can::{Network, network};
 use axisbridge::engine::build::sercos::master_config;
+use axisbridge::engine::bus::can::CanBus;
 use axisbridge::engine::bus::sercos::SercosBus;
-use axisbridge::engine::bus::sercos::commissioner::Commissioner;
-use axisbridge::engine::bus::{AnyBus, Buses};
+use axisbridge::engine::bus::{AnyBus, Buses, can, sercos};
 use axisbridge::engine::notice::Notice;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{Engine, Parts};
 use axisbridge::latest;
-use axisbridge::mapping::{AxisUnits, CaptureMode, CipScaling, SercosAxis};
+use axisbridge::mapping::{AxisUnits, CaptureMode, Cia402Axis, CipScaling, SercosAxis};
+use axisbridge::simulate::can_bus::InProcessCan;
+use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::status::BoxStatus;
+use profile_cia402::node::drive::Axis;
 use profile_generic::fault::Reaction;
 use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet};
 use profile_generic::interpolation::TargetUpdate;
-use profile_generic::mode::ModeSelection;
-use profile_generic::quantity::Position;
+use profile_generic::mode::{ModeSelection, OperatingMode};
+use profile_generic::quantity::{Position, Velocity};
 use profile_generic::scaling::UnitKind;
+use profile_generic::servo::{Servo, ServoActual};
 use profile_generic::state::{DriveState, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::config::Connections;
@@ -34,15 +39,116 @@ use super::{BOX, HOST, START, SYSTEM_OFFSET, mapping};
 /// SERCOS address of the drive.
 const ADDRESS: u16 = 1;
 
+/// The configuration of a box with one CANopen drive.
+const CAN_BOX: &str = include_str!("generic-can.toml");
+
 /// Time between two set-points of a controller that leads the axis.
 pub const UPDATE_PERIOD: DurationNs = DurationNs::from_millis(4);
 
+/// The south side of the one axis: its bus and its drive.
+pub trait South {
+    /// The port of the bus.
+    fn port(&mut self) -> SouthPort<'_>;
+
+    /// What happens on the bus, and beside the cycle, after it. Without a `cable` nothing gets through.
+    fn exchange(&mut self, now: MonotonicTime, cable: bool);
+
+    /// The servo of the drive.
+    fn servo(&self) -> &Servo;
+
+    /// What it did last.
+    fn actual(&self) -> &ServoActual;
+}
+
+/// A SERCOS line with the one drive.
+pub struct SercosSouth {
+    /// The line.
+    pub line: DriveNetwork,
+    queue: SouthQueue,
+}
+
+impl South for SercosSouth {
+    fn port(&mut self) -> SouthPort<'_> {
+        SouthPort::Ethernet(&mut self.queue)
+    }
+
+    fn exchange(&mut self, now: MonotonicTime, cable: bool) {
+        self.line.handle_time(now);
+        while let Some(mut frame) = self.queue.outbound.pop_front() {
+            if cable && self.line.round_trip(now, frame.as_mut_slice()) {
+                self.queue.inbound.push_back(frame);
+            }
+        }
+    }
+
+    fn servo(&self) -> &Servo {
+        self.line.slaves()[0].application().servo()
+    }
+
+    fn actual(&self) -> &ServoActual {
+        self.line.slaves()[0].application().actual()
+    }
+}
+
+/// A CAN bus with one CANopen device.
+pub struct CanSouth {
+    /// The bus.
+    pub bus: InProcessCan,
+    commissioner: can::commissioner::Commissioner,
+    /// The axis of the device.
+    axis: usize,
+    connected: bool,
+}
+
+impl South for CanSouth {
+    fn port(&mut self) -> SouthPort<'_> {
+        SouthPort::Can(&mut self.bus)
+    }
+
+    fn exchange(&mut self, now: MonotonicTime, cable: bool) {
+        self.commissioner.poll();
+        if std::mem::replace(&mut self.connected, cable) != cable {
+            self.bus.connect(now, 0, cable);
+        }
+    }
+
+    fn servo(&self) -> &Servo {
+        self.axis().servo()
+    }
+
+    fn actual(&self) -> &ServoActual {
+        self.axis().actual()
+    }
+}
+
+impl CanSouth {
+    /// The device.
+    ///
+    /// # Panics
+    /// Never: there is one.
+    pub fn node(&self) -> &DriveNode {
+        self.bus.nodes().next().expect("a device")
+    }
+
+    /// The device, to act on it from outside.
+    ///
+    /// # Panics
+    /// Never: there is one.
+    pub fn node_mut(&mut self) -> &mut DriveNode {
+        self.bus.nodes_mut().next().expect("a device")
+    }
+
+    fn axis(&self) -> &Axis {
+        &self.node().application().axes()[self.axis]
+    }
+}
+
 /// One axis, its drive, and what leads it.
-pub struct GenericRig {
+pub struct OneAxis<S> {
     /// What runs in the cycle.
     pub engine: Engine,
-    /// The line with the one drive.
-    pub line: DriveNetwork,
+    /// The bus with the one drive.
+    pub south: S,
     /// What the engine told.
     pub notices: Vec<Notice>,
     /// What the north side wants.
@@ -54,10 +160,15 @@ pub struct GenericRig {
     next_update: MonotonicTime,
     now: MonotonicTime,
     due: MonotonicTime,
-    south: SouthQueue,
     notice_queue: rtrb::Consumer<Notice>,
     _status: latest::Reader<BoxStatus>,
 }
+
+/// One axis on SERCOS.
+pub type GenericRig = OneAxis<SercosSouth>;
+
+/// One axis on CANopen.
+pub type GenericCan = OneAxis<CanSouth>;
 
 impl GenericRig {
     /// A rotary axis with these modes, the first active at start, whose bus is in CP4. `prepare` sets up its needs and its
@@ -71,8 +182,8 @@ impl GenericRig {
         prepare: impl FnOnce(&mut SercosAxis, &mut DriveNetwork),
     ) -> Self {
         let config = Config::parse(BOX, "box.toml").expect("the configuration is sound");
-        let sercos = config.sercos.as_ref().expect("the box has a SERCOS bus");
-        let mut master = master_config(sercos, HOST);
+        let bus = config.sercos.as_ref().expect("the box has a SERCOS bus");
+        let mut master = master_config(bus, HOST);
         master.slaves = [SlaveConfig { address: ADDRESS, connections: Connections::new(), hot_plug: None }]
             .into_iter()
             .collect();
@@ -87,6 +198,93 @@ impl GenericRig {
         };
         let mut line = drives([(ADDRESS, UnitKind::Rotary)], false);
         prepare(&mut needs, &mut line);
+        // No drive comes later.
+        let (_, commissioner) = sercos::commissioner::Commissioner::new(mapping(), 0, []);
+        let bus = SercosBus::new(master, vec![(0, ADDRESS, needs)], commissioner)
+            .expect("the master's configuration is sound");
+        let south = SercosSouth { line, queue: SouthQueue::default() };
+        Self::on(AnyBus::Sercos(Box::new(bus)), south, limits)
+    }
+
+    /// The drive.
+    pub fn drive(&self) -> &Drive {
+        self.south.line.slaves()[0].application()
+    }
+
+    /// The drive, to act on it from outside.
+    pub fn drive_mut(&mut self) -> &mut Drive {
+        self.south.line.slaves_mut()[0].application_mut()
+    }
+
+    /// What the drive holds in a parameter.
+    pub fn number(&self, idn: Idn) -> i64 {
+        self.south.line.slaves()[0].store().number_of(idn)
+    }
+
+    /// Puts a value into a parameter of the drive.
+    pub fn set_number(&mut self, idn: Idn, value: i64) {
+        self.south.line.slaves_mut()[0].store_mut().set_number_of(idn, value);
+    }
+}
+
+impl GenericCan {
+    /// A rotary axis with these modes, the first active at start, on axis `axis` of a device in operation. `prepare` sets up its
+    /// needs and its device before.
+    ///
+    /// # Panics
+    /// When the bus does not come up.
+    pub fn ready(
+        axis: usize,
+        modes: impl IntoIterator<Item = ModeSelection>,
+        limits: Limits,
+        prepare: impl FnOnce(&mut Cia402Axis, &mut DriveNode),
+    ) -> Self {
+        let text = CAN_BOX.replace("axis = 0", &format!("axis = {axis}"));
+        let config = Config::parse(&text, "generic-can.toml").expect("the configuration is sound");
+        let Network { master, mut devices } = network(&config, 0, &mapping()).expect("a network");
+        let mut bus = InProcessCan::of(&config.can[0], None);
+        let needs = &mut devices[0].1[0].needs;
+        needs.modes = modes.into_iter().collect();
+        prepare(needs, bus.nodes_mut().next().expect("a device"));
+        let (commissioner, end) = can::commissioner::Commissioner::new(mapping(), devices.iter().cloned());
+        let master = CanBus::new(0, master, &devices, end).expect("the master's configuration is sound");
+        let south = CanSouth { bus, commissioner, axis, connected: true };
+        Self::on(AnyBus::Can(Box::new(master)), south, limits)
+    }
+
+    /// The axis of the device.
+    pub fn drive(&self) -> &Axis {
+        self.south.axis()
+    }
+
+    /// The axis of the device, to act on it from outside.
+    pub fn drive_mut(&mut self) -> &mut Axis {
+        let axis = self.south.axis;
+        &mut self.south.node_mut().application_mut().axes_mut()[axis]
+    }
+
+    /// What the axis of the device holds in an object, which is named as on the first axis.
+    ///
+    /// # Panics
+    /// Never: there are eight axes.
+    pub fn number(&self, index: u16, sub: u8) -> i64 {
+        self.south.node().dictionary().number(self.index(index), sub)
+    }
+
+    /// Puts a value into such an object, as the SDO server would.
+    pub fn set_number(&mut self, index: u16, sub: u8, value: i64) {
+        let index = self.index(index);
+        self.south.node_mut().dictionary_mut().set(index, sub, value);
+    }
+
+    fn index(&self, index: u16) -> u16 {
+        index + 0x800 * u16::try_from(self.south.axis).expect("eight axes")
+    }
+}
+
+impl<S: South> OneAxis<S> {
+    /// The axis on its bus, once its drive is ready.
+    fn on(bus: AnyBus, south: S, limits: Limits) -> Self {
         let mapping = mapping();
         let scaling = CipScaling {
             kind: UnitKind::Rotary,
@@ -98,14 +296,10 @@ impl GenericRig {
         let north = mapping.cip_program(&scaling).expect("a million counts are exact");
         let axis = AxisChannel::new(north, limits, Reaction::DecelerateAndDisable, true);
         let (producer, notice_queue) = rtrb::RingBuffer::new(1024);
-        // No drive comes later.
-        let (_, commissioner) = Commissioner::new(super::mapping(), 0, []);
         let (publisher, status) = latest::latest(BoxStatus::STARTING);
-        let bus = SercosBus::new(master, vec![(0, ADDRESS, needs)], commissioner)
-            .expect("the master's configuration is sound");
         let engine = Engine::new(Parts {
             mapping,
-            buses: Buses::new(vec![AnyBus::Sercos(Box::new(bus))], vec![0]),
+            buses: Buses::new(vec![bus], vec![0]),
             devices: Vec::new(),
             axes: vec![axis],
             notices: producer,
@@ -113,7 +307,7 @@ impl GenericRig {
         });
         let mut rig = Self {
             engine,
-            line,
+            south,
             notices: Vec::new(),
             command: AxisCommand::default(),
             velocity: None,
@@ -121,7 +315,6 @@ impl GenericRig {
             next_update: START,
             now: START,
             due: START,
-            south: SouthQueue::default(),
             notice_queue,
             _status: status,
         };
@@ -153,6 +346,16 @@ impl GenericRig {
         self.velocity = Some(velocity);
     }
 
+    /// Leads the axis by velocity set-points, this one from now on.
+    pub fn drive_at(&mut self, velocity: i64) {
+        self.want(|command| {
+            command.select(OperatingMode::Velocity.into());
+            command.velocity = Velocity(velocity);
+            command.present = CommandSet::VELOCITY;
+        });
+        self.velocity = Some(0);
+    }
+
     /// Enables the axis and waits until it follows.
     pub fn enable(&mut self) {
         self.want(|command| command.request = Some(Request::Enable));
@@ -175,34 +378,14 @@ impl GenericRig {
         self.axis().state()
     }
 
-    /// The drive.
-    pub fn drive(&self) -> &Drive {
-        self.line.slaves()[0].application()
-    }
-
-    /// The drive, to act on it from outside.
-    pub fn drive_mut(&mut self) -> &mut Drive {
-        self.line.slaves_mut()[0].application_mut()
-    }
-
-    /// What the drive holds in a parameter.
-    pub fn number(&self, idn: Idn) -> i64 {
-        self.line.slaves()[0].store().number_of(idn)
-    }
-
-    /// Puts a value into a parameter of the drive.
-    pub fn set_number(&mut self, idn: Idn, value: i64) {
-        self.line.slaves_mut()[0].store_mut().set_number_of(idn, value);
-    }
-
     /// Where the drive really is, nanounits.
     pub fn position(&self) -> i64 {
-        self.drive().servo().position().get()
+        self.south.servo().position().get()
     }
 
     /// How fast it really is, nanounits per second.
     pub fn speed(&self) -> i64 {
-        self.drive().actual().velocity.get()
+        self.south.actual().velocity.get()
     }
 
     /// The instant that has been reached.
@@ -218,22 +401,19 @@ impl GenericRig {
     pub fn step(&mut self) {
         self.now = self.due.max(self.now);
         let system = self.system();
-        if let Some(velocity) = self.velocity.filter(|_| self.now >= self.next_update) {
+        // A request goes before the next set-point.
+        let free = self.command.request.is_none();
+        if let Some(velocity) = self.velocity.filter(|_| free && self.now >= self.next_update) {
             self.next_update = self.now + UPDATE_PERIOD;
-            self.command.request = None;
             let way = velocity * UPDATE_PERIOD.as_nanos() / 1_000_000_000;
             self.command.position.0 += way;
             self.command.target_time = Some(system + UPDATE_PERIOD * 2);
             self.command.sequence += 1;
         }
         self.engine.axes_mut()[0].from_north(self.now, system, &self.command);
-        self.due = self.engine.cycle(self.now, system, &mut [], &mut [SouthPort::Ethernet(&mut self.south)]);
-        self.line.handle_time(self.now);
-        while let Some(mut frame) = self.south.outbound.pop_front() {
-            if self.cable && self.line.round_trip(self.now, frame.as_mut_slice()) {
-                self.south.inbound.push_back(frame);
-            }
-        }
+        self.command.request = None;
+        self.due = self.engine.cycle(self.now, system, &mut [], &mut [self.south.port()]);
+        self.south.exchange(self.now, self.cable);
         while let Ok(notice) = self.notice_queue.pop() {
             self.notices.push(notice);
         }

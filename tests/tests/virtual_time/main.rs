@@ -2,6 +2,7 @@
 
 mod attributes;
 mod can;
+mod can_modes;
 mod drive_profile;
 mod events;
 mod faults;

@@ -2,7 +2,7 @@
 
 use super::diagnosis::CAUSE_TIME_OUT;
 use super::procedure::{ProcedureUnit, Surroundings};
-use super::{AxisChannel, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
+use super::{AxisChannel, MODE_TIME_OUT, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
 use profile_generic::image::{FeedbackSet, StatusBits};
@@ -46,6 +46,10 @@ impl AxisChannel {
         let Some(status) = status else { return };
         self.status = status;
         self.shown = program.mode(status);
+        if program.handover(self.command.selection()).is_some() && !self.handover.is_done(&self.command) {
+            // It has come to the target of before.
+            self.feedback.status.remove(StatusBits::TARGET_REACHED);
+        }
         self.follows = program.report(status) == Report::Operating;
         if referenced && !self.feedback.status.contains(StatusBits::REFERENCED) {
             self.procedure.lose_reference();
@@ -59,13 +63,21 @@ impl AxisChannel {
         }
         let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();
         let stands = self.feedback.velocity.get().unsigned_abs() <= zero_speed;
-        if !program.acknowledges()
-            && self.action == Action::Halt
-            && stands
-            && self.feedback.report == Report::Operating
-        {
-            // Nothing in its status word would say so.
-            self.feedback.report = Report::Halted;
+        let with_torque = matches!(self.feedback.report, Report::Operating | Report::Enabling);
+        if !program.acknowledges() && self.action == Action::Halt && with_torque {
+            if stands {
+                // Nothing in its status word would say so.
+                self.feedback.report = Report::Halted;
+                self.halted_at.get_or_insert(self.feedback.position);
+            }
+        } else {
+            self.halted_at = None;
+            if self.feedback.report == Report::Enabling && now.since(self.told_since) <= MODE_TIME_OUT {
+                // It changes the operating mode: it follows again in a moment.
+                let changes = self.drive.machine.state() == DriveState::Operating
+                    && program.mode_octet(status).is_some();
+                self.feedback.report = if changes { Report::Operating } else { Report::Enabling };
+            }
         }
         self.count_saturated(conversions.saturated);
         let report = self.feedback.report;
@@ -83,10 +95,17 @@ impl AxisChannel {
             stands: self.feedback.velocity.get().unsigned_abs() <= zero_speed,
             follows: self.follows,
             shown: self.shown,
+            status: self.status,
         };
         let mut unit = self.procedure;
         unit.want(self.south().and_then(|program| program.procedure(self.command.selection())), &around);
         self.procedure = unit;
+        if unit.has_shifted()
+            && let Some((_, trackers)) = &mut self.south
+        {
+            // The drive has given its place another position: it is what the drive says, not so many turns more.
+            trackers.restart();
+        }
         if let Some(selection) = unit.selection() {
             (self.feedback.mode, self.feedback.interpolation) = (selection.mode, selection.interpolation);
         }
@@ -174,6 +193,7 @@ impl AxisChannel {
             (FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, above && !homing),
             (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below && !homing),
             (FaultCause::EXCESSIVE_POSITION_ERROR, astray),
+            (FaultCause::HOMING, self.feedback.status.contains(StatusBits::HOMING_FAILED)),
         ] {
             if led && there {
                 self.faults.raise(Fault::new(cause, system), Origin::Watch);

@@ -12,6 +12,7 @@ mod action;
 pub mod capture;
 mod diagnosis;
 mod feedback;
+mod handover;
 mod history;
 mod hookup;
 mod image;
@@ -190,6 +191,11 @@ pub struct AxisChannel {
     counters: AxisCounters,
     captures: capture::CaptureUnit,
     procedure: ProcedureUnit,
+    handover: handover::Handover,
+    /// Since when the drive is told the operating mode that it is told now.
+    told_since: MonotonicTime,
+    /// Where the axis came to rest in a halt.
+    halted_at: Option<Position>,
     /// The operation mode that the drive shows, and whether it follows command values, whatever it carries out.
     shown: Option<ModeSelection>,
     follows: bool,
@@ -255,6 +261,9 @@ impl AxisChannel {
             counters: AxisCounters::default(),
             captures: capture::CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
+            handover: handover::Handover::default(),
+            told_since: MonotonicTime::default(),
+            halted_at: None,
             shown: None,
             follows: false,
             requested: None,

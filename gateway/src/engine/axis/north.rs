@@ -9,7 +9,7 @@ use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::image::AxisCommand;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{InterpolationSource, OperatingMode};
-use profile_generic::state::{DriveState, Request};
+use profile_generic::state::{Action, DriveState, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 impl AxisChannel {
@@ -24,7 +24,13 @@ impl AxisChannel {
             self.requested = Some(command.sequence);
             match command.request {
                 Some(Request::FaultReset) => self.begin_reset(now, system, self.reset_id),
-                Some(request) => self.request(now, system, request),
+                Some(request) => {
+                    if request == Request::Enable && self.halts() {
+                        // The torque is there already, and what the axis was led by is of before the halt.
+                        self.prepare_start(now);
+                    }
+                    self.request(now, system, request);
+                }
                 None => {}
             }
         }
@@ -65,6 +71,11 @@ impl AxisChannel {
     /// The north side is lost: the axis stops as its configuration says.
     pub fn lose_north(&mut self, now: MonotonicTime, system: SystemTime) {
         self.lose_command(now, system, Loss::Silent);
+    }
+
+    /// Whether the axis was halted in operation.
+    fn halts(&self) -> bool {
+        self.state() == DriveState::Operating && self.action == Action::Halt
     }
 
     /// Why a command is not followed.

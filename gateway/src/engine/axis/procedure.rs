@@ -1,4 +1,4 @@
-//! Modes that a drive carries out as procedure commands: homing.
+//! Modes that a drive carries out by itself: homing, by procedure commands or by a mode of its own.
 //!
 //! ```text
 //! wanted --> Clear(0) --> Start(0) --> Process(0) --> Stand(1) --> Clear(1) ... --> Process(last)
@@ -12,13 +12,21 @@
 //! command values again. No longer wanting it, or losing the operation of the drive, cancels on the way. A drive that comes
 //! (back) to the bus may still have commands set, and would not follow: they are cancelled before anything else. Everything
 //! goes over the service channel, one access at a time, beside the cycle.
+//!
+//! ```text
+//! wanted --> Enter ---------> Run ------------> Leave ---------------> Settling --> Done, Failed
+//!            mode, no bit     bit, until the    no bit, until the      the mode of before, until
+//!            until it shows   status tells      axis stands            the drive follows
+//! ```
+//!
+//! A mode of its own ends likewise, and it ends after its time in any case.
 
 use profile_generic::image::StatusBits;
 use profile_generic::mode::ModeSelection;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use crate::engine::access::{Access, AccessFailure, Operation, Progress};
-use crate::mapping::Procedure;
+use crate::mapping::{Procedure, ProcedureBy};
 
 /// How often the drive is asked how far a command is.
 const ASK_EVERY: DurationNs = DurationNs::from_millis(10);
@@ -28,6 +36,15 @@ const FOLLOW_TIME_OUT: DurationNs = DurationNs::from_millis(500);
 
 /// Accesses of a cancellation that the drive does not answer before it is given up.
 const CANCEL_ATTEMPTS: u8 = 3;
+
+/// How long the drive may take to show the mode of a procedure, and how long what it shows may be of the procedure before.
+const MODE_TIME: DurationNs = DurationNs::from_millis(100);
+
+/// How long the drive may take to come to rest after a procedure has ended.
+const REST_TIME_OUT: DurationNs = DurationNs::from_secs(30);
+
+/// Fresh telegrams after the end until its values are those of after it.
+const SETTLED_AFTER: u8 = 2;
 
 /// What comes of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +66,14 @@ enum Stage {
     /// The command before this one is done: the controller has to stop the axis.
     Stand(usize),
     Cancel(usize, End),
+    /// The drive is told the mode of the procedure.
+    Enter,
+    /// The procedure is asked for. `stale` is whether the drive still shows an end as it did before.
+    Run {
+        stale: bool,
+    },
+    /// The procedure has ended: the axis has to come to rest. So many telegrams came since.
+    Leave(End, u8),
     /// Through with the commands; the drive has to follow command values again.
     Settling(End),
     Ended(End),
@@ -82,6 +107,8 @@ pub struct Surroundings {
     pub follows: bool,
     /// The operation mode that it shows.
     pub shown: Option<ModeSelection>,
+    /// The status that it shows.
+    pub status: u32,
 }
 
 /// The procedures of one axis.
@@ -99,12 +126,14 @@ pub struct ProcedureUnit {
     since: MonotonicTime,
     attempts: u8,
     homed: bool,
+    /// The mode in which the drive was before it was told one of its own for the procedure.
+    before: Option<ModeSelection>,
 }
 
 impl ProcedureUnit {
     /// The drive was lost or is new: nothing is under way, and all that it has of these procedures is cancelled.
     pub fn restart(&mut self, procedures: &[Procedure]) {
-        let left_over = procedures.iter().map(|procedure| procedure.commands.len()).sum();
+        let left_over = procedures.iter().map(|procedure| procedure.commands().len()).sum();
         *self = Self { generation: self.generation.wrapping_add(1), left_over, ..Self::default() };
     }
 
@@ -122,12 +151,15 @@ impl ProcedureUnit {
                 }
             }
             Stage::Settling(end) => {
-                if around.follows || !around.operating || around.now.since(self.since) > FOLLOW_TIME_OUT {
+                let there = self.before.is_none_or(|mode| around.shown == Some(mode));
+                let late = around.now.since(self.since) > FOLLOW_TIME_OUT;
+                if around.follows && there || !around.operating || late {
                     self.stage = Stage::Ended(end);
                     self.homed |= end == End::Done;
                 }
             }
             Stage::Cancel(..) => {}
+            Stage::Enter | Stage::Run { .. } | Stage::Leave(..) => self.go_on_by_mode(same, around),
             Stage::Clear(at) | Stage::Start(at) | Stage::Process(at) | Stage::Stand(at) => {
                 match (same, self.stage) {
                     (None, _) => self.end(at, End::Dropped),
@@ -143,9 +175,75 @@ impl ProcedureUnit {
         let there = procedure.led_in.is_none_or(|mode| around.shown == Some(mode));
         if around.operating && around.follows && there && self.left_over == 0 {
             self.selection = procedure.selection;
-            self.stage = Stage::Clear(0);
+            (self.stage, self.before) = match procedure.by {
+                ProcedureBy::Commands(_) => (Stage::Clear(0), None),
+                ProcedureBy::Mode(_) => (Stage::Enter, around.shown),
+            };
+            self.since = around.now;
             self.homed = false;
         }
+    }
+
+    /// A procedure that is a mode of its own.
+    fn go_on_by_mode(&mut self, wanted: Option<&Procedure>, around: &Surroundings) {
+        let mode = wanted.and_then(|procedure| match &procedure.by {
+            ProcedureBy::Mode(mode) => Some(mode),
+            ProcedureBy::Commands(_) => None,
+        });
+        let passed = around.now.since(self.since);
+        let next = match (self.stage, mode) {
+            (Stage::Leave(end, came), _) => {
+                let rests = around.stands && came >= SETTLED_AFTER;
+                if rests || !around.operating || passed > REST_TIME_OUT {
+                    Stage::Settling(end)
+                } else {
+                    Stage::Leave(end, came.saturating_add(1))
+                }
+            }
+            (_, None) => Stage::Leave(End::Dropped, 0),
+            (_, Some(_)) if !around.operating => Stage::Leave(End::Failed, 0),
+            (Stage::Enter, Some(mode)) if mode.shown.matches(around.status) => {
+                Stage::Run { stale: mode.is_done(around.status) || mode.has_failed(around.status) }
+            }
+            (Stage::Enter, Some(_)) if passed > MODE_TIME => Stage::Leave(End::Failed, 0),
+            (Stage::Run { stale }, Some(mode)) => {
+                let (done, failed) = (mode.is_done(around.status), mode.has_failed(around.status));
+                let stale = stale && (done || failed) && passed <= MODE_TIME;
+                if !stale && done {
+                    Stage::Leave(End::Done, 0)
+                } else if !stale && failed || passed > mode.time_out {
+                    Stage::Leave(End::Failed, 0)
+                } else {
+                    Stage::Run { stale }
+                }
+            }
+            (stage, _) => stage,
+        };
+        let same = std::mem::discriminant(&next) == std::mem::discriminant(&self.stage);
+        self.stage = next;
+        if !same {
+            self.since = around.now;
+        }
+    }
+
+    /// The mode that the drive is to be told in place of the one that is chosen: its own of the procedure, and the one of
+    /// before when it is through.
+    pub fn told(&self) -> Option<ModeSelection> {
+        match self.stage {
+            Stage::Enter | Stage::Run { .. } | Stage::Leave(..) => Some(self.selection),
+            Stage::Settling(_) | Stage::Ended(_) => self.before,
+            _ => None,
+        }
+    }
+
+    /// Whether the drive is asked to carry the procedure out.
+    pub fn asks(&self) -> bool {
+        matches!(self.stage, Stage::Run { .. })
+    }
+
+    /// Whether the positions of the drive may have got another reference in this cycle.
+    pub fn has_shifted(&self) -> bool {
+        matches!(self.stage, Stage::Leave(End::Done, ..=SETTLED_AFTER))
     }
 
     /// On to the end by cancelling what was set, from this place on.
@@ -162,7 +260,7 @@ impl ProcedureUnit {
     /// Whether the drive need not follow command values: from the start of the first command until it follows again
     /// after the last.
     pub fn leads(&self) -> bool {
-        !matches!(self.stage, Stage::Idle | Stage::Ended(_) | Stage::Clear(0))
+        !matches!(self.stage, Stage::Idle | Stage::Ended(_) | Stage::Clear(0) | Stage::Enter)
     }
 
     /// Whether set-points of a controller that moves the axis meanwhile count: until it stands at the place.
@@ -207,7 +305,7 @@ impl ProcedureUnit {
         }
         if let Some(at) = self.left_over.checked_sub(1) {
             // The last one first.
-            let item = *procedures.iter().flat_map(|procedure| &procedure.commands).nth(at)?;
+            let item = *procedures.iter().flat_map(Procedure::commands).nth(at)?;
             let cancel = Access::new(item, Operation::Cancel).urgent();
             return Some((cancel, ProcedureAccess::Sweep(at), self.generation));
         }
@@ -219,7 +317,7 @@ impl ProcedureUnit {
             Stage::Cancel(at, _) => (at, ProcedureAccess::Cancel(at), Operation::Cancel),
             _ => return None,
         };
-        let item = *procedure.commands.get(at)?;
+        let item = *procedure.commands().get(at)?;
         Some((Access::new(item, operation).urgent(), access, self.generation))
     }
 
@@ -247,7 +345,7 @@ impl ProcedureUnit {
             return false;
         }
         self.outstanding = None;
-        let commands = self.of(procedures).map_or(0, |procedure| procedure.commands.len());
+        let commands = self.of(procedures).map_or(0, |procedure| procedure.commands().len());
         match (self.stage, access, result) {
             // A drive that does not let it be cancelled has none that is set.
             (_, ProcedureAccess::Sweep(at), _) => self.left_over = at,

@@ -14,6 +14,7 @@
 //! ```
 
 use super::{AxisChannel, START_TIME_OUT};
+use crate::mapping::DriveProgram;
 use profile_cip::target::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::FeedbackSet;
@@ -80,7 +81,10 @@ impl AxisChannel {
             true => OperatingMode::Velocity,
             false => OperatingMode::Position,
         };
-        self.command.select(mode.into());
+        let south = self.south();
+        // A drive that is not used in that mode starts in its own.
+        let other = south.filter(|program| !program.has_mode(mode)).and_then(DriveProgram::first_mode);
+        self.command.select(other.unwrap_or(mode.into()));
     }
 
     pub(super) fn begin_stop(&mut self, now: MonotonicTime, system: SystemTime, plan: StopPlan) {

@@ -1,10 +1,10 @@
 //! From the controller's set-points to the telegram of the drive.
 
 use super::{AxisChannel, Loss, MODE_TIME_OUT};
-use crate::mapping::{CyclicValues, DriveProgram};
+use crate::mapping::{CyclicValues, DriveProgram, Order};
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, FeedbackSet};
+use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::program::ConversionReport;
@@ -126,7 +126,7 @@ impl AxisChannel {
     }
 
     pub(super) fn beyond_limits(&self, command: &AxisCommand) -> Option<FaultCause> {
-        let position = command.present.contains(profile_generic::image::CommandSet::POSITION);
+        let position = command.present.contains(CommandSet::POSITION);
         let below = self.limits.position_min.is_some_and(|limit| command.position < limit);
         let above = self.limits.position_max.is_some_and(|limit| command.position > limit);
         (position && (below || above)).then_some(FaultCause::POSITION_COMMAND_LIMIT)
@@ -180,6 +180,7 @@ impl AxisChannel {
     ) -> bool {
         let before = self.command.position;
         self.fine_command(now, system, acts_at);
+        self.hand_over(now, system);
         self.watch_step(now, system, before);
         let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
         let mut conversions = ConversionReport::default();
@@ -189,8 +190,17 @@ impl AxisChannel {
             action => action,
         };
         self.reset_cycles = self.reset_cycles.saturating_sub(1);
-        self.control =
-            program.encode(&self.command, action, self.control, self.status, telegram, &mut conversions);
+        let order = Order {
+            action,
+            told: self.procedure.told(),
+            asks: self.procedure.asks() || self.handover.asks(),
+        };
+        let command = self.handover.apply(&self.command);
+        let control = program.encode(&command, order, self.control, self.status, telegram, &mut conversions);
+        if program.mode_octet(control) != program.mode_octet(self.control) {
+            self.told_since = now;
+        }
+        self.control = control;
         self.captures.encode(program.captures(), telegram);
         self.count_saturated(conversions.saturated);
         if conversions.saturated > 0 && self.state() == DriveState::Operating {
@@ -198,6 +208,23 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
         }
         true
+    }
+
+    /// Goes on with handing the target over, where the drive takes it over step by step.
+    fn hand_over(&mut self, now: MonotonicTime, system: SystemTime) {
+        let selection = self.command.selection();
+        let leads = self.state() == DriveState::Operating
+            && self.action == Action::Enable
+            && self.procedure.told().is_none();
+        let south = self.south().filter(|program| leads && program.shows(selection, self.status));
+        let answers = south
+            .and_then(|program| program.handover(selection))
+            .map(|handover| handover.taken.matches(self.status));
+        let wanted = self.command.present.contains(CommandSet::TARGET_POSITION) && self.sequence.is_some();
+        if !self.handover.go_on(now, answers, wanted.then_some(&self.command)) {
+            // It goes on to the target of before, or nowhere.
+            self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
+        }
     }
 
     /// A drive that works modulo takes the short way to its next position: a longer one would lead it backward, so it is
@@ -220,7 +247,9 @@ impl AxisChannel {
         self.made_at = now;
         let test_torque = self.run_test(now, system);
         let operating = self.state() == DriveState::Operating;
-        let counts = operating && self.sequence.is_some() && self.takes_set_points();
+        // What comes while the axis is halted leads it nowhere, now or later.
+        let halts = self.action == Action::Halt;
+        let counts = operating && !halts && self.sequence.is_some() && self.takes_set_points();
         let fine = match self.interpolator.as_mut() {
             Some(interpolator) if counts => Some(interpolator.at(acts_at)),
             _ => None,
@@ -251,7 +280,10 @@ impl AxisChannel {
         let velocity = points.velocity.unwrap_or(last.velocity);
         let rest = if still(OperatingMode::Position) {
             last.position.saturating_add(way(velocity, span))
-        } else if led || self.halts_by_command() {
+        } else if self.halts_by_command() {
+            // A drive that brakes by itself comes to rest behind its last command.
+            self.halted_at.unwrap_or(last.position)
+        } else if led {
             last.position
         } else {
             self.feedback.position
@@ -275,7 +307,10 @@ impl AxisChannel {
 
     /// A drive that does not come to the operating mode that it is told follows values that are meant for no one.
     fn watch_mode(&mut self, now: MonotonicTime, system: SystemTime) {
-        let led = self.state() == DriveState::Operating && self.action == Action::Enable;
+        // A drive that is led through a procedure is told another mode, with times of its own.
+        let led = self.state() == DriveState::Operating
+            && self.action == Action::Enable
+            && self.procedure.told().is_none();
         let expected = self.south().and_then(|program| program.shown_in(self.command.selection()));
         if !led || expected.is_none_or(|mode| self.shown == Some(mode)) {
             self.other_mode_since = None;

@@ -1,25 +1,29 @@
 //! From rows to the resolved mapping.
 
 use profile_generic::image::Signal;
+use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::state::Action;
+use profile_generic::time::DurationNs;
 
 use super::{
-    ActionRule, Base, Cia402Tables, DriveMode, FixedUnit, Method, ModeRule, Object, ParameterRule,
-    ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value, Words,
+    ActionRule, Base, Cia402Tables, DriveMode, FixedUnit, Handover, Method, ModeRule, Object, ParameterRule,
+    ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value, Words,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::mapping::drive_program::FaultRow;
 use crate::mapping::format::{
-    Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402MethodRow, Cia402ModeRow,
-    Cia402ParameterRow, Cia402ScalingRow, Cia402SignalRow, FieldValueRow, GenericCia402File, Name,
+    Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandoverRow, Cia402MethodRow,
+    Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow, Cia402SignalRow, FieldValueRow,
+    GenericCia402File, Name,
 };
 use crate::mapping::generic_names::{
-    action, cause_and_reaction, directions, operating_mode, parameter, report, signal, status_bit,
+    action, cause_and_reaction, directions, interpolation, operating_mode, parameter, report, signal,
+    status_bit,
 };
 use crate::mapping::item::Item;
 use crate::mapping::load::Parsed;
@@ -48,6 +52,9 @@ impl Cia402Tables {
         }
         for row in &rows.mode {
             builder.mode(row);
+        }
+        for row in &rows.procedure {
+            builder.procedure(row);
         }
         builder.states(rows);
         for row in &rows.fault {
@@ -206,10 +213,14 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
         self.writable(entry, to_drive, &row.direction, value.object);
-        if self.tables.signal(signal).is_some() {
+        let modes = self.mode_codes(&row.modes);
+        let shared = |known: &SignalRule| {
+            known.modes.is_empty() && modes.is_empty() || known.modes.iter().any(|mode| modes.contains(mode))
+        };
+        if self.tables.signals.iter().any(|known| known.signal == signal && shared(known)) {
             self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
         }
-        self.tables.signals.push(SignalRule { signal, value, refuse });
+        self.tables.signals.push(SignalRule { signal, value, modes, refuse });
     }
 
     fn writable(&mut self, entry: &Cia402Sub, to_drive: bool, direction: &Name, object: Object) {
@@ -241,27 +252,77 @@ impl<'a> Builder<'a> {
 
     fn mode(&mut self, row: &Cia402ModeRow) {
         let mode = operating_mode(&mut self.resolver, &row.mode);
+        let interpolation = match &row.interpolation {
+            None => Some(InterpolationSource::Controller),
+            Some(name) => interpolation(&mut self.resolver, name),
+        };
         let optional = self.resolver.word("missing", &row.missing, &[("refuse", false), ("omit", true)]);
         let modes = self.drive_modes(&row.modes);
         if row.modes.is_empty() {
             let message = "expected at least one mode of operation";
             self.resolver.error(code::MISSING_KEY, row.mode.span(), "modes", message);
         }
-        let command = self.mapped("command", &row.command);
-        let actual = self.mapped("actual", &row.actual);
-        let (Some(mode), Some(optional)) = (mode, optional) else { return };
-        let selection = mode.into();
-        if self.tables.modes.iter().any(|known| known.selection == selection) {
+        let control = self.pattern("Controlword", &row.control);
+        let handover = match &row.handover {
+            None => Some(None),
+            Some(handover) => self.handover(handover).map(Some),
+        };
+        let command = self.mapped("command", &row.command, &modes);
+        let actual = self.mapped("actual", &row.actual, &modes);
+        let (Some(mode), Some(interpolation), Some(optional), Some(control), Some(handover)) =
+            (mode, interpolation, optional, control, handover)
+        else {
+            return;
+        };
+        let selection = ModeSelection { mode, interpolation };
+        let same = |known: &&ModeRule| known.selection == selection;
+        let mut known = self.tables.modes.iter().filter(same).flat_map(|known| &known.modes);
+        if known.any(|known| modes.contains(known)) {
             self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
         }
-        self.tables.modes.push(ModeRule { selection, optional, modes, command, actual });
+        let rule = ModeRule { selection, optional, modes, control, handover, command, actual };
+        self.tables.modes.push(rule);
     }
 
-    fn mapped(&mut self, key: &str, names: &[Name]) -> Vec<Signal> {
+    fn handover(&mut self, row: &Cia402HandoverRow) -> Option<Handover> {
+        let ask = self.pattern("Controlword", &row.ask);
+        let taken = self.pattern("Statusword", &row.taken);
+        Some(Handover { ask: ask?, taken: taken? })
+    }
+
+    fn procedure(&mut self, row: &Cia402ProcedureRow) {
+        let mode = operating_mode(&mut self.resolver, &row.mode);
+        let source = interpolation(&mut self.resolver, &row.interpolation);
+        if source == Some(InterpolationSource::Controller) {
+            let message = "expected `drive`: what the controller leads is a [[mode]]";
+            self.resolver.error(code::CONTRADICTION, row.interpolation.span(), "interpolation", message);
+        }
+        let modes = self.drive_modes(&row.modes);
+        if row.modes.is_empty() {
+            let message = "expected at least one mode of operation";
+            self.resolver.error(code::MISSING_KEY, row.mode.span(), "modes", message);
+        }
+        let start = self.pattern("Controlword", &row.start);
+        let done = self.coded_state("Homing status", "done", &row.done);
+        let failed: Vec<_> =
+            row.failed.iter().filter_map(|name| self.coded_state("Homing status", "failed", name)).collect();
+        let (Some(mode), Some(interpolation), Some(start), Some(done)) = (mode, source, start, done) else {
+            return;
+        };
+        let selection = ModeSelection { mode, interpolation };
+        if self.tables.procedures.iter().any(|known| known.selection == selection) {
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+        }
+        let time_out = DurationNs::from_secs(i64::from(*row.seconds.get_ref()));
+        self.tables.procedures.push(ProcedureRule { selection, modes, start, done, failed, time_out });
+    }
+
+    /// Signals that have an object in each of these modes of operation.
+    fn mapped(&mut self, key: &str, names: &[Name], modes: &[DriveMode]) -> Vec<Signal> {
         let mut signals = Vec::with_capacity(names.len());
         for name in names {
             let Some(signal) = signal(&mut self.resolver, key, name) else { continue };
-            if self.tables.signal(signal).is_none() {
+            if modes.iter().any(|mode| self.tables.signal(signal, mode.code).is_none()) {
                 let message = format!("expected a [[signal]] row for {signal}, got none");
                 self.resolver.error(code::ROW_MISSING, name.span(), key, message);
             }
@@ -281,7 +342,12 @@ impl<'a> Builder<'a> {
     }
 
     fn state(&mut self, key: &str, name: &Name) -> Option<BitPattern> {
-        let states = &self.set("State")?.codes;
+        self.coded_state("State", key, name)
+    }
+
+    /// Mask and value of a state of a set of them.
+    fn coded_state(&mut self, set: &str, key: &str, name: &Name) -> Option<BitPattern> {
+        let states = &self.set(set)?.codes;
         let find = |text: &str| states.iter().find(|state| state.name == text);
         let names = states.iter().map(|state| state.name.as_str());
         let state = self.resolver.name(key, name, "a state of the drive", find, names)?;
@@ -426,8 +492,9 @@ impl<'a> Builder<'a> {
         ];
         let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
         let fail = self.resolver.word("refused", &row.refused, &[("fail", true), ("continue", false)]);
+        let modes = self.mode_codes(&row.modes);
         let (Some(kind), Some(fail)) = (self.kind(row, verb), fail) else { return };
-        self.tables.steps.push(StepRule { kind, fail });
+        self.tables.steps.push(StepRule { kind, modes, fail });
     }
 
     fn kind(&mut self, row: &Cia402CommissionRow, verb: Verb) -> Option<StepKind> {

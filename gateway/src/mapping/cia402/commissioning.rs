@@ -58,8 +58,18 @@ impl Cia402Tables {
         facts: &ObjectFacts,
     ) -> Result<Vec<ObjectStep>, Cia402Error> {
         let mut steps = Vec::new();
+        let uses = |modes: &[i8]| -> Result<bool, Cia402Error> {
+            let chosen = self.chosen(axis, facts)?;
+            let procedures = self.procedures_of(axis, facts);
+            let modes_of_axis = chosen.iter().map(|(_, mode)| mode.code);
+            let mut all = modes_of_axis.chain(procedures.iter().map(|(_, mode)| mode.code));
+            Ok(all.any(|mode| modes.contains(&mode)))
+        };
         for rule in &self.steps {
             let fail = rule.fail;
+            if !rule.modes.is_empty() && !uses(&rule.modes)? {
+                continue;
+            }
             match (plan, &rule.kind) {
                 (Plan::Ask, StepKind::Read(object)) => steps.push(ObjectStep::Read { object: *object, fail }),
                 (Plan::Ask, StepKind::ReadScaling) => {
@@ -68,8 +78,7 @@ impl Cia402Tables {
                 }
                 (Plan::Ask, StepKind::ReadParameters) => {
                     let parameters = self.parameters.iter().map(|rule| rule.value.object);
-                    let signals = self.signals.iter().map(|rule| rule.value.object);
-                    for object in signals.chain(parameters) {
+                    for object in self.asked_signals(axis).chain(parameters) {
                         let step = ObjectStep::Read { object, fail };
                         if !steps.contains(&step) {
                             steps.push(step);
@@ -105,6 +114,18 @@ impl Cia402Tables {
             }
         }
         Ok(steps)
+    }
+
+    /// The objects of the signals that the modes of an axis can have. What is only there in a mode of operation, which 6502 tells,
+    /// is not asked for.
+    fn asked_signals(&self, axis: &Cia402Axis) -> impl Iterator<Item = Object> + '_ {
+        let modes = axis.modes.clone();
+        let used = move |signal| {
+            let rules = self.modes.iter().filter(|rule| modes.contains(&rule.selection));
+            rules.flat_map(|rule| rule.command.iter().chain(&rule.actual)).any(|known| *known == signal)
+        };
+        let rules = self.signals.iter().filter(move |rule| used(rule.signal));
+        rules.filter(|rule| rule.modes.is_empty() || !rule.refuse).map(|rule| rule.value.object)
     }
 
     fn write_parameter(

@@ -10,12 +10,12 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
-use super::{Cia402Tables, DriveMode, ModeRule, Object, ParameterRule, SignalRule, Value};
+use super::{Cia402Tables, DriveMode, ModeRule, Object, ParameterRule, ProcedureRule, SignalRule, Value};
 use crate::mapping::capture_program::Place;
 use crate::mapping::dictionary::Cia402Dictionary;
 use crate::mapping::drive_program::{
-    DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeEntry, ParameterEntry, StatusRow, StepRow, Telegram,
-    WORD_BYTES,
+    DriveProgram, FaultRow, Handover, MAX_MODES, MODE_SHIFT, ModeEntry, ModeProcedure,
+    PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
 use crate::mapping::item::Item;
 use crate::mapping::scaling::AxisUnits;
@@ -129,24 +129,31 @@ pub enum Cia402Error {
 type Places<'a> = Vec<(&'a SignalRule, u16)>;
 
 impl Cia402Tables {
-    /// The modes of an axis, with what they are in the drive. The mode of operation that 6502 names first in the row counts;
-    /// a drive without 6502 is believed to have the first.
+    /// The modes of an axis that the controller leads, or that go to targets, with what they are in the drive. The first rule
+    /// counts of whose modes of operation 6502 names one, and of those the first; a drive without 6502 is believed to have what
+    /// is wanted most.
     pub(super) fn chosen(
         &self,
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Vec<(&ModeRule, &DriveMode)>, Cia402Error> {
-        let supported = facts.integer(self.words.modes_supported, Width::U32);
-        let has = |mode: &&DriveMode| supported.is_none_or(|word| word >> mode.bit & 1 != 0);
         let mut chosen = Vec::with_capacity(axis.modes.len());
         for selection in &axis.modes {
-            let rule = self.modes.iter().find(|rule| rule.selection == *selection);
-            let rule = rule.ok_or(Cia402Error::Mode(*selection))?;
-            match rule.modes.iter().find(has) {
-                Some(mode) => chosen.push((rule, mode)),
-                None if rule.optional => {}
+            let mut rules = self.modes.iter().filter(|rule| rule.selection == *selection).peekable();
+            match rules.peek() {
+                None if self.procedures.iter().any(|rule| rule.selection == *selection) => continue,
+                None => return Err(Cia402Error::Mode(*selection)),
+                Some(_) => {}
+            }
+            let has = |mode: &&DriveMode| self.has_mode(mode, facts);
+            let found = rules.clone().find_map(|rule| Some((rule, rule.modes.iter().find(has)?)));
+            match found {
+                Some((rule, mode)) if rule.optional && self.lacks_any(rule, mode, facts) => {}
+                Some(found) => chosen.push(found),
+                None if rules.clone().all(|rule| rule.optional) => {}
                 None => {
-                    let names: Vec<_> = rule.modes.iter().map(|mode| mode.name.as_str()).collect();
+                    let names: Vec<_> =
+                        rules.flat_map(|rule| &rule.modes).map(|mode| mode.name.as_str()).collect();
                     return Err(Cia402Error::NotSupported { mode: *selection, wanted: names.join(", ") });
                 }
             }
@@ -155,6 +162,33 @@ impl Cia402Tables {
             return Err(Cia402Error::NoMode);
         }
         Ok(chosen)
+    }
+
+    /// The modes of an axis that its drive carries out by itself, with what they are in the drive; one that it lacks the axis
+    /// does without.
+    pub(super) fn procedures_of(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Vec<(&ProcedureRule, &DriveMode)> {
+        let rules =
+            axis.modes.iter().filter_map(|mode| self.procedures.iter().find(|rule| rule.selection == *mode));
+        let has = |mode: &&DriveMode| self.has_mode(mode, facts);
+        rules.filter_map(|rule| Some((rule, rule.modes.iter().find(has)?))).collect()
+    }
+
+    fn has_mode(&self, mode: &DriveMode, facts: &ObjectFacts) -> bool {
+        let supported = facts.integer(self.words.modes_supported, Width::U32);
+        supported.is_none_or(|word| word >> mode.bit & 1 != 0)
+    }
+
+    /// Whether the drive lacks a value without which a mode does not work.
+    fn lacks_any(&self, rule: &ModeRule, mode: &DriveMode, facts: &ObjectFacts) -> bool {
+        let mut signals = rule.command.iter().chain(&rule.actual);
+        signals.any(|signal| {
+            let rule = self.signal(*signal, mode.code);
+            rule.is_some_and(|rule| rule.refuse && facts.is_missing(rule.value.object))
+        })
     }
 
     /// The program of an axis whose drive was asked.
@@ -169,12 +203,17 @@ impl Cia402Tables {
         let chosen = self.chosen(axis, facts)?;
         let item = |object| axis.item(object).ok_or(Cia402Error::Axis(axis.axis));
         let (telegram, places) = self.telegram(axis, &chosen, facts)?;
+        let shares =
+            |signal: Signal| places.iter().find(|(rule, _)| rule.signal == signal).map(|(_, at)| *at);
+        let shares_target =
+            shares(Signal::TargetPosition).is_some_and(|at| shares(Signal::PositionCommand) == Some(at));
         let mut fields = Vec::new();
         for (rule, at) in places {
             fields.push(self.field(rule, at, axis, facts)?);
         }
         let mut program = DriveProgram::new(telegram, false);
         program.mode_octets = Some([WORD_BYTES, WORD_BYTES]);
+        program.shares_target = shares_target;
         for field in fields {
             let full = match field.signal.is_command() {
                 true => program.command.push(field),
@@ -182,17 +221,7 @@ impl Cia402Tables {
             };
             full.map_err(|_| Cia402Error::Full("the cyclic values"))?;
         }
-        for (rule, mode) in &chosen {
-            let pattern = shown(mode.code);
-            let entry = ModeEntry {
-                selection: rule.selection,
-                control: pattern,
-                status: pattern,
-                needs: self.needs(rule),
-                carried: Self::carried(rule, &program),
-            };
-            program.modes.try_push(entry).map_err(|_| Cia402Error::Full("the table of modes"))?;
-        }
+        self.mode_entries(&chosen, &self.procedures_of(axis, facts), &mut program)?;
         self.words(axis, &chosen, &mut program)?;
         let error = item(self.words.error)?;
         for row in &self.faults {
@@ -241,9 +270,17 @@ impl Cia402Tables {
             (true, &mut telegram.command, &mut telegram.command_bytes),
             (false, &mut telegram.feedback, &mut telegram.feedback_bytes),
         ] {
+            let mut known: Vec<(Object, u16)> = Vec::new();
             for rule in self.signals_of(axis, chosen, to_drive, facts)? {
-                items.push(item(rule.value.object)?);
+                let object = rule.value.object;
+                // What two signals are goes there once.
+                if let Some((_, at)) = known.iter().find(|(known, _)| *known == object) {
+                    places.push((rule, *at));
+                    continue;
+                }
+                items.push(item(object)?);
                 places.push((rule, *bytes));
+                known.push((object, *bytes));
                 *bytes += octets(rule.value.width);
             }
         }
@@ -259,9 +296,13 @@ impl Cia402Tables {
         facts: &ObjectFacts,
     ) -> Result<Vec<&SignalRule>, Cia402Error> {
         let mut rules: Vec<&SignalRule> = Vec::new();
-        for signal in chosen.iter().flat_map(|(rule, _)| if to_drive { &rule.command } else { &rule.actual })
-        {
-            let Some(rule) = self.signal(*signal) else { continue };
+        let of = |(rule, mode): &(&ModeRule, &DriveMode)| {
+            let signals = if to_drive { &rule.command } else { &rule.actual };
+            signals.iter().map(|signal| (*signal, mode.code)).collect::<Vec<_>>()
+        };
+        for (signal, mode) in chosen.iter().flat_map(of) {
+            let signal = &signal;
+            let Some(rule) = self.signal(*signal, mode) else { continue };
             let unwanted = !rule.refuse && axis.left_out.contains(signal);
             if unwanted || rules.iter().any(|known| known.signal == *signal) {
                 continue;
@@ -277,16 +318,61 @@ impl Cia402Tables {
         Ok(rules)
     }
 
-    /// The signals without which a mode must not be chosen.
-    fn needs(&self, rule: &ModeRule) -> CommandSet {
-        let refuse = |signal: &&Signal| self.signal(**signal).is_some_and(|row| row.refuse);
-        rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect()
-    }
-
-    /// The signals of a mode that go to the drive.
-    fn carried(rule: &ModeRule, program: &DriveProgram) -> CommandSet {
-        let there = |signal: &&Signal| program.command.fields().any(|field| field.signal == **signal);
-        rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect()
+    /// What the modes are in control and status.
+    fn mode_entries(
+        &self,
+        chosen: &[(&ModeRule, &DriveMode)],
+        procedures: &[(&ProcedureRule, &DriveMode)],
+        program: &mut DriveProgram,
+    ) -> Result<(), Cia402Error> {
+        // Every bit of the controlword that one of the modes uses means something else, or nothing, in the others.
+        let of_modes = chosen
+            .iter()
+            .map(|(rule, _)| rule.control.mask | rule.handover.map_or(0, |handover| handover.ask.mask));
+        let mask =
+            of_modes.chain(procedures.iter().map(|(rule, _)| rule.start.mask)).fold(0, |all, one| all | one);
+        let entry =
+            |selection, mode: &DriveMode, control: BitPattern, handover: Option<Handover>| ModeEntry {
+                selection,
+                control: shown(mode.code),
+                status: shown(mode.code),
+                bits: BitPattern::new(mask, control.value),
+                handover,
+                needs: CommandSet::empty(),
+                carried: CommandSet::empty(),
+            };
+        let full = |_| Cia402Error::Full("the table of modes");
+        for (rule, mode) in chosen {
+            let there = |signal: &&Signal| program.command.fields().any(|field| field.signal == **signal);
+            let needed = |signal: &&Signal| self.signal(**signal, mode.code).is_some_and(|row| row.refuse);
+            let set =
+                |signals: Vec<&Signal>| signals.into_iter().map(|signal| signal.command_bit()).collect();
+            let entry = ModeEntry {
+                needs: set(rule.command.iter().filter(needed).collect()),
+                carried: set(rule.command.iter().filter(there).collect()),
+                ..entry(rule.selection, mode, rule.control, rule.handover)
+            };
+            program.modes.try_push(entry).map_err(full)?;
+        }
+        for (rule, mode) in procedures {
+            let start = Handover { ask: rule.start, taken: rule.done };
+            let entry = entry(rule.selection, mode, BitPattern::default(), Some(start));
+            program.modes.try_push(entry).map_err(full)?;
+            let mut failed = [None; PROCEDURE_FAILURES_MAX];
+            for (place, pattern) in failed.iter_mut().zip(&rule.failed) {
+                *place = Some(*pattern);
+            }
+            let by = ProcedureBy::Mode(ModeProcedure {
+                shown: shown(mode.code),
+                done: rule.done,
+                failed,
+                time_out: rule.time_out,
+            });
+            let procedure = Procedure { selection: rule.selection, led_in: None, by };
+            let full = |_| Cia402Error::Full("the table of procedures");
+            program.procedures.try_push(procedure).map_err(full)?;
+        }
+        Ok(())
     }
 
     fn field(
@@ -324,7 +410,9 @@ impl Cia402Tables {
             self.reports.iter().filter(|rule| rule.follows.is_none_or(|follows| follows != axis.silent))
         {
             for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
-                if !program.reports.push(pattern, rule.report) {
+                // A drive that carries out something by itself need not follow command values.
+                let led = rule.follows == Some(true) || program.led_reports.push(pattern, rule.report);
+                if !led || !program.reports.push(pattern, rule.report) {
                     return Err(Cia402Error::Full("the table of reports"));
                 }
             }

@@ -20,12 +20,13 @@ use profile_generic::program::{BitPattern, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
+use profile_generic::time::DurationNs;
 
 pub use self::commissioning::{ObjectStep, Plan};
 pub use self::compile::{Cia402Axis, Cia402Error};
 pub use self::facts::ObjectFacts;
 
-use super::drive_program::{FaultRow, MAX_MODES};
+use super::drive_program::{FaultRow, Handover, MAX_MODES};
 use super::item::Object;
 
 /// An object that holds a number, and what it measures.
@@ -70,6 +71,8 @@ pub(super) enum Base {
 pub(super) struct SignalRule {
     pub signal: Signal,
     pub value: Value,
+    /// Modes of operation in which it is this object; empty = all that no other rule of the signal has.
+    pub modes: Vec<i8>,
     /// Whether an axis cannot work without it.
     pub refuse: bool,
 }
@@ -88,8 +91,22 @@ pub(super) struct ModeRule {
     /// Whether an axis can do without it.
     pub optional: bool,
     pub modes: Vec<DriveMode>,
+    /// Bits of the controlword that stand in it.
+    pub control: BitPattern,
+    pub handover: Option<Handover>,
     pub command: Vec<Signal>,
     pub actual: Vec<Signal>,
+}
+
+/// A mode that the drive carries out by itself.
+#[derive(Debug, Clone)]
+pub(super) struct ProcedureRule {
+    pub selection: ModeSelection,
+    pub modes: Vec<DriveMode>,
+    pub start: BitPattern,
+    pub done: BitPattern,
+    pub failed: Vec<BitPattern>,
+    pub time_out: DurationNs,
 }
 
 #[derive(Debug, Clone)]
@@ -142,6 +159,8 @@ pub(super) enum StepKind {
 #[derive(Debug, Clone)]
 pub(super) struct StepRule {
     pub kind: StepKind,
+    /// Modes of operation of which the axis has to use one; empty = whatever it uses.
+    pub modes: Vec<i8>,
     /// Whether commissioning fails when the drive refuses.
     pub fail: bool,
 }
@@ -166,6 +185,7 @@ pub struct Cia402Tables {
     pub(super) words: Words,
     pub(super) signals: Vec<SignalRule>,
     pub(super) modes: Vec<ModeRule>,
+    pub(super) procedures: Vec<ProcedureRule>,
     pub(super) actions: Vec<ActionRule>,
     pub(super) reports: Vec<ReportRule>,
     pub(super) status: Vec<StatusRule>,
@@ -175,13 +195,19 @@ pub struct Cia402Tables {
 }
 
 impl Cia402Tables {
-    pub(super) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
-        self.signals.iter().find(|rule| rule.signal == signal)
+    /// Where a signal is while the drive is in a mode of operation.
+    pub(super) fn signal(&self, signal: Signal, mode: i8) -> Option<&SignalRule> {
+        let mut rules = self.signals.iter().filter(|rule| rule.signal == signal);
+        let general = rules.clone().find(|rule| rule.modes.is_empty());
+        rules.find(|rule| rule.modes.contains(&mode)).or(general)
     }
 
-    /// The operating modes that drives have.
+    /// The operating modes that a controller can lead drives in.
     pub fn modes(&self) -> impl Iterator<Item = ModeSelection> + '_ {
-        self.modes.iter().map(|rule| rule.selection).take(MAX_MODES)
+        let first =
+            |at: usize| !self.modes[..at].iter().any(|rule| rule.selection == self.modes[at].selection);
+        let rules = self.modes.iter().enumerate().filter(move |(at, _)| first(*at));
+        rules.map(|(_, rule)| rule.selection).take(MAX_MODES)
     }
 
     /// What statuswords say, the first that fits counts.

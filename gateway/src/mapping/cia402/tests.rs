@@ -187,7 +187,10 @@ fn the_first_mode_that_the_drive_has_is_taken() {
     assert_eq!(modes, [8, 3, 4]);
     facts.note_data(object(0x6502, 0), &0x04_u32.to_le_bytes());
     let error = shipped().cia402_program(&axis(&ALL), &facts).unwrap_err();
-    assert_eq!(error.to_string(), "position needs one of the modes csp, the drive has none of them by 6502");
+    assert_eq!(
+        error.to_string(),
+        "position needs one of the modes csp, ip, the drive has none of them by 6502"
+    );
     // A drive that does not say is believed to have what is wanted most.
     let mut unsaid = servo();
     unsaid.note_missing(object(0x6502, 0));

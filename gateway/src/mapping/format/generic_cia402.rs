@@ -25,6 +25,8 @@ pub struct GenericCia402File {
     pub signal: Vec<Cia402SignalRow>,
     /// Operating modes.
     pub mode: Vec<Cia402ModeRow>,
+    /// Operating modes that a drive carries out by itself.
+    pub procedure: Vec<Cia402ProcedureRow>,
     /// Controlword of each action.
     pub action: Vec<Cia402ActionRow>,
     /// What a statusword says.
@@ -118,6 +120,9 @@ pub struct Cia402SignalRow {
     pub signal: Name,
     /// Object.
     pub object: Name,
+    /// Modes of operation in which it is this object. Default: all that no other row of the signal names.
+    #[serde(default)]
+    pub modes: Vec<Name>,
     /// `to_drive` or `from_drive`.
     pub direction: Name,
     /// What happens when the drive has no such object: `refuse` or `omit`.
@@ -126,22 +131,61 @@ pub struct Cia402SignalRow {
     pub source: Source,
 }
 
-/// An operating mode on CiA 402.
+/// An operating mode on CiA 402. Of several rows of one operating mode the first counts whose modes of operation the drive has.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cia402ModeRow {
     /// Operating mode.
     pub mode: Name,
+    /// Who makes the way, `controller` or `drive`. Default: the controller.
+    pub interpolation: Option<Name>,
     /// What happens when the drive has none of the modes, or lacks a value: `refuse` the drive, or `omit` the mode.
     pub missing: Name,
     /// Modes of operation, the preferred one first.
     pub modes: Vec<Name>,
+    /// Fields of the controlword that stand in the mode while operation is enabled. Those of other modes are 0.
+    #[serde(default)]
+    pub control: Vec<FieldValueRow>,
+    /// How the drive takes a target over.
+    pub handover: Option<Cia402HandoverRow>,
     /// Signals to the drive.
     pub command: Vec<Name>,
     /// Signals from the drive.
     pub actual: Vec<Name>,
     /// Where it comes from.
     pub source: Source,
+}
+
+/// An operating mode that a drive carries out by itself, from a start to an end that it tells.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402ProcedureRow {
+    /// Operating mode.
+    pub mode: Name,
+    /// Who moves the axis: `drive`.
+    pub interpolation: Name,
+    /// Modes of operation, the preferred one first.
+    pub modes: Vec<Name>,
+    /// Fields of the controlword that start it, and stand until it has ended.
+    pub start: Vec<FieldValueRow>,
+    /// How far it is when it is done.
+    pub done: Name,
+    /// How far it is when it has failed.
+    pub failed: Vec<Name>,
+    /// After so many seconds it has failed as well.
+    pub seconds: Spanned<u32>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// How a drive takes a target over: it is asked to, says that it has, and may then be asked again.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402HandoverRow {
+    /// Fields of the controlword that ask; the bits are the other way round before and after.
+    pub ask: Vec<FieldValueRow>,
+    /// Fields of the statusword that answer.
+    pub taken: Vec<FieldValueRow>,
 }
 
 /// What the controlword becomes by an action.
@@ -259,6 +303,9 @@ pub struct Cia402CommissionRow {
     pub value: Option<Spanned<i64>>,
     /// Parameter of the axis configuration to write, if it is given there.
     pub parameter: Option<Name>,
+    /// Modes of operation of which the axis has to use one. Default: whatever it uses.
+    #[serde(default)]
+    pub modes: Vec<Name>,
     /// What happens when the drive refuses: `fail` or `continue`.
     pub refused: Name,
     /// Where it comes from.

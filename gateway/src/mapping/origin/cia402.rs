@@ -6,23 +6,32 @@ use profile_generic::parameter::Parameter;
 use profile_generic::state::Action;
 
 use super::{Origin, find, origin};
+use crate::mapping::cia402::DriveMode;
 use crate::mapping::drive_program::MODE_SHIFT;
 use crate::mapping::{Item, Mapping, Object};
 
 impl Mapping {
-    /// The `[[signal]]` row of a signal.
+    /// The `[[signal]]` row of a signal in an object of the first axis.
     #[must_use]
-    pub fn object_signal_row(&self, signal: Signal) -> Option<Origin> {
+    pub fn object_signal_row(&self, signal: Signal, object: Object) -> Option<Origin> {
         let file = &self.tables.generic_cia402;
-        find(&file.text, "signal", &file.rows.signal, |row| &row.signal, signal.name())
+        let mut rules = self.cia402.signals.iter();
+        let at = rules.position(|rule| rule.signal == signal && rule.value.object == object)?;
+        Some(origin(&file.text, "signal", &file.rows.signal.get(at)?.signal))
     }
 
-    /// The `[[mode]]` row of an operating mode.
+    /// The `[[mode]]` or `[[procedure]]` row of an operating mode that is this mode of operation.
     #[must_use]
-    pub fn object_mode_row(&self, selection: ModeSelection) -> Option<Origin> {
+    pub fn object_mode_row(&self, selection: ModeSelection, mode: i8) -> Option<Origin> {
         let file = &self.tables.generic_cia402;
-        let at = self.cia402.modes.iter().position(|rule| rule.selection == selection)?;
-        Some(origin(&file.text, "mode", &file.rows.mode.get(at)?.mode))
+        let is = |known: &DriveMode| known.code == mode;
+        let mut rules = self.cia402.modes.iter();
+        if let Some(at) = rules.position(|rule| rule.selection == selection && rule.modes.iter().any(is)) {
+            return Some(origin(&file.text, "mode", &file.rows.mode.get(at)?.mode));
+        }
+        let mut rules = self.cia402.procedures.iter();
+        let at = rules.position(|rule| rule.selection == selection && rule.modes.iter().any(is))?;
+        Some(origin(&file.text, "procedure", &file.rows.procedure.get(at)?.mode))
     }
 
     /// The `[[action]]` row of an action while the drive shows a status.
@@ -116,7 +125,10 @@ mod tests {
             let text = include_str!("../../../../mappings/generic-cia402.toml");
             text.lines().nth(origin.unwrap().line - 1).unwrap().to_owned()
         };
-        assert_eq!(line(mapping.object_signal_row(Signal::PositionCommand)), "signal = \"position_command\"");
+        assert_eq!(
+            line(mapping.object_signal_row(Signal::PositionCommand, Object { index: 0x607A, sub: 0 })),
+            "signal = \"position_command\""
+        );
         assert_eq!(
             key(mapping.object_action_row(Action::Enable, 0x23)),
             Some("action enable, Switched on".to_owned())

@@ -113,15 +113,16 @@ const GENERIC_SERCOS: &[Section] = &[
 const GENERIC_CIA402: &[Section] = &[
     section("unit", &["unit", "quantity"]),
     nested("scaling", &["unit"], const { &[first("methods", &["name"])] }),
-    section("signal", &["signal"]),
-    section("mode", &["mode"]),
+    section("signal", &["signal", "modes"]),
+    first("mode", &["mode", "interpolation", "modes"]),
+    section("procedure", &["mode", "interpolation"]),
     section("action", &["action", "when"]),
     first("report", &["state", "pattern", "modes", "follows"]),
     section("status", &["status", "object", "state", "pattern", "modes"]),
     first("fault", &["codes"]),
     first("fault_class", &["classes"]),
     section("parameter", &["parameter"]),
-    section("commission", &["do", "object", "parameter", "value"]),
+    section("commission", &["do", "object", "parameter", "value", "modes"]),
 ];
 
 /// The lists of a table by its name; everything else in it is a table of single keys.

@@ -28,8 +28,8 @@ use crate::mapping::format::{
     SercosSignalRow, UnboundRow,
 };
 use crate::mapping::generic_names::{
-    action, capture_kind, cause_and_reaction, directions, operating_mode, parameter, report, signal,
-    status_bit, unit_kind,
+    action, capture_kind, cause_and_reaction, directions, interpolation, operating_mode, parameter, report,
+    signal, status_bit, unit_kind,
 };
 use crate::mapping::load::Parsed;
 use crate::mapping::resolver::Resolver;
@@ -343,7 +343,7 @@ impl<'a> Builder<'a> {
         let actual = self.mapped_signals("actual", &row.actual);
         let interpolation = match &row.interpolation {
             None => Some(InterpolationSource::Controller),
-            Some(name) => self.interpolation(name),
+            Some(name) => interpolation(&mut self.resolver, name),
         };
         if let (Some(mode), Some(interpolation), Some(optional)) = (mode, interpolation, optional) {
             let selection = ModeSelection { mode, interpolation };
@@ -354,15 +354,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn interpolation(&mut self, name: &Name) -> Option<InterpolationSource> {
-        let known = InterpolationSource::ALL.iter().map(|source| source.name());
-        let what = "who makes the way";
-        self.resolver.name("interpolation", name, what, InterpolationSource::parse, known)
-    }
-
     fn procedure(&mut self, row: &ProcedureRow) {
         let mode = operating_mode(&mut self.resolver, &row.mode);
-        let interpolation = self.interpolation(&row.interpolation);
+        let interpolation = interpolation(&mut self.resolver, &row.interpolation);
         let led_in = match &row.led_in {
             None => None,
             Some(name) => {

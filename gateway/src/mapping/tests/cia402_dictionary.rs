@@ -46,7 +46,7 @@ fn has_the_types_on_which_sources_agree() {
 #[test]
 fn has_every_object_of_the_profile_that_is_known() {
     let subs: usize = cia402().objects().iter().map(|object| object.subs.len()).sum();
-    assert_eq!((cia402().objects().len(), subs), (194, 248));
+    assert_eq!((cia402().objects().len(), subs), (194, 249));
     let unknown: Vec<u16> = cia402()
         .objects()
         .iter()

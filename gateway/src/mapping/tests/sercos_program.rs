@@ -312,7 +312,7 @@ fn modes_and_slots() {
         write!(text, "{selection}: ").unwrap();
         match program.procedure(*selection) {
             Some(procedure) => {
-                let commands: Vec<_> = procedure.commands.iter().map(ToString::to_string).collect();
+                let commands: Vec<_> = procedure.commands().iter().map(ToString::to_string).collect();
                 write!(text, "{}", commands.join(", ")).unwrap();
                 if let Some(mode) = procedure.led_in {
                     write!(text, ", led in {mode}").unwrap();

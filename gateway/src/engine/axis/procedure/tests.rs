@@ -10,13 +10,15 @@ const BY_DRIVE: ModeSelection = ModeSelection::by_drive(OperatingMode::Homing);
 
 fn procedures() -> Vec<Procedure> {
     let position = ModeSelection::from(OperatingMode::Position);
-    let commands = |blocks: &[u16]| blocks.iter().map(|block| Item::from(Idn::standard(*block))).collect();
+    let commands = |blocks: &[u16]| {
+        ProcedureBy::Commands(blocks.iter().map(|block| Item::from(Idn::standard(*block))).collect())
+    };
     vec![
-        Procedure { selection: BY_DRIVE, led_in: None, commands: commands(&[148]) },
+        Procedure { selection: BY_DRIVE, led_in: None, by: commands(&[148]) },
         Procedure {
             selection: OperatingMode::Homing.into(),
             led_in: Some(position),
-            commands: commands(&[146, 171, 172]),
+            by: commands(&[146, 171, 172]),
         },
     ]
 }
@@ -30,6 +32,7 @@ const GOOD: Surroundings = Surroundings {
         mode: OperatingMode::Position,
         interpolation: profile_generic::mode::InterpolationSource::Controller,
     }),
+    status: 0,
 };
 
 /// What a drive answers to an access.
@@ -147,8 +150,11 @@ fn it_can_be_ended_at_any_point() {
                         set.push(idn);
                     }
                 }
-                assert!(set.len() <= procedure.commands.len(), "each once: {set:?}");
-                assert!(set.is_empty() || set.last() == procedure.commands.first(), "to the first: {set:?}");
+                assert!(set.len() <= procedure.commands().len(), "each once: {set:?}");
+                assert!(
+                    set.is_empty() || set.last() == procedure.commands().first(),
+                    "to the first: {set:?}"
+                );
                 assert!(!unit.leads(), "{procedure:?} {after} {dropped}: {:?}", unit.stage);
                 if dropped {
                     assert_eq!(unit.selection(), None);
