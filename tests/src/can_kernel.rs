@@ -35,6 +35,9 @@ const LEFT_OUT: &str = "raid6_select_algo,calibrate_xor_blocks,init_btrfs_fs,ini
 /// Set inside a guest.
 const INSIDE: &str = "AXISBRIDGE_CAN_KERNEL";
 
+/// Runs a command before everything that is ordinary.
+const URGENT: [&str; 3] = ["chrt", "--fifo", "10"];
+
 /// How long the host waits beyond the guest's own limit, and for a guest that was asked to end.
 const GRACE: Duration = Duration::from_secs(20);
 const ENDING: Duration = Duration::from_secs(3);
@@ -89,6 +92,7 @@ pub struct Kernel {
     writable: Vec<PathBuf>,
     limit: Duration,
     user: u32,
+    urgent: bool,
     environment: Vec<(&'static str, OsString)>,
 }
 
@@ -109,6 +113,7 @@ impl Kernel {
             writable: Vec::new(),
             limit,
             user: 0,
+            urgent: false,
             environment: Vec::new(),
         }
     }
@@ -141,6 +146,13 @@ impl Kernel {
     #[must_use]
     pub fn user(mut self, id: u32) -> Self {
         self.user = id;
+        self
+    }
+
+    /// For processes that keep time: the host runs the guest before what is ordinary, where it permits that (`SCHED_FIFO`).
+    #[must_use]
+    pub fn urgent(mut self) -> Self {
+        self.urgent = true;
         self
     }
 
@@ -225,9 +237,15 @@ impl Kernel {
     fn boot(&self, job: &Job) {
         let log = std::fs::File::create(job.0.join("log")).expect("the job folder can be written");
         let folder = job.0.display();
+        let scheduling: &[&str] = match self.urgent && is_permitted(&URGENT) {
+            true => &URGENT,
+            false => &[],
+        };
         // A guest must not outlive the test that started it.
         let mut kernel = Command::new("setpriv")
-            .args(["--pdeathsig", "TERM", PROGRAM])
+            .args(["--pdeathsig", "TERM"])
+            .args(scheduling)
+            .arg(PROGRAM)
             .args(["mem=512M", "rootfstype=hostfs", "rootflags=/", "ro", "panic=1", "loglevel=4"])
             .args(["con=null", "con0=null,fd:1", "ssl=null", "pty.legacy_count=0"])
             .arg(format!("initcall_blacklist={LEFT_OUT}"))
@@ -254,6 +272,13 @@ impl Kernel {
         let _ = kernel.kill();
         let _ = kernel.wait();
     }
+}
+
+/// Whether a command may be run in this way.
+fn is_permitted(way: &[&str]) -> bool {
+    let mut command = Command::new(way[0]);
+    command.args(&way[1..]).arg("true").stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
 }
 
 fn signal(name: &str, process: &str) {

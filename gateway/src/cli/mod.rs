@@ -386,6 +386,9 @@ struct CanDriveArguments {
     /// How many axes the drive has.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     axes: u8,
+    /// How many cycles may pass without a SYNC until the drive stops.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    sync_losses: u16,
     /// Where to write the drive's electronic data sheet.
     #[arg(long, value_name = "FILE")]
     eds: Option<PathBuf>,

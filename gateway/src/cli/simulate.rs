@@ -82,6 +82,7 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
 pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
     let node = arguments.node.map(NodeId::new).transpose()?;
     let mut drive = can_drive::drive(node, arguments.axes)?;
+    drive.set_sync_cycles(arguments.sync_losses);
     if let Some(path) = &arguments.eds {
         std::fs::write(path, drive.eds()).map_err(|error| format!("{}: {error}", path.display()))?;
     }

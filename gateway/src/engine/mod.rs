@@ -40,6 +40,10 @@ pub const BUSES_MAX: usize = 8;
 /// Time between two calls while no bus has anything to do by itself, so that the north side is served.
 const IDLE_INTERVAL: DurationNs = DurationNs::from_millis(1);
 
+/// The same of a box whose buses are slow: a part of the shortest cycle, up to this.
+const IDLE_INTERVAL_MAX: DurationNs = DurationNs::from_millis(4);
+const IDLE_CALLS_PER_CYCLE: i64 = 4;
+
 /// Rather than call so shortly before a cycle of a bus, the engine sleeps until that.
 const QUIET_BEFORE_CYCLE: DurationNs = DurationNs::from_micros(250);
 
@@ -244,10 +248,12 @@ impl Engine {
     fn next_due(&self, now: MonotonicTime) -> MonotonicTime {
         let wake = self.buses.iter().filter_map(Bus::wake_at).min();
         let patience = self.buses.iter().map(Bus::patience).min().unwrap_or(IDLE_INTERVAL);
-        let idle = now + IDLE_INTERVAL.max(patience);
+        let part = DurationNs(self.cycle_time.as_nanos() / IDLE_CALLS_PER_CYCLE);
+        let interval = part.max(IDLE_INTERVAL).min(IDLE_INTERVAL_MAX);
+        let idle = now + interval.max(patience);
         match wake {
             Some(wake) if wake <= idle + QUIET_BEFORE_CYCLE => wake,
-            _ => now + IDLE_INTERVAL,
+            _ => now + interval,
         }
     }
 

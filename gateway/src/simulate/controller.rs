@@ -13,7 +13,7 @@ use profile_generic::time::DurationNs;
 
 use crate::sys::clock::{self, SystemClock};
 use crate::sys::realtime;
-use crate::sys::udp::{BindError, DSCP_URGENT, IoSocket, PORT_IO};
+use crate::sys::udp::{self, BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
 /// TCP port of EtherNet/IP explicit messages.
 pub const PORT_EXPLICIT: u16 = 44818;
@@ -21,8 +21,11 @@ pub const PORT_EXPLICIT: u16 = 44818;
 /// How long a device may take to accept the TCP connection.
 const CONNECT_TIME_OUT: Duration = Duration::from_secs(5);
 
-/// Longest wait between two looks at the sockets.
-const POLL_INTERVAL: DurationNs = DurationNs(500_000);
+/// Longest wait between two looks at whether to stop.
+const LOOK_INTERVAL: DurationNs = DurationNs::from_millis(20);
+
+/// Longest wait while the stream has no room for what is to be sent.
+const FULL_INTERVAL: DurationNs = DurationNs::from_micros(500);
 
 /// `SCHED_FIFO` priority, below that of the box and of the drives.
 const PRIORITY: u8 = 10;
@@ -147,10 +150,12 @@ pub fn run(
             on_event(&event);
         }
         let now = clock::monotonic_now();
-        let latest = now + POLL_INTERVAL;
+        let latest = now + if outgoing.is_empty() { LOOK_INTERVAL } else { FULL_INTERVAL };
         let wake = controller.wake_at().map_or(latest, |due| due.min(latest));
         if wake > now {
-            clock::sleep_until(wake).map_err(|source| RunError::Socket { what: "clock", source })?;
+            let timeout = Duration::from_nanos(wake.since(now).as_nanos().unsigned_abs());
+            udp::wait(&io, stream.as_ref(), timeout)
+                .map_err(|source| RunError::Socket { what: "waiting for the sockets", source })?;
         }
     }
     Ok(controller.report())

@@ -112,9 +112,13 @@ pub(super) fn wait_for_input(descriptors: &[RawFd], timeout: Duration) -> io::Re
     let entry = |descriptor: &RawFd| libc::pollfd { fd: *descriptor, events: libc::POLLIN, revents: 0 };
     let mut entries: ArrayVec<_, 2> = descriptors.iter().take(2).map(entry).collect();
     let count = libc::nfds_t::try_from(entries.len()).unwrap_or(0);
-    let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: `entries` are `count` valid, writable `pollfd`s that outlive the call.
-    let ready = unsafe { libc::poll(entries.as_mut_ptr(), count, milliseconds) };
+    let timeout = libc::timespec {
+        tv_sec: libc::time_t::try_from(timeout.as_secs()).unwrap_or(libc::time_t::MAX),
+        tv_nsec: libc::c_long::from(timeout.subsec_nanos().cast_signed()),
+    };
+    // SAFETY: `entries` are `count` valid, writable `pollfd`s, and they and `timeout` outlive the call; without a signal mask
+    // the process keeps its own.
+    let ready = unsafe { libc::ppoll(entries.as_mut_ptr(), count, &raw const timeout, std::ptr::null()) };
     if ready < 0 {
         let error = io::Error::last_os_error();
         return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };

@@ -6,16 +6,18 @@
 #![allow(unsafe_code)]
 
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::os::fd::{AsFd, BorrowedFd};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Duration;
 
+use arrayvec::ArrayVec;
 use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 use thiserror::Error;
 
 use super::clock::KernelTime;
-use super::receive::{PlainAddress, enable_time_stamps, enable_type_of_service, receive};
+use super::receive::{PlainAddress, enable_time_stamps, enable_type_of_service, receive, wait_for_input};
 
 /// UDP port of EtherNet/IP implicit messages.
 pub const PORT_IO: u16 = 2222;
@@ -181,6 +183,18 @@ impl IoSocket {
     }
 }
 
+/// Waits until a datagram has come, or something on `stream`, or `timeout` is over; `true` when something can be read.
+///
+/// For threads that are not the cycle's.
+///
+/// # Errors
+/// What `ppoll` refuses.
+pub fn wait(socket: &IoSocket, stream: Option<&TcpStream>, timeout: Duration) -> io::Result<bool> {
+    let mut descriptors = ArrayVec::<_, 2>::from_iter([socket.socket.as_raw_fd()]);
+    descriptors.extend(stream.map(AsRawFd::as_raw_fd));
+    wait_for_input(&descriptors, timeout)
+}
+
 impl AsFd for IoSocket {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
@@ -189,7 +203,8 @@ impl AsFd for IoSocket {
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
+    use std::net::TcpListener;
+    use std::time::Instant;
 
     use super::*;
     use crate::sys::clock::realtime_now;
@@ -225,6 +240,24 @@ mod tests {
             let at = datagram.at.unwrap();
             assert!(before <= at && at <= realtime_now(), "{before:?} {at:?}");
         }
+    }
+
+    #[test]
+    fn waiting_ends_with_what_comes_first() {
+        let (a, b) = (any([127, 0, 0, 1]), any([127, 0, 0, 1]));
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (mut peer, _) = listener.accept().unwrap();
+        let start = Instant::now();
+        assert!(!super::wait(&b, Some(&stream), Duration::from_micros(1_500)).unwrap());
+        assert!(start.elapsed() >= Duration::from_micros(1_500), "less than a millisecond counts");
+        let long = Duration::from_secs(30);
+        a.send_to(&[1], b.local_address()).unwrap();
+        assert!(super::wait(&b, None, long).unwrap());
+        assert_eq!(wait(&b, &mut [0; 8]).len, 1);
+        std::io::Write::write_all(&mut peer, &[1]).unwrap();
+        assert!(super::wait(&b, Some(&stream), long).unwrap());
+        assert!(start.elapsed() < long);
     }
 
     #[test]

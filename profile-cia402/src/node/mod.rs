@@ -56,8 +56,8 @@ pub const CATCH_UP_MAX: DurationNs = DurationNs::from_millis(100);
 /// Frames that wait to be sent: the PDOs of eight axes twice, and some. Beyond that they are lost.
 const WAITING_MAX: usize = 96;
 
-/// Cycles of 1006h without a SYNC after which it is lost.
-const SYNC_CYCLES_MAX: i64 = 3;
+/// Cycles of 1006h without a SYNC after which it is lost, unless somebody says otherwise.
+const SYNC_CYCLES: u16 = 3;
 
 /// Source of errors of the communication, in the first byte of the manufacturer in EMCY; those of axes are 1 to 8.
 const COMMUNICATION: u8 = 0;
@@ -133,6 +133,7 @@ pub struct Node<A> {
     guarding: Guarding,
     /// Last SYNC since the communication started.
     last_sync: Option<MonotonicTime>,
+    sync_cycles: u16,
     sync_lost: bool,
     time: TimeOfDay,
     /// Up to when the application has been called; `None` before the first call.
@@ -183,6 +184,7 @@ impl<A: Application> Node<A> {
             heartbeat_at: MonotonicTime::ZERO,
             guarding: Guarding::default(),
             last_sync: None,
+            sync_cycles: SYNC_CYCLES,
             sync_lost: false,
             time: TimeOfDay::default(),
             stepped: None,
@@ -244,6 +246,11 @@ impl<A: Application> Node<A> {
         } else {
             self.errors.clear(code, COMMUNICATION, &mut self.dictionary);
         }
+    }
+
+    /// How many cycles of 1006h may pass without a SYNC; 3 where this is not called.
+    pub fn set_sync_cycles(&mut self, cycles: u16) {
+        self.sync_cycles = cycles;
     }
 
     /// The bus is off: the master is gone.
@@ -505,7 +512,8 @@ impl<A: Application> Node<A> {
         }
         let period = DurationNs::from_micros(self.dictionary.number(object::CYCLE_PERIOD, 0));
         let silence = self.last_sync.map_or(DurationNs::ZERO, |last| now.since(last));
-        if period > DurationNs::ZERO && silence.0 > SYNC_CYCLES_MAX * period.0 && !self.sync_lost {
+        if period > DurationNs::ZERO && silence.0 > i64::from(self.sync_cycles) * period.0 && !self.sync_lost
+        {
             self.sync_lost = true;
             self.application.event(Event::SyncLost, &mut self.dictionary);
         }

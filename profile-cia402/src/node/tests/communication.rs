@@ -328,7 +328,15 @@ fn leaving_operational_stops_the_axis() {
 
 #[test]
 fn a_sync_that_stays_away_stops_the_cyclic_modes() {
+    for (cycles, silence) in [(3, 30), (50, 500)] {
+        stops_after(cycles, silence);
+    }
+}
+
+/// In operation at 10 ms: nothing after a silence of so many milliseconds, a fault right after.
+fn stops_after(cycles: u16, silence: i64) {
     let mut rig = Rig::new(1);
+    rig.node.set_sync_cycles(cycles);
     rig.map_position();
     rig.set(0x1006, 0, 10_000).unwrap();
     rig.nmt(NmtCommand::START);
@@ -344,6 +352,8 @@ fn a_sync_that_stays_away_stops_the_cyclic_modes() {
             rig.set(index::MODE, 0, 8).unwrap();
         }
     }
+    // A cycle of the rig ends when its time is over.
+    rig.run(silence - 15);
     assert_eq!(rig.state(), State::OperationEnabled);
     rig.run(200);
     assert_eq!(rig.state(), State::Fault);
