@@ -111,9 +111,36 @@ impl InProcessCan {
         self.nodes.iter_mut().map(|(_, node)| node)
     }
 
+    /// The bus.
+    #[must_use]
+    pub fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
     /// The bus, to look at it or to disturb it.
     pub fn bus_mut(&mut self) -> &mut Bus {
         &mut self.bus
+    }
+
+    /// The station of the box.
+    #[must_use]
+    pub fn own_station(&self) -> Station {
+        self.own
+    }
+
+    /// The station of a device.
+    #[must_use]
+    pub fn station(&self, device: usize) -> Station {
+        self.nodes[device].0
+    }
+
+    /// Puts another device on the bus, behind all others.
+    ///
+    /// # Panics
+    /// When the bus has no room for it.
+    pub fn add(&mut self, device: DriveNode) {
+        let station = self.bus.add(QUEUE_DEFAULT).expect("the bus has room for another station");
+        self.nodes.push((station, device));
     }
 
     /// Pulls or plugs the cable of a device.

@@ -54,7 +54,7 @@ use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
 
 use self::network::{Knobs, Pipe};
-use self::ports::{Bytes, NorthQueue, SouthQueue};
+use self::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
 
 /// The configuration of the box: a turntable (axis 1, revolutions) and a slide (axis 2, millimetres).
 pub const BOX: &str = include_str!("box.toml");
@@ -147,7 +147,7 @@ pub struct Rig {
     /// The drives.
     pub line: DriveNetwork,
     /// The CAN buses with their drives.
-    pub can: Vec<InProcessCan>,
+    pub can: Vec<CanWire>,
     /// The police over the line.
     pub court: Court,
     /// What was seen of each drive.
@@ -197,7 +197,7 @@ impl Rig {
         let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
         let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&config);
         let line = drives(settings.drives.iter().copied(), false);
-        let can = config.can.iter().map(|bus| InProcessCan::of(bus, None)).collect();
+        let can = config.can.iter().map(|bus| CanWire::new(InProcessCan::of(bus, None))).collect();
         Self {
             controller: None,
             events: Vec::new(),
@@ -526,7 +526,8 @@ impl Rig {
         let free =
             |report: R| matches!(report, R::NotReady | R::AwaitingPower | R::Ready | R::Faulted | R::Silent);
         let drives = self.config.sercos.as_ref().map_or(0, |_| self.line.slaves().len());
-        let axes = self.can.iter().flat_map(InProcessCan::nodes).flat_map(|node| node.application().axes());
+        let axes =
+            self.can.iter().flat_map(|wire| wire.bus.nodes()).flat_map(|node| node.application().axes());
         (0..drives).all(|place| free(self.drive(place).actual().report))
             && axes.into_iter().all(|axis| free(axis.actual().report))
     }
@@ -701,7 +702,7 @@ impl Drop for Rig {
 fn ports_of<'a>(
     config: &Config,
     south: &'a mut SouthQueue,
-    can: &'a mut [InProcessCan],
+    can: &'a mut [CanWire],
 ) -> ArrayVec<SouthPort<'a>, BUSES_MAX> {
     let mut ports = ArrayVec::new();
     if config.sercos.is_some() {

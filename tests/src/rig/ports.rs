@@ -4,8 +4,10 @@
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
-use axisbridge::engine::port::{EthernetPort, FRAME_MAX, NorthPort};
+use axisbridge::engine::port::{CanInput, CanPort, CanSent, EthernetPort, FRAME_MAX, NorthPort};
+use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::drives::DriveNetwork;
+use profile_generic::can::Frame;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::police::court::Court;
@@ -138,5 +140,43 @@ impl EthernetPort for SouthQueue {
             self.outbound.push_back(Bytes::of(frame));
         }
         room
+    }
+}
+
+/// Changes a frame on its way from the bus to the box; `false` loses it there, and nobody notices.
+pub type TamperCan = Box<dyn FnMut(MonotonicTime, &mut Frame) -> bool>;
+
+/// A CAN bus as the box sees it, which may be something else than what is there.
+pub struct CanWire {
+    /// The bus with its drives.
+    pub bus: InProcessCan,
+    /// What happens to frames that the box receives.
+    pub tamper: Option<TamperCan>,
+}
+
+impl CanWire {
+    /// All there is, as it is.
+    #[must_use]
+    pub fn new(bus: InProcessCan) -> Self {
+        Self { bus, tamper: None }
+    }
+}
+
+impl CanPort for CanWire {
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        loop {
+            match self.bus.receive(now)? {
+                CanInput::Frame(mut frame) => {
+                    if self.tamper.as_mut().is_none_or(|tamper| tamper(now, &mut frame)) {
+                        return Some(CanInput::Frame(frame));
+                    }
+                }
+                other => return Some(other),
+            }
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        self.bus.send(now, frame)
     }
 }

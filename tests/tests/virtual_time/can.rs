@@ -13,7 +13,7 @@ fn settings() -> Settings {
 }
 
 fn axis(rig: &Rig, device: usize) -> &Axis {
-    &rig.can[0].nodes().nth(device).expect("a device").application().axes()[0]
+    &rig.can[0].bus.nodes().nth(device).expect("a device").application().axes()[0]
 }
 
 #[test]
@@ -28,6 +28,6 @@ fn two_axes_go_where_the_controller_sends_them() {
         let position = axis(&rig, device).actual().position.get() as f64 / 1e9 * unit;
         assert!((position - plan.target).abs() < plan.window, "{position} is not {}", plan.target);
     }
-    rig.can[0].bus_mut().judge();
+    rig.can[0].bus.bus_mut().judge();
     assert!(rig.torque_free());
 }

@@ -3,6 +3,7 @@
 mod attributes;
 mod can;
 mod can_modes;
+mod can_faults;
 mod drive_profile;
 mod events;
 mod faults;

@@ -347,8 +347,10 @@ impl Work {
                 }
                 let object =
                     self.axes[place].needs.item(object).and_then(super::layout::object).unwrap_or(object);
+                // One that says nothing is not one that lacks the object: it is gone, and would cost this time at each step.
+                let gone = matches!(failure, SdoFailure::Timeout { .. } | SdoFailure::NodeLost);
                 let failure = StepFailure { what, object, failure };
-                if must {
+                if must || gone {
                     let (axis, node) = (self.number(place), self.node);
                     let notice = Notice::NodeCommissioning { axis, node, failure };
                     waiting.push_back(Done::Failed(self.run, notice));

@@ -1,0 +1,470 @@
+//! A CANopen drive, its bus or somebody else on it misbehaves: its axis stops and says why, the other one goes on as if nothing
+//! were, and when it is over a Fault Reset brings the axis back.
+//!
+//! The turntable (node 1) turns in velocity control without anybody looking after it, so that a drive that acts on an old
+//! set-point goes on and on. The slide (node 2) is on a long way at constant speed.
+
+use axisbridge::simulate::can_drive::drive;
+use axisbridge::status::BoxState;
+use axisbridge_tests::rig::motion::{NANO, both, millis};
+use axisbridge_tests::rig::{Rig, Settings};
+use profile_cia402::node::drive::Axis;
+use profile_cia402::wire::NodeId;
+use profile_cip::controller::{AxisSet, Limits, Step};
+use profile_cip::wire::motion::codes::{AxisControl, ControlMode, FaultType};
+use profile_generic::can::bus::{Disturbance, Effect, State, Station};
+use profile_generic::can::{Frame, Id};
+use profile_generic::fault::FaultCause;
+use profile_generic::state::DriveState;
+
+const BOX: &str = include_str!("can.toml");
+
+const TURNTABLE: AxisSet = AxisSet::one(1);
+
+/// Revolutions per second of the turntable, before and after.
+const SPEED: f64 = 2.0;
+
+/// The slide's speed: 24 mm/s, which are 4.8 revolutions of its screw per second.
+const SLIDE: Limits = Limits { velocity: 24.0, acceleration: 240.0, jerk: 4_800.0 };
+const SLIDE_SPEED: i64 = 24 * NANO / 5;
+
+/// COB-IDs of node 1.
+const EMCY: Id = Id::Standard(0x081);
+const TPDO: Id = Id::Standard(0x181);
+const SDO_ANSWER: Id = Id::Standard(0x581);
+const HEARTBEAT: Id = Id::Standard(0x701);
+
+fn axis(rig: &Rig, device: usize) -> &Axis {
+    &rig.can[0].bus.nodes().nth(device).expect("a device").application().axes()[0]
+}
+
+fn velocity(rig: &Rig, device: usize) -> i64 {
+    axis(rig, device).actual().velocity.get()
+}
+
+fn position(rig: &Rig, device: usize) -> i64 {
+    axis(rig, device).actual().position.get()
+}
+
+fn turn() -> Step {
+    Step::RunAt { axis: 1, velocity: SPEED, acceleration: 20.0, jerk: 400.0 }
+}
+
+fn settings() -> Settings {
+    Settings { configuration: BOX.to_owned(), drives: Vec::new(), ..Settings::default() }
+}
+
+/// The slide goes far enough for what follows: `seconds`, and then turning the turntable again for a while.
+fn far(seconds: f64) -> Step {
+    Step::MoveAbsolute { axis: 2, position: 24.0 * (seconds + 2.0), limits: SLIDE }
+}
+
+/// Connects a controller with the turntable in velocity control.
+fn connect(rig: &mut Rig, program: Vec<Step>) {
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    rig.connect_with(config, program);
+}
+
+/// Both axes in motion; the turntable is reset and turned again after so many seconds.
+fn in_motion(seconds: f64) -> Rig {
+    let mut rig = Rig::ready(settings());
+    let again = vec![Step::Dwell { seconds }, Step::FaultReset(TURNTABLE), Step::Enable(TURNTABLE), turn()];
+    let program = vec![
+        Step::Enable(both()),
+        turn(),
+        Step::Together(vec![far(seconds), Step::Sequence(again)]),
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "both in motion", moving);
+    rig
+}
+
+fn moving(rig: &Rig) -> bool {
+    velocity(rig, 0) > 199 * NANO / 100 && slide_moves(rig)
+}
+
+/// The slide is at its speed, to a hundredth.
+fn slide_moves(rig: &Rig) -> bool {
+    (velocity(rig, 1) - SLIDE_SPEED).abs() < SLIDE_SPEED / 100
+}
+
+/// Type and code of the faults of an axis that the controller got.
+fn codes(rig: &Rig, place: usize) -> Vec<(FaultType, u8)> {
+    rig.report().axes[place].faults.kept().iter().map(|fault| (fault.fault_type, fault.code)).collect()
+}
+
+/// Goes on until `done` while the slide goes on.
+#[track_caller]
+fn go(rig: &mut Rig, limit: i64, what: &str, mut done: impl FnMut(&Rig) -> bool) {
+    rig.run_until(millis(limit), what, |rig| {
+        assert!(slide_moves(rig), "the slide runs at {}\n{}", velocity(rig, 1), rig.told());
+        done(rig)
+    });
+}
+
+#[track_caller]
+fn go_for(rig: &mut Rig, span: i64) {
+    let end = rig.now() + millis(span);
+    go(rig, span + 1_000, "the end of the time", |rig| rig.now() >= end);
+}
+
+/// The turntable comes to rest within so many milliseconds and stays where it is.
+#[track_caller]
+fn stops_within(rig: &mut Rig, limit: i64) {
+    go(rig, limit, "rest", |rig| velocity(rig, 0).abs() < NANO / 100);
+    go_for(rig, 50);
+    let stands = position(rig, 0);
+    go_for(rig, 300);
+    let moved = position(rig, 0) - stands;
+    assert!(moved.abs() < NANO / 1_000, "it moved by {moved} afterwards\n{}", rig.told());
+}
+
+/// The turntable turns again, to the end of the program; nothing was wrong with the slide, nor with anybody on the bus.
+#[track_caller]
+fn runs_again(rig: &mut Rig) {
+    go(rig, 30_000, "the turntable turns again", |rig| {
+        rig.engine.axes()[0].fault().is_none() && velocity(rig, 0) > 199 * NANO / 100
+    });
+    go_for(rig, 200);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert_eq!((report.axes[1].faults.total, report.axes[1].alarms.total), (0, 0), "{}", rig.told());
+    assert_eq!(rig.engine.axes()[1].counters().faults, 0);
+    assert!(rig.torque_free());
+}
+
+/// What was told once.
+#[track_caller]
+fn told(rig: &Rig, text: &str) {
+    let count = rig.told().lines().filter(|line| *line == text).count();
+    assert_eq!(count, 1, "`{text}` is told {count} times:\n{}", rig.told());
+}
+
+/// The turntable's axis has stopped because nothing good comes from its drive.
+#[track_caller]
+fn silent(rig: &Rig) {
+    assert_eq!(codes(rig, 0), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
+    let axis = &rig.engine.axes()[0];
+    assert_eq!(axis.fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
+    assert!(matches!(axis.state(), DriveState::FaultReaction | DriveState::Faulted), "{:?}", axis.state());
+    told(rig, "axis 1: Axis Fault - Mfg 17 (south_silence) in Running, fault action 0x23");
+}
+
+/// A station that nobody has asked for.
+fn intruder(rig: &mut Rig) -> Station {
+    rig.can[0].bus.bus_mut().add(64).expect("the bus has room for another station")
+}
+
+fn send(rig: &mut Rig, from: Station, id: Id, data: &[u8]) {
+    let now = rig.now();
+    let frame = Frame::new(id, data).expect("a frame");
+    rig.can[0].bus.bus_mut().send(now, from, &frame).expect("the station has room");
+}
+
+#[test]
+fn a_lost_heartbeat_stops_its_axis() {
+    let mut rig = in_motion(3.0);
+    rig.can[0].tamper = Some(Box::new(|_, frame| frame.id() != HEARTBEAT));
+    // Three heartbeats of 100 ms may be missing.
+    stops_within(&mut rig, 500);
+    told(&rig, "CAN bus 1: the heartbeat of node 1 is gone");
+    silent(&rig);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+    rig.can[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_drive_whose_plug_is_pulled_stops_by_itself() {
+    let mut rig = in_motion(3.0);
+    let now = rig.now();
+    rig.can[0].bus.connect(now, 0, false);
+    stops_within(&mut rig, 500);
+    silent(&rig);
+    go(&mut rig, 1_000, "the loss", |rig| rig.told().contains("the heartbeat of node 1 is gone"));
+    let now = rig.now();
+    rig.can[0].bus.connect(now, 0, true);
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_drive_that_reboots_stops_its_axis() {
+    let mut rig = in_motion(3.0);
+    let now = rig.now();
+    rig.can[0].bus.nodes_mut().next().expect("a drive").power_cycle(now);
+    stops_within(&mut rig, 500);
+    told(&rig, "CAN bus 1: node 1 has restarted while it was in operation");
+    silent(&rig);
+    runs_again(&mut rig);
+    rig.can[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_storm_of_emergency_messages_stops_nobody() {
+    let mut rig = in_motion(2.0);
+    let other = intruder(&mut rig);
+    rig.can[0].bus.bus_mut().share(EMCY);
+    for _ in 0..500 {
+        send(&mut rig, other, EMCY, &[0x00, 0x10, 0x01, 0, 0, 0, 0, 0]);
+        go_for(&mut rig, 1);
+        assert!(moving(&rig), "{}", rig.told());
+    }
+    told(&rig, "CAN bus 1: node 1 sends more emergency messages than are told one by one");
+    let all = rig.notices.iter().filter(|notice| notice.to_string().contains("EMCY ")).count();
+    assert_eq!(all, 16, "in a second: {}", rig.told());
+    assert_eq!(codes(&rig, 0), []);
+    runs_again(&mut rig);
+    rig.can[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_box_that_is_bus_off_stops_every_axis_and_leads_them_again_when_it_is_back() {
+    let mut rig = in_motion(30.0);
+    let (now, own) = (rig.now(), rig.can[0].bus.own_station());
+    rig.can[0].bus.bus_mut().take_off(now, own);
+    // The drives miss the SYNC of the box after three cycles.
+    let still = |rig: &Rig| (0..2).all(|device| velocity(rig, device).abs() < NANO / 100);
+    rig.run_until(millis(500), "rest", still);
+    told(&rig, "CAN bus 1: the controller is off the bus");
+    let stands = [position(&rig, 0), position(&rig, 1)];
+    rig.run(millis(60_000));
+    for (place, stands) in stands.into_iter().enumerate() {
+        assert_eq!(codes(&rig, place), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
+        assert!((position(&rig, place) - stands).abs() < NANO / 1_000);
+    }
+    let now = rig.now();
+    rig.can[0].bus.bus_mut().restart(now, own);
+    rig.run_for(millis(2_000));
+    told(&rig, "CAN bus 1: the controller is back on the bus");
+    assert!(still(&rig) && rig.torque_free(), "nobody moves by itself");
+    let program = vec![
+        Step::Dwell { seconds: 0.1 },
+        Step::FaultReset(both()),
+        Step::Enable(both()),
+        Step::Together(vec![far(0.0), turn()]),
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "both in motion", moving);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+}
+
+#[test]
+fn a_second_device_with_the_same_node_id_stops_the_axis_until_it_is_gone() {
+    let mut rig = in_motion(14.0);
+    rig.can[0].bus.add(drive(NodeId::new(1).ok(), 1).expect("a drive"));
+    // Two stations that answer at once spoil each other's frames until both are bus off. What the drives know of the time is SYNC,
+    // which waits for that.
+    let mut slowest = SLIDE_SPEED;
+    rig.run_until(millis(1_000), "both off", |rig| {
+        slowest = slowest.min(velocity(rig, 1));
+        let bus = &rig.can[0].bus;
+        bus.bus().state(bus.station(0)) == State::BusOff && velocity(rig, 0).abs() < NANO / 100
+    });
+    assert!(slowest > SLIDE_SPEED * 9 / 10, "{slowest}");
+    told(&rig, "CAN bus 1: node 1 has restarted while it was in operation");
+    silent(&rig);
+    go_for(&mut rig, 600);
+    let left_out = |line: &str| {
+        line.starts_with("axis 1: commissioning of node 1 failed: ")
+            && line.ends_with(": no answer within 500 ms; it is left out")
+    };
+    assert_eq!(rig.told().lines().filter(|line| left_out(line)).count(), 1, "{}", rig.told());
+    stops_within(&mut rig, 10);
+    let now = rig.now();
+    let bus = &mut rig.can[0].bus;
+    bus.connect(now, 2, false);
+    bus.connect(now, 0, true);
+    bus.nodes_mut().next().expect("a drive").power_cycle(now);
+    runs_again(&mut rig);
+}
+
+#[test]
+fn every_tpdo_twice_stops_its_axis() {
+    let mut rig = in_motion(12.0);
+    let (own, device) = (rig.can[0].bus.own_station(), rig.can[0].bus.station(0));
+    let twice = Disturbance::all(Effect::Double).from(device).to(own).id(TPDO);
+    rig.can[0].bus.bus_mut().disturb(twice);
+    stops_within(&mut rig, 300);
+    told(&rig, "CAN bus 1: two devices seem to have node-id 1: two of each TPDO");
+    silent(&rig);
+    rig.can[0].bus.bus_mut().calm();
+    runs_again(&mut rig);
+}
+
+#[test]
+fn as_many_lost_tpdos_as_are_permitted_stop_nobody() {
+    let mut rig = in_motion(1.0);
+    let mut left = 3;
+    rig.can[0].tamper = Some(Box::new(move |_, frame| {
+        let lost = frame.id() == TPDO && left > 0;
+        left -= i32::from(lost);
+        !lost
+    }));
+    go_for(&mut rig, 200);
+    assert!(moving(&rig), "{}", rig.told());
+    assert_eq!(rig.engine.axes()[0].counters().lost_telegrams, 3);
+    assert_eq!((codes(&rig, 0), codes(&rig, 1)), (vec![], vec![]));
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_tpdo_that_stays_away_stops_its_axis() {
+    let mut rig = in_motion(2.0);
+    rig.can[0].tamper = Some(Box::new(|_, frame| frame.id() != TPDO));
+    stops_within(&mut rig, 300);
+    told(&rig, "CAN bus 1: TPDO 1 of node 1 is missing more often than permitted");
+    silent(&rig);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+    told(&rig, "CAN bus 1: TPDO 1 of node 1 comes again");
+    rig.can[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_tpdo_of_another_length_is_not_taken_and_stops_its_axis() {
+    let mut rig = in_motion(2.0);
+    rig.can[0].tamper = Some(Box::new(|_, frame| {
+        if frame.id() == TPDO {
+            *frame = Frame::new(TPDO, &frame.data()[..3]).expect("a frame");
+        }
+        true
+    }));
+    stops_within(&mut rig, 300);
+    told(&rig, "CAN bus 1: TPDO 1 of node 1: expected 7 bytes, got 3; it is not taken");
+    silent(&rig);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+}
+
+#[test]
+fn frames_that_nobody_has_asked_for_change_nothing() {
+    let mut rig = in_motion(1.0);
+    let other = intruder(&mut rig);
+    let refused = rig.status().counters.refused_frames;
+    let strange = [
+        (Id::Standard(0x1A5), vec![0xFF; 8]),
+        (Id::Standard(0x5A5), vec![0x43, 0, 0x10, 0, 0, 0, 0, 0]),
+        (Id::Standard(0x7E4), vec![0x44; 8]),
+        (Id::Standard(0x100), vec![1, 2, 3]),
+        (Id::Standard(0x6A5), vec![0x40, 0, 0x10, 0, 0, 0, 0, 0]),
+        (Id::Extended(0x181), vec![0; 8]),
+        (Id::Standard(0x7A5), vec![]),
+    ];
+    for (id, data) in &strange {
+        send(&mut rig, other, *id, data);
+        go_for(&mut rig, 50);
+        assert!(moving(&rig), "{id}: {}", rig.told());
+    }
+    told(&rig, "CAN bus 1: node 37 is there and not in the list");
+    assert_eq!(rig.status().counters.refused_frames - refused, strange.len() as u64);
+    assert_eq!((codes(&rig, 0), codes(&rig, 1)), (vec![], vec![]));
+    runs_again(&mut rig);
+}
+
+#[test]
+fn somebody_else_who_commands_a_drive_stops_its_axis_and_is_told() {
+    let mut rig = in_motion(2.0);
+    let other = intruder(&mut rig);
+    rig.can[0].bus.bus_mut().share(Id::Standard(0x201));
+    // Disable voltage, for as long as it takes.
+    for _ in 0..20 {
+        send(&mut rig, other, Id::Standard(0x201), &[0; 7]);
+        go_for(&mut rig, 2);
+    }
+    stops_within(&mut rig, 1_000);
+    told(&rig, "CAN bus 1: somebody else sends 201, which only the master may send");
+    // Whoever takes away its operation takes away its power, as far as the drive tells.
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 37)], "{}", rig.told());
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::POWER_LOSS));
+    runs_again(&mut rig);
+}
+
+/// A box whose turntable does not come up; the slide runs, and the turntable after so many seconds.
+fn without_turntable(seconds: f64, tamper: impl FnMut(&mut Frame) -> bool + 'static) -> Rig {
+    let mut rig = Rig::new(settings());
+    let mut tamper = tamper;
+    rig.can[0].tamper = Some(Box::new(move |_, frame| tamper(frame)));
+    rig.run_until(millis(20_000), "the bus up", |rig| rig.status().state == BoxState::READY);
+    let late = vec![Step::Dwell { seconds }, Step::Enable(TURNTABLE), turn()];
+    let program = vec![
+        Step::Enable(AxisSet::one(2)),
+        Step::Together(vec![far(seconds), Step::Sequence(late)]),
+        Step::Disable(both()),
+    ];
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    config.late = TURNTABLE;
+    rig.connect_with(config, program);
+    rig.run_until(millis(10_000), "the slide in motion", slide_moves);
+    assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
+    rig
+}
+
+#[test]
+fn a_drive_that_refuses_its_mapping_is_left_out_and_tried_again() {
+    let mut rig = without_turntable(12.0, |frame| {
+        if frame.id() == SDO_ANSWER && frame.data()[..4] == [0x60, 0x00, 0x16, 0x01] {
+            let abort = [0x80, 0x00, 0x16, 0x01, 0x41, 0, 0x04, 0x06];
+            *frame = Frame::new(SDO_ANSWER, &abort).expect("a frame");
+        }
+        true
+    });
+    told(
+        &rig,
+        "CAN bus 1: node 1 does not come up: J: configuration download failed: map write 1600:01: refused with 06040041: \
+         object cannot be mapped to a PDO",
+    );
+    go_for(&mut rig, 1_000);
+    assert_eq!(position(&rig, 0), 0);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_drive_that_answers_no_sdo_is_left_out_and_tried_again() {
+    let mut rig = without_turntable(24.0, |frame| frame.id() != SDO_ANSWER);
+    go_for(&mut rig, 11_000);
+    told(&rig, "CAN bus 1: node 1 does not come up: B: no answer to device type");
+    assert_eq!(position(&rig, 0), 0);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_drive_that_does_not_come_into_operation_is_a_fault_and_is_not_led() {
+    let mut rig = Rig::ready(settings());
+    // Its status word says Switched on for ever.
+    rig.can[0].tamper = Some(Box::new(|_, frame| {
+        if frame.id() == TPDO && frame.data()[0] & 0x6F == 0x27 {
+            let mut data = frame.data().to_vec();
+            data[0] &= !0x04;
+            *frame = Frame::new(TPDO, &data).expect("a frame");
+        }
+        true
+    }));
+    let late = vec![
+        Step::Ask { axes: TURNTABLE, request: AxisControl::ENABLE },
+        Step::Dwell { seconds: 12.0 },
+        Step::FaultReset(TURNTABLE),
+        Step::Enable(TURNTABLE),
+        turn(),
+    ];
+    let program = vec![
+        Step::Enable(AxisSet::one(2)),
+        Step::Together(vec![far(12.0), Step::Sequence(late)]),
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "the slide in motion", slide_moves);
+    go_for(&mut rig, 10_500);
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS_MFG, 12)], "{}", rig.told());
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::START_TIME_OUT));
+    told(&rig, "axis 1: Axis Fault - Mfg 12 (start_time_out) in Starting, fault action 0x23");
+    assert!(velocity(&rig, 0).abs() < NANO / 100);
+    rig.can[0].tamper = None;
+    runs_again(&mut rig);
+}
