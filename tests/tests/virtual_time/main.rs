@@ -2,8 +2,8 @@
 
 mod attributes;
 mod can;
-mod can_modes;
 mod can_faults;
+mod can_modes;
 mod drive_profile;
 mod events;
 mod faults;
