@@ -98,10 +98,12 @@ fn coverage(page: &mut String, mapping: &Mapping) {
     let (served, rejected) = (mapping.cip.attributes.len(), mapping.cip.rejected.len());
     let idns = mapping.dictionaries.sercos.idns().iter().filter(|row| row.part == IdnPart::Profile).count();
     let unbound = mapping.sercos.unbound.len();
+    let (objects, left) = (mapping.dictionaries.cia402.objects().len(), mapping.cia402.unbound.len());
     let _ = writeln!(
         page,
         "<h2>Coverage</h2>\n<p>Of {all} attributes of an axis {served} are served and {rejected} rejected with a reason. \
-         Of {idns} IDNs of the drive profile {unbound} are bound by no row, with a reason.</p>"
+         Of {idns} IDNs of the drive profile {unbound} are bound by no row, with a reason. \
+         Of {objects} objects or families of objects of CiA 402 drives {left} are bound by no row, with a reason.</p>"
     );
 }
 

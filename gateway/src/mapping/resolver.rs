@@ -22,6 +22,12 @@ impl<'a> Resolver<'a> {
         Self { file, errors }
     }
 
+    /// The path of the file that a row stands in: the table itself, or what was laid over it.
+    pub fn path_of(&self, name: &Name) -> &'a str {
+        let (path, ..) = self.file.place(name.span().start);
+        path
+    }
+
     /// Whether something is wrong already, here or in another file.
     pub fn has_errors(&self) -> bool {
         self.errors.has_errors()

@@ -1,5 +1,7 @@
 //! From rows to the resolved mapping.
 
+use std::collections::BTreeSet;
+
 use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::BitPattern;
@@ -18,8 +20,8 @@ use crate::mapping::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Diction
 use crate::mapping::drive_program::FaultRow;
 use crate::mapping::format::{
     Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandoverRow, Cia402MethodRow,
-    Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow, Cia402SignalRow, FieldValueRow,
-    GenericCia402File, Name,
+    Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow, Cia402SignalRow,
+    Cia402UnboundRow, FieldValueRow, GenericCia402File, Name,
 };
 use crate::mapping::generic_names::{
     action, cause_and_reaction, directions, interpolation, operating_mode, parameter, report, signal,
@@ -40,7 +42,12 @@ impl Cia402Tables {
     ) -> Self {
         let rows = &file.rows;
         let resolver = Resolver::new(&file.text, errors);
-        let mut builder = Builder { resolver, dictionaries, tables: Self::default() };
+        let mut builder = Builder {
+            resolver,
+            dictionaries,
+            tables: Self::default(),
+            bound: BTreeSet::from([(ERROR_CODE.index, file.text.path())]),
+        };
         builder.resolver.head(&rows.format, "mapping", &rows.mapping, "generic to cia402");
         builder.units(rows);
         for row in &rows.scaling {
@@ -69,6 +76,7 @@ impl Cia402Tables {
         for row in &rows.commission {
             builder.step(row);
         }
+        builder.unbound(&rows.unbound);
         builder.tables
     }
 
@@ -87,9 +95,46 @@ struct Builder<'a> {
     resolver: Resolver<'a>,
     dictionaries: &'a Dictionaries,
     tables: Cia402Tables,
+    /// Objects that rows name, with the files of the rows.
+    bound: BTreeSet<(u16, &'a str)>,
 }
 
 impl<'a> Builder<'a> {
+    /// What no row binds has a reason, once.
+    fn unbound(&mut self, rows: &[Cia402UnboundRow]) {
+        for row in rows {
+            self.resolver.reason(&row.reason);
+            for name in &row.objects {
+                let known = &self.dictionaries.cia402;
+                let index = u16::from_str_radix(name.get_ref(), 16).ok();
+                let Some(object) = index.and_then(|index| known.object(index)) else {
+                    let message = format!(
+                        "expected an object of the dictionary such as 60FD, got `{}`",
+                        name.get_ref()
+                    );
+                    self.resolver.error(code::UNKNOWN_NAME, name.span(), "objects", message);
+                    continue;
+                };
+                let (shown, path) = (name.get_ref(), self.resolver.path_of(name));
+                let family = object.index..=object.last;
+                let mut bound = self.bound.iter().filter(|(index, _)| family.contains(index)).peekable();
+                let wins = bound.peek().is_some();
+                // A row that is laid over the table wins over its list.
+                if bound.any(|(_, bound_in)| *bound_in == path) {
+                    let message = format!("a row binds {shown}");
+                    self.resolver.error(code::CONTRADICTION, name.span(), "objects", message);
+                }
+                if self.tables.unbound.iter().any(|(index, _)| *index == object.index) {
+                    let message = format!("{shown} is there twice");
+                    self.resolver.error(code::TWICE, name.span(), "objects", message);
+                }
+                if !wins {
+                    self.tables.unbound.push((object.index, row.reason.get_ref().clone()));
+                }
+            }
+        }
+    }
+
     fn object(&mut self, key: &str, name: &Name) -> Option<(Object, &'a Cia402Sub)> {
         let Some(object) = Object::parse(name.get_ref()) else {
             let message = format!("expected an object such as 607A:00, got `{}`", name.get_ref());
@@ -101,6 +146,7 @@ impl<'a> Builder<'a> {
             let message = format!("expected an object of the dictionary, got {object}");
             self.resolver.error(code::UNKNOWN_NAME, name.span(), key, message);
         }
+        self.bound.insert((object.index, self.resolver.path_of(name)));
         Some((object, row?))
     }
 

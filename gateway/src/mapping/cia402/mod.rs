@@ -192,6 +192,8 @@ pub struct Cia402Tables {
     pub(super) faults: Vec<FaultRow>,
     pub(super) parameters: Vec<ParameterRule>,
     pub(super) steps: Vec<StepRule>,
+    /// Objects that no row binds, a family by its first number, with the reason.
+    pub unbound: Vec<(u16, String)>,
 }
 
 impl Cia402Tables {

@@ -41,6 +41,18 @@ pub struct GenericCia402File {
     pub parameter: Vec<Cia402ParameterRow>,
     /// What is written and read at start.
     pub commission: Vec<Cia402CommissionRow>,
+    /// Objects that no row binds, with the reason.
+    pub unbound: Vec<Cia402UnboundRow>,
+}
+
+/// Objects that no other row binds.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402UnboundRow {
+    /// Why.
+    pub reason: Name,
+    /// Their numbers, a family by the first one.
+    pub objects: Vec<Name>,
 }
 
 /// How a unit follows from the drive's factor group.

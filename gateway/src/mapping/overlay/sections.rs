@@ -123,6 +123,7 @@ const GENERIC_CIA402: &[Section] = &[
     first("fault_class", &["classes"]),
     section("parameter", &["parameter"]),
     section("commission", &["do", "object", "parameter", "value", "modes"]),
+    section("unbound", &["reason"]),
 ];
 
 /// The lists of a table by its name; everything else in it is a table of single keys.

@@ -90,14 +90,14 @@ struct Builder<'a> {
     dictionaries: &'a Dictionaries,
     exceptions: &'a [ExceptionRow],
     /// IDNs that a row names, by themselves or by their word.
-    bound: BTreeSet<Idn>,
+    bound: BTreeSet<(Idn, &'a str)>,
     tables: SercosTables,
 }
 
 impl<'a> Builder<'a> {
     fn idn(&mut self, key: &str, name: &Name) -> Option<&'a SercosIdn> {
         let row = self.dictionaries.sercos.idn_or_error(key, name, &mut self.resolver)?;
-        self.bound.insert(row.idn);
+        self.bound.insert((row.idn, self.resolver.path_of(name)));
         Some(row)
     }
 
@@ -110,7 +110,8 @@ impl<'a> Builder<'a> {
                 let sercos = &self.dictionaries.sercos;
                 let Some(idn) = sercos.idn_or_error("idns", name, &mut self.resolver) else { continue };
                 let idn = idn.idn;
-                if self.bound.contains(&idn) {
+                // A row that is laid over the table wins over its list.
+                if self.bound.contains(&(idn, self.resolver.path_of(name))) {
                     self.resolver.error(
                         code::CONTRADICTION,
                         name.span(),
@@ -121,7 +122,9 @@ impl<'a> Builder<'a> {
                 if !known.insert(idn) {
                     self.resolver.error(code::TWICE, name.span(), "idns", format!("{idn} is there twice"));
                 }
-                self.tables.unbound.push((idn, row.reason.get_ref().clone()));
+                if !self.bound.iter().any(|(bound, _)| *bound == idn) {
+                    self.tables.unbound.push((idn, row.reason.get_ref().clone()));
+                }
             }
         }
     }
@@ -133,7 +136,7 @@ impl<'a> Builder<'a> {
         let find = |text: &str| sercos.word(text);
         let word = self.resolver.name(key, name, "a word of the dictionary", find, known)?;
         if let [idn] = word.idns.as_slice() {
-            self.bound.insert(*idn);
+            self.bound.insert((*idn, self.resolver.path_of(name)));
             return Some((*idn, word));
         }
         let message = format!("expected a word of one IDN, `{}` has {}", word.name, word.idns.len());

@@ -171,3 +171,24 @@ fn every_idn_of_the_profile_is_bound_or_has_a_reason() {
     assert_eq!((all, unbound.len()), (395, 295));
     assert_eq!(neither, Vec::<String>::new());
 }
+
+/// Every object of the dictionary of CiA 402 is named by a row, or stands among the unbound with a reason.
+#[test]
+fn every_object_of_cia_402_is_bound_or_has_a_reason() {
+    let mapping = shipped();
+    let text = TableTexts::embedded().generic_cia402.text.clone();
+    // A row names a value of an object, the list of the unbound an object as a whole.
+    let names_a_value = |index: u16| text.contains(&format!("\"{index:04X}:"));
+    let unbound = &mapping.cia402.unbound;
+    let mut neither = Vec::new();
+    for object in mapping.dictionaries.cia402.objects() {
+        let listed = unbound.iter().any(|(index, _)| *index == object.index);
+        // The error code stands for the faults; what stands in worked examples alone is listed.
+        let bound = object.index == 0x603F || (object.index..=object.last).any(names_a_value);
+        if !listed && !bound {
+            neither.push(format!("{:04X} {}", object.index, object.name));
+        }
+    }
+    assert_eq!((mapping.dictionaries.cia402.objects().len(), unbound.len()), (194, 141));
+    assert_eq!(neither, Vec::<String>::new());
+}
