@@ -17,9 +17,12 @@ fn what_is_shipped_is_good() {
     let output = check(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", out(&output));
     assert!(out(&output).starts_with("0 errors, 0 warnings, "), "{}", out(&output));
-    for config in
-        ["examples/two-axes-in-process.toml", "examples/two-axes-sercos.toml", "examples/two-axes-can.toml"]
-    {
+    for config in [
+        "examples/two-axes-in-process.toml",
+        "examples/two-axes-sercos.toml",
+        "examples/two-axes-can.toml",
+        "examples/two-axes-devicenet.toml",
+    ] {
         let output = check(&["--config", config, "--mappings", "examples/overlays"]);
         assert_eq!(output.status.code(), Some(0), "{}", out(&output));
         assert!(out(&output).contains("checked the tables, 1 overlay, 2 axes"), "{}", out(&output));

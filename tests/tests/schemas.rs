@@ -33,6 +33,7 @@ fn every_shipped_file_is_valid_and_broken_ones_are_not() {
     add("examples/two-axes-in-process.toml", "config", "good");
     add("examples/two-axes-sercos.toml", "config", "good");
     add("examples/two-axes-can.toml", "config", "good");
+    add("examples/two-axes-devicenet.toml", "config", "good");
     add("examples/overlays/line-4.toml", "overlay", "good");
     // What the program refuses for its form or for a name, the schema refuses too.
     for (case, verdict) in [

@@ -8,6 +8,7 @@ mod attributes;
 mod axes;
 mod bus;
 mod can_bus;
+mod devicenet_bus;
 mod faults;
 mod page;
 mod rows;
@@ -67,6 +68,7 @@ pub fn check(request: &Request<'_>) -> Outcome {
             axes::check(mapping, written, findings);
             bus::check(mapping, written, findings);
             can_bus::check(mapping, written, findings);
+            devicenet_bus::check(mapping, written, findings);
         }
     }
     outcome.config = written.map(|written| written.config);

@@ -8,8 +8,8 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
-use super::check::{Checker, NANO, names};
-use super::file::{CanDriveTable, CanTable, CountsTable, SouthTable};
+use super::check::{Checker, NANO};
+use super::file::{CanDriveTable, CanTable, CountsTable};
 use super::{Can, CanDrive, CanLink, duration};
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
@@ -28,7 +28,7 @@ const DEFAULT_ALLOWED_LOSSES: u16 = 3;
 const AXES: core::ops::RangeInclusive<i64> = 0..=7;
 
 /// What an axis can be used for.
-const MODES: [(&str, OperatingMode); 3] = [
+pub(super) const MODES: [(&str, OperatingMode); 3] = [
     ("position", OperatingMode::Position),
     ("velocity", OperatingMode::Velocity),
     ("torque", OperatingMode::Torque),
@@ -39,33 +39,15 @@ const ACTUAL_VALUES: [(&str, Signal); 2] =
     [("velocity", Signal::VelocityActual), ("torque", Signal::TorqueActual)];
 
 impl Checker {
-    /// All CAN buses. Without any bus there is nothing behind the box.
-    pub(super) fn can(&mut self, table: &Spanned<SouthTable>) -> Option<Vec<Can>> {
-        let south = table.get_ref();
-        if south.sercos.is_none() && south.can.is_empty() {
-            return self.report(
-                table.span(),
-                "there is no bus behind the box",
-                "expected [south.sercos] or [[south.can]]",
-            );
-        }
-        self.count(&south.can, "CAN buses", BUSES_MAX);
-        let real: Vec<_> =
-            names(&south.can, |bus| &bus.interface).into_iter().filter(|name| self.is_real(name)).collect();
-        self.unique("the CAN interface", &real);
-        let buses: Vec<_> = south.can.iter().map(|bus| self.can_bus(bus.get_ref())).collect();
+    /// All CAN buses.
+    pub(super) fn can(&mut self, tables: &[Spanned<CanTable>]) -> Option<Vec<Can>> {
+        self.count(tables, "CAN buses", BUSES_MAX);
+        let buses: Vec<_> = tables.iter().map(|bus| self.can_bus(bus.get_ref())).collect();
         buses.into_iter().collect()
     }
 
-    fn is_real(&mut self, name: &Spanned<String>) -> bool {
-        name.get_ref() != super::check::IN_PROCESS
-    }
-
     fn can_bus(&mut self, table: &CanTable) -> Option<Can> {
-        let link = self.interface(&table.interface).map(|name| match name {
-            None => CanLink::InProcess,
-            Some(name) => CanLink::Interface { name, set_bit_rate: table.set_bit_rate.unwrap_or(false) },
-        });
+        let link = self.can_link(&table.interface, table.set_bit_rate);
         let bit_rate = self.number_or(table.bit_rate.as_ref(), "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
         let cycle_time = self.sync_time(&table.cycle_time);
         let node = self.number_or(table.node.as_ref(), "the node-id of the box", NODES, DEFAULT_NODE);
@@ -93,6 +75,18 @@ impl Checker {
             heartbeat_ms: heartbeat_ms?,
             allowed_losses: allowed_losses?,
             drives: drives.into_iter().collect::<Option<_>>()?,
+        })
+    }
+
+    /// How a bus is reached.
+    pub(super) fn can_link(
+        &mut self,
+        interface: &Spanned<String>,
+        set_bit_rate: Option<bool>,
+    ) -> Option<CanLink> {
+        self.interface(interface).map(|name| match name {
+            None => CanLink::InProcess,
+            Some(name) => CanLink::Interface { name, set_bit_rate: set_bit_rate.unwrap_or(false) },
         })
     }
 
@@ -187,34 +181,38 @@ impl Checker {
     }
 
     /// Words of a list, each once.
-    fn words<T: Copy>(
+    pub(super) fn words<T: Copy>(
         &mut self,
         names: &Spanned<Vec<Spanned<String>>>,
         what: &str,
         known: &[(&str, T)],
     ) -> Option<Vec<T>> {
         self.unique(&format!("the {what}"), names.get_ref());
-        let words: Vec<_> = names
-            .get_ref()
-            .iter()
-            .map(|name| {
-                let found = known.iter().find(|(word, _)| *word == name.get_ref()).map(|(_, value)| *value);
-                found.or_else(|| {
-                    let all: Vec<_> = known.iter().map(|(word, _)| format!("\"{word}\"")).collect();
-                    self.report_as(
-                        code::UNKNOWN_WORD,
-                        name.span(),
-                        format_args!("unknown {what} `{}`", name.get_ref()),
-                        format_args!("expected one of {}", all.join(", ")),
-                    )
-                })
-            })
-            .collect();
+        let words: Vec<_> = names.get_ref().iter().map(|name| self.word(name, what, known)).collect();
         words.into_iter().collect()
     }
 
+    /// A word of a list.
+    pub(super) fn word<T: Copy>(
+        &mut self,
+        name: &Spanned<String>,
+        what: &str,
+        known: &[(&str, T)],
+    ) -> Option<T> {
+        let found = known.iter().find(|(word, _)| *word == name.get_ref()).map(|(_, value)| *value);
+        found.or_else(|| {
+            let all: Vec<_> = known.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+            self.report_as(
+                code::UNKNOWN_WORD,
+                name.span(),
+                format_args!("unknown {what} `{}`", name.get_ref()),
+                format_args!("expected one of {}", all.join(", ")),
+            )
+        })
+    }
+
     /// A number above 0 with up to nine decimals as an exact ratio.
-    fn exact(&mut self, value: &Spanned<f64>, what: &str) -> Option<Ratio> {
+    pub(super) fn exact(&mut self, value: &Spanned<f64>, what: &str) -> Option<Ratio> {
         let nano = self.fine(value, what, NANO)?;
         match Ratio::new(nano, NANO?.num()).filter(|_| nano > 0) {
             Some(ratio) => Some(ratio),

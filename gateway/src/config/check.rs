@@ -15,7 +15,7 @@ use profile_sercos::master::config::AddressPolicy;
 use super::duration;
 use super::file::{
     AxisTable, DeviceTable, DriveTable, File, IdentityTable, LimitsTable, RealtimeTable, SercosTable,
-    UpdatePeriodTable,
+    SouthTable, UpdatePeriodTable,
 };
 use super::rated;
 use super::{
@@ -144,10 +144,14 @@ impl Checker {
             Some(table) => self.sercos(table.get_ref()).map(Some),
             None => Some(None),
         };
-        let can = self.can(&file.south);
+        self.some_bus(&file.south);
+        let can = self.can(&south.can);
+        let devicenet = self.devicenet(&south.devicenet);
+        self.interfaces(south);
         let drives = self.drives(file);
         let cycles = sercos.iter().flatten().map(|sercos| sercos.cycle_time);
         let cycles = cycles.chain(can.iter().flatten().map(|can| can.cycle_time));
+        let cycles = cycles.chain(devicenet.iter().flatten().map(|network| network.cycle_time));
         let cycle_time = cycles.min().unwrap_or(DurationNs::ZERO);
 
         self.unique("the device name", &names(&file.device, |device| &device.name));
@@ -181,6 +185,7 @@ impl Checker {
             realtime: realtime?,
             sercos: sercos?,
             can: can?,
+            devicenet: devicenet?,
         })
     }
 
@@ -686,6 +691,11 @@ impl Checker {
             let all = table.get_ref().drive.iter().enumerate();
             drives.extend(all.map(|(drive, table)| (&table.get_ref().name, DriveAt::Can { bus, drive })));
         }
+        for (network, table) in south.devicenet.iter().enumerate() {
+            let all = table.get_ref().drive.iter().enumerate();
+            let at = |drive| DriveAt::Devicenet { network, drive };
+            drives.extend(all.map(|(drive, table)| (&table.get_ref().name, at(drive))));
+        }
         let names: Vec<_> = drives.iter().map(|(name, _)| (*name).clone()).collect();
         self.unique("the drive name", &names);
         drives
@@ -736,6 +746,26 @@ impl Checker {
             },
             drives: drives.into_iter().collect::<Option<_>>()?,
         })
+    }
+
+    /// Without any bus there is nothing behind the box.
+    fn some_bus(&mut self, table: &Spanned<SouthTable>) {
+        let south = table.get_ref();
+        if south.sercos.is_none() && south.can.is_empty() && south.devicenet.is_empty() {
+            self.report::<()>(
+                table.span(),
+                "there is no bus behind the box",
+                "expected [south.sercos], [[south.can]] or [[south.devicenet]]",
+            );
+        }
+    }
+
+    /// No two buses share a CAN interface.
+    fn interfaces(&mut self, south: &SouthTable) {
+        let all = names(&south.can, |bus| &bus.interface);
+        let all = all.into_iter().chain(names(&south.devicenet, |network| &network.interface));
+        let real: Vec<_> = all.filter(|name| name.get_ref() != IN_PROCESS).collect();
+        self.unique("the CAN interface", &real);
     }
 
     fn link(&mut self, name: &Spanned<String>, ring: Option<&Spanned<String>>) -> Option<Link> {

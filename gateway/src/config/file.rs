@@ -212,6 +212,9 @@ pub struct SouthTable {
     /// CAN buses with CANopen drives, at most 4.
     #[serde(default)]
     pub can: Vec<Spanned<CanTable>>,
+    /// DeviceNet networks, at most 4.
+    #[serde(default)]
+    pub devicenet: Vec<Spanned<DevicenetTable>>,
 }
 
 /// `[south.sercos]`
@@ -337,4 +340,58 @@ pub struct CountsTable {
     pub velocity: Option<Spanned<f64>>,
     /// Acceleration counts in an axis unit per second squared.
     pub acceleration: Option<Spanned<f64>>,
+}
+
+/// `[[south.devicenet]]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DevicenetTable {
+    /// CAN interface of the network, such as `"can0"`, or `"in-process"` for simulated drives.
+    pub interface: Spanned<String>,
+    /// Bits per second: 125000, 250000 or 500000. What goes over the network in a cycle is checked against it. Default:
+    /// 125000.
+    pub bit_rate: Option<Spanned<i64>>,
+    /// Set the interface to this bit rate and bring it up; else it is taken as it is. Default: false.
+    pub set_bit_rate: Option<bool>,
+    /// Time from one poll of a drive to the next: `1 ms` to `1 s`, in whole milliseconds.
+    pub cycle_time: Spanned<String>,
+    /// MAC ID of the box, 0 to 63, of its own. Default: 0.
+    pub mac_id: Option<Spanned<i64>>,
+    /// How many answers of a drive in a row may be missing before its axis stops, 1 to 100. Default: 3.
+    pub allowed_losses: Option<Spanned<i64>>,
+    /// The drives, at least one.
+    pub drive: Vec<Spanned<DevicenetDriveTable>>,
+}
+
+/// `[[south.devicenet.drive]]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DevicenetDriveTable {
+    /// Name, unique among drives.
+    pub name: Spanned<String>,
+    /// MAC ID of the drive, 0 to 63, unique on the network.
+    pub mac_id: Spanned<i64>,
+    /// `"motion"`, a CIP Motion drive with the fixed connection format, or `"ac-dc"`, a velocity drive of the AC/DC drive
+    /// profile. Default: `"motion"`.
+    pub kind: Option<Spanned<String>>,
+    /// Expected packet rate that the drive is given, in whole milliseconds up to `10 s`; without a message for four times as
+    /// long it gives the box up and stops. Default: the cycle time.
+    pub packet_rate: Option<Spanned<String>>,
+    /// Vendor number that the drive has to have, 1 to 65535. Default: any.
+    pub vendor_id: Option<Spanned<i64>>,
+    /// Product code that the drive has to have, 0 to 65535. Default: any.
+    pub product_code: Option<Spanned<i64>>,
+    /// What a CIP Motion drive is to be used for: `"position"`, `"velocity"`, `"torque"`. Default: all three.
+    pub modes: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Position counts of a CIP Motion drive in one of its position units, 1 to 2147483647. Needed for one.
+    pub resolution: Option<Spanned<i64>>,
+    /// Millimetres that a linear axis makes in a turn of its motor. For an axis in revolutions there is none. A CIP Motion
+    /// drive of a linear axis counts in millimetres without it; a velocity drive needs it.
+    pub millimetres_per_turn: Option<Spanned<f64>>,
+    /// Output assembly of a velocity drive: 20, basic speed control, or 21, extended speed control; its input assembly is 70
+    /// or 71. Default: 21.
+    pub assembly: Option<Spanned<i64>>,
+    /// SpeedScale (attribute 22 of the AC/DC Drive object) of a velocity drive, -15 to 15: its speed is in units of rpm /
+    /// 2^SpeedScale. Default: 0.
+    pub speed_scale: Option<Spanned<i64>>,
 }

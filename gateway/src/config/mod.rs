@@ -7,6 +7,7 @@
 mod can;
 mod check;
 mod connection_format;
+mod devicenet;
 pub(crate) mod duration;
 pub mod file;
 mod rated;
@@ -15,6 +16,9 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use profile_cia402::wire::NodeId;
+use profile_cip::devicenet::master::config::{DataRate, ExpectedIdentity};
+use profile_cip::devicenet::wire::MacId;
+use profile_cip::devicenet::wire::speed::Assembly;
 use profile_cip::wire::motion::Format;
 use profile_generic::can::timing::BitRate;
 use profile_generic::image::Signal;
@@ -66,6 +70,8 @@ pub struct Config {
     pub sercos: Option<Sercos>,
     /// The CAN buses behind.
     pub can: Vec<Can>,
+    /// The DeviceNet networks behind.
+    pub devicenet: Vec<Devicenet>,
 }
 
 impl Config {
@@ -97,7 +103,9 @@ impl Config {
     #[must_use]
     pub fn cycle_time(&self) -> DurationNs {
         let sercos = self.sercos.iter().map(|sercos| sercos.cycle_time);
-        sercos.chain(self.can.iter().map(|can| can.cycle_time)).min().unwrap_or(DurationNs::ZERO)
+        let can = self.can.iter().map(|can| can.cycle_time);
+        let devicenet = self.devicenet.iter().map(|network| network.cycle_time);
+        sercos.chain(can).chain(devicenet).min().unwrap_or(DurationNs::ZERO)
     }
 
     /// The SERCOS drive of an axis; `None` when it is on another bus.
@@ -105,7 +113,7 @@ impl Config {
     pub fn sercos_drive(&self, axis: &Axis) -> Option<&Drive> {
         match axis.drive {
             DriveAt::Sercos { drive } => self.sercos.as_ref()?.drives.get(drive),
-            DriveAt::Can { .. } => None,
+            DriveAt::Can { .. } | DriveAt::Devicenet { .. } => None,
         }
     }
 
@@ -113,10 +121,22 @@ impl Config {
     #[must_use]
     pub fn can_drive(&self, axis: &Axis) -> Option<(&Can, &CanDrive)> {
         match axis.drive {
-            DriveAt::Sercos { .. } => None,
+            DriveAt::Sercos { .. } | DriveAt::Devicenet { .. } => None,
             DriveAt::Can { bus, drive } => {
                 let bus = self.can.get(bus)?;
                 Some((bus, bus.drives.get(drive)?))
+            }
+        }
+    }
+
+    /// The drive on DeviceNet of an axis and its network; `None` when it is on another kind of bus.
+    #[must_use]
+    pub fn devicenet_drive(&self, axis: &Axis) -> Option<(&Devicenet, &DevicenetDrive)> {
+        match axis.drive {
+            DriveAt::Sercos { .. } | DriveAt::Can { .. } => None,
+            DriveAt::Devicenet { network, drive } => {
+                let network = self.devicenet.get(network)?;
+                Some((network, network.drives.get(drive)?))
             }
         }
     }
@@ -462,6 +482,13 @@ pub enum DriveAt {
         /// Index in [`Can::drives`].
         drive: usize,
     },
+    /// On a DeviceNet network.
+    Devicenet {
+        /// Index in [`Config::devicenet`].
+        network: usize,
+        /// Index in [`Devicenet::drives`].
+        drive: usize,
+    },
 }
 
 /// A CAN bus with CANopen drives.
@@ -483,7 +510,7 @@ pub struct Can {
     pub drives: Vec<CanDrive>,
 }
 
-/// How a CAN bus is reached.
+/// How a CAN bus, or a DeviceNet network, is reached.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CanLink {
     /// Simulated drives inside this process.
@@ -516,6 +543,70 @@ pub struct CanDrive {
     pub way_of_a_turn: Option<Ratio>,
     /// Generic units in one count, where the drive is not to be asked.
     pub counts: Vec<(Quantity, Ratio)>,
+}
+
+/// A DeviceNet network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Devicenet {
+    /// How it is reached.
+    pub link: CanLink,
+    /// Its data rate.
+    pub rate: DataRate,
+    /// Time from one poll to the next.
+    pub cycle_time: DurationNs,
+    /// MAC ID of the box.
+    pub mac: MacId,
+    /// Answers in a row that may be missing.
+    pub allowed_losses: u8,
+    /// The drives on it.
+    pub drives: Vec<DevicenetDrive>,
+}
+
+impl Devicenet {
+    /// Its data rate as that of a CAN bus.
+    ///
+    /// # Panics
+    /// Never: a data rate is a bit rate.
+    #[must_use]
+    pub fn bit_rate(&self) -> BitRate {
+        BitRate::classic(self.rate.bits_per_second()).expect("a data rate is a bit rate")
+    }
+}
+
+/// A drive on DeviceNet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DevicenetDrive {
+    /// Name, unique among drives.
+    pub name: String,
+    /// Its MAC ID.
+    pub mac: MacId,
+    /// Expected packet rate of its poll connection, ms.
+    pub packet_rate_ms: u16,
+    /// Who it has to be.
+    pub identity: ExpectedIdentity,
+    /// Nanounits of a linear axis in a nanoturn.
+    pub way_of_a_turn: Option<Ratio>,
+    /// What it is.
+    pub kind: DevicenetKind,
+}
+
+/// What a drive on DeviceNet is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DevicenetKind {
+    /// A CIP Motion drive.
+    Motion {
+        /// What it is used for, the mode at start first.
+        modes: Vec<OperatingMode>,
+        /// Position counts in a position unit.
+        resolution: u32,
+    },
+    /// A velocity drive of the AC/DC drive profile.
+    Speed {
+        /// Its output assembly.
+        assembly: Assembly,
+        /// SpeedScale.
+        scale: i8,
+    },
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ use crate::mapping::Mapping;
 use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
 
 /// Most buses of a box.
-pub const BUSES_MAX: usize = 8;
+pub const BUSES_MAX: usize = 9;
 
 /// Time between two calls while no bus has anything to do by itself, so that the north side is served.
 const IDLE_INTERVAL: DurationNs = DurationNs::from_millis(1);

@@ -4,6 +4,8 @@ use std::fmt;
 
 use profile_cia402::master::event::Event as CanEvent;
 use profile_cia402::wire::NodeId;
+use profile_cip::devicenet::master::event::Event as DevicenetEvent;
+use profile_cip::devicenet::wire::MacId;
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::fault_log::{LogEntry, LogKind};
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
@@ -14,6 +16,7 @@ use profile_sercos::master::topology::Topology;
 
 use super::axis::{Loss, OwnWords};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
+use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
 
@@ -84,6 +87,22 @@ pub enum Notice {
         bus: u8,
         /// What it tells.
         event: CanEvent,
+    },
+    /// The master of a DeviceNet network.
+    Devicenet {
+        /// The network, from 0 among those of DeviceNet.
+        network: u8,
+        /// What it tells.
+        event: DevicenetEvent,
+    },
+    /// A drive on DeviceNet could not be set up; it is left out for a while.
+    SlaveSetup {
+        /// The axis.
+        axis: u8,
+        /// Its MAC ID.
+        mac: MacId,
+        /// Why.
+        failure: SetupFailure,
     },
     /// A step of the commissioning of a CANopen drive failed; its device is left out.
     NodeCommissioning {
@@ -205,6 +224,11 @@ impl Notice {
                     | CanEvent::PdoBack { .. }
                     | CanEvent::Sdo { .. },
                 ..
+            }
+            | Self::Devicenet {
+                event:
+                    DevicenetEvent::Online | DevicenetEvent::Exchanging(_) | DevicenetEvent::Released { .. },
+                ..
             } => Severity::Info,
             _ => Severity::Warning,
         }
@@ -214,10 +238,13 @@ impl Notice {
     #[must_use]
     pub fn axis(&self) -> Option<u8> {
         match self {
-            Self::Sercos(_) | Self::Can { .. } | Self::Retry | Self::Node { .. } => None,
+            Self::Sercos(_) | Self::Can { .. } | Self::Devicenet { .. } | Self::Retry | Self::Node { .. } => {
+                None
+            }
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
             | Self::PassedOver { axis, .. }
+            | Self::SlaveSetup { axis, .. }
             | Self::NodeCommissioning { axis, .. }
             | Self::NodeProgram { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
@@ -249,6 +276,10 @@ impl fmt::Display for Notice {
                 )
             }
             Self::Can { bus, event } => write!(f, "CAN bus {}: {event}", bus + 1),
+            Self::Devicenet { network, event } => write!(f, "DeviceNet {}: {event}", network + 1),
+            Self::SlaveSetup { mac, failure, .. } => {
+                write!(f, "the drive with MAC ID {mac} cannot be used: {failure}; it is left out")
+            }
             Self::NodeCommissioning { node, failure, .. } => {
                 write!(f, "commissioning of node {node} failed: {failure}; it is left out")
             }

@@ -33,6 +33,22 @@ impl fmt::Display for Object {
     }
 }
 
+/// An attribute of instance 1 of an object of a drive on DeviceNet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Attribute {
+    /// Class code.
+    pub class: u16,
+    /// Number of the attribute.
+    pub id: u16,
+}
+
+/// `class 0x42 attribute 661`.
+impl fmt::Display for Attribute {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "class {:#04x} attribute {}", self.class, self.id)
+    }
+}
+
 /// The number of something that a drive keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Item {
@@ -40,6 +56,8 @@ pub enum Item {
     Idn(Idn),
     /// An object of a CANopen drive.
     Object(Object),
+    /// An attribute of a drive on DeviceNet.
+    Attribute(Attribute),
 }
 
 impl Item {
@@ -49,12 +67,18 @@ impl Item {
         Self::Object(Object { index, sub })
     }
 
+    /// An attribute of a drive on DeviceNet.
+    #[must_use]
+    pub const fn attribute(class: u16, id: u16) -> Self {
+        Self::Attribute(Attribute { class, id })
+    }
+
     /// The IDN, where it is one.
     #[must_use]
     pub const fn idn(self) -> Option<Idn> {
         match self {
             Self::Idn(idn) => Some(idn),
-            Self::Object(_) => None,
+            Self::Object(_) | Self::Attribute(_) => None,
         }
     }
 }
@@ -71,6 +95,7 @@ impl fmt::Display for Item {
         match self {
             Self::Idn(idn) => write!(f, "{idn}"),
             Self::Object(object) => write!(f, "{object}"),
+            Self::Attribute(attribute) => write!(f, "{attribute}"),
         }
     }
 }

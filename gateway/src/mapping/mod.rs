@@ -23,6 +23,7 @@ mod compile_cip;
 mod compile_sercos;
 mod definitions;
 mod device_link;
+pub mod devicenet;
 mod dictionary;
 mod drive_facts;
 mod drive_program;
@@ -79,7 +80,7 @@ pub use drive_facts::{Difference, DriveFacts};
 pub use drive_program::{
     DriveProgram, FaultRow, MAX_MODES, ModeProcedure, Order, ParameterEntry, Procedure, ProcedureBy, Telegram,
 };
-pub use item::{Item, Object};
+pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;

@@ -22,6 +22,7 @@ use profile_cip::target::identity::{Health, ModuleState};
 use profile_cip::target::motion_device::SyncState;
 use profile_cip::target::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
+use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
 use tracing::{info, warn};
 
@@ -29,7 +30,7 @@ use self::cycle::{CycleThread, Setup};
 use self::indicators::{Change, Shown};
 use self::port::{CanSocketPort, OpenPort, PacketPort, UdpPort};
 use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{Can, CanLink, Config, Link};
+use crate::config::{CanLink, Config, Link};
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
@@ -159,7 +160,16 @@ pub fn start(
         }));
     }
     for (number, can) in (0..).zip(&config.can) {
-        south.push(OpenPort::Can(can_port(can, tap().map(|tap| (tap, number)))?));
+        let tap = tap().map(|tap| (tap, number));
+        south.push(OpenPort::Can(can_port(&can.link, can.bit_rate, tap, |tap| {
+            Box::new(InProcessCan::of(can, tap).in_host_time(can.cycle_time))
+        })?));
+    }
+    for (number, network) in (config.can.len()..).zip(&config.devicenet) {
+        let tap = tap().zip(u8::try_from(number).ok());
+        south.push(OpenPort::Can(can_port(&network.link, network.bit_rate(), tap, |tap| {
+            Box::new(InProcessCan::of_devicenet(network, tap).in_host_time(network.cycle_time))
+        })?));
     }
     let mut north = Vec::with_capacity(config.devices.len());
     let mut markers = Vec::with_capacity(config.devices.len());
@@ -247,14 +257,17 @@ pub fn start(
     Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
 }
 
-/// The port of a CAN bus.
-fn can_port(config: &Can, tap: Option<(Tap, u8)>) -> Result<Box<dyn CanPort + Send>, StartError> {
-    let CanLink::Interface { name, set_bit_rate } = &config.link else {
-        return Ok(Box::new(InProcessCan::of(config, tap).in_host_time(config.cycle_time)));
-    };
+/// The port of a bus on CAN.
+fn can_port(
+    link: &CanLink,
+    bit_rate: BitRate,
+    tap: Option<(Tap, u8)>,
+    in_process: impl FnOnce(Option<(Tap, u8)>) -> Box<dyn CanPort + Send>,
+) -> Result<Box<dyn CanPort + Send>, StartError> {
+    let CanLink::Interface { name, set_bit_rate } = link else { return Ok(in_process(tap)) };
     if *set_bit_rate {
         let settings = can_interface::Settings {
-            bit_rate: Some(config.bit_rate),
+            bit_rate: Some(bit_rate),
             restart_ms: Some(CAN_RESTART_MS),
             ..can_interface::Settings::default()
         };
@@ -323,14 +336,16 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
         }
         None => ["not used"; 2].map(str::to_owned),
     };
-    let can = config.can.iter().map(|bus| match &bus.link {
-        CanLink::InProcess => "simulated CAN".to_owned(),
+    let named = |link: &CanLink, simulated: &str| match link {
+        CanLink::InProcess => simulated.to_owned(),
         CanLink::Interface { name, .. } => name.clone(),
-    });
-    settings.can = can.collect();
+    };
+    let can = config.can.iter().map(|bus| named(&bus.link, "simulated CAN"));
+    let devicenet = config.devicenet.iter().map(|network| named(&network.link, "simulated DeviceNet"));
+    settings.can = can.chain(devicenet).collect();
     settings.depth = 4096;
     // The buses, and for each device its I/O and its explicit side.
-    let buses = usize::from(config.sercos.is_some()) + config.can.len();
+    let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
     let (recorder, taps) = Recorder::start(settings, buses + 2 * config.devices.len())
         .map_err(|source| StartError::Recording { path: path.display().to_string(), source })?;
     Ok((Some(recorder), taps))

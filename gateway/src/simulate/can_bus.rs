@@ -1,17 +1,19 @@
-//! Simulated CiA 402 drives inside this process, on a bus that takes as long for each frame as its bits do.
+//! Simulated drives inside this process, of CANopen or of DeviceNet, on a bus that takes as long for each frame as its bits do.
 //!
 //! Whenever the box looks at its port, everything happens on the bus that has happened up to then: arbitration, frames in
 //! both directions, and what the drives say to them.
 
 use std::collections::VecDeque;
 
+use profile_cip::devicenet::wire::{Identifier, MacId};
 use profile_generic::can::Frame;
 use profile_generic::can::bus::{Bus, Output, QUEUE_DEFAULT, SendError, State, Station};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::can_drive::{DriveNode, drive};
+use super::devicenet_drive::{self, DevicenetNode};
 use crate::capture::recorder::Tap;
-use crate::config::Can;
+use crate::config::{Can, Devicenet};
 use crate::engine::port::{CanInput, CanPort, CanSent};
 use crate::sys::clock;
 
@@ -21,12 +23,57 @@ const INBOUND_MAX: usize = 1024;
 /// Frames that the box's transmit queue holds.
 const QUEUE: usize = 64;
 
+/// A node of a simulated bus.
+pub trait CanNode {
+    /// It is switched on.
+    fn start(&mut self, now: MonotonicTime);
+
+    /// Takes a frame from the bus.
+    fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame);
+
+    /// Lets time pass.
+    fn handle_time(&mut self, now: MonotonicTime);
+
+    /// The next frame that it sends.
+    fn poll(&mut self, now: MonotonicTime) -> Option<Frame>;
+
+    /// When it has something to do by itself.
+    fn wake_at(&self) -> MonotonicTime;
+
+    /// Its controller is off the bus.
+    fn bus_off(&mut self, now: MonotonicTime);
+}
+
+impl CanNode for DriveNode {
+    fn start(&mut self, _now: MonotonicTime) {}
+
+    fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) {
+        self.handle_frame(now, frame);
+    }
+
+    fn handle_time(&mut self, now: MonotonicTime) {
+        self.handle_time(now);
+    }
+
+    fn poll(&mut self, now: MonotonicTime) -> Option<Frame> {
+        self.poll(now)
+    }
+
+    fn wake_at(&self) -> MonotonicTime {
+        self.wake_at()
+    }
+
+    fn bus_off(&mut self, _now: MonotonicTime) {
+        self.bus_off();
+    }
+}
+
 /// The bus as the box sees it.
 #[derive(Debug)]
-pub struct InProcessCan {
+pub struct InProcessCan<N = DriveNode> {
     bus: Bus,
     own: Station,
-    nodes: Vec<(Station, DriveNode)>,
+    nodes: Vec<(Station, N)>,
     inbound: VecDeque<CanInput>,
     /// Up to when everything has happened.
     reached: MonotonicTime,
@@ -58,19 +105,6 @@ impl Pauses {
 }
 
 impl InProcessCan {
-    /// A bus with these devices.
-    ///
-    /// # Panics
-    /// With more devices than a bus has room for.
-    #[must_use]
-    pub fn new(mut bus: Bus, devices: Vec<DriveNode>, tap: Option<(Tap, u8)>) -> Self {
-        let own = bus.add(QUEUE).expect("an empty bus has room");
-        let mut station = || bus.add(QUEUE_DEFAULT).expect("a bus has room for all its node-ids");
-        let nodes = devices.into_iter().map(|device| (station(), device)).collect();
-        let inbound = VecDeque::with_capacity(INBOUND_MAX);
-        Self { bus, own, nodes, inbound, reached: MonotonicTime::ZERO, pauses: None, tap }
-    }
-
     /// The devices of a configuration, each with as many axes as it names.
     ///
     /// # Panics
@@ -89,6 +123,38 @@ impl InProcessCan {
             devices.into_iter().map(|(node, axes)| drive(Some(node), axes).expect("1 to 8 axes")).collect();
         Self::new(Bus::new(config.bit_rate), devices, tap)
     }
+}
+
+impl InProcessCan<DevicenetNode> {
+    /// The drives of a DeviceNet network.
+    ///
+    /// # Panics
+    /// Never with a checked configuration.
+    #[must_use]
+    pub fn of_devicenet(config: &Devicenet, tap: Option<(Tap, u8)>) -> Self {
+        let mut bus = Bus::new(config.bit_rate());
+        for mac in (0..).map_while(MacId::new) {
+            // Whoever asks whether a MAC ID is free uses the identifier of that MAC ID.
+            bus.share(Identifier::DuplicateMacCheck(mac).can());
+        }
+        let drives = config.drives.iter().map(|drive| devicenet_drive::drive(config, drive));
+        Self::new(bus, drives.collect(), tap)
+    }
+}
+
+impl<N: CanNode> InProcessCan<N> {
+    /// A bus with these devices.
+    ///
+    /// # Panics
+    /// With more devices than a bus has room for.
+    #[must_use]
+    pub fn new(mut bus: Bus, devices: Vec<N>, tap: Option<(Tap, u8)>) -> Self {
+        let own = bus.add(QUEUE).expect("an empty bus has room");
+        let mut station = || bus.add(QUEUE_DEFAULT).expect("a bus has room for all its node-ids");
+        let nodes = devices.into_iter().map(|device| (station(), device)).collect();
+        let inbound = VecDeque::with_capacity(INBOUND_MAX);
+        Self { bus, own, nodes, inbound, reached: MonotonicTime::ZERO, pauses: None, tap }
+    }
 
     /// The same in the time of a host, which may pause, at this cycle of the box.
     #[must_use]
@@ -102,12 +168,12 @@ impl InProcessCan {
     }
 
     /// The devices, in the order in which they were given.
-    pub fn nodes(&self) -> impl Iterator<Item = &DriveNode> {
+    pub fn nodes(&self) -> impl Iterator<Item = &N> {
         self.nodes.iter().map(|(_, node)| node)
     }
 
     /// The same, to act on them from outside.
-    pub fn nodes_mut(&mut self) -> impl Iterator<Item = &mut DriveNode> {
+    pub fn nodes_mut(&mut self) -> impl Iterator<Item = &mut N> {
         self.nodes.iter_mut().map(|(_, node)| node)
     }
 
@@ -138,7 +204,7 @@ impl InProcessCan {
     ///
     /// # Panics
     /// When the bus has no room for it.
-    pub fn add(&mut self, device: DriveNode) {
+    pub fn add(&mut self, device: N) {
         let station = self.bus.add(QUEUE_DEFAULT).expect("the bus has room for another station");
         self.nodes.push((station, device));
     }
@@ -159,6 +225,7 @@ impl InProcessCan {
         if self.reached == MonotonicTime::ZERO {
             // Nobody was there before the first look.
             self.reached = now;
+            self.nodes.iter_mut().for_each(|(_, node)| node.start(now));
         }
         loop {
             self.happen();
@@ -195,7 +262,7 @@ impl InProcessCan {
                 }
                 Output::State { station, state: State::BusOff, .. } => {
                     if let Some((_, node)) = nodes.iter_mut().find(|(known, _)| *known == station) {
-                        node.bus_off();
+                        node.bus_off(now);
                     }
                 }
                 Output::Sent { .. } | Output::State { .. } => {}
@@ -217,7 +284,7 @@ fn keep(inbound: &mut VecDeque<CanInput>, input: CanInput) {
     }
 }
 
-impl CanPort for InProcessCan {
+impl<N: CanNode> CanPort for InProcessCan<N> {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
         let now = self.bus_time(now);
         self.advance(now);

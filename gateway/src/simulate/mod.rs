@@ -5,6 +5,7 @@
 pub mod can_bus;
 pub mod can_drive;
 pub mod controller;
+pub mod devicenet_drive;
 pub mod drives;
 pub mod program;
 pub mod script;

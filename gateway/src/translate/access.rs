@@ -90,7 +90,7 @@ impl Translator {
         };
         let is_diagnostic = match item {
             Item::Idn(idn) => mapping.sercos.is_diagnostic(idn),
-            Item::Object(_) => axis.south.is_diagnostic(item),
+            Item::Object(_) | Item::Attribute(_) => axis.south.is_diagnostic(item),
         };
         if let Some(word) = word.filter(|_| is_diagnostic) {
             self.causes(number, item, word, &mut node);

@@ -194,6 +194,7 @@ impl Translator {
         let dictionaries = &self.stage.mapping.dictionaries;
         let name = match item {
             Item::Idn(idn) => dictionaries.sercos.idn(idn).map(|row| row.name.clone()),
+            Item::Attribute(_) => None,
             Item::Object(object) => {
                 let index = Cia402Dictionary::on_first_axis(object.index);
                 let row = dictionaries.cia402.object(index);

@@ -79,6 +79,7 @@ impl StageAxis {
         match item {
             Item::Idn(idn) => mapping.fault_row(idn, word, cause),
             Item::Object(_) => mapping.object_fault_row(word),
+            Item::Attribute(_) => None,
         }
     }
 

@@ -164,6 +164,9 @@ impl Stage {
         let mut can: Vec<_> = config.can.iter().map(|bus| InProcessCan::of(bus, None)).collect();
         let mut south: Vec<SouthPort<'_>> = sercos.iter_mut().map(|port| SouthPort::Ethernet(port)).collect();
         south.extend(can.iter_mut().map(|port| SouthPort::Can(port)));
+        let devicenet = config.devicenet.iter().map(|network| InProcessCan::of_devicenet(network, None));
+        let mut devicenet: Vec<_> = devicenet.collect();
+        south.extend(devicenet.iter_mut().map(|port| SouthPort::Can(port)));
         let mut ports: Vec<Silent> = config.devices.iter().map(|_| Silent).collect();
         let mut ports: Vec<&mut dyn NorthPort> =
             ports.iter_mut().map(|port| port as &mut dyn NorthPort).collect();

@@ -56,6 +56,11 @@ impl Handshake {
         self.advance();
     }
 
+    /// What waits for the exchange to be free is not wanted any more.
+    pub fn withdraw(&mut self) {
+        self.next = None;
+    }
+
     /// Gives up the request under way, if there is one, so that another can be made.
     pub fn cancel(&mut self) {
         self.next = None;

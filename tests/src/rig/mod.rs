@@ -33,6 +33,7 @@ use axisbridge::latest::Reader;
 use axisbridge::mapping::Mapping;
 use axisbridge::north::AdapterEnd;
 use axisbridge::simulate::can_bus::InProcessCan;
+use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::simulate::setup;
 use axisbridge::status::{BoxState, BoxStatus};
@@ -148,6 +149,8 @@ pub struct Rig {
     pub line: DriveNetwork,
     /// The CAN buses with their drives.
     pub can: Vec<CanWire>,
+    /// The DeviceNet networks with their drives.
+    pub devicenet: Vec<InProcessCan<DevicenetNode>>,
     /// The police over the line.
     pub court: Court,
     /// What was seen of each drive.
@@ -198,6 +201,8 @@ impl Rig {
         let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&config);
         let line = drives(settings.drives.iter().copied(), false);
         let can = config.can.iter().map(|bus| CanWire::new(InProcessCan::of(bus, None))).collect();
+        let devicenet =
+            config.devicenet.iter().map(|network| InProcessCan::of_devicenet(network, None)).collect();
         Self {
             controller: None,
             events: Vec::new(),
@@ -207,6 +212,7 @@ impl Rig {
             watched: vec![Watched::default(); line.slaves().len()],
             line,
             can,
+            devicenet,
             court: Court::new(START),
             knobs: settings.knobs,
             tamper_command: None,
@@ -318,7 +324,10 @@ impl Rig {
     #[must_use]
     pub fn controller_config(&self) -> ControllerConfig {
         let counts: Vec<_> = self.config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
-        let mut config = setup::controller(&self.mapping, &counts, UPDATE_PERIOD_US);
+        // A slow bus has a slow box.
+        let least = u32::try_from(self.config.devices[0].update_period_min.as_nanos() / 1_000);
+        let period = UPDATE_PERIOD_US.max(least.unwrap_or(0));
+        let mut config = setup::controller(&self.mapping, &counts, period);
         if self.config.devices[0].connection_format == Format::Fixed {
             config.set_fixed();
             config.axes.iter_mut().for_each(|axis| axis.sets = DataSets::fixed(axis.control_mode));
@@ -485,8 +494,8 @@ impl Rig {
         self.now = self.engine_due.max(self.now);
         self.deliver();
         let (now, system) = (self.now, self.system());
-        let Self { engine, engine_due, north, south, can, config, .. } = self;
-        let mut ports = ports_of(config, south, can);
+        let Self { engine, engine_due, north, south, can, devicenet, config, .. } = self;
+        let mut ports = ports_of(config, south, can, devicenet);
         let result = around(&mut || *engine_due = engine.cycle(now, system, &mut [north], &mut ports));
         drop(ports);
         self.after_cycle();
@@ -530,6 +539,7 @@ impl Rig {
             self.can.iter().flat_map(|wire| wire.bus.nodes()).flat_map(|node| node.application().axes());
         (0..drives).all(|place| free(self.drive(place).actual().report))
             && axes.into_iter().all(|axis| free(axis.actual().report))
+            && self.devicenet.iter().flat_map(InProcessCan::nodes).all(|drive| free(drive.actual().report))
     }
 
     // ---- one step -------------------------------------------------------------------------------
@@ -550,8 +560,8 @@ impl Rig {
 
     fn cycle(&mut self) {
         let (now, system) = (self.now, self.system());
-        let Self { engine, engine_due, north, south, can, config, .. } = self;
-        *engine_due = engine.cycle(now, system, &mut [north], &mut ports_of(config, south, can));
+        let Self { engine, engine_due, north, south, can, devicenet, config, .. } = self;
+        *engine_due = engine.cycle(now, system, &mut [north], &mut ports_of(config, south, can, devicenet));
         self.after_cycle();
     }
 
@@ -703,12 +713,14 @@ fn ports_of<'a>(
     config: &Config,
     south: &'a mut SouthQueue,
     can: &'a mut [CanWire],
+    devicenet: &'a mut [InProcessCan<DevicenetNode>],
 ) -> ArrayVec<SouthPort<'a>, BUSES_MAX> {
     let mut ports = ArrayVec::new();
     if config.sercos.is_some() {
         ports.push(SouthPort::Ethernet(south));
     }
     ports.extend(can.iter_mut().map(|bus| SouthPort::Can(bus)));
+    ports.extend(devicenet.iter_mut().map(|network| SouthPort::Can(network)));
     ports
 }
 

@@ -4,6 +4,7 @@ mod attributes;
 mod can;
 mod can_faults;
 mod can_modes;
+mod devicenet;
 mod drive_profile;
 mod events;
 mod faults;

@@ -1,6 +1,7 @@
 //! From a configuration to an engine and the adapters beside it.
 
 pub mod can;
+pub mod devicenet;
 pub mod sercos;
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -81,6 +82,22 @@ pub enum BuildError {
         /// Why.
         error: Misfit,
     },
+    /// A DeviceNet master cannot work so.
+    #[error("DeviceNet master of `{network}`: {error}")]
+    Devicenet {
+        /// The network.
+        network: String,
+        /// Why.
+        error: profile_cip::devicenet::master::config::ConfigError,
+    },
+    /// The tables make no program for a drive on DeviceNet.
+    #[error("axis {name}: {error}")]
+    DevicenetDrive {
+        /// The axis.
+        name: String,
+        /// Why.
+        error: crate::mapping::devicenet::DevicenetError,
+    },
     /// A device cannot work so.
     #[error("device {name}: {error}")]
     Device {
@@ -140,7 +157,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     Ok(Built { engine, adapters, notices, status, commissioners })
 }
 
-/// The buses of a configuration in the order of their ports: SERCOS first, then those of CAN.
+/// The buses of a configuration in the order of their ports: SERCOS first, then those of CAN, then those of DeviceNet.
 fn buses(config: &Config, host: Host, mapping: &Mapping) -> Result<(Buses, Commissioners), BuildError> {
     let mut list = Vec::new();
     let mut commissioners = Commissioners::default();
@@ -155,9 +172,14 @@ fn buses(config: &Config, host: Host, mapping: &Mapping) -> Result<(Buses, Commi
         list.push(AnyBus::Can(Box::new(bus)));
         commissioners.can.push(commissioner);
     }
+    let behind_can = list.len();
+    for place in 0..config.devicenet.len() {
+        list.push(AnyBus::Devicenet(Box::new(devicenet::bus(config, place, mapping)?)));
+    }
     let of = config.axes.iter().map(|axis| match axis.drive {
         DriveAt::Sercos { .. } => 0,
         DriveAt::Can { bus, .. } => first + bus,
+        DriveAt::Devicenet { network, .. } => behind_can + network,
     });
     Ok((Buses::new(list, of.collect()), commissioners))
 }

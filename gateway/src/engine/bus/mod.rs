@@ -1,6 +1,7 @@
 //! The buses behind the engine: what they have in common.
 
 pub mod can;
+pub mod devicenet;
 pub mod sercos;
 
 use profile_generic::state::Action;
@@ -162,6 +163,8 @@ pub enum AnyBus {
     Sercos(Box<sercos::SercosBus>),
     /// CANopen.
     Can(Box<can::CanBus>),
+    /// DeviceNet.
+    Devicenet(Box<devicenet::DevicenetBus>),
 }
 
 impl AnyBus {
@@ -171,6 +174,7 @@ impl AnyBus {
         match self {
             Self::Sercos(bus) => &**bus,
             Self::Can(bus) => &**bus,
+            Self::Devicenet(bus) => &**bus,
         }
     }
 
@@ -179,6 +183,7 @@ impl AnyBus {
         match self {
             Self::Sercos(bus) => &mut **bus,
             Self::Can(bus) => &mut **bus,
+            Self::Devicenet(bus) => &mut **bus,
         }
     }
 }
@@ -199,7 +204,7 @@ impl Buses {
     pub fn sercos(&self) -> Option<&sercos::SercosBus> {
         self.list.iter().find_map(|bus| match bus {
             AnyBus::Sercos(bus) => Some(&**bus),
-            AnyBus::Can(_) => None,
+            AnyBus::Can(_) | AnyBus::Devicenet(_) => None,
         })
     }
 
@@ -207,7 +212,15 @@ impl Buses {
     pub fn can(&self) -> impl Iterator<Item = &can::CanBus> {
         self.list.iter().filter_map(|bus| match bus {
             AnyBus::Can(bus) => Some(&**bus),
-            AnyBus::Sercos(_) => None,
+            AnyBus::Sercos(_) | AnyBus::Devicenet(_) => None,
+        })
+    }
+
+    /// The DeviceNet networks.
+    pub fn devicenet(&self) -> impl Iterator<Item = &devicenet::DevicenetBus> {
+        self.list.iter().filter_map(|bus| match bus {
+            AnyBus::Devicenet(bus) => Some(&**bus),
+            AnyBus::Sercos(_) | AnyBus::Can(_) => None,
         })
     }
 

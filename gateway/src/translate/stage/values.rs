@@ -53,11 +53,11 @@ impl Stage {
                     let index = Cia402Dictionary::on_first_axis(object.index);
                     drive.facts.note_data(Object { index, ..object }, &bytes);
                 }
-                (Behind::Sercos(_), Item::Object(_)) => {
+                (Behind::Sercos(_), Item::Object(_) | Item::Attribute(_)) => {
                     let message = format!("{drive} is a SERCOS drive and has no objects");
                     return Err(ValuesError::Drive { line, message });
                 }
-                (Behind::Can(_), Item::Idn(_)) => {
+                (Behind::Can(_), Item::Idn(_) | Item::Attribute(_)) => {
                     let message = format!("{drive} is on CANopen and has no IDNs");
                     return Err(ValuesError::Drive { line, message });
                 }

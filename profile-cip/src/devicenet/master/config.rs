@@ -112,6 +112,11 @@ impl IoConfig {
     }
 }
 
+/// Frames of one message.
+const fn message_frames(len: usize) -> usize {
+    if len <= IO_UNFRAGMENTED_MAX { 1 } else { len.div_ceil(IO_FRAGMENT_MAX) }
+}
+
 /// Bits of the frames of one message, at most.
 fn message_bits(len: usize) -> u32 {
     let frame = |len| Shape::classic(len).map_or(0, |shape| shape.most().nominal);
@@ -175,8 +180,10 @@ pub struct MasterConfig {
     /// Time to wait for the answer to a request on an explicit connection before it is sent once more, and then given up:
     /// more than the 2 s after which a server gives up a response in fragments.
     pub explicit_timeout: DurationNs,
-    /// Time after which a slave that is missing, lost or refuses is asked again.
+    /// Time after which a slave that is missing, lost or refuses is asked again; it doubles with every vain attempt.
     pub retry: DurationNs,
+    /// Longest such time.
+    pub retry_max: DurationNs,
     /// After bus off it goes through the duplicate MAC ID check again, and otherwise stays off.
     pub bus_off_reset: bool,
     /// The slaves.
@@ -261,7 +268,7 @@ pub enum ConfigError {
 }
 
 impl MasterConfig {
-    /// A master without slaves, with the usual times: 2.5 s for answers, one second between attempts.
+    /// A master without slaves, with the usual times: 2.5 s for answers, one to eight seconds between attempts.
     #[must_use]
     pub fn new(mac: MacId, vendor: u16, serial: u32, rate: DataRate, cycle: DurationNs) -> Self {
         Self {
@@ -272,9 +279,22 @@ impl MasterConfig {
             cycle,
             explicit_timeout: DurationNs::from_millis(2500),
             retry: DurationNs::from_secs(1),
+            retry_max: DurationNs::from_secs(8),
             bus_off_reset: false,
             slaves: Vec::new(),
         }
+    }
+
+    /// Frames of the I/O messages of a cycle, when every slave is asked.
+    #[must_use]
+    pub fn io_frames(&self) -> usize {
+        let connections = || self.slaves.iter().flat_map(|slave| &slave.connections);
+        let strobe = usize::from(connections().any(|one| one.kind == ConnectionKind::BitStrobe));
+        let output = |one: &IoConfig| match one.kind {
+            ConnectionKind::BitStrobe => 0,
+            _ => message_frames(one.output),
+        };
+        connections().map(|one| output(one) + message_frames(one.input)).sum::<usize>() + strobe
     }
 
     /// Time that the I/O messages of a cycle take on the wire at most, when every slave is asked.
@@ -299,6 +319,7 @@ impl MasterConfig {
         let times = [
             ("time for an explicit answer", self.explicit_timeout, ACKNOWLEDGE_TIMEOUT * 2),
             ("retry", self.retry, DurationNs::ZERO),
+            ("longest retry", self.retry_max, self.retry - DurationNs(1)),
         ];
         if let Some((what, got, above)) = times.into_iter().find(|(_, got, above)| got <= above) {
             return Err(ConfigError::Time { what, got, above });

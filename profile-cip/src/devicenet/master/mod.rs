@@ -34,7 +34,7 @@ use std::collections::VecDeque;
 
 use arrayvec::ArrayVec;
 use profile_generic::can::Frame;
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::client::Client;
 use self::config::{CONNECTIONS_MAX, ConfigError, MasterConfig, SlaveConfig};
@@ -120,6 +120,8 @@ struct Station {
     since: MonotonicTime,
     /// The slave is asked again then.
     retry_at: MonotonicTime,
+    /// Time from the next loss to the next attempt.
+    retry_pause: DurationNs,
     /// Reason told last.
     told: Option<LossReason>,
     client: Client,
@@ -169,6 +171,7 @@ impl Master {
             step: 0,
             since: MonotonicTime::ZERO,
             retry_at: MonotonicTime::ZERO,
+            retry_pause: config.retry,
             told: None,
             client: Client::new(config.mac, slave.mac, config.explicit_timeout),
             own: false,
@@ -225,6 +228,18 @@ impl Master {
     #[must_use]
     pub const fn access(&self) -> AccessState {
         self.access.state()
+    }
+
+    /// When the next cycle begins; `None` while the master is not on line.
+    #[must_use]
+    pub fn next_cycle(&self) -> Option<MonotonicTime> {
+        self.access.is_online().then_some(self.next_cycle)
+    }
+
+    /// Whether everything that was made is sent.
+    #[must_use]
+    pub fn is_drained(&self) -> bool {
+        self.frames.is_empty()
     }
 
     /// What it was told.

@@ -158,6 +158,23 @@ impl MotionEnd {
         self.handshake.request(request);
     }
 
+    /// What the axis is to be asked for from now on, in place of whatever is asked for; the same one again changes nothing.
+    /// `None` lets a request that is under way end, and makes no new one.
+    pub fn order(&mut self, request: Option<AxisControl>) {
+        match request {
+            None => self.handshake.withdraw(),
+            Some(request) if self.handshake.code() == AxisControl::NONE => self.handshake.request(request),
+            Some(request) if self.handshake.code() != request => self.handshake.chain(request),
+            Some(_) => {}
+        }
+    }
+
+    /// The change of state that is asked for now and not answered.
+    #[must_use]
+    pub const fn asked(&self) -> AxisControl {
+        self.handshake.code()
+    }
+
     /// Response Status of `request`, once: 0 is success.
     pub fn take_answer(&mut self, request: AxisControl) -> Option<u8> {
         self.handshake.take(request).map(|answer| answer.status)

@@ -149,7 +149,7 @@ impl Master {
         loop {
             self.take_outcome(now, place);
             let master = self.config.mac;
-            let running = self.running;
+            let (running, retry) = (self.running, self.config.retry);
             let station = &mut self.stations[place];
             if station.phase == Phase::Waiting
                 && running
@@ -172,6 +172,7 @@ impl Master {
                     if next == Phase::Exchange {
                         station.ends.iter_mut().for_each(super::IoEnd::reset);
                         station.told = None;
+                        station.retry_pause = retry;
                         let mac = station.config.mac;
                         self.tell(Event::Exchanging(mac));
                     }
@@ -228,7 +229,7 @@ impl Master {
 
     /// A slave is not exchanged with any more; it is asked for again after a while.
     pub(super) fn lose(&mut self, now: MonotonicTime, place: usize, reason: LossReason) {
-        let retry = self.config.retry;
+        let retry_max = self.config.retry_max;
         let station = &mut self.stations[place];
         let slave = station.config.mac;
         station.client.reset();
@@ -237,7 +238,8 @@ impl Master {
         station.end_requests();
         station.ends.iter_mut().for_each(super::IoEnd::reset);
         station.enter(now, station.phase.next(PhaseEvent::Lost));
-        station.retry_at = now + retry;
+        station.retry_at = now + station.retry_pause;
+        station.retry_pause = (station.retry_pause * 2).min(retry_max);
         self.statistics.losses += 1;
         if self.stations[place].told.as_ref() != Some(&reason) {
             self.stations[place].told = Some(reason.clone());

@@ -85,6 +85,12 @@ impl SpeedEnd {
         self.resets = Some(RESET_MESSAGES);
     }
 
+    /// Whether the reset of a fault is raised.
+    #[must_use]
+    pub fn is_resetting(&self) -> bool {
+        self.resets.is_some_and(|left| left > 0)
+    }
+
     /// The connection was taken anew: what was asked does not count any more.
     pub fn restart(&mut self) {
         self.stop();
@@ -97,7 +103,7 @@ impl SpeedEnd {
     /// # Errors
     /// The buffer is too short.
     pub fn emit(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
-        let raised = self.resets.is_some_and(|left| left > 0);
+        let raised = self.is_resetting();
         self.command.control.set(SpeedControl::FAULT_RESET, raised);
         let len = self.command.emit(self.output, buffer)?;
         self.resets = self.resets.and_then(|left| left.checked_sub(1));

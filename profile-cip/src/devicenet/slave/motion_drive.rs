@@ -13,8 +13,8 @@
 //! | released, deleted | closes: the axis is without torque and initializes |
 //! | a message without data | none: updates that are missing count as missing |
 //!
-//! Units: position control unit is the encoder count, velocity and acceleration are counts per second and per second
-//! squared, torque is % of the rated one.
+//! Units (IEC 61800-7-202, Table 35): the position control unit is the encoder count, velocity and acceleration are in
+//! revolutions per second and per second squared, torque is % of the rated one.
 
 use core::net::{Ipv4Addr, SocketAddrV4};
 
@@ -208,17 +208,6 @@ impl MotionDrive {
         saturate((i128::from(nanounits) * self.counts_per_unit()).div_euclid(NANO))
     }
 
-    /// Nanounits a second of so many counts a second.
-    fn velocity(&self, counts: f32) -> i64 {
-        let per_count = 1e9 / f64::from(self.config.servo.encoder_counts);
-        cast::i64_from_f64(f64::from(counts) * per_count)
-    }
-
-    fn counts_f32(&self, nanounits: i64) -> f32 {
-        let per_nanounit = f64::from(self.config.servo.encoder_counts) / 1e9;
-        narrow(cast::f64_from_i64(nanounits) * per_nanounit)
-    }
-
     // -- simulation ---------------------------------------------------------------------------------------------
 
     /// One step: what the axis has to do goes to the servo, and what became of it back.
@@ -287,7 +276,8 @@ impl MotionDrive {
                 ServoCommand { mode: OperatingMode::Position, position, ..command }
             }
             ControlMode::VELOCITY => {
-                let velocity = Velocity(self.velocity(values.velocity.unwrap_or(0.0)));
+                let velocity = f64::from(values.velocity.unwrap_or(0.0)) * 1e9;
+                let velocity = Velocity(cast::i64_from_f64(velocity));
                 ServoCommand { velocity, ..command }
             }
             ControlMode::TORQUE => {
@@ -315,8 +305,8 @@ impl MotionDrive {
             tracking: enable && actual.report == Report::Operating,
             conditions: self.conditions(),
             position: self.counts(actual.position.0),
-            velocity: Some(self.counts_f32(velocity)),
-            acceleration: Some(self.counts_f32(acceleration)),
+            velocity: Some(units(velocity)),
+            acceleration: Some(units(acceleration)),
             torque: Some(narrow(cast::f64_from_i64(actual.torque.0) / 10_000.0)),
             ..DriveImage::default()
         }
@@ -405,6 +395,11 @@ fn saturate(value: i128) -> i64 {
 fn low_word(value: i64) -> i32 {
     let [a, b, c, d, ..] = value.to_le_bytes();
     i32::from_le_bytes([a, b, c, d])
+}
+
+/// Units of so many nanounits.
+fn units(nanounits: i64) -> f32 {
+    narrow(cast::f64_from_i64(nanounits) / 1e9)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a REAL has fewer digits; rounding is what is wanted")]

@@ -119,16 +119,15 @@ fn a_drive_is_taken_configured_enabled_and_moved_in_position_control() {
 fn velocity_and_torque_control() {
     let (mut net, controllers) = stopped(&[(5, SetPoint::Velocity(0.0), Watched::Velocity)]);
     enable(&mut net, &controllers);
-    let turns = f32::from(1_u16 << 10) * 1024.0;
-    controllers[0].borrow_mut().end.set(SetPoint::Velocity(10.0 * turns)).unwrap();
+    controllers[0].borrow_mut().end.set(SetPoint::Velocity(10.0)).unwrap();
     run(&mut net, &controllers, 500);
-    let velocity = controllers[0].borrow().end.velocity().unwrap() / turns;
+    let velocity = controllers[0].borrow().end.velocity().unwrap();
     assert!((velocity - 10.0).abs() < 0.1, "{velocity}");
     controllers[0].borrow_mut().end.set(SetPoint::Torque(20.0)).unwrap();
     run(&mut net, &controllers, 100);
     let torque = net.motion(1).application().actual().torque.0;
     assert!((torque - 200_000).abs() < 20_000, "{torque}");
-    let faster = controllers[0].borrow().end.velocity().unwrap() / turns;
+    let faster = controllers[0].borrow().end.velocity().unwrap();
     assert!(faster > 10.5, "{faster}");
     assert_eq!(
         controllers[0].borrow_mut().end.set(SetPoint::Velocity(f32::NAN)),
@@ -166,7 +165,7 @@ fn three_drives_and_one_that_fails() {
     let (mut net, controllers) = stopped(&[velocity(5), velocity(9), velocity(63)]);
     enable(&mut net, &controllers);
     for controller in &controllers {
-        controller.borrow_mut().end.set(SetPoint::Velocity(1e6)).unwrap();
+        controller.borrow_mut().end.set(SetPoint::Velocity(1.0)).unwrap();
     }
     run(&mut net, &controllers, 300);
     net.plug(2, false);
@@ -200,7 +199,7 @@ fn three_drives_and_one_that_fails() {
 fn a_slave_that_is_given_back_while_its_axis_runs_has_no_torque_and_no_fault() {
     let (mut net, controllers) = stopped(&[(5, SetPoint::Velocity(0.0), Watched::Velocity)]);
     enable(&mut net, &controllers);
-    controllers[0].borrow_mut().end.set(SetPoint::Velocity(1e6)).unwrap();
+    controllers[0].borrow_mut().end.set(SetPoint::Velocity(1.0)).unwrap();
     run(&mut net, &controllers, 200);
     let now = net.now;
     net.master().stop(now);

@@ -182,7 +182,7 @@ impl SpareIds {
 pub fn object(item: Item) -> Option<Object> {
     match item {
         Item::Object(object) => Some(object),
-        Item::Idn(_) => None,
+        Item::Idn(_) | Item::Attribute(_) => None,
     }
 }
 

@@ -1,0 +1,163 @@
+//! The DeviceNet networks of a configuration.
+
+use profile_cip::devicenet::master::config::{MasterConfig, SlaveConfig};
+use profile_cip::wire::motion::codes::ControlMode;
+use profile_generic::mode::OperatingMode;
+use profile_generic::ratio::Ratio;
+use profile_generic::scaling::{NANO, UnitKind};
+
+use super::{BuildError, kind, parameters};
+use crate::config::{Axis, AxisFunction, CanLink, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
+use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
+use crate::engine::bus::devicenet::setup::{SetupStep, motion_steps, speed_steps};
+use crate::engine::bus::devicenet::{DevicenetBus, DrivePlan};
+use crate::mapping::devicenet::{DevicenetError, MotionAxis, SpeedAxis};
+use crate::mapping::{CipScaling, DriveProgram, Mapping};
+
+/// Highest SpeedScale and, with a minus, the lowest one that a ratio has room for.
+const SCALE_MAX: u32 = 30;
+
+/// What the master of a network is told. Slaves that no axis is on are not taken.
+#[must_use]
+pub fn master(config: &Config, place: usize) -> MasterConfig {
+    let network = &config.devicenet[place];
+    // The box is one node there, whatever its devices are.
+    let identity = config.devices.first().map(|device| &device.identity);
+    let (vendor, serial) = identity.map_or((0, 0), |identity| (identity.vendor_id, identity.serial_number));
+    let mut master = MasterConfig::new(network.mac, vendor, serial, network.rate, network.cycle_time);
+    for (number, drive) in network.drives.iter().enumerate() {
+        if axis_of(config, place, number).is_none() {
+            continue;
+        }
+        let (output, input) = lengths(drive);
+        let slave = SlaveConfig::polled(drive.mac, output, input, drive.packet_rate_ms);
+        master.slaves.push(SlaveConfig {
+            identity: drive.identity,
+            missed_max: network.allowed_losses,
+            ..slave
+        });
+    }
+    master
+}
+
+/// Bytes of the messages of a drive: to it, and from it.
+fn lengths(drive: &DevicenetDrive) -> (usize, usize) {
+    use profile_cip::devicenet::master::motion::UPDATE_LEN;
+    match drive.kind {
+        DevicenetKind::Motion { .. } => (UPDATE_LEN, UPDATE_LEN),
+        DevicenetKind::Speed { assembly, .. } => {
+            (assembly.buffer_len(), assembly.status().map_or(0, |status| status.buffer_len()))
+        }
+    }
+}
+
+fn axis_of(config: &Config, network: usize, drive: usize) -> Option<(usize, &Axis)> {
+    let at = DriveAt::Devicenet { network, drive };
+    config.axes.iter().enumerate().find(|(_, axis)| axis.drive == at)
+}
+
+/// A network.
+pub(super) fn bus(config: &Config, place: usize, mapping: &Mapping) -> Result<DevicenetBus, BuildError> {
+    let network = &config.devicenet[place];
+    let mut drives = Vec::with_capacity(network.drives.len());
+    for (number, drive) in network.drives.iter().enumerate() {
+        if let Some((number, axis)) = axis_of(config, place, number) {
+            let made = plan(network, drive, axis, number, mapping);
+            drives.push(made.map_err(|error| BuildError::DevicenetDrive { name: axis.name.clone(), error })?);
+        }
+    }
+    let name = match &network.link {
+        CanLink::InProcess => "in-process",
+        CanLink::Interface { name, .. } => name,
+    };
+    let number = u8::try_from(place).unwrap_or(u8::MAX);
+    DevicenetBus::new(number, master(config, place), drives)
+        .map_err(|error| BuildError::Devicenet { network: name.to_owned(), error })
+}
+
+fn plan(
+    network: &Devicenet,
+    drive: &DevicenetDrive,
+    axis: &Axis,
+    number: usize,
+    mapping: &Mapping,
+) -> Result<DrivePlan, DevicenetError> {
+    let (end, program, steps) = parts(network, drive, axis, mapping)?;
+    Ok(DrivePlan { axis: number, mac: drive.mac, end, program, steps })
+}
+
+/// What a drive is led by.
+///
+/// # Errors
+/// The tables have nothing for it, or its numbers do not fit.
+pub fn parts(
+    network: &Devicenet,
+    drive: &DevicenetDrive,
+    axis: &Axis,
+    mapping: &Mapping,
+) -> Result<(End, DriveProgram, Vec<SetupStep>), DevicenetError> {
+    match &drive.kind {
+        DevicenetKind::Motion { modes, resolution } => {
+            let modes: &[OperatingMode] = match axis.function {
+                AxisFunction::Drive => modes,
+                // What is only looked at has its position looked at.
+                AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
+            };
+            let scaling = scaling(drive, axis, *resolution)?;
+            let program = mapping.devicenet_motion_program(&MotionAxis { scaling, modes: modes.to_vec() })?;
+            let limits = parameters(axis);
+            let limits = limits
+                .into_iter()
+                .map(|(parameter, value)| mapping.devicenet_parameter(&scaling, parameter, value))
+                .collect::<Result<Vec<_>, _>>()?;
+            let first = match modes.first() {
+                Some(OperatingMode::Velocity) => ControlMode::VELOCITY,
+                Some(OperatingMode::Torque) => ControlMode::TORQUE,
+                _ => ControlMode::POSITION,
+            };
+            let link = MotionLink::new(first, *resolution, network.cycle_time);
+            Ok((End::Motion(link), program, motion_steps(&limits)))
+        }
+        DevicenetKind::Speed { assembly, scale } => {
+            let speed = speed(drive, axis, *scale).ok_or(DevicenetError::Overflow)?;
+            let extended = assembly.is_extended();
+            let program = mapping.devicenet_speed_program(&SpeedAxis { speed, extended })?;
+            let link = SpeedLink::new(*assembly).map_err(|_| DevicenetError::Assembly(*assembly))?;
+            Ok((End::Speed(link), program, speed_steps(*scale, extended)))
+        }
+    }
+}
+
+/// The units of a CIP Motion drive: revolutions of its motor, or millimetres.
+fn scaling(drive: &DevicenetDrive, axis: &Axis, resolution: u32) -> Result<CipScaling, DevicenetError> {
+    // Nanounits of the axis in a turn; a way that is no whole number of them cannot be.
+    let way = match drive.way_of_a_turn {
+        Some(way) if kind(axis) == UnitKind::Linear => {
+            let whole = way.convert(NANO, profile_generic::ratio::Rounding::Nearest);
+            if whole.inexact || whole.saturated {
+                return Err(DevicenetError::Overflow);
+            }
+            whole.value
+        }
+        _ => NANO,
+    };
+    Ok(CipScaling {
+        kind: kind(axis),
+        nanounits_per_unit: way,
+        counts_per_unit: i64::from(resolution),
+        inverted: false,
+        unwind: None,
+    })
+}
+
+/// Nanounits of the axis per second in a unit of the speed: rpm / 2^SpeedScale.
+fn speed(drive: &DevicenetDrive, axis: &Axis, scale: i8) -> Option<Ratio> {
+    let steps = u32::from(scale.unsigned_abs()).min(SCALE_MAX);
+    let power = 1_i64 << steps;
+    let rpm = Ratio::new(NANO, 60)?;
+    let unit = rpm.then(if scale < 0 { Ratio::new(power, 1)? } else { Ratio::new(1, power)? })?;
+    match kind(axis) {
+        UnitKind::Rotary => Some(unit),
+        UnitKind::Linear => unit.then(drive.way_of_a_turn?),
+    }
+}

@@ -1,0 +1,503 @@
+//! The DeviceNet side of the engine: the master, and the drives on the way from their allocation to the cycle.
+//!
+//! The master takes each slave by itself. Once its poll connection runs, the drive is [set up](setup) by explicit messages
+//! beside the exchange, and only then its axis has a program. A drive that is lost is taken again by the master, with pauses
+//! that grow, and goes the same way; the others go on.
+//!
+//! Everything that a drive can need is made before the start: nothing here allocates, so there is no commissioner.
+
+pub mod access;
+pub mod end;
+pub mod setup;
+
+use arrayvec::ArrayVec;
+use profile_cip::devicenet::connection::ConnectionKind;
+use profile_cip::devicenet::master::Master;
+use profile_cip::devicenet::master::config::{ConfigError, MasterConfig};
+use profile_cip::devicenet::master::event::{Event, Outcome, Ticket};
+use profile_cip::devicenet::master::station::Phase;
+use profile_cip::devicenet::wire::MacId;
+use profile_generic::can::Frame;
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+use self::end::{End, Row};
+use self::setup::{SetupFailure, SetupStep};
+use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
+use crate::engine::access::{Access, Data, Operation, Progress};
+use crate::engine::axis::AxisChannel;
+use crate::engine::notice::Notice;
+use crate::engine::port::{CanInput, CanSent, SouthPort};
+use crate::mapping::devicenet::ROW_LEN;
+use crate::mapping::{DriveProgram, Item, Mapping};
+
+/// The connection that carries the commands.
+const POLL: ConnectionKind = ConnectionKind::Poll;
+
+/// Frames taken from the network in one call: more than it carries in ten milliseconds.
+const FRAMES_PER_CALL: usize = 256;
+
+/// Accesses of one axis that wait for an answer at the same time.
+const ACCESSES_MAX: usize = 2;
+
+/// How long a frame waits for room in the transmit queue before it is offered again.
+const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
+
+/// Longest wait for what comes in: answers come at any time.
+const PATIENCE: DurationNs = DurationNs::from_millis(1);
+
+/// Pause before a drive that could not be set up is tried anew, and before the box asks again for a MAC ID that another node
+/// has; it doubles with every vain attempt.
+const RETRY_PAUSE: DurationNs = DurationNs::from_secs(10);
+
+/// Longest such pause.
+const RETRY_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
+
+/// A pause that grows.
+#[derive(Debug, Clone, Copy)]
+struct Backoff {
+    at: Option<MonotonicTime>,
+    pause: DurationNs,
+}
+
+impl Backoff {
+    const NONE: Self = Self { at: None, pause: RETRY_PAUSE };
+
+    fn begin(&mut self, now: MonotonicTime) {
+        self.at = Some(now + self.pause);
+        self.pause = (self.pause * 2).min(RETRY_PAUSE_MAX);
+    }
+
+    /// Whether the pause is over, once.
+    fn take(&mut self, now: MonotonicTime) -> bool {
+        self.at.take_if(|at| now >= *at).is_some()
+    }
+}
+
+/// Where a drive is on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// The master takes it, or it is not there.
+    Absent,
+    /// It is set up: the step, and the request that is under way.
+    Setup(usize, Option<Ticket>),
+    /// Its axis is led.
+    Ready,
+    /// It could not be set up.
+    Unfit,
+}
+
+/// What the bus has to know of a drive.
+#[derive(Debug)]
+pub struct DrivePlan {
+    /// Number of the axis in the box.
+    pub axis: usize,
+    /// Its MAC ID.
+    pub mac: MacId,
+    /// The box's end of its poll connection.
+    pub end: End,
+    /// How its axis speaks to it. Without anything on the heap, because it is copied in the cycle.
+    pub program: DriveProgram,
+    /// How it is set up.
+    pub steps: Vec<SetupStep>,
+}
+
+#[derive(Debug)]
+struct Drive {
+    plan: DrivePlan,
+    stage: Stage,
+    command: Row,
+    feedback: Row,
+    fresh: bool,
+    /// It has been tried: nobody waits for it any longer.
+    tried: bool,
+    backoff: Backoff,
+    accesses: ArrayVec<(Ticket, Purpose, Item), ACCESSES_MAX>,
+}
+
+/// A frame that waits for room in the transmit queue.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    frame: Frame,
+    /// When it is offered again.
+    again: MonotonicTime,
+}
+
+/// The bus.
+#[derive(Debug)]
+pub struct DevicenetBus {
+    /// Its number among the DeviceNet networks of the box.
+    number: u8,
+    master: Master,
+    drives: Vec<Drive>,
+    cycles_seen: u64,
+    /// Messages of drives that did not count.
+    refused: u64,
+    held: Option<Held>,
+    /// When the frames that wait were made.
+    made_at: MonotonicTime,
+    /// It is on, or tries to be.
+    started: bool,
+    backoff: Backoff,
+    up: bool,
+    stopped: bool,
+}
+
+impl DevicenetBus {
+    /// A bus that begins with the first call.
+    ///
+    /// # Errors
+    /// What the master finds wrong with its configuration.
+    pub fn new(number: u8, config: MasterConfig, drives: Vec<DrivePlan>) -> Result<Self, ConfigError> {
+        let drive = |plan| Drive {
+            plan,
+            stage: Stage::Absent,
+            command: [0; ROW_LEN],
+            feedback: [0; ROW_LEN],
+            fresh: false,
+            tried: false,
+            backoff: Backoff::NONE,
+            accesses: ArrayVec::new(),
+        };
+        Ok(Self {
+            number,
+            master: Master::new(config)?,
+            drives: drives.into_iter().map(drive).collect(),
+            cycles_seen: 0,
+            refused: 0,
+            held: None,
+            made_at: MonotonicTime::ZERO,
+            started: false,
+            backoff: Backoff::NONE,
+            up: false,
+            stopped: false,
+        })
+    }
+
+    /// The master.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    /// Takes what the drives have answered in the cycle that has ended.
+    fn gather(&mut self) {
+        let cycle = self.master.statistics().cycles;
+        for drive in &mut self.drives {
+            drive.fresh = false;
+            let consumer = self.master.consumer(drive.plan.mac, POLL);
+            let Some(consumer) = consumer.filter(|consumer| consumer.fresh) else { continue };
+            match drive.plan.end.handle(cycle, consumer.data, &mut drive.feedback) {
+                Ok(()) => drive.fresh = true,
+                Err(_) => self.refused += 1,
+            }
+        }
+    }
+
+    fn event(&mut self, now: MonotonicTime, event: &Event) {
+        match event {
+            Event::Online => self.backoff = Backoff::NONE,
+            Event::DuplicateMac { .. } => {
+                self.backoff.begin(now);
+                // Nobody will be taken for now.
+                self.drives.iter_mut().for_each(|drive| drive.tried = true);
+            }
+            Event::Lost { slave, .. } => {
+                let drive = self.drives.iter_mut().find(|drive| drive.plan.mac == *slave);
+                drive.into_iter().for_each(|drive| drive.tried = true);
+            }
+            _ => {}
+        }
+    }
+
+    /// An explicit request has ended.
+    fn outcome(
+        &mut self,
+        now: MonotonicTime,
+        ticket: Ticket,
+        outcome: &Outcome,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        for drive in &mut self.drives {
+            let axis = drive.plan.axis;
+            if let Stage::Setup(step, Some(known)) = drive.stage
+                && known == ticket
+            {
+                let judged = drive.plan.steps.get(step).map_or(Ok(()), |step| step.judge(outcome));
+                match (judged, outcome) {
+                    (Ok(()), _) => drive.stage = Stage::Setup(step + 1, None),
+                    // It is taken anew, and set up anew.
+                    (Err(_), Outcome::Lost) => drive.stage = Stage::Absent,
+                    (Err(failure), _) => {
+                        drive.stage = Stage::Unfit;
+                        drive.tried = true;
+                        drive.backoff.begin(now);
+                        notice(told(axis, drive.plan.mac, failure));
+                    }
+                }
+                return;
+            }
+            if let Some(at) = drive.accesses.iter().position(|(known, ..)| *known == ticket) {
+                let (_, purpose, item) = drive.accesses.remove(at);
+                answer(axes, Answer { axis, purpose, item, result: reply(item, purpose, outcome) });
+                return;
+            }
+        }
+    }
+
+    /// Takes each drive on as far as it goes now.
+    fn lead_on(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        let Self { master, drives, .. } = self;
+        for drive in drives {
+            let axis = drive.plan.axis;
+            if master.phase(drive.plan.mac) != Some(Phase::Exchange) {
+                if drive.stage == Stage::Ready {
+                    axes[axis].lose_south(now, system);
+                }
+                if drive.stage != Stage::Absent {
+                    (drive.stage, drive.fresh) = (Stage::Absent, false);
+                }
+                continue;
+            }
+            match drive.stage {
+                Stage::Absent => {
+                    drive.plan.end.restart();
+                    drive.fresh = false;
+                    drive.stage = Stage::Setup(0, None);
+                }
+                Stage::Unfit if drive.backoff.take(now) => drive.stage = Stage::Setup(0, None),
+                Stage::Setup(step, None) if drive.plan.end.is_answered() => {
+                    if let Some(step_of) = drive.plan.steps.get(step) {
+                        // A full queue is tried again in the next call.
+                        let ticket = master.submit(drive.plan.mac, step_of.request()).ok();
+                        drive.stage = Stage::Setup(step, ticket);
+                    } else if drive.fresh {
+                        drive.stage = Stage::Ready;
+                        (drive.tried, drive.backoff) = (true, Backoff::NONE);
+                        drive.command = [0; ROW_LEN];
+                        axes[axis].set_south(drive.plan.program.clone());
+                    }
+                }
+                Stage::Setup(..) | Stage::Unfit | Stage::Ready => {}
+            }
+        }
+    }
+}
+
+fn told(axis: usize, mac: MacId, failure: SetupFailure) -> Notice {
+    Notice::SlaveSetup { axis: u8::try_from(axis).unwrap_or(u8::MAX), mac, failure }
+}
+
+/// What an access came to.
+fn reply(
+    item: Item,
+    purpose: Purpose,
+    outcome: &Outcome,
+) -> Result<(Data, Progress), crate::engine::access::AccessFailure> {
+    let Item::Attribute(attribute) = item else {
+        return Err(crate::engine::access::AccessFailure::Unanswered);
+    };
+    if matches!(purpose, Purpose::Attribute { write: true, .. }) {
+        access::written(attribute, outcome)?;
+        return Ok((Data::new(), Progress::None));
+    }
+    Ok((access::value(attribute, outcome)?, Progress::None))
+}
+
+impl Bus for DevicenetBus {
+    fn cycle_time(&self) -> DurationNs {
+        self.master.config().cycle
+    }
+
+    fn patience(&self) -> DurationNs {
+        PATIENCE
+    }
+
+    fn wake_at(&self) -> Option<MonotonicTime> {
+        match self.held {
+            Some(held) => Some(held.again),
+            None => self.master.wake_at(),
+        }
+    }
+
+    fn is_due(&self, now: MonotonicTime) -> bool {
+        self.master.next_cycle().is_none_or(|at| now >= at)
+    }
+
+    fn is_up(&self) -> bool {
+        self.up
+    }
+
+    fn phase(&self) -> Option<u8> {
+        None
+    }
+
+    fn counts(&self) -> Counts {
+        let statistics = self.master.statistics();
+        Counts {
+            cycles: statistics.cycles,
+            lost: statistics.missed,
+            refused: statistics.refused + self.refused,
+        }
+    }
+
+    fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
+        let SouthPort::Can(port) = port else { return };
+        for _ in 0..FRAMES_PER_CALL {
+            match port.receive(now) {
+                // A refused frame is counted by the master and changes nothing.
+                Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
+                Some(CanInput::BusOff) => {
+                    self.held = None;
+                    self.master.handle_bus_off(now);
+                    self.drives.iter_mut().for_each(|drive| drive.tried = true);
+                }
+                // Whether the MAC ID is still free has to be asked anew.
+                Some(CanInput::BusOn) if !self.stopped => self.master.start(now),
+                Some(CanInput::BusOn) => {}
+                None => break,
+            }
+        }
+    }
+
+    fn take_cycle(&mut self) -> bool {
+        let cycles = self.master.statistics().cycles;
+        let taken = std::mem::replace(&mut self.cycles_seen, cycles) != cycles;
+        if taken {
+            self.gather();
+        }
+        taken
+    }
+
+    fn feedback(&self, axis: usize) -> Option<Received<'_>> {
+        let drive = self.drives.iter().find(|drive| drive.plan.axis == axis)?;
+        // The master gives a drive up that has missed too many answers.
+        let alive = self.master.phase(drive.plan.mac) == Some(Phase::Exchange);
+        let ready = drive.stage == Stage::Ready;
+        ready.then_some(Received { data: &drive.feedback, fresh: drive.fresh, alive })
+    }
+
+    fn set_idle(&mut self, _idle: bool) {}
+
+    fn run(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        _mapping: &Mapping,
+        axes: &mut [AxisChannel],
+        answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        if !self.stopped && (!self.started || self.backoff.take(now)) {
+            self.started = true;
+            self.master.start(now);
+        }
+        while let Some(event) = self.master.poll_event() {
+            if let Event::Explicit { ticket, outcome } = &event {
+                self.outcome(now, *ticket, outcome, axes, answer, notice);
+                continue;
+            }
+            self.event(now, &event);
+            notice(Notice::Devicenet { network: self.number, event });
+        }
+        self.lead_on(now, system, axes);
+        for place in 0..self.drives.len() {
+            let axis = self.drives[place].plan.axis;
+            if self.drives[place].stage == Stage::Ready {
+                ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
+            }
+        }
+        let mut ready = false;
+        let mut settled = true;
+        for drive in &self.drives {
+            ready |= drive.stage == Stage::Ready;
+            settled &= drive.tried;
+        }
+        self.up = !self.stopped && (self.up || settled && ready);
+    }
+
+    fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
+        let Self { master, drives, .. } = self;
+        let Some(drive) = drives.iter_mut().find(|drive| drive.plan.axis == axis) else {
+            fill(None);
+            return;
+        };
+        let mac = drive.plan.mac;
+        let ready = drive.stage == Stage::Ready;
+        let given = fill(ready.then_some(&mut drive.command[..]));
+        let exchanging = master.phase(mac) == Some(Phase::Exchange);
+        // Without a command the master sends a message without data, which keeps the connection and commands nothing.
+        let Some(message) = master.producer(mac, POLL).filter(|_| exchanging) else { return };
+        let written = match drive.stage {
+            Stage::Ready => given && drive.plan.end.emit(&drive.command, message),
+            Stage::Setup(..) => drive.plan.end.emit_neutral(message),
+            Stage::Absent | Stage::Unfit => false,
+        };
+        if written {
+            master.commit(mac, POLL);
+        }
+    }
+
+    fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
+        let Item::Attribute(attribute) = access.item else { return false };
+        let request = match &access.operation {
+            Operation::Read => access::read(attribute),
+            Operation::Write(data) => access::write(attribute, data),
+            Operation::Command | Operation::Start | Operation::Progress | Operation::Cancel => None,
+        };
+        let Some(request) = request else { return false };
+        let Self { master, drives, .. } = self;
+        let Some(drive) = drives.iter_mut().find(|drive| drive.plan.axis == axis) else { return false };
+        if drive.stage != Stage::Ready || drive.accesses.is_full() {
+            return false;
+        }
+        match master.submit(drive.plan.mac, request) {
+            Ok(ticket) => {
+                drive.accesses.push((ticket, purpose, access.item));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
+        let mut sent = Sent::default();
+        let SouthPort::Can(port) = port else { return sent };
+        let cycles = self.master.statistics().cycles;
+        loop {
+            if self.held.is_none() && self.master.is_drained() {
+                // What comes now is made now; all of it has the same age.
+                self.made_at = now;
+            }
+            let next = self.held.take().map(|held| held.frame).or_else(|| self.master.poll(now));
+            let Some(frame) = next else { break };
+            // What has waited for a whole cycle is old: no drive shall act on it.
+            let result = match now.since(self.made_at) > self.cycle_time() {
+                true => CanSent::Failed,
+                false => port.send(now, &frame),
+            };
+            match result {
+                CanSent::Sent => {}
+                CanSent::Full => {
+                    self.held = Some(Held { frame, again: now + FULL_PAUSE });
+                    break;
+                }
+                CanSent::Failed => sent.failures += 1,
+            }
+        }
+        sent.cycle = self.master.statistics().cycles != cycles;
+        sent
+    }
+
+    fn stop(&mut self, now: MonotonicTime) {
+        if !std::mem::replace(&mut self.stopped, true) {
+            self.master.stop(now);
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        // The drives have been given back, or cannot be.
+        self.stopped && self.master.is_drained() && self.held.is_none()
+    }
+}
