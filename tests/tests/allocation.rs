@@ -9,19 +9,22 @@ use axisbridge::config::Config;
 use axisbridge::engine::notice::Notice;
 use axisbridge::mapping::{CyclicValues, Mapping};
 use axisbridge::simulate::drives::linear;
+use axisbridge::status::BoxState;
 use axisbridge::translate::Stage;
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis};
 use axisbridge_tests::rig::network::Knobs;
+use axisbridge_tests::rig::ports::TamperCan;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::sets::DataSets;
-use profile_cip::controller::{AxisSet, ControllerConfig, Event, Misbehaviour, Step};
+use profile_cip::controller::{AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::mode::OperatingMode;
@@ -250,4 +253,90 @@ fn a_hookup_test_allocates_nothing() {
     assert_eq!(weigh(&mut rig, 6_000, |_, _| ()), []);
     assert!(rig.position(0) - from > 200_000_000, "it moved while it was weighed");
     assert!(stopped(&rig), "from beginning to end");
+}
+
+/// A box with two CAN drives that has just been switched on.
+fn on_can_from_the_start(tamper: Option<TamperCan>) -> Rig {
+    let configuration = include_str!("virtual_time/can.toml").to_owned();
+    let mut rig = Rig::new(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+    rig.can[0].tamper = tamper;
+    rig
+}
+
+/// Both CAN axes in the middle of a long move.
+fn on_can(tamper: Option<TamperCan>) -> Rig {
+    let mut rig = on_can_from_the_start(tamper);
+    rig.run_until(millis(20_000), "the bus up", |rig| rig.status().state == BoxState::READY);
+    let limits = Limits { velocity: 4.0, acceleration: 50.0, jerk: 1_000.0 };
+    rig.connect(vec![
+        Step::Enable(AxisSet::first(2)),
+        Step::Together(vec![
+            Step::MoveAbsolute { axis: 1, position: 1_000.0, limits },
+            Step::MoveAbsolute { axis: 2, position: 900.0, limits },
+        ]),
+    ]);
+    rig.run_until(millis(5_000), "both in motion", |rig| (0..2).all(|device| turns(rig, device)));
+    rig
+}
+
+fn turns(rig: &Rig, device: usize) -> bool {
+    let node = rig.can[0].bus.nodes().nth(device).expect("a device");
+    node.application().axes()[0].actual().velocity.get() > 700_000_000
+}
+
+#[test]
+fn cycles_with_two_can_axes_in_motion_allocate_nothing() {
+    let mut rig = on_can(None);
+    assert_eq!(weigh(&mut rig, 4_000, |_, _| ()), []);
+    assert!(rig.engine.axes().iter().all(|axis| axis.counters().commands > 900), "both axes were led");
+    assert!((0..2).all(|device| turns(&rig, device)));
+}
+
+/// The first drive has no torque to tell, and gets other PDOs than those that were planned.
+fn without_torque() -> TamperCan {
+    Box::new(|_, frame| {
+        let torque = frame.id() == Id::Standard(0x581) && frame.data().get(1..3) == Some(&[0x77, 0x60]);
+        if torque {
+            let abort = [0x80, 0x77, 0x60, 0, 0, 0, 0x02, 0x06];
+            *frame = Frame::new(frame.id(), &abort).expect("a frame");
+        }
+        true
+    })
+}
+
+#[test]
+fn can_drives_come_up_without_allocating_in_the_cycle() {
+    let mut rig = on_can_from_the_start(Some(without_torque()));
+    assert_eq!(weigh(&mut rig, 1_500, |_, _| ()), []);
+    assert_eq!(rig.status().state, BoxState::READY, "{}", rig.told());
+    let bus = rig.engine.buses().can().next().expect("a CAN bus");
+    let bytes = |node: usize| bus.master().config().nodes[node].tpdos.iter().map(|pdo| pdo.mapping.len());
+    assert!(bytes(0).sum::<usize>() < bytes(1).sum::<usize>(), "the first one has no torque");
+}
+
+#[test]
+fn neither_an_emergency_nor_a_lost_can_drive_nor_its_return_allocates() {
+    let mut rig = on_can(Some(without_torque()));
+    assert!(rig.told().contains("commissioning goes on without reading 6077:00"), "{}", rig.told());
+    let found = weigh(&mut rig, 6_000, |rig, number| {
+        let now = rig.now();
+        let bus = &mut rig.can[0].bus;
+        match number {
+            // Temperature of the motor, as a fault.
+            200 => {
+                let node = bus.nodes_mut().next().expect("a drive");
+                node.dictionary_mut().set(0x2FFF, 1, 0x4310);
+            }
+            1_000 => bus.connect(now, 0, false),
+            2_000 => bus.connect(now, 0, true),
+            _ => {}
+        }
+    });
+    let told = rig.told();
+    for line in ["CAN bus 1: the heartbeat of node 1 is gone", "CAN bus 1: node 1: EMCY 4310"] {
+        assert!(told.lines().any(|found| found.starts_with(line)), "{line}: {told}");
+    }
+    let back = told.lines().filter(|line| *line == "CAN bus 1: node 1 is in operation").count();
+    assert_eq!(back, 2, "{told}");
+    assert_eq!(found, []);
 }

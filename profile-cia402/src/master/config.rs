@@ -535,21 +535,6 @@ impl MasterConfig {
         }
         Ok(())
     }
-
-    /// The same network with other PDOs of one device, if that is possible.
-    pub(super) fn with_pdos(
-        &self,
-        place: usize,
-        rpdos: Vec<PdoConfig>,
-        tpdos: Vec<PdoConfig>,
-    ) -> Result<Self, ConfigError> {
-        let mut changed = self.clone();
-        if let Some(node) = changed.nodes.get_mut(place) {
-            (node.rpdos, node.tpdos) = (rpdos, tpdos);
-        }
-        changed.check()?;
-        Ok(changed)
-    }
 }
 
 fn check_heartbeat(node: NodeId, producer_ms: u16, timeout_ms: u16) -> Result<(), ConfigError> {

@@ -16,13 +16,15 @@
 //! were committed, which take effect at the next SYNC; what else there is to send follows. A device that is not in operation gets
 //! no RPDO, and nothing of it is fresh.
 //!
-//! All storage is set aside in [`Master::new`]; nothing is allocated or freed afterwards, but in [`Master::set_pdos`].
+//! All storage is set aside in [`Master::new`], and for other PDOs in [`pdo_set::PdoSet::new`]; nothing is allocated or freed
+//! afterwards.
 
 pub mod boot;
 pub mod config;
 mod cycle;
 mod ends;
 pub mod event;
+pub mod pdo_set;
 mod plan;
 mod program;
 mod queue;
@@ -37,7 +39,7 @@ use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::boot::{BootEvent, BootState, BootStatus};
-use self::config::{ConfigError, Direction, MasterConfig, PdoConfig};
+use self::config::{ConfigError, Direction, MasterConfig};
 pub use self::ends::{Consumer, ConsumerState};
 use self::event::{DuplicateSign, Event, Output, Refusal, Statistics, Ticket};
 pub use self::queue::Priority;
@@ -340,26 +342,6 @@ impl Master {
             (place, BootState::Await) => self.stations[place].proceed = true,
             (_, state) => return Err(CallError::State(state)),
         }
-        Ok(())
-    }
-
-    /// Replaces the PDOs of a device that awaits the application. This allocates.
-    ///
-    /// # Errors
-    /// [`CallError`]; the device keeps what it has.
-    pub fn set_pdos(
-        &mut self,
-        node: NodeId,
-        rpdos: Vec<PdoConfig>,
-        tpdos: Vec<PdoConfig>,
-    ) -> Result<(), CallError> {
-        let (place, state) = self.call(node)?;
-        if state != BootState::Await || self.stations[place].proceed {
-            return Err(CallError::State(state));
-        }
-        self.config = self.config.with_pdos(place, rpdos, tpdos)?;
-        self.stations[place].make_ends(&self.config.nodes[place]);
-        self.routes = Routes::new(&self.stations);
         Ok(())
     }
 

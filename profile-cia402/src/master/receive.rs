@@ -1,6 +1,7 @@
 //! What comes from the bus.
 
 use super::boot::BootState;
+use super::config::PDOS_MAX;
 use super::ends::Taken;
 use super::station::EmcyVerdict;
 use super::*;
@@ -34,7 +35,18 @@ pub(super) struct Routes {
 
 impl Routes {
     pub fn new(stations: &[Station]) -> Self {
-        let mut routes = Self { standard: vec![Route::None; STANDARD_COUNT].into(), extended: vec![] };
+        // As many as there can be, so that there is room for other PDOs.
+        let extended = Vec::with_capacity(stations.len() * 2 * PDOS_MAX);
+        let mut routes = Self { standard: vec![Route::None; STANDARD_COUNT].into(), extended };
+        routes.fill(stations);
+        routes
+    }
+
+    /// Fills them anew, without allocating.
+    pub fn fill(&mut self, stations: &[Station]) {
+        let routes = self;
+        routes.standard.fill(Route::None);
+        routes.extended.clear();
         let number = |place: usize| u16::try_from(place).unwrap_or(u16::MAX);
         for (index, station) in stations.iter().enumerate() {
             for (place, end) in station.tpdos.iter().enumerate() {
@@ -44,7 +56,6 @@ impl Routes {
                 routes.set(end.id, Route::Own);
             }
         }
-        routes
     }
 
     fn set(&mut self, id: Id, route: Route) {

@@ -246,7 +246,8 @@ impl GenericCan {
         let needs = &mut devices[0].1[0].needs;
         needs.modes = modes.into_iter().collect();
         prepare(needs, bus.nodes_mut().next().expect("a device"));
-        let (commissioner, end) = can::commissioner::Commissioner::new(mapping(), devices.iter().cloned());
+        let (commissioner, end) =
+            can::commissioner::Commissioner::new(mapping(), master.clone(), devices.iter().cloned());
         let master = CanBus::new(0, master, &devices, end).expect("the master's configuration is sound");
         let south = CanSouth { bus, commissioner, axis, connected: true };
         Self::on(AnyBus::Can(Box::new(master)), south, limits)

@@ -104,7 +104,7 @@ pub(super) fn bus(
     mapping: &Mapping,
 ) -> Result<(CanBus, Commissioner), BuildError> {
     let Network { master, devices } = network(config, place, mapping)?;
-    let (commissioner, end) = Commissioner::new(mapping.clone(), devices.iter().cloned());
+    let (commissioner, end) = Commissioner::new(mapping.clone(), master.clone(), devices.iter().cloned());
     let number = u8::try_from(place).unwrap_or(u8::MAX);
     let name = match &config.can[place].link {
         CanLink::InProcess => "in-process",

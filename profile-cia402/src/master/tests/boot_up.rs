@@ -291,13 +291,26 @@ fn the_application_works_before_pdos_are_configured() {
         rig.master.sdo_submit(id(1), SdoRequest::upload(Mux::new(0x5555, 0)), Priority::Normal).unwrap();
     // PDOs can be chosen by what the device has told.
     let rpdos = vec![PdoConfig::cyclic(2, vec![CONTROLWORD])];
-    rig.master.set_pdos(id(2), rpdos, vec![PdoConfig::cyclic(3, vec![POSITION])]).unwrap();
+    let config = rig.master.config().clone();
+    let set = |node, rpdos, tpdos| PdoSet::new(&config, id(node), rpdos, tpdos);
+    let chosen = set(2, rpdos, vec![PdoConfig::cyclic(3, vec![POSITION])]).unwrap();
+    let had = rig.master.set_pdos(chosen).unwrap();
+    assert_eq!(had.pdos(Direction::Receive), config.nodes[1].pdos(Direction::Receive));
     let twice = vec![PdoConfig::cyclic(1, vec![CONTROLWORD]); 2];
-    assert!(matches!(rig.master.set_pdos(id(2), twice, vec![]), Err(CallError::Config(_))));
+    assert!(matches!(set(2, twice, vec![]), Err(CallError::Config(_))));
+    assert!(matches!(set(3, vec![], vec![]), Err(CallError::NoNode)));
+    // Made for a network without the first device, it would take what that one has.
+    let alone = MasterConfig { nodes: config.nodes[1..].to_vec(), ..config.clone() };
+    let theirs = config.nodes[0].tpdos[0].id(Direction::Transmit, id(1));
+    let stolen = PdoConfig { id: theirs, ..PdoConfig::cyclic(3, vec![POSITION]) };
+    let stolen = PdoSet::new(&alone, id(2), vec![], vec![stolen]).unwrap();
+    let (error, _) = rig.master.set_pdos(stolen).unwrap_err();
+    assert!(matches!(error, CallError::Config(ConfigError::Pdo { reason: PdoError::Id, number: 3, .. })));
     for node in [1, 2] {
         rig.master.node_ready(id(node)).unwrap();
     }
-    assert!(matches!(rig.master.set_pdos(id(2), vec![], vec![]), Err(CallError::State(BootState::Await))));
+    let none = set(2, vec![], vec![]).unwrap();
+    assert!(matches!(rig.master.set_pdos(none), Err((CallError::State(BootState::Await), _))));
     rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
     let outcomes: Vec<_> = rig
         .log

@@ -15,6 +15,7 @@ use self::peer::Device;
 use super::boot::{BootState, BootStatus};
 use super::config::*;
 use super::event::*;
+use super::pdo_set::PdoSet;
 use super::*;
 use crate::sdo::request::{SdoData, SdoFailure};
 use crate::wire::pdo::{MappingEntry, TransmissionType};

@@ -13,7 +13,9 @@
 
 use std::collections::VecDeque;
 
-use profile_cia402::master::config::{Direction, PdoConfig};
+use profile_cia402::master::CallError;
+use profile_cia402::master::config::{Direction, MasterConfig, PdoConfig};
+use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{Mux, NodeId};
 
@@ -62,8 +64,8 @@ pub enum Done {
     Submit(Run, SdoRequest),
     /// The program of an axis, by its place in the device, and how its values are spread over RPDOs and TPDOs.
     Program(Run, u8, DriveProgram, [Spread; 2]),
-    /// The RPDOs and TPDOs of the device: it is through.
-    Pdos(Run, Vec<PdoConfig>, Vec<PdoConfig>),
+    /// The RPDOs and TPDOs of the device: it is through. On the way back those that it had.
+    Pdos(Run, PdoSet),
     /// The device cannot be used.
     Failed(Run, Notice),
     /// Something that people should know.
@@ -143,6 +145,9 @@ pub enum Misfit {
     /// More devices with several axes than there are free identifiers.
     #[error("no identifiers are left for its PDOs: expected fewer devices with several axes")]
     Identifiers,
+    /// The network is not possible with its PDOs.
+    #[error("{0}")]
+    Network(#[from] CallError),
     /// Nobody says how long a value is.
     #[error("the dictionary has no length for {0}")]
     Length(Item),
@@ -168,6 +173,8 @@ struct Work {
 #[derive(Debug)]
 pub struct Commissioner {
     mapping: Mapping,
+    /// The network, with the PDOs that its devices have been given.
+    network: MasterConfig,
     devices: Vec<Work>,
     jobs: rtrb::Consumer<Job>,
     done: rtrb::Producer<Done>,
@@ -176,10 +183,11 @@ pub struct Commissioner {
 }
 
 impl Commissioner {
-    /// A commissioner for these devices, and the cycle thread's end.
+    /// A commissioner for these devices of a network, and the cycle thread's end.
     #[must_use]
     pub fn new(
         mapping: Mapping,
+        network: MasterConfig,
         devices: impl IntoIterator<Item = (NodeId, Vec<AxisSetup>)>,
     ) -> (Self, CommissionerEnd) {
         let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
@@ -197,7 +205,7 @@ impl Commissioner {
         };
         let devices = devices.into_iter().map(work).collect();
         let end = CommissionerEnd { jobs: jobs_in, done: done_out };
-        (Self { mapping, devices, jobs, done, waiting: VecDeque::new() }, end)
+        (Self { mapping, network, devices, jobs, done, waiting: VecDeque::new() }, end)
     }
 
     /// Whether the cycle thread has gone.
@@ -209,17 +217,17 @@ impl Commissioner {
     /// Does what there is to do, without waiting.
     pub fn poll(&mut self) {
         while let Ok(job) = self.jobs.pop() {
-            let Self { mapping, devices, waiting, .. } = self;
+            let Self { mapping, network, devices, waiting, .. } = self;
             match job {
                 Job::Begin(run) => {
                     if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.begin(run, mapping, waiting);
+                        work.begin(run, mapping, network, waiting);
                     }
                 }
                 Job::Outcome(run, outcome) => {
                     let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
                     if let Some(work) = work {
-                        work.handle(&outcome, mapping, waiting);
+                        work.handle(&outcome, mapping, network, waiting);
                     }
                 }
                 Job::Unsent(run, _) => {
@@ -239,11 +247,17 @@ impl Commissioner {
 }
 
 impl Work {
-    fn begin(&mut self, run: Run, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+    fn begin(
+        &mut self,
+        run: Run,
+        mapping: &Mapping,
+        network: &mut MasterConfig,
+        waiting: &mut VecDeque<Done>,
+    ) {
         self.give_up();
         self.run = run;
         self.pdos = [Vec::new(), Vec::new()];
-        self.set_out(0, Plan::Ask, mapping, waiting);
+        self.set_out(0, Plan::Ask, mapping, network, waiting);
     }
 
     fn give_up(&mut self) {
@@ -254,7 +268,14 @@ impl Work {
     }
 
     /// Begins a plan of an axis.
-    fn set_out(&mut self, place: usize, plan: Plan, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+    fn set_out(
+        &mut self,
+        place: usize,
+        plan: Plan,
+        mapping: &Mapping,
+        network: &mut MasterConfig,
+        waiting: &mut VecDeque<Done>,
+    ) {
         let Some(setup) = self.axes.get(place) else { return };
         if plan == Plan::Ask {
             self.facts = ObjectFacts::new();
@@ -263,7 +284,7 @@ impl Work {
             Ok(steps) => {
                 self.at = Some((place, plan));
                 self.steps = steps.into();
-                self.go_on(mapping, waiting);
+                self.go_on(mapping, network, waiting);
             }
             Err(error) => self.fail(place, error.into(), waiting),
         }
@@ -280,7 +301,7 @@ impl Work {
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.
-    fn go_on(&mut self, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+    fn go_on(&mut self, mapping: &Mapping, network: &mut MasterConfig, waiting: &mut VecDeque<Done>) {
         while self.sent.len() < WINDOW
             && let Some((place, _)) = self.at
             && let Some(step) = self.steps.pop_front()
@@ -298,13 +319,20 @@ impl Work {
             && self.sent.is_empty()
         {
             self.at = None;
-            self.through(place, plan, mapping, waiting);
+            self.through(place, plan, mapping, network, waiting);
         }
     }
 
-    fn through(&mut self, place: usize, plan: Plan, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+    fn through(
+        &mut self,
+        place: usize,
+        plan: Plan,
+        mapping: &Mapping,
+        network: &mut MasterConfig,
+        waiting: &mut VecDeque<Done>,
+    ) {
         if plan == Plan::Ask {
-            self.set_out(place, Plan::Tell, mapping, waiting);
+            self.set_out(place, Plan::Tell, mapping, network, waiting);
             return;
         }
         let axis = self.number(place);
@@ -326,14 +354,26 @@ impl Work {
         let which = u8::try_from(place).unwrap_or(u8::MAX);
         waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
         if place + 1 < self.axes.len() {
-            self.set_out(place + 1, Plan::Ask, mapping, waiting);
+            self.set_out(place + 1, Plan::Ask, mapping, network, waiting);
         } else {
             let [receive, transmit] = std::mem::take(&mut self.pdos);
-            waiting.push_back(Done::Pdos(self.run, receive, transmit));
+            match PdoSet::new(network, self.node, receive, transmit) {
+                Ok(set) => {
+                    network.take_pdos(&set);
+                    waiting.push_back(Done::Pdos(self.run, set));
+                }
+                Err(error) => self.fail(place, error.into(), waiting),
+            }
         }
     }
 
-    fn handle(&mut self, outcome: &SdoOutcome, mapping: &Mapping, waiting: &mut VecDeque<Done>) {
+    fn handle(
+        &mut self,
+        outcome: &SdoOutcome,
+        mapping: &Mapping,
+        network: &mut MasterConfig,
+        waiting: &mut VecDeque<Done>,
+    ) {
         let (Some(step), Some((place, _))) = (self.sent.pop_front(), self.at) else { return };
         let (object, what, must) = match &step {
             ObjectStep::Read { object, fail } => (*object, "reading", *fail),
@@ -360,7 +400,7 @@ impl Work {
                 self.passed_over.push(failure);
             }
         }
-        self.go_on(mapping, waiting);
+        self.go_on(mapping, network, waiting);
     }
 }
 

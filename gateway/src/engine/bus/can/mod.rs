@@ -12,8 +12,9 @@ pub mod load;
 
 use arrayvec::ArrayVec;
 use profile_cia402::master::boot::BootState;
-use profile_cia402::master::config::{ConfigError, Direction, MasterConfig, PdoConfig};
+use profile_cia402::master::config::{ConfigError, MasterConfig};
 use profile_cia402::master::event::{Event, Output, Refusal as FrameRefusal, Ticket};
+use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::master::{ConsumerState, Master, Priority};
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{AbortCode, Mux, NodeId};
@@ -337,7 +338,7 @@ impl CanBus {
                         axes[drive.axis].set_south(program);
                     }
                 }
-                Done::Pdos(run, receive, transmit) => self.connect(now, place, run, receive, transmit),
+                Done::Pdos(run, set) => self.connect(now, place, run, set),
                 Done::Failed(_, failed) => {
                     notice(failed);
                     self.give_up(now, place);
@@ -365,26 +366,13 @@ impl CanBus {
     }
 
     /// The PDOs of a device are known: the master sets them up and starts it.
-    fn connect(
-        &mut self,
-        now: MonotonicTime,
-        place: usize,
-        run: Run,
-        receive: Vec<PdoConfig>,
-        transmit: Vec<PdoConfig>,
-    ) {
+    fn connect(&mut self, now: MonotonicTime, place: usize, run: Run, set: PdoSet) {
         let node = self.devices[place].node;
-        let known = self.master.config().nodes.iter().find(|known| known.node == node);
-        let same = known.is_some_and(|known| {
-            (known.pdos(Direction::Receive), known.pdos(Direction::Transmit)) == (&receive, &transmit)
-        });
-        let taken = if same {
-            self.commissioner.push(Job::Unused(Done::Pdos(run, receive, transmit)));
-            true
-        } else {
-            // Only for a drive that lacks something that may be lacking, at its first boot-up: this allocates.
-            self.master.set_pdos(node, receive, transmit).is_ok()
+        let (taken, unused) = match self.master.set_pdos(set) {
+            Ok(had) => (true, had),
+            Err((_, set)) => (false, set),
         };
+        self.commissioner.push(Job::Unused(Done::Pdos(run, unused)));
         if taken && self.master.node_ready(node).is_ok() {
             self.devices[place].stage = Stage::Ready;
         } else {
