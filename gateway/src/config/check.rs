@@ -501,7 +501,12 @@ impl Checker {
             Some(limits) => self.limits(limits, table.unwind_counts.as_ref()),
             None => Some(Limits::default()),
         };
-        let events = self.capture_mode(table.events.as_ref());
+        // A PDO more is much of a CAN bus.
+        let usual = match drive {
+            Some(DriveAt::Can { .. }) => CaptureMode::ServiceChannel,
+            _ => CaptureMode::Cyclic,
+        };
+        let events = self.capture_mode(table.events.as_ref(), usual);
         let on_command_loss = self.stopping_action(table.on_command_loss.as_ref());
         Some(Axis {
             name: name?,
@@ -562,8 +567,8 @@ impl Checker {
         (self.problems.len() == before).then_some(function)
     }
 
-    fn capture_mode(&mut self, name: Option<&Spanned<String>>) -> Option<CaptureMode> {
-        let Some(name) = name else { return Some(CaptureMode::Cyclic) };
+    fn capture_mode(&mut self, name: Option<&Spanned<String>>, usual: CaptureMode) -> Option<CaptureMode> {
+        let Some(name) = name else { return Some(usual) };
         match name.get_ref().as_str() {
             "cyclic" => Some(CaptureMode::Cyclic),
             "service-channel" => Some(CaptureMode::ServiceChannel),

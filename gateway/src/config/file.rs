@@ -164,7 +164,8 @@ pub struct AxisTable {
     /// `"ramped-decel-and-disable"`, `"current-decel-and-hold"` or `"ramped-decel-and-hold"`. Default:
     /// `"ramped-decel-and-disable"`.
     pub on_command_loss: Option<Spanned<String>>,
-    /// `cyclic`, `service-channel` or `off`.
+    /// How the drive's captures are used: `cyclic`, `service-channel` or `off`. Default: `cyclic` on SERCOS, `service-channel`, which
+    /// is SDO there, on CAN.
     pub events: Option<Spanned<String>>,
 }
 

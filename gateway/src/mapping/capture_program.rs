@@ -62,13 +62,35 @@ impl Place {
         Some(u32::from_le_bytes([a, b, c, d]))
     }
 
-    /// Writes 0 or 1 into the master's telegram.
-    pub fn write_bit(&self, telegram: &mut [u8], on: bool) {
-        let Some(from) = self.offset.map(usize::from) else { return };
-        if let Some(place) = telegram.get_mut(from..from + self.width.bytes()) {
-            place.fill(0);
-            place[0] = u8::from(on);
+    /// Writes these bits into the master's telegram; the others stay as they are.
+    pub fn write_bits(&self, telegram: &mut [u8], bits: BitPattern) {
+        let Some(word) = self.read_word(telegram) else { return };
+        let from = self.offset.map_or(0, usize::from);
+        let bytes = u64::from(bits.apply(word)).to_le_bytes();
+        if let Some(place) = telegram.get_mut(from..from + self.width.bytes())
+            && let Some(bytes) = bytes.get(..place.len())
+        {
+            place.copy_from_slice(bytes);
         }
+    }
+}
+
+/// What lets the edges of latches through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gate {
+    /// Where it is told.
+    pub place: Place,
+    /// The bits that belong to it.
+    pub mask: u32,
+    /// Those that stand while it lets edges through, beside what its latches need.
+    pub on: u32,
+}
+
+impl Gate {
+    /// A word of its own that is 1 or 0.
+    #[must_use]
+    pub const fn whole(place: Place) -> Self {
+        Self { place, mask: u32::MAX, on: 1 }
     }
 }
 
@@ -104,6 +126,8 @@ pub struct Latch {
     pub word: usize,
     /// What the word shows when the edge has come.
     pub pattern: BitPattern,
+    /// Bits of the enable that let this edge through.
+    pub select: u32,
     /// The position.
     pub value: Stored,
 }
@@ -147,7 +171,7 @@ pub struct CaptureProgram {
     /// Latches.
     pub latches: ArrayVec<Latch, CAPTURES_MAX>,
     /// What lets the edges of the latches through.
-    pub enables: ArrayVec<Place, WORDS_MAX>,
+    pub enables: ArrayVec<Gate, WORDS_MAX>,
     /// What says that the edges have come.
     pub words: ArrayVec<Place, WORDS_MAX>,
     /// The procedure command that has to be in process.

@@ -11,7 +11,7 @@ use profile_generic::quantity::Quantity;
 use profile_sercos::wire::idn::Idn;
 
 use super::capture_program::{
-    CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored, WORDS_MAX,
+    CaptureMode, CaptureProgram, Counter, Gate, Input, Latch, Place, Sequence, Stored, WORDS_MAX,
 };
 use super::compile_sercos::{Compiler, SercosAxis};
 use super::dictionary::{SercosDictionary, SercosIdn};
@@ -137,7 +137,7 @@ pub(super) fn extend(
 }
 
 /// The place of an IDN among others, at the end when it is new; `None` when it has no room.
-fn index_of(places: &mut ArrayVec<Place, WORDS_MAX>, place: Place) -> Option<usize> {
+pub(super) fn index_of(places: &mut ArrayVec<Place, WORDS_MAX>, place: Place) -> Option<usize> {
     let known = places.iter().position(|known| known.item == place.item);
     known.or_else(|| places.try_push(place).ok().map(|()| places.len() - 1))
 }
@@ -174,8 +174,15 @@ impl Compiler<'_> {
                     return None;
                 }
                 let word = index_of(&mut program.words, word)?;
-                let enable = index_of(&mut program.enables, enable)?;
-                program.latches.try_push(Latch { kind, enable, word, pattern, value }).ok()?;
+                let known = program.enables.iter().position(|gate| gate.place.item == enable.item);
+                let enable = match known {
+                    Some(known) => known,
+                    None => {
+                        program.enables.try_push(Gate::whole(enable)).ok()?;
+                        program.enables.len() - 1
+                    }
+                };
+                program.latches.try_push(Latch { kind, enable, word, pattern, select: 0, value }).ok()?;
                 program.command = command.map(Item::from);
             }
             CaptureBy::Counter { value, counter } => {

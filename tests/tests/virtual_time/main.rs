@@ -2,6 +2,7 @@
 
 mod attributes;
 mod can;
+mod can_captures;
 mod can_faults;
 mod can_modes;
 mod devicenet;

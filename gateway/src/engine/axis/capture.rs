@@ -17,6 +17,7 @@
 use crate::engine::access::{Access, AccessFailure, Operation};
 use arrayvec::ArrayVec;
 use profile_generic::capture::{CaptureKind, CaptureResult, CaptureSet, CaptureStatus};
+use profile_generic::program::BitPattern;
 use profile_generic::quantity::Position;
 use profile_generic::time::SystemTime;
 
@@ -67,6 +68,8 @@ struct Gate {
     fresh: u8,
     /// What the drive has been told over the service channel.
     told: Option<bool>,
+    /// Bits that stand since it rose.
+    bits: u32,
 }
 
 impl Gate {
@@ -76,6 +79,11 @@ impl Gate {
 
     const fn is_on(self) -> bool {
         matches!(self.phase, Phase::Rising | Phase::Armed)
+    }
+
+    /// The bits that stand now.
+    const fn word(self) -> u32 {
+        if self.is_on() { self.bits } else { 0 }
     }
 }
 
@@ -151,8 +159,8 @@ impl CaptureUnit {
 
     /// Puts the enables into the master's telegram.
     pub fn encode(&self, program: &CaptureProgram, telegram: &mut [u8]) {
-        for (place, gate) in program.enables.iter().zip(self.gates) {
-            place.write_bit(telegram, gate.is_on());
+        for (enable, gate) in program.enables.iter().zip(self.gates) {
+            enable.place.write_bits(telegram, BitPattern::new(enable.mask, gate.word()));
         }
     }
 
@@ -269,7 +277,7 @@ impl CaptureUnit {
     fn move_gate(&mut self, program: &CaptureProgram, place: usize) {
         let own = |latch: &&Latch| latch.enable == place;
         let wanted = program.latches.iter().filter(own).any(|latch| self.is_wanted(latch.kind));
-        let cyclic = program.enables[place].offset.is_some();
+        let cyclic = program.enables[place].place.offset.is_some();
         let gate = self.gates[place];
         let arrived = if cyclic { gate.fresh >= SEEN_AFTER } else { gate.told == Some(gate.is_on()) };
         // What is read over the service channel has no newer word than the one that showed the edge.
@@ -283,8 +291,10 @@ impl CaptureUnit {
                 (wanted && ready && clear).then_some(Phase::Rising)
             }
             Phase::Rising | Phase::Armed => {
+                // What has come, or what the drive was not told to look for.
                 let again = (0..).zip(&program.latches).any(|(at, latch): (usize, _)| {
-                    own(&latch) && self.is_wanted(latch.kind) && self.latched[at]
+                    let open = latch.select & !gate.bits == 0;
+                    own(&latch) && self.is_wanted(latch.kind) && (self.latched[at] || !open)
                 });
                 if !reading && (!wanted || again) {
                     Some(Phase::Falling)
@@ -298,6 +308,9 @@ impl CaptureUnit {
         self.gates[place].go(next);
         match next {
             Phase::Rising => {
+                let latches = program.latches.iter().filter(own);
+                let selected = latches.filter(|latch| self.is_wanted(latch.kind)).map(|latch| latch.select);
+                self.gates[place].bits = selected.fold(program.enables[place].on, |bits, one| bits | one);
                 for (at, latch) in program.latches.iter().enumerate().filter(|(_, latch)| own(latch)) {
                     self.latched[at] = false;
                     if program.words[latch.word].offset.is_none() {
@@ -330,10 +343,13 @@ impl CaptureUnit {
         let next = self.next_access(program)?;
         let request = match next {
             CaptureAccess::Start => Access::new(program.command?, Operation::Start),
-            CaptureAccess::Enable(place, on) => {
-                let enable = program.enables.get(place)?;
-                let value = u64::from(on).to_le_bytes();
-                Access::write(enable.item, &value[..enable.width.bytes()])?
+            CaptureAccess::Enable(place, _) => {
+                let enable = program.enables.get(place)?.place;
+                // One word may have the bits of several.
+                let gates = program.enables.iter().zip(self.gates);
+                let same = gates.filter(|(gate, _)| gate.place.item == enable.item);
+                let word = same.fold(0, |word, (_, gate)| word | gate.word());
+                Access::write(enable.item, &u64::from(word).to_le_bytes()[..enable.width.bytes()])?
             }
             CaptureAccess::Word(place) => Access::read(program.words.get(place)?.item),
             CaptureAccess::Value(place) => Access::read(program.latches.get(place)?.value.place.item),
@@ -353,7 +369,7 @@ impl CaptureUnit {
         for (place, enable) in program.enables.iter().enumerate() {
             let gate = self.gates[place];
             let changes = gate.phase != Phase::Off && gate.told != Some(gate.is_on());
-            if enable.offset.is_none() && changes {
+            if enable.place.offset.is_none() && changes {
                 return Some(CaptureAccess::Enable(place, gate.is_on()));
             }
         }

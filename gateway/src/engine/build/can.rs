@@ -133,5 +133,6 @@ pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
         parameters: parameters(axis),
         silent: !drive.acknowledges,
         left_out: drive.left_out.clone(),
+        captures: axis.events,
     }
 }

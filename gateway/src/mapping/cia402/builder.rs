@@ -10,6 +10,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::Action;
 use profile_generic::time::DurationNs;
 
+use super::captures::{CaptureRule, LatchRule};
 use super::{
     ActionRule, Base, Cia402Tables, DriveMode, FixedUnit, Handover, Method, ModeRule, Object, ParameterRule,
     ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value, Words,
@@ -19,13 +20,13 @@ use crate::finding::registry as code;
 use crate::mapping::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::mapping::drive_program::FaultRow;
 use crate::mapping::format::{
-    Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandoverRow, Cia402MethodRow,
-    Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow, Cia402SignalRow,
-    Cia402UnboundRow, FieldValueRow, GenericCia402File, Name,
+    Cia402CaptureRow, Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandoverRow,
+    Cia402MethodRow, Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow,
+    Cia402SignalRow, Cia402UnboundRow, FieldValueRow, GenericCia402File, Name,
 };
 use crate::mapping::generic_names::{
-    action, cause_and_reaction, directions, interpolation, operating_mode, parameter, report, signal,
-    status_bit,
+    action, capture_kind, cause_and_reaction, directions, interpolation, operating_mode, parameter, report,
+    signal, status_bit,
 };
 use crate::mapping::item::Item;
 use crate::mapping::load::Parsed;
@@ -72,6 +73,9 @@ impl Cia402Tables {
         }
         for row in &rows.parameter {
             builder.parameter(row);
+        }
+        for row in &rows.capture {
+            builder.capture(row);
         }
         for row in &rows.commission {
             builder.step(row);
@@ -527,12 +531,48 @@ impl<'a> Builder<'a> {
         self.tables.parameters.push(rule);
     }
 
+    fn capture(&mut self, row: &Cia402CaptureRow) {
+        let Some(kind) = capture_kind(&mut self.resolver, &row.capture, &row.edge) else { return };
+        let set = |object: Object| match object.index {
+            0x60B8 => "Touch probe function",
+            0x60B9 => "Touch probe status",
+            _ => "Digital inputs",
+        };
+        let Some((word, _)) = self.value("word", &row.word) else { return };
+        let Some(pattern) = self.pattern(set(word.object), &row.pattern) else { return };
+        let latch = match (&row.value, &row.function) {
+            (None, None) if row.enable.is_empty() && row.select.is_empty() => None,
+            (Some(value), Some(function)) => {
+                let Some((value, _)) = self.value("value", value) else { return };
+                if !self.measures(&value, Quantity::Position) {
+                    let message = format!("the unit of {} is no {}", value.object, Quantity::Position);
+                    self.resolver.error(code::UNIT, row.capture.span(), "value", message);
+                }
+                let Some((held, entry)) = self.value("function", function) else { return };
+                self.writable(entry, true, function, held.object);
+                let enable = self.pattern(set(held.object), &row.enable);
+                let select = self.pattern(set(held.object), &row.select);
+                let (Some(enable), Some(select)) = (enable, select) else { return };
+                Some(LatchRule { value, function: held, enable, select })
+            }
+            _ => {
+                let message = "expected `value` and `function` with `enable` and `select`, or none of them";
+                return self.resolver.error(code::CONTRADICTION, row.capture.span(), "value", message);
+            }
+        };
+        if self.tables.captures.iter().any(|known| known.kind == kind) {
+            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is there twice");
+        }
+        self.tables.captures.push(CaptureRule { kind, word, pattern, latch });
+    }
+
     fn step(&mut self, row: &Cia402CommissionRow) {
         let words = [
             ("write", Verb::Write),
             ("read", Verb::Read),
             ("read_scaling", Verb::ReadScaling),
             ("read_parameters", Verb::ReadParameters),
+            ("read_captures", Verb::ReadCaptures),
             ("write_cycle", Verb::WriteCycle),
             ("write_mode", Verb::WriteMode),
         ];
@@ -575,6 +615,7 @@ impl<'a> Builder<'a> {
             }
             (Verb::ReadScaling, None, None, None, None) => Some(StepKind::ReadScaling),
             (Verb::ReadParameters, None, None, None, None) => Some(StepKind::ReadParameters),
+            (Verb::ReadCaptures, None, None, None, None) => Some(StepKind::ReadCaptures),
             (Verb::WriteMode, None, None, None, None) => Some(StepKind::WriteMode),
             _ => {
                 let message = "expected `write` with object and value or with parameter, `read` with object, \
@@ -592,6 +633,7 @@ enum Verb {
     Read,
     ReadScaling,
     ReadParameters,
+    ReadCaptures,
     WriteCycle,
     WriteMode,
 }

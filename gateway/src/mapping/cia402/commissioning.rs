@@ -85,6 +85,10 @@ impl Cia402Tables {
                         }
                     }
                 }
+                (Plan::Ask, StepKind::ReadCaptures) => {
+                    let objects = self.capture_objects(axis).into_iter();
+                    steps.extend(objects.map(|object| ObjectStep::Read { object, fail }));
+                }
                 (Plan::Tell, StepKind::Write(value, number)) => {
                     steps.push(ObjectStep::Write {
                         object: value.object,

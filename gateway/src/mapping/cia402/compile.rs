@@ -10,8 +10,10 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
-use super::{Cia402Tables, DriveMode, ModeRule, Object, ParameterRule, ProcedureRule, SignalRule, Value};
-use crate::mapping::capture_program::Place;
+use super::{
+    Cia402Tables, DriveMode, FULL_RANGE, ModeRule, Object, ParameterRule, ProcedureRule, SignalRule, Value,
+};
+use crate::mapping::capture_program::{CaptureMode, Place};
 use crate::mapping::dictionary::Cia402Dictionary;
 use crate::mapping::drive_program::{
     DriveProgram, FaultRow, Handover, MAX_MODES, MODE_SHIFT, ModeEntry, ModeProcedure,
@@ -22,9 +24,6 @@ use crate::mapping::scaling::AxisUnits;
 
 /// Octets of a mode of operation.
 const MODE_BYTES: u16 = 1;
-
-/// Wraps of a position: the range of its 32 bits.
-const FULL_RANGE: i64 = 1 << 32;
 
 /// What must be known of an axis to work with its CiA 402 drive.
 #[derive(Debug, Clone, Default)]
@@ -45,8 +44,10 @@ pub struct Cia402Axis {
     pub parameters: Vec<(Parameter, i64)>,
     /// The drive's statusword does not tell whether it follows command values.
     pub silent: bool,
-    /// Actual values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
+    /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
+    /// How its captures are used.
+    pub captures: CaptureMode,
 }
 
 impl Cia402Axis {
@@ -223,6 +224,7 @@ impl Cia402Tables {
         }
         self.mode_entries(&chosen, &self.procedures_of(axis, facts), &mut program)?;
         self.words(axis, &chosen, &mut program)?;
+        program.captures = self.capture_program(axis, facts, &program.telegram)?;
         let error = item(self.words.error)?;
         for row in &self.faults {
             let row = FaultRow { word: error, ..*row };
@@ -282,6 +284,10 @@ impl Cia402Tables {
                 places.push((rule, *bytes));
                 known.push((object, *bytes));
                 *bytes += octets(rule.value.width);
+            }
+            for value in self.cyclic_of_captures(axis, facts, to_drive) {
+                items.push(item(value.object)?);
+                *bytes += octets(value.width);
             }
         }
         Ok((telegram, places))

@@ -5,6 +5,7 @@
 //! ```
 
 mod builder;
+mod captures;
 mod commissioning;
 mod compile;
 mod facts;
@@ -26,8 +27,12 @@ pub use self::commissioning::{ObjectStep, Plan};
 pub use self::compile::{Cia402Axis, Cia402Error};
 pub use self::facts::ObjectFacts;
 
+use self::captures::CaptureRule;
 use super::drive_program::{FaultRow, Handover, MAX_MODES};
 use super::item::Object;
+
+/// Wraps of a position: the range of its 32 bits.
+const FULL_RANGE: i64 = 1 << 32;
 
 /// An object that holds a number, and what it measures.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -151,6 +156,7 @@ pub(super) enum StepKind {
     WriteParameter(Parameter),
     ReadScaling,
     ReadParameters,
+    ReadCaptures,
     /// The cycle as value and power of ten.
     WriteCycle(Value, Value),
     WriteMode,
@@ -191,6 +197,7 @@ pub struct Cia402Tables {
     pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<FaultRow>,
     pub(super) parameters: Vec<ParameterRule>,
+    pub(super) captures: Vec<CaptureRule>,
     pub(super) steps: Vec<StepRule>,
     /// Objects that no row binds, a family by its first number, with the reason.
     pub unbound: Vec<(u16, String)>,

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::cast::f64_from_i64;
 use profile_generic::image::{AxisCommand, AxisFeedback};
 use profile_generic::mode::OperatingMode;
@@ -12,7 +13,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::mapping::tests::shipped;
-use crate::mapping::{AxisUnits, DriveProgram, Item, Mapping};
+use crate::mapping::{AxisUnits, CaptureMode, DriveProgram, Item, Mapping};
 
 const ALL: [OperatingMode; 3] = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
 
@@ -151,6 +152,44 @@ fn the_telegrams_carry_what_the_modes_need() {
     let third = shipped().cia402_program(&third, &facts).unwrap().telegram;
     assert_eq!(items(&third.command), "7040:00 7060:00 707A:00");
     assert_eq!(items(&third.feedback), "7041:00 7061:00 7064:00 706C:00");
+}
+
+#[test]
+fn captures_are_those_whose_objects_the_drive_has() {
+    let kind = CaptureKind::new;
+    let (one, two) = (CaptureSource::Registration1, CaptureSource::Registration2);
+    let home = kind(CaptureSource::HomeSwitch, CaptureEdge::Positive);
+    let mut facts = servo();
+    facts.note_missing(object(0x60BC, 0));
+    let of = |captures| {
+        let second = Cia402Axis { axis: 1, captures, ..axis(&ALL[..1]) };
+        shipped().cia402_program(&second, &facts).unwrap()
+    };
+    assert!(of(CaptureMode::Off).captures().kinds().is_empty());
+    for (captures, telegrams) in [(CaptureMode::ServiceChannel, [3, 5]), (CaptureMode::Cyclic, [4, 7])] {
+        let program = of(captures);
+        let kinds = program.captures().kinds();
+        assert!(
+            kinds.contains(kind(one, CaptureEdge::Positive))
+                && kinds.contains(kind(two, CaptureEdge::Negative))
+        );
+        assert!(!kinds.contains(kind(two, CaptureEdge::Positive)), "it has no 60BC");
+        assert_eq!(
+            kinds.contains(home),
+            captures == CaptureMode::Cyclic,
+            "an input has to come in every cycle"
+        );
+        assert_eq!([program.telegram.command.len(), program.telegram.feedback.len()], telegrams);
+        let places: Vec<_> = program.captures().enables.iter().map(|gate| gate.place).collect();
+        let offset = (captures == CaptureMode::Cyclic).then_some(7);
+        assert!(places.iter().all(|place| (place.item, place.offset) == (Item::object(0x68B8, 0), offset)));
+        let words: Vec<_> = program.captures().words.iter().map(|place| (place.item, place.offset)).collect();
+        assert_eq!(words, [(Item::object(0x68B9, 0), (captures == CaptureMode::Cyclic).then_some(13))]);
+    }
+    let cyclic = of(CaptureMode::Cyclic);
+    let input = cyclic.captures().inputs[0].word;
+    assert_eq!((input.item, input.offset), (Item::object(0x68FD, 0), Some(15)));
+    assert_eq!((cyclic.telegram.command_bytes, cyclic.telegram.feedback_bytes), (9, 19));
 }
 
 #[test]

@@ -39,6 +39,8 @@ pub struct GenericCia402File {
     pub fault_class: Vec<Cia402FaultClassRow>,
     /// Parameters.
     pub parameter: Vec<Cia402ParameterRow>,
+    /// Captures.
+    pub capture: Vec<Cia402CaptureRow>,
     /// What is written and read at start.
     pub commission: Vec<Cia402CommissionRow>,
     /// Objects that no row binds, with the reason.
@@ -300,11 +302,37 @@ pub struct Cia402ParameterRow {
     pub source: Source,
 }
 
+/// What a drive captures: a position that a probe stores, or an input that changes from one cycle to the next.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402CaptureRow {
+    /// Source of the capture.
+    pub capture: Name,
+    /// Its edge.
+    pub edge: Name,
+    /// Object with the word that says that the edge has come, or what the level is.
+    pub word: Name,
+    /// Its fields.
+    pub pattern: Vec<FieldValueRow>,
+    /// Object with the stored position; of a probe.
+    pub value: Option<Name>,
+    /// Object that lets the probe work; of a probe.
+    pub function: Option<Name>,
+    /// Its fields for the probe.
+    #[serde(default)]
+    pub enable: Vec<FieldValueRow>,
+    /// Its fields for this edge: the others of the probe are 0 where nobody wants them.
+    #[serde(default)]
+    pub select: Vec<FieldValueRow>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
 /// One step of commissioning.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cia402CommissionRow {
-    /// `write`, `read`, `read_scaling`, `read_parameters`, `write_cycle` or `write_mode`.
+    /// `write`, `read`, `read_scaling`, `read_parameters`, `read_captures`, `write_cycle` or `write_mode`.
     #[serde(rename = "do")]
     pub step: Name,
     /// Object; none for the steps that know theirs.

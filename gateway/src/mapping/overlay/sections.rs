@@ -122,6 +122,7 @@ const GENERIC_CIA402: &[Section] = &[
     first("fault", &["codes"]),
     first("fault_class", &["classes"]),
     section("parameter", &["parameter"]),
+    section("capture", &["capture", "edge"]),
     section("commission", &["do", "object", "parameter", "value", "modes"]),
     section("unbound", &["reason"]),
 ];

@@ -97,9 +97,9 @@ const CASES: &[Case] = &[
     ("bound and unbound", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0047\", "),
     ("unbound twice", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0026\", "),
     ("unbound for no reason", |t| &mut t.generic_sercos, "reason = \"one bit", "reason = \"\" # one bit"),
-    ("CiA 402: bound and unbound", |t| &mut t.generic_cia402, "\"60FD\"", "\"60FD\", \"6040\""),
-    ("CiA 402: unbound twice", |t| &mut t.generic_cia402, "\"60FD\"", "\"60FD\", \"60FE\""),
-    ("CiA 402: unbound and unknown", |t| &mut t.generic_cia402, "\"60FD\"", "\"60FD\", \"5FFF\""),
+    ("CiA 402: bound and unbound", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"6040\""),
+    ("CiA 402: unbound twice", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"60E3\""),
+    ("CiA 402: unbound and unknown", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"5FFF\""),
     ("wrong direction", |t| &mut t.generic_sercos, "direction = \"to_drive\"", "direction = \"from_drive\""),
     (
         "read only",
