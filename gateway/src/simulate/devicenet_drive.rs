@@ -10,7 +10,7 @@ use profile_cip::target::attribute::{Access, AttributeDefinition, DataType, Scop
 use profile_cip::target::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use profile_generic::can::Frame;
 use profile_generic::fault::FaultCause;
-use profile_generic::servo::{ServoActual, ServoParameters};
+use profile_generic::servo::{Servo, ServoActual, ServoParameters};
 use profile_generic::time::MonotonicTime;
 
 use super::can_bus::CanNode;
@@ -27,10 +27,10 @@ const LIMITS: [(u16, &str); 5] = [
 
 /// Axis Fault (attribute 657) of what can be wrong with the servo.
 const AXIS_FAULTS: [(FaultCause, u8); 2] =
-    [(FaultCause::OVER_CURRENT, 8), (FaultCause::MOTOR_OVER_TEMPERATURE, 5)];
+    [(FaultCause::OVER_CURRENT, 10), (FaultCause::MOTOR_OVER_TEMPERATURE, 5)];
 
 /// The same as `FaultCode` of the Control Supervisor.
-const FAULT_CODES: [(FaultCause, u16); 1] = [(FaultCause::OVER_CURRENT, 0x2310)];
+const FAULT_CODES: [(FaultCause, u16); 1] = [(FaultCause::MOTOR_OVER_CURRENT, 0x2310)];
 
 /// Device type of an AC drive.
 const DEVICE_TYPE_AC_DRIVE: u16 = 2;
@@ -101,6 +101,14 @@ pub fn drive(network: &Devicenet, drive: &DevicenetDrive) -> DevicenetNode {
 }
 
 impl DevicenetNode {
+    /// The servo, to load it and to raise faults.
+    pub fn servo_mut(&mut self) -> &mut Servo {
+        match self {
+            Self::Motion(slave) => slave.application_mut().servo_mut(),
+            Self::Speed(slave) => slave.application_mut().servo_mut(),
+        }
+    }
+
     /// What the servo did in its last step.
     #[must_use]
     pub fn actual(&self) -> &ServoActual {

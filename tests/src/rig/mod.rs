@@ -150,7 +150,7 @@ pub struct Rig {
     /// The CAN buses with their drives.
     pub can: Vec<CanWire>,
     /// The DeviceNet networks with their drives.
-    pub devicenet: Vec<InProcessCan<DevicenetNode>>,
+    pub devicenet: Vec<CanWire<DevicenetNode>>,
     /// The police over the line.
     pub court: Court,
     /// What was seen of each drive.
@@ -202,7 +202,7 @@ impl Rig {
         let line = drives(settings.drives.iter().copied(), false);
         let can = config.can.iter().map(|bus| CanWire::new(InProcessCan::of(bus, None))).collect();
         let devicenet =
-            config.devicenet.iter().map(|network| InProcessCan::of_devicenet(network, None)).collect();
+            config.devicenet.iter().map(|network| CanWire::new(InProcessCan::of_devicenet(network, None)));
         Self {
             controller: None,
             events: Vec::new(),
@@ -212,7 +212,7 @@ impl Rig {
             watched: vec![Watched::default(); line.slaves().len()],
             line,
             can,
-            devicenet,
+            devicenet: devicenet.collect(),
             court: Court::new(START),
             knobs: settings.knobs,
             tamper_command: None,
@@ -539,7 +539,11 @@ impl Rig {
             self.can.iter().flat_map(|wire| wire.bus.nodes()).flat_map(|node| node.application().axes());
         (0..drives).all(|place| free(self.drive(place).actual().report))
             && axes.into_iter().all(|axis| free(axis.actual().report))
-            && self.devicenet.iter().flat_map(InProcessCan::nodes).all(|drive| free(drive.actual().report))
+            && self
+                .devicenet
+                .iter()
+                .flat_map(|wire| wire.bus.nodes())
+                .all(|drive| free(drive.actual().report))
     }
 
     // ---- one step -------------------------------------------------------------------------------
@@ -713,7 +717,7 @@ fn ports_of<'a>(
     config: &Config,
     south: &'a mut SouthQueue,
     can: &'a mut [CanWire],
-    devicenet: &'a mut [InProcessCan<DevicenetNode>],
+    devicenet: &'a mut [CanWire<DevicenetNode>],
 ) -> ArrayVec<SouthPort<'a>, BUSES_MAX> {
     let mut ports = ArrayVec::new();
     if config.sercos.is_some() {

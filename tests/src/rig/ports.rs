@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
 use axisbridge::engine::port::{CanInput, CanPort, CanSent, EthernetPort, FRAME_MAX, NorthPort};
-use axisbridge::simulate::can_bus::InProcessCan;
+use axisbridge::simulate::can_bus::{CanNode, InProcessCan};
+use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::DriveNetwork;
 use profile_generic::can::Frame;
 use profile_generic::time::MonotonicTime;
@@ -147,22 +148,22 @@ impl EthernetPort for SouthQueue {
 pub type TamperCan = Box<dyn FnMut(MonotonicTime, &mut Frame) -> bool>;
 
 /// A CAN bus as the box sees it, which may be something else than what is there.
-pub struct CanWire {
+pub struct CanWire<N = DriveNode> {
     /// The bus with its drives.
-    pub bus: InProcessCan,
+    pub bus: InProcessCan<N>,
     /// What happens to frames that the box receives.
     pub tamper: Option<TamperCan>,
 }
 
-impl CanWire {
+impl<N: CanNode> CanWire<N> {
     /// All there is, as it is.
     #[must_use]
-    pub fn new(bus: InProcessCan) -> Self {
+    pub fn new(bus: InProcessCan<N>) -> Self {
         Self { bus, tamper: None }
     }
 }
 
-impl CanPort for CanWire {
+impl<N: CanNode> CanPort for CanWire<N> {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
         loop {
             match self.bus.receive(now)? {

@@ -1,22 +1,185 @@
 //! The whole chain with DeviceNet: a network with arbitration and bit times between the box and simulated drives.
+//!
+//! Where something goes wrong, the turntable (MAC ID 5) turns in velocity control, so that a drive that acts on an old set-point
+//! goes on and on, and the slide (MAC ID 9) is on a long way at constant speed, and goes on.
 
+use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::program::{self, AxisPlan};
-use axisbridge_tests::rig::motion::millis;
+use axisbridge::status::BoxState;
+use axisbridge_tests::rig::motion::{NANO, both, millis};
 use axisbridge_tests::rig::{Rig, Settings};
+use profile_cip::controller::{AxisSet, Limits, Step};
+use profile_cip::devicenet::wire::{DuplicateMac, Identifier, MacId};
+use profile_cip::wire::motion::codes::{ControlMode, FaultType};
+use profile_generic::can::Frame;
+use profile_generic::can::bus::Station;
+use profile_generic::fault::FaultCause;
+use profile_generic::state::DriveState;
 
 /// Two CIP Motion drives at 10 ms and 500 kbit/s.
 const BOX: &str = include_str!("devicenet.toml");
 
+const TURNTABLE: AxisSet = AxisSet::one(1);
+
+/// The slide's speed: 24 mm/s, which are 4.8 revolutions of its screw per second.
+const SLIDE: Limits = Limits { velocity: 24.0, acceleration: 240.0, jerk: 4_800.0 };
+const SLIDE_SPEED: i64 = 24 * NANO / 5;
+
 fn settings() -> Settings {
-    Settings { configuration: BOX.to_owned(), drives: Vec::new(), ..Settings::default() }
+    with(BOX)
+}
+
+fn with(configuration: &str) -> Settings {
+    Settings { configuration: configuration.to_owned(), drives: Vec::new(), ..Settings::default() }
+}
+
+/// The box with a velocity drive of the AC/DC drive profile on the turntable.
+fn velocity_drive(assembly: u8) -> String {
+    let (head, tail) =
+        BOX.split_once("[axis.limits]\nfollowing_error = 0.5\n").expect("the turntable's limits");
+    let kind = format!("mac_id = 5\nkind = \"ac-dc\"\nassembly = {assembly}");
+    format!("{head}{tail}").replace("mac_id = 5\nresolution = 1_048_576", &kind)
+}
+
+fn drive(rig: &Rig, drive: usize) -> &DevicenetNode {
+    rig.devicenet[0].bus.nodes().nth(drive).expect("a drive")
+}
+
+fn velocity(rig: &Rig, place: usize) -> i64 {
+    drive(rig, place).actual().velocity.get()
 }
 
 /// Where the servo of a drive is, in turns of its motor.
-fn turns(rig: &Rig, drive: usize) -> f64 {
-    let node = rig.devicenet[0].nodes().nth(drive).expect("a drive");
+fn turns(rig: &Rig, place: usize) -> f64 {
     #[allow(clippy::cast_precision_loss)]
-    let turns = node.actual().position.get() as f64 / 1e9;
+    let turns = drive(rig, place).actual().position.get() as f64 / 1e9;
     turns
+}
+
+fn turn(velocity: f64) -> Step {
+    Step::RunAt { axis: 1, velocity, acceleration: 20.0, jerk: 400.0 }
+}
+
+/// Connects a controller with the turntable in velocity control.
+fn connect(rig: &mut Rig, program: Vec<Step>) {
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    rig.connect_with(config, program);
+}
+
+/// Both axes in motion; the turntable is reset and turned again after so many seconds.
+fn in_motion(configuration: &str, seconds: f64) -> Rig {
+    let mut rig = Rig::ready(with(configuration));
+    let again =
+        vec![Step::Dwell { seconds }, Step::FaultReset(TURNTABLE), Step::Enable(TURNTABLE), turn(2.0)];
+    let far = Step::MoveAbsolute { axis: 2, position: 24.0 * (seconds + 2.0), limits: SLIDE };
+    let program = vec![
+        Step::Enable(both()),
+        turn(2.0),
+        Step::Together(vec![far, Step::Sequence(again)]),
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "both in motion", |rig| turntable_turns(rig) && slide_moves(rig));
+    rig
+}
+
+/// The turntable is at its speed, to a hundredth.
+fn turntable_turns(rig: &Rig) -> bool {
+    (velocity(rig, 0) - 2 * NANO).abs() < 2 * NANO / 100
+}
+
+/// The slide is at its speed: to a third at any instant, because the drive gets a position every 10 ms and makes a step of each, and
+/// to a tenth over four cycles, as the box sees it.
+fn slide_moves(rig: &Rig) -> bool {
+    let seen = rig.engine.axes()[1].feedback().velocity.get();
+    (velocity(rig, 1) - SLIDE_SPEED).abs() < SLIDE_SPEED / 3 && (seen - 24 * NANO).abs() < 24 * NANO / 10
+}
+
+/// Goes on until `done` while the slide goes on.
+#[track_caller]
+fn go(rig: &mut Rig, limit: i64, what: &str, mut done: impl FnMut(&Rig) -> bool) {
+    rig.run_until(millis(limit), what, |rig| {
+        assert!(slide_moves(rig), "the slide runs at {}\n{}", velocity(rig, 1), rig.told());
+        done(rig)
+    });
+}
+
+#[track_caller]
+fn go_for(rig: &mut Rig, span: i64) {
+    let end = rig.now() + millis(span);
+    go(rig, span + 1_000, "the end of the time", |rig| rig.now() >= end);
+}
+
+/// The turntable comes to rest within so many milliseconds and stays where it is.
+#[track_caller]
+fn stops_within(rig: &mut Rig, limit: i64) {
+    go(rig, limit, "rest", |rig| velocity(rig, 0).abs() < NANO / 100);
+    go_for(rig, 50);
+    let stands = turns(rig, 0);
+    go_for(rig, 300);
+    let moved = turns(rig, 0) - stands;
+    assert!(moved.abs() < 0.001, "it moved by {moved} afterwards\n{}", rig.told());
+}
+
+/// The turntable turns again, to the end of the program; nothing was wrong with the slide, nor with anybody on the bus.
+#[track_caller]
+fn runs_again(rig: &mut Rig) {
+    go(rig, 30_000, "the turntable turns again", |rig| {
+        rig.engine.axes()[0].fault().is_none() && turntable_turns(rig)
+    });
+    go_for(rig, 200);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert_eq!((report.axes[1].faults.total, report.axes[1].alarms.total), (0, 0), "{}", rig.told());
+    assert_eq!(rig.engine.axes()[1].counters().faults, 0);
+    assert!(rig.torque_free());
+}
+
+#[track_caller]
+fn count(rig: &Rig, text: &str) -> usize {
+    rig.told().lines().filter(|line| *line == text).count()
+}
+
+/// Type and code of the faults of the turntable that the controller got.
+fn codes(rig: &Rig) -> Vec<(FaultType, u8)> {
+    rig.report().axes[0].faults.kept().iter().map(|fault| (fault.fault_type, fault.code)).collect()
+}
+
+/// The turntable's axis has stopped because nothing good comes from its drive.
+#[track_caller]
+fn silent(rig: &Rig) {
+    assert_eq!(codes(rig), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
+    let axis = &rig.engine.axes()[0];
+    assert_eq!(axis.fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
+    assert!(matches!(axis.state(), DriveState::FaultReaction | DriveState::Faulted), "{:?}", axis.state());
+}
+
+/// A station that nobody has asked for, which says that it has the MAC ID of the box.
+fn claim(rig: &mut Rig, from: Station, response: bool) {
+    let mac = MacId::new(1).expect("a MAC ID");
+    let message = DuplicateMac { response, port: 0, vendor: 0x0777, serial: 0x1234_5678 };
+    let mut data = [0; 7];
+    message.emit(&mut data).expect("seven bytes");
+    let frame = Frame::new(Identifier::DuplicateMacCheck(mac).can(), &data).expect("a frame");
+    let now = rig.now();
+    rig.devicenet[0].bus.bus_mut().send(now, from, &frame).expect("the station has room");
+}
+
+fn intruder(rig: &mut Rig) -> Station {
+    rig.devicenet[0].bus.bus_mut().add(64).expect("the bus has room for another station")
+}
+
+/// Lets the fragments of the drive with MAC ID 5 come in another order: the last but one is told to be the last.
+fn shuffle(frame: &mut Frame) {
+    const LAST: u8 = 0x80;
+    let of = Identifier::PollResponse(MacId::new(5).expect("a MAC ID")).can();
+    let [head, rest @ ..] = frame.data() else { return };
+    if frame.id() == of && matches!(head & 0x3F, 1 | 2) {
+        let other = if head & 0x3F == 1 { LAST | 2 } else { 0x40 | 1 };
+        let data: Vec<u8> = core::iter::once(other).chain(rest.iter().copied()).collect();
+        *frame = Frame::new(of, &data).expect("as long as it was");
+    }
 }
 
 #[test]
@@ -26,10 +189,156 @@ fn two_axes_go_where_the_controller_sends_them() {
     rig.connect(program::standard(&plans, 6.0));
     let report = rig.run(millis(60_000));
     assert!(report.failure.is_none(), "{report:?}\n{}\n{}", rig.log(), rig.told());
-    for (drive, (plan, way)) in plans.iter().zip([1.0, 5.0]).enumerate() {
-        let position = turns(&rig, drive) * way;
+    for (place, (plan, way)) in plans.iter().zip([1.0, 5.0]).enumerate() {
+        let position = turns(&rig, place) * way;
         assert!((position - plan.target).abs() < plan.window, "{position} is not {}", plan.target);
     }
-    rig.devicenet[0].bus_mut().judge();
+    rig.devicenet[0].bus.bus_mut().judge();
     assert!(rig.torque_free());
+}
+
+#[test]
+fn a_drive_whose_plug_is_pulled_stops_by_itself_and_comes_back_while_the_other_goes_on() {
+    let mut rig = in_motion(BOX, 8.0);
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, false);
+    stops_within(&mut rig, 800);
+    silent(&rig);
+    assert_eq!(count(&rig, "DeviceNet 1: slave 5: poll connection: 4 answers in a row are missing"), 1);
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, true);
+    go(&mut rig, 7_000, "the drive taken anew", |rig| {
+        count(rig, "DeviceNet 1: slave 5: exchanging") == 2 && rig.engine.axes()[0].south().is_some()
+    });
+    assert!(velocity(&rig, 0).abs() < NANO / 100, "nobody has asked it to move");
+    runs_again(&mut rig);
+    rig.devicenet[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_fault_of_the_drive_is_told_with_its_cause_and_reset() {
+    let mut rig = in_motion(BOX, 3.0);
+    rig.devicenet[0]
+        .bus
+        .nodes_mut()
+        .next()
+        .expect("a drive")
+        .servo_mut()
+        .raise_fault(FaultCause::OVER_CURRENT);
+    stops_within(&mut rig, 1_000);
+    assert_eq!(codes(&rig), [(FaultType::AXIS, 10)], "Inverter Overcurrent\n{}", rig.told());
+    rig.devicenet[0]
+        .bus
+        .nodes_mut()
+        .next()
+        .expect("a drive")
+        .servo_mut()
+        .clear_fault(FaultCause::OVER_CURRENT);
+    runs_again(&mut rig);
+}
+
+#[test]
+fn one_message_with_its_fragments_out_of_order_stops_nobody() {
+    let mut rig = in_motion(BOX, 1.0);
+    let (from, refused) = (rig.now(), rig.status().counters.refused_frames);
+    rig.devicenet[0].tamper = Some(Box::new(move |now, frame| {
+        if now.since(from) < millis(10) {
+            shuffle(frame);
+        }
+        true
+    }));
+    go_for(&mut rig, 200);
+    assert!(turntable_turns(&rig), "{}", rig.told());
+    assert!(rig.status().counters.refused_frames > refused, "they were not taken");
+    let lost = rig.engine.axes()[0].counters().lost_telegrams;
+    assert!((1..=2).contains(&lost), "{lost}");
+    runs_again(&mut rig);
+}
+
+#[test]
+fn fragments_that_stay_out_of_order_stop_their_axis() {
+    let mut rig = in_motion(BOX, 8.0);
+    rig.devicenet[0].tamper = Some(Box::new(|_, frame| {
+        shuffle(frame);
+        true
+    }));
+    stops_within(&mut rig, 1_500);
+    silent(&rig);
+    rig.devicenet[0].tamper = None;
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_box_whose_mac_id_another_node_has_stays_off_the_network_until_it_is_free() {
+    let mut rig = Rig::new(settings());
+    let other = intruder(&mut rig);
+    rig.run_for(millis(500));
+    claim(&mut rig, other, true);
+    rig.run_for(millis(5_000));
+    assert_ne!(rig.status().state, BoxState::READY);
+    assert!(!rig.told().contains("on line") && !rig.told().contains("exchanging"), "{}", rig.told());
+    assert!(rig.told().contains("0x0777"), "expected who it is: {}", rig.told());
+    // It asks again after ten seconds, and nobody minds.
+    rig.run_until(millis(15_000), "the bus up", |rig| rig.status().state == BoxState::READY);
+    assert_eq!(count(&rig, "DeviceNet 1: on line"), 1);
+}
+
+#[test]
+fn a_node_that_asks_for_the_mac_id_of_the_box_is_told_and_changes_nothing() {
+    let mut rig = in_motion(BOX, 1.0);
+    let other = intruder(&mut rig);
+    claim(&mut rig, other, false);
+    go_for(&mut rig, 300);
+    assert!(turntable_turns(&rig), "{}", rig.told());
+    runs_again(&mut rig);
+}
+
+#[test]
+fn another_drive_than_expected_is_left_out_and_named() {
+    let other = BOX.replacen("mac_id = 9\n", "mac_id = 9\nproduct_code = 77\n", 1);
+    let mut rig = Rig::ready(with(&other));
+    rig.run_for(millis(3_000));
+    let named = "DeviceNet 1: slave 9: product code: expected 0x004d, found 0x0001";
+    assert_eq!(count(&rig, named), 1, "{}", rig.told());
+    let [good, left_out] = rig.engine.axes() else { panic!("two axes") };
+    assert!(good.south().is_some() && left_out.south().is_none());
+}
+
+#[test]
+fn a_velocity_drive_turns_both_ways_beside_a_motion_drive() {
+    let mut rig = Rig::ready(with(&velocity_drive(21)));
+    let far = Step::MoveAbsolute { axis: 2, position: 100.0, limits: SLIDE };
+    let program = vec![
+        Step::Enable(both()),
+        turn(2.0),
+        Step::Dwell { seconds: 1.0 },
+        turn(-1.5),
+        Step::Dwell { seconds: 1.0 },
+        far,
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "forward", turntable_turns);
+    rig.run_for(millis(300));
+    let seen = rig.engine.axes()[0].feedback().velocity.get();
+    assert!((seen - 2 * NANO).abs() < NANO / 20, "the drive says {seen}, in whole rpm");
+    rig.run_until(millis(10_000), "reverse", |rig| (velocity(rig, 0) + 3 * NANO / 2).abs() < NANO / 50);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    let reached = turns(&rig, 1) * 5.0;
+    assert!((reached - 100.0).abs() < 0.2, "{reached}: the step ends with the command");
+    assert!(rig.torque_free());
+    rig.devicenet[0].bus.bus_mut().judge();
+}
+
+#[test]
+fn a_velocity_drive_that_is_lost_stops_and_comes_back() {
+    let mut rig = in_motion(&velocity_drive(21), 9.0);
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, false);
+    stops_within(&mut rig, 6_000);
+    silent(&rig);
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, true);
+    runs_again(&mut rig);
 }
