@@ -3,7 +3,7 @@
 
 use arrayvec::ArrayVec;
 use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, StatusBits};
+use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, Signal, StatusBits};
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{
@@ -312,6 +312,11 @@ impl DriveProgram {
     /// The values from the drive, each with what carries it.
     pub fn feedback_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
         self.feedback.fields().zip(self.telegram.feedback.iter().skip(self.heads()).copied())
+    }
+
+    /// Whether the drive tells this value in every cycle.
+    pub fn tells(&self, signal: Signal) -> bool {
+        self.feedback.fields().any(|field| field.signal == signal)
     }
 
     /// Whether it is what leads the drive, or shows its state: no PDO may be without it.

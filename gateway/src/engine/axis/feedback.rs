@@ -5,7 +5,7 @@ use super::procedure::{ProcedureUnit, Surroundings};
 use super::{AxisChannel, MODE_TIME_OUT, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
-use profile_generic::image::{FeedbackSet, StatusBits};
+use profile_generic::image::{FeedbackSet, Signal, StatusBits};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
@@ -44,6 +44,7 @@ impl AxisChannel {
         let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
         let status = program.decode(received.data, led, &mut self.feedback, trackers, &mut conversions);
         let Some(status) = status else { return };
+        let tells_velocity = program.tells(Signal::VelocityActual);
         self.status = status;
         self.shown = program.mode(status);
         if program.handover(self.command.selection()).is_some() && !self.handover.is_done(&self.command) {
@@ -59,6 +60,16 @@ impl AxisChannel {
         self.feedback.at = sampled;
         if self.feedback.present.contains(FeedbackSet::POSITION) {
             let position = self.feedback.position;
+            if referenced != self.feedback.status.contains(StatusBits::REFERENCED) {
+                // The drive counts from another place.
+                self.velocimeter.restart();
+            }
+            if !tells_velocity {
+                self.feedback.present.remove(FeedbackSet::VELOCITY);
+                if let Some(velocity) = self.velocimeter.sample(position, sampled) {
+                    self.feedback.set(Signal::VelocityActual, velocity.get());
+                }
+            }
             self.captures.sample(program.captures(), received.data, position, sampled);
         }
         let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();

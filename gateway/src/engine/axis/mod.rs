@@ -22,6 +22,7 @@ pub mod procedure;
 mod sequence;
 mod set_point;
 mod trim;
+mod velocimeter;
 
 pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
@@ -176,6 +177,8 @@ pub struct AxisChannel {
     faults: FaultSet,
     diagnosis: diagnosis::Diagnosis,
     own_words: own_words::Reading,
+    /// For a drive that tells positions and no velocity.
+    velocimeter: velocimeter::Velocimeter,
     loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
@@ -251,6 +254,7 @@ impl AxisChannel {
             faults: FaultSet::new(),
             diagnosis: diagnosis::Diagnosis::default(),
             own_words: own_words::Reading::default(),
+            velocimeter: velocimeter::Velocimeter::default(),
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
@@ -352,6 +356,7 @@ impl AxisChannel {
         self.feedback.fresh = false;
         self.feedback.present = FeedbackSet::empty();
         self.end_diagnosis();
+        self.velocimeter.restart();
         self.report(now, system, report);
         self.south = None;
         self.captures.restart();
