@@ -222,7 +222,11 @@ fn ethernetip_opens_runs_and_closes_the_motion_connection() {
     assert_eq!(got["open"], 0);
     assert_eq!(got["intervals_ms"], json!([8.0, 8.0]), "the intervals granted are those asked for");
     assert_eq!(got["second_owner"], 0x0106);
-    let received = got["received"].as_array().expect("datagrams");
+    // On a host in a hurry the box sends on its own before it hears the first update: those have no update to name.
+    let before = |datagram: &&serde_json::Value| {
+        datagram["data"].as_str().is_some_and(|data| data.starts_with("070200"))
+    };
+    let received: Vec<_> = got["received"].as_array().expect("datagrams").iter().skip_while(before).collect();
     assert!(received.len() >= 4, "an answer to each update: {received:?}");
     for datagram in received {
         assert_eq!(datagram["from"], ADDRESS);
