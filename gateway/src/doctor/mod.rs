@@ -157,17 +157,21 @@ fn cycles(config: Option<&Config>) -> Vec<Cycle> {
         tolerance: bus.jitter,
         losses: bus.allowed_losses,
     });
-    let can = config.can.iter().map(|bus| Cycle {
-        what: match &bus.link {
-            CanLink::Interface { name, .. } => format!("CAN on {name}"),
-            CanLink::InProcess => "CAN in the process".to_owned(),
+    // Neither declares a jitter: a SYNC or poll half a cycle late is one that the box itself counts as late.
+    let on_can = |kind: &str, link: &CanLink, time: DurationNs, losses| Cycle {
+        what: match link {
+            CanLink::Interface { name, .. } => format!("{kind} on {name}"),
+            CanLink::InProcess => format!("{kind} in the process"),
         },
-        time: bus.cycle_time,
-        // CANopen declares no jitter: a SYNC half a cycle late is one that the box itself counts as late.
-        tolerance: DurationNs(bus.cycle_time.as_nanos() / 2),
-        losses: bus.allowed_losses,
-    });
-    sercos.chain(can).collect()
+        time,
+        tolerance: DurationNs(time.as_nanos() / 2),
+        losses,
+    };
+    let can = config.can.iter().map(|bus| on_can("CANopen", &bus.link, bus.cycle_time, bus.allowed_losses));
+    let devicenet = config.devicenet.iter();
+    let devicenet =
+        devicenet.map(|bus| on_can("DeviceNet", &bus.link, bus.cycle_time, bus.allowed_losses.into()));
+    sercos.chain(can).chain(devicenet).collect()
 }
 
 #[cfg(test)]
@@ -186,6 +190,11 @@ mod tests {
             losses: bus.allowed_losses,
         };
         assert_eq!(cycles(Some(&config)), [expected]);
+        let config = include_str!("../../../examples/two-axes-devicenet.toml");
+        let config = Config::parse(config, "devicenet.toml").unwrap_or_else(|error| panic!("{error}"));
+        let [network] = &cycles(Some(&config))[..] else { panic!("one network") };
+        assert_eq!((network.what.as_str(), network.time.as_nanos()), ("DeviceNet on can0", 10_000_000));
+        assert_eq!(network.tolerance.as_nanos(), 5_000_000);
         let without = cycles(None);
         assert_eq!(
             without.iter().map(|cycle| cycle.time.as_nanos()).collect::<Vec<_>>(),

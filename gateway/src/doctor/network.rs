@@ -44,9 +44,10 @@ pub(super) fn checks(root: &Path, config: Option<&Config>) -> Vec<Check> {
         Some(Link::InProcess { .. }) => simulated = true,
         None => {}
     }
-    for bus in &config.can {
-        match &bus.link {
-            CanLink::Interface { name, set_bit_rate } => checks.push(can(name, bus.bit_rate, *set_bit_rate)),
+    let devicenet = config.devicenet.iter().map(|network| (&network.link, network.bit_rate()));
+    for (link, bit_rate) in config.can.iter().map(|bus| (&bus.link, bus.bit_rate)).chain(devicenet) {
+        match link {
+            CanLink::Interface { name, set_bit_rate } => checks.push(can(name, bit_rate, *set_bit_rate)),
             CanLink::InProcess => simulated = true,
         }
     }
@@ -207,7 +208,7 @@ fn can(name: &str, wanted: BitRate, set_bit_rate: bool) -> Check {
     let state = match can_interface::state(name) {
         Ok(state) => state,
         Err(error) => {
-            let advice = "[[south.can]] interface; `ip link` shows what there is";
+            let advice = "[[south.can]] or [[south.devicenet]] interface; `ip link` shows what there is";
             return Check::unfit(AREA, what, error.to_string(), advice);
         }
     };
