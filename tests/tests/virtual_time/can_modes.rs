@@ -5,12 +5,13 @@ use axisbridge::engine::axis::Limits;
 use axisbridge::mapping::Cia402Axis;
 use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge_tests::rig::generic::GenericCan;
-use profile_cia402::drive::Mode;
+use profile_cia402::drive::{Mode, State};
+use profile_cia402::node::dictionary::Group;
 use profile_generic::capture::CaptureWindow;
 use profile_generic::fault::FaultCause;
 use profile_generic::image::{CommandSet, Signal, StatusBits};
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
-use profile_generic::quantity::{Acceleration, Position, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::state::{DriveState, Report, Request};
 
 const NANO: i64 = 1_000_000_000;
@@ -414,5 +415,101 @@ fn a_fault_of_the_drive_and_a_lost_bus_end_homing() {
         rig.run_for(500);
         assert!((rig.position() - here).abs() < NANO / 500, "{here} to {}", rig.position());
         assert!(!status(&rig, StatusBits::HOMED), "lost {lost}");
+    }
+}
+
+/// 607E inverts positions, velocities, both or none; 6071 and 6077 never. Forward is where positions rise.
+#[test]
+fn a_drive_with_negative_polarity_goes_forward_where_its_positions_rise() {
+    const TORQUE: ModeSelection = ModeSelection { mode: OperatingMode::Torque, interpolation: CONTROLLER };
+    for polarity in [0x00, 0x80, 0x40, 0xC0] {
+        let mut rig = ready(&[POSITION, VELOCITY, TORQUE], |_, node| {
+            node.dictionary_mut().set(0x607E, 0, polarity);
+            node.dictionary_mut().store(Group::All);
+        });
+        assert_eq!(rig.number(0x607E, 0), polarity);
+        let sign = if polarity & 0x80 == 0 { 1 } else { -1 };
+        rig.enable();
+        let before = rig.feedback().position.get();
+        rig.lead(2 * NANO, POSITION);
+        rig.run_for(500);
+        let shown = rig.feedback().velocity.get();
+        assert!((shown - 2 * NANO).abs() < NANO / 20, "{polarity:02X}: {shown}");
+        assert!((rig.speed() - sign * 2 * NANO).abs() < NANO / 20, "{polarity:02X}: {}", rig.speed());
+        assert!(rig.feedback().position.get() - before > NANO / 2, "{polarity:02X}");
+        rig.drive_at(3 * NANO);
+        rig.run_for(500);
+        let shown = rig.feedback().velocity.get();
+        assert!((shown - 3 * NANO).abs() < NANO / 20, "{polarity:02X} csv: {shown}");
+        assert!((rig.speed() - sign * 3 * NANO).abs() < NANO / 20, "{polarity:02X} csv: {}", rig.speed());
+        rig.want(|command| {
+            command.select(TORQUE);
+            command.torque = Torque(200_000);
+            command.present = CommandSet::TORQUE;
+        });
+        rig.run_for(40);
+        let torque = rig.feedback().torque.get();
+        assert!((torque - 200_000).abs() < 20_000, "{polarity:02X} cst: {torque}");
+        assert!(rig.feedback().velocity.get() > 31 * NANO / 10, "{polarity:02X} cst: it speeds up");
+        assert_eq!(rig.axis().faults().count(), 0, "{polarity:02X}");
+    }
+}
+
+/// The second axis of a device: every object 800h higher, PDOs of its own, and the first axis left alone.
+#[test]
+fn the_second_axis_of_a_device_goes_to_targets_and_homes() {
+    let modes = [POSITION, TARGET, HOMING];
+    let mut rig = GenericCan::ready(1, modes, Limits::default(), |_, _| ());
+    let first: Vec<String> =
+        rig.axis().south().expect("a program").telegram.command.iter().map(ToString::to_string).collect();
+    assert_eq!(first[..3], ["6840:00", "6860:00", "687A:00"]);
+    rig.enable();
+    go_to(&mut rig, 3, 2);
+    rig.run_until(5_000, "the target", |rig| status(rig, StatusBits::TARGET_REACHED));
+    rig.run_for(100);
+    assert!((rig.position() - 3 * NANO).abs() < NANO / 1_000, "{}", rig.position());
+    rig.set_number(0x6098, 0, 37);
+    rig.set_number(0x607C, 0, -5 * TURN);
+    rig.want(|command| command.select(HOMING));
+    rig.run_until(1_000, "the end of homing", |rig| status(rig, StatusBits::HOMED));
+    assert!((rig.position() + 5 * NANO).abs() < NANO / 1_000, "{}", rig.position());
+    let other = &rig.south.node().application().axes()[0];
+    assert_eq!((other.actual().position.get(), other.state()), (0, State::SwitchOnDisabled));
+    assert_eq!(rig.axis().faults().count(), 0);
+}
+
+/// A drive that does not hear its master makes a quick stop by 605A, as 6007 was told; one that would hold by it, 6, is taken
+/// out of it when the bus is back, and nothing moves before it is enabled anew.
+#[test]
+fn a_quick_stop_ends_as_its_option_code_says() {
+    for (option, expected) in [(2, State::SwitchOnDisabled), (6, State::QuickStopActive)] {
+        let mut rig = ready(&[POSITION, TARGET], |_, _| ());
+        assert_eq!((rig.number(0x605A, 0), rig.number(0x6007, 0)), (2, 3), "what the box has written");
+        rig.set_number(0x605A, 0, option);
+        rig.set_number(0x6085, 0, 20 * TURN);
+        rig.enable();
+        // Not in csp: without SYNC a drive faults there before it misses the heartbeat.
+        go_to(&mut rig, 50, 2);
+        rig.run_for(800);
+        assert!(rig.speed() > 19 * NANO / 10);
+        rig.cable = false;
+        rig.run_until(2_000, "the drive to miss its master", |rig| {
+            rig.drive().state() != State::OperationEnabled
+        });
+        let from = rig.position();
+        rig.run_until(2_000, "rest", |rig| rig.speed().abs() < NANO / 100);
+        // 2 turns/s at 20 turns/s2 are 0.1 turns.
+        let way = rig.position() - from;
+        assert!((way - NANO / 10).abs() < NANO / 50, "{option}: {way}");
+        rig.run_for(100);
+        assert_eq!(rig.drive().state(), expected, "{option}");
+        let here = rig.position();
+        rig.cable = true;
+        rig.run_until(60_000, "the bus", |rig| rig.feedback().fresh);
+        rig.run_for(500);
+        assert_eq!(rig.drive().state(), State::SwitchOnDisabled, "{option}");
+        rig.want(|command| command.request = Some(Request::FaultReset));
+        rig.run_until(10_000, "the reset", |rig| rig.state() == DriveState::Ready);
+        assert!((rig.position() - here).abs() < NANO / 100, "{option}");
     }
 }

@@ -228,8 +228,20 @@ impl<'a> Builder<'a> {
             mode: word("mode", &row.mode),
             mode_shown: word("mode_shown", &row.mode_shown),
             modes_supported: word("modes_supported", &row.modes_supported),
+            polarity: word("polarity", &row.polarity),
+            direction: 0,
             error: ERROR_CODE,
         };
+        self.tables.words.direction = self.polarity("direction", &row.direction).unwrap_or_default();
+    }
+
+    /// The bit of a field of the polarity.
+    fn polarity(&mut self, key: &str, name: &Name) -> Option<u32> {
+        let bits = &self.set("Polarity")?.codes;
+        let find = |text: &str| bits.iter().find(|bit| bit.name == text);
+        let names = bits.iter().map(|bit| bit.name.as_str());
+        let bit = self.resolver.name(key, name, "a field of the polarity", find, names)?;
+        u32::try_from(bit.code).ok()
     }
 
     /// Whether the unit of a value can become the quantity.
@@ -270,7 +282,8 @@ impl<'a> Builder<'a> {
         if self.tables.signals.iter().any(|known| known.signal == signal && shared(known)) {
             self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
         }
-        self.tables.signals.push(SignalRule { signal, value, modes, refuse });
+        let polarity = row.polarity.as_ref().and_then(|name| self.polarity("polarity", name));
+        self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse });
     }
 
     fn writable(&mut self, entry: &Cia402Sub, to_drive: bool, direction: &Name, object: Object) {

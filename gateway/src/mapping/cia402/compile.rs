@@ -389,11 +389,24 @@ impl Cia402Tables {
         facts: &ObjectFacts,
     ) -> Result<Field, Cia402Error> {
         let (signal, value) = (rule.signal, &rule.value);
-        let count = self.count(value, signal.quantity(), axis, facts)?;
+        let mut count = self.count(value, signal.quantity(), axis, facts)?;
+        if self.is_inverted(rule, facts) {
+            let inverted = count.num().checked_neg().and_then(|num| Ratio::new(num, count.den()));
+            count = inverted.ok_or(Cia402Error::Overflow(value.object))?;
+        }
         let conversion = if signal.is_command() { to_drive(value, count)? } else { Conversion::new(count) };
         let absolute = matches!(signal, Signal::PositionActual) && value.width.bits() == 32;
         let modulo = absolute.then_some(FULL_RANGE);
         Ok(Field { signal, offset, width: value.width, conversion, modulo })
+    }
+
+    /// Whether the sign of a value is not that of the axis: the drive inverts positions and velocities by bits of their own, and
+    /// torques not at all.
+    fn is_inverted(&self, rule: &SignalRule, facts: &ObjectFacts) -> bool {
+        let word = facts.integer(self.words.polarity, Width::U8).unwrap_or(0);
+        let bit = |bit: u32| word >> bit & 1 != 0;
+        let own = rule.polarity.is_some_and(bit);
+        own != bit(self.words.direction)
     }
 
     /// Actions, reports and status bits.

@@ -78,6 +78,8 @@ pub(super) struct SignalRule {
     pub value: Value,
     /// Modes of operation in which it is this object; empty = all that no other rule of the signal has.
     pub modes: Vec<i8>,
+    /// Bit of the polarity by which the drive inverts it.
+    pub polarity: Option<u32>,
     /// Whether an axis cannot work without it.
     pub refuse: bool,
 }
@@ -179,6 +181,9 @@ pub(super) struct Words {
     pub mode: Object,
     pub mode_shown: Object,
     pub modes_supported: Object,
+    /// Which values the drive inverts, and the bit of the value whose sign is that of the axis.
+    pub polarity: Object,
+    pub direction: u32,
     /// The error code.
     pub error: Object,
 }

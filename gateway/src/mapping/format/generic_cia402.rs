@@ -122,6 +122,10 @@ pub struct Cia402WordsRow {
     pub mode_shown: Name,
     /// Modes of operation that there are.
     pub modes_supported: Name,
+    /// Which values the drive inverts.
+    pub polarity: Name,
+    /// Its field for the value whose sign is that of the axis.
+    pub direction: Name,
     /// Where it comes from.
     pub source: Source,
 }
@@ -139,6 +143,8 @@ pub struct Cia402SignalRow {
     pub modes: Vec<Name>,
     /// `to_drive` or `from_drive`.
     pub direction: Name,
+    /// Field of the polarity by which the drive inverts the value. Default: it never does.
+    pub polarity: Option<Name>,
     /// What happens when the drive has no such object: `refuse` or `omit`.
     pub missing: Name,
     /// Where it comes from.
