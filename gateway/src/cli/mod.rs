@@ -71,7 +71,7 @@ struct DemoArguments {
     /// Address on which the gateway's EtherNet/IP side listens (TCP and UDP 44818, UDP 2222).
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.2")]
     listen: std::net::Ipv4Addr,
-    /// What is behind the box, one axis on each; the last kind has the rest of the two axes.
+    /// What is behind the box, one axis on each; the last kind has the rest of the two axes, a third kind has a third axis.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
     /// Where to write the recording of both sides.

@@ -1,7 +1,8 @@
 //! `axisbridge demo`: the whole chain in one process.
 //!
 //! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
-//! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, or one of each.
+//! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, of DeviceNet, or
+//! one of each.
 
 mod drives;
 
@@ -35,7 +36,7 @@ const ADDRESS: &str = "127.0.0.2";
 const UPDATE_PERIOD_US: u32 = 8_000;
 
 /// What each axis has: speed in units per second, reach in units, window in units.
-const AXES: [(f64, f64, f64); 2] = [(2.0, 600.0, 0.002), (40.0, 700.0, 0.02)];
+const AXES: [(f64, f64, f64); 3] = [(2.0, 600.0, 0.002), (40.0, 700.0, 0.02), (3.0, 600.0, 0.004)];
 
 /// How long the buses may take to cyclic operation.
 const START_TIME_OUT: Duration = Duration::from_secs(20);
@@ -56,6 +57,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let seconds = f64::from(arguments.seconds);
     let plans: Vec<_> = (1..)
         .zip(AXES)
+        .take(config.axes.len())
         .map(|(axis, (speed, reach, window))| AxisPlan::new(axis, speed, reach, window, seconds))
         .collect();
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
