@@ -53,6 +53,17 @@ impl Namespace {
         command
     }
 
+    /// Gives an interface an address with prefix length.
+    ///
+    /// # Panics
+    /// When the interface does not exist here, or has the address already.
+    pub fn add_address(&self, interface: &str, address: &str) {
+        assert!(
+            ip(&["-n", &self.name, "addr", "add", address, "dev", interface]),
+            "cannot give {interface} the address {address}"
+        );
+    }
+
     /// Takes one end of a cable down or up.
     ///
     /// # Panics
@@ -81,10 +92,7 @@ pub fn cable(a: (&Namespace, &str, Option<&str>), b: (&Namespace, &str, Option<&
     assert!(made, "cannot lay a cable from {} to {}", a.1, b.1);
     for (namespace, interface, address) in [a, b] {
         if let Some(address) = address {
-            assert!(
-                ip(&["-n", &namespace.name, "addr", "add", address, "dev", interface]),
-                "cannot give {interface} the address {address}"
-            );
+            namespace.add_address(interface, address);
         }
         namespace.set_link(interface, true);
     }

@@ -1,6 +1,7 @@
 //! SERCOS III lines and rings of simulated drives in processes of their own, behind virtual cables.
 
 use std::fmt::Write as _;
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
@@ -14,6 +15,9 @@ use super::{in_namespace, one_bus, scratch, wait_for};
 
 /// Address of the box, where its controller is in the same namespace.
 const BOX: &str = "127.0.0.2";
+
+/// Set for the copies of this test binary that talk to each other on the wire of a bus.
+const TALKER: &str = "AXISBRIDGE_TEST_TALKER";
 
 /// What the drives form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -230,4 +234,127 @@ fn a_drive_is_plugged_in_behind_a_running_one_and_moved() {
         bus.wait_for("slave at position 2 with address 2 was lost in CP4");
         bus.end();
     });
+}
+
+/// What a scan over a cable prints is a configuration that the check takes and the box runs.
+#[test]
+fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
+    let name = "a_scan_over_a_cable_makes_a_configuration_that_runs";
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let _alone = one_bus();
+    in_real_time(name, || {
+        let (gateway, drives) = (Namespace::new("box"), Namespace::new("drv"));
+        cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
+        let arguments =
+            ["simulate", "sercos-drive", "--interface", "sercos0", "--slaves", "3", "--address", "7"];
+        let mut line = in_namespace(&drives, &arguments);
+        line.args(["--linear", "8", "--seconds", "90"]).stderr(Stdio::inherit());
+        let mut line = Running::start("simulate sercos-drive", &mut line);
+        let config = scratch(&format!("{name}.toml"));
+        let path = config.to_str().expect("UTF-8");
+        let output = |arguments: &[&str]| {
+            let output = in_namespace(&gateway, arguments).output().expect("axisbridge can be started");
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            (output.status.code(), text(&output.stdout), text(&output.stderr))
+        };
+
+        let (status, found, said) = output(&["scan", "--interface", "sercos0"]);
+        assert_eq!(status, Some(0), "{found}{said}");
+        for line in [
+            "# axisbridge scan of sercos0: 3 slaves, line on port 1",
+            "# 2, address 8: Simulated drive (AXB-SIM-1)",
+            "#   vendor                 Axisbridge (code 0)",
+            "#                          0x0003 Position control, feedback 1",
+            "#   serial number          00000009",
+        ] {
+            assert!(found.lines().any(|there| there == line), "no {line:?} in {found}");
+        }
+        std::fs::write(&config, &found).expect("the scratch folder can be written");
+        let starter = found;
+
+        let (status, found, said) = output(&["check", "--config", path]);
+        assert_eq!(status, Some(0), "{found}{said}");
+        assert!(found.starts_with("0 errors, 0 warnings"), "{found}");
+        let (status, found, said) = output(&["scan", "--config", path]);
+        assert_eq!(status, Some(0), "{found}{said}");
+        assert!(!found.contains("# !"), "the bus is the one of the configuration: {found}");
+
+        // Nobody promises the tests a host that keeps time.
+        let patient =
+            starter.replace("cycle_time = \"2 ms\"", "cycle_time = \"2 ms\"\nallowed_losses = 1000");
+        std::fs::write(&config, patient).expect("the scratch folder can be written");
+        let log = scratch(&format!("{name}.log"));
+        let mut run = in_namespace(&gateway, &["run", "--config", path]);
+        run.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
+        let mut run = Running::start("run", &mut run);
+        wait_for(&log, "CP4", &mut run);
+        assert_eq!(run.terminate(Duration::from_secs(10)).code(), Some(0), "{}", text(&log));
+        line.terminate(Duration::from_secs(10));
+    });
+}
+
+/// The wire of a bus in operation carries other frames too (NRT), and the bus does not notice.
+#[test]
+fn other_traffic_crosses_the_cable_of_a_running_bus() {
+    let name = "other_traffic_crosses_the_cable_of_a_running_bus";
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let _alone = one_bus();
+    in_real_time(name, || {
+        let mut bus = Bus::start(name, 1, 2, 4, Shape::Line);
+        bus.gateway.add_address("sercos0", "192.0.2.1/24");
+        bus.segments[0].add_address("in", "192.0.2.2/24");
+        bus.wait_for("CP4");
+        let mut controller = bus.controller(2, 3);
+        bus.wait_for("-> Running");
+        let own = std::env::current_exe().expect("own path");
+        let talker = |namespace: &Namespace, role: &str| {
+            let mut command = namespace.command(own.to_str().expect("UTF-8"));
+            command
+                .args(["--exact", "sercos::talker", "--nocapture"])
+                .env(TALKER, role)
+                .stdout(Stdio::null());
+            Running::start("talker", &mut command)
+        };
+        let echo = talker(&bus.segments[0], "echo");
+        let mut asking = talker(&bus.gateway, "ask");
+        assert!(asking.wait(Duration::from_secs(30)).success(), "every datagram came back");
+        drop(echo);
+        let status = controller.wait(Duration::from_secs(60));
+        let log = text(&bus.log);
+        assert!(status.success(), "the controller moved both axes: {status}\n{log}");
+        assert!(!log.contains("lost"), "no slave was lost: {log}");
+        bus.end();
+    });
+}
+
+/// Not a test of its own: the two ends of the other traffic in the test above, as its role says. It ends well once a
+/// hundred datagrams of 1400 bytes have come back whole.
+#[test]
+fn talker() {
+    let Ok(role) = std::env::var(TALKER) else { return };
+    let echoes = role == "echo";
+    let socket =
+        UdpSocket::bind(if echoes { "192.0.2.2:5000" } else { "192.0.2.1:5000" }).expect("an address");
+    let mut buffer = [0; 2048];
+    if echoes {
+        loop {
+            let (length, from) = socket.recv_from(&mut buffer).expect("a datagram");
+            socket.send_to(&buffer[..length], from).expect("it can be sent back");
+        }
+    }
+    socket.set_read_timeout(Some(Duration::from_millis(500))).expect("a time-out");
+    for number in 0..100 {
+        let datagram = [number; 1400];
+        // The other end may not be there yet, and UDP may lose one: it is sent again.
+        let came_back = (0..20).any(|_| {
+            socket.send_to(&datagram, "192.0.2.2:5000").is_ok()
+                && socket.recv_from(&mut buffer).is_ok_and(|(length, _)| buffer[..length] == datagram)
+        });
+        assert!(came_back, "datagram {number}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
