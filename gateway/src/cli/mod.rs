@@ -12,6 +12,7 @@ mod progress;
 mod report;
 mod run;
 mod scan;
+mod scan_can;
 mod script;
 mod signal;
 mod simulate;

@@ -7,7 +7,7 @@ use profile_generic::time::DurationNs;
 use profile_sercos::master::config::{MasterConfig, Ports};
 
 use super::progress::Progress;
-use super::{CliError, ScanArguments, print, signal};
+use super::{CliError, ScanArguments, print, scan_can, signal};
 use crate::config::{Config, Link};
 use crate::engine::build::Host;
 use crate::engine::build::sercos::master_config;
@@ -29,6 +29,11 @@ const LIMIT: DurationNs = DurationNs::from_secs(120);
 /// # Errors
 /// The configuration is faulty, the interface cannot be opened, the output cannot be written.
 pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
+    if let Some(interface) = arguments.interface.as_deref().filter(|_| arguments.ring.is_none())
+        && scan_can::is_can(interface)?
+    {
+        return scan_can::run(interface, arguments.json);
+    }
     let config = arguments.config.as_deref().map(Config::load).transpose()?;
     let mapping = Mapping::embedded()?;
     let sercos = match &config {

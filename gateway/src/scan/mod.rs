@@ -4,6 +4,7 @@
 //! connection is set up and nothing is written but the active communication classes (S-0-1000.0.1), so that nothing can
 //! move.
 
+pub mod can;
 mod questions;
 mod report;
 mod starter;

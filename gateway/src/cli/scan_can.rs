@@ -1,0 +1,68 @@
+//! `axisbridge scan` of a CAN bus.
+
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+use profile_generic::time::DurationNs;
+
+use super::progress::Progress;
+use super::{CliError, print, signal};
+use crate::runner::port::CanSocketPort;
+use crate::scan::can::{self, Scanner};
+use crate::sys::can_socket::{self, CanSocket, OpenError};
+use crate::sys::{can_interface, clock};
+
+/// Longest sleep: answers come at any time.
+const PATIENCE: DurationNs = DurationNs::from_millis(1);
+
+/// Whether an interface is one of CAN.
+///
+/// # Errors
+/// It is one, and cannot be used.
+pub fn is_can(interface: &str) -> Result<bool, CliError> {
+    match CanSocket::open(interface, &can_socket::Options::default()) {
+        Ok(_) => Ok(true),
+        Err(OpenError::NotPermitted { name }) => Err(OpenError::NotPermitted { name }.into()),
+        // What else is wrong with it, the scan of SERCOS says.
+        Err(_) => Ok(false),
+    }
+}
+
+/// Looks at the bus and prints what is there.
+///
+/// # Errors
+/// The interface cannot be opened, the output cannot be written.
+pub fn run(interface: &str, json: bool) -> Result<ExitCode, CliError> {
+    let mut port = CanSocketPort::open(interface)?;
+    // A virtual interface has no rate.
+    let rate = can_interface::state(interface).ok().and_then(|state| state.nominal);
+    let stop = signal::stop_on_signals()?;
+    let mut progress = Progress::new(json);
+    progress.step(&format!("scanning {interface}"));
+    let mut scanner = Scanner::new();
+    loop {
+        let now = clock::monotonic_now();
+        if scanner.step(now, &mut port) || stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let latest = now + PATIENCE;
+        clock::sleep_until(scanner.wake_at().map_or(latest, |at| at.min(latest)))?;
+    }
+    let found = scanner.finish();
+    let output = if json {
+        format!("{:#}\n", can::json(&found))
+    } else {
+        let remarks = format!("axisbridge scan of {interface}: {}", can::text(&found));
+        let mut out = String::new();
+        for line in remarks.lines() {
+            out.push_str(format!("# {line}").trim_end());
+            out.push('\n');
+        }
+        if let Some(starter) = can::starter(&found, interface, rate) {
+            out.push('\n');
+            out.push_str(&starter);
+        }
+        out
+    };
+    print(output, if found.is_empty() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}

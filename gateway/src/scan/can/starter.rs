@@ -1,0 +1,125 @@
+//! A configuration to begin with: one device in front, one axis for each axis of each drive that was found.
+
+use std::fmt::Write as _;
+
+use profile_cia402::drive::modes::SupportedModes;
+
+use super::Found;
+use super::report::title;
+use crate::config::AXES_MAX;
+
+/// Which modes of a drive give which mode of the box.
+const USES: [(&str, SupportedModes); 3] = [
+    ("position", SupportedModes::CYCLIC_POSITION.union(SupportedModes::PROFILE_POSITION)),
+    ("velocity", SupportedModes::CYCLIC_VELOCITY.union(SupportedModes::PROFILE_VELOCITY)),
+    ("torque", SupportedModes::CYCLIC_TORQUE.union(SupportedModes::TORQUE)),
+];
+
+/// Node-id of the box, unless somebody has it.
+const OWN_NODE: u8 = 127;
+
+/// Rate that is written where the interface tells none.
+const BIT_RATE: u32 = 1_000_000;
+
+/// The configuration as text, for this interface and, where that is known, its rate. It is whole: `axisbridge run` takes it.
+/// What nobody but the machine's builder knows stands in it with a value that is safe and a remark.
+///
+/// `None` without a drive.
+#[must_use]
+pub fn starter(found: &[Found], interface: &str, bit_rate: Option<u32>) -> Option<String> {
+    let drives = found.iter().flat_map(|device| {
+        let axes =
+            device.axes().filter(|(_, modes)| USES.iter().any(|(_, wanted)| modes.intersects(*wanted)));
+        axes.map(move |(axis, modes)| (device, axis, modes))
+    });
+    let drives: Vec<_> = drives.take(AXES_MAX).collect();
+    if drives.is_empty() {
+        return None;
+    }
+    let name = |device: &Found, axis: u16| match axis {
+        0 => device.node.to_string(),
+        _ => format!("{}-{axis}", device.node),
+    };
+    let names: Vec<_> =
+        drives.iter().map(|(device, axis, _)| format!("\"axis-{}\"", name(device, *axis))).collect();
+    let own = (1..=OWN_NODE).rev().find(|own| found.iter().all(|device| device.node.get() != *own))?;
+    let mut out = String::new();
+    let _ = write!(
+        out,
+        "\
+[box]
+name = \"axisbridge\"
+
+[[device]]
+name = \"front\"
+listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
+axes = [{}]
+power_structure_class_id = 0
+update_period = {{ min = \"10 ms\", max = \"80 ms\" }}
+
+[device.identity]
+vendor_id = 1 # CHANGE: the number ODVA gave you
+product_code = 1
+revision = \"1.1\"
+serial_number = 1 # CHANGE: every box has its own
+product_name = \"Axisbridge\"
+",
+        names.join(", ")
+    );
+    for (place, (device, axis, _)) in drives.iter().enumerate() {
+        let (name, instance) = (name(device, *axis), place + 1);
+        let _ = write!(
+            out,
+            "
+[[axis]]
+name = \"axis-{name}\"
+instance = {instance}
+drive = \"drive-{name}\"
+unit = \"revolution\"
+motion_resolution = 1_000_000 # counts in one revolution
+on_command_loss = \"current-decel-and-disable\"
+
+[axis.limits] # CHANGE: these are for a first, slow look
+velocity = 0.5 # revolutions per second
+acceleration = 5.0 # revolutions per second squared
+torque_percent = 50.0
+"
+        );
+    }
+    let rate = match bit_rate {
+        Some(rate) => rate.to_string(),
+        None => format!("{BIT_RATE} # CHANGE: the rate of the bus"),
+    };
+    let _ = write!(
+        out,
+        "
+[[south.can]]
+interface = \"{interface}\"
+bit_rate = {rate}
+cycle_time = \"10 ms\"
+node = {own} # of the box
+"
+    );
+    for (device, axis, modes) in &drives {
+        let name = name(device, *axis);
+        let _ = write!(
+            out,
+            "
+[[south.can.drive]] # {}
+name = \"drive-{name}\"
+node = {}
+",
+            title(device),
+            device.node
+        );
+        if *axis > 0 {
+            let _ = writeln!(out, "axis = {axis}");
+        }
+        let uses = USES.into_iter().filter(|(_, wanted)| modes.intersects(*wanted));
+        let uses: Vec<_> = uses.map(|(name, _)| format!("\"{name}\"")).collect();
+        if uses.len() < USES.len() {
+            let _ = writeln!(out, "modes = [{}]", uses.join(", "));
+        }
+    }
+    Some(out)
+}
