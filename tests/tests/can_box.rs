@@ -64,6 +64,27 @@ fn two_can_drives_run_the_whole_program_of_a_controller() {
     in_real_time(test, || assert!(!kernel.inside(test)));
 }
 
+/// Both drives are found once they have started, which takes them a while.
+fn scan(binary: &Path) {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let output = Command::new(binary)
+            .args(["scan", "--interface", "vcan0", "--json"])
+            .stdin(Stdio::null())
+            .output()
+            .expect("the scan can be started");
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        let nodes = found["nodes"].as_array().cloned().unwrap_or_default();
+        if let [first, second] = nodes.as_slice() {
+            assert_eq!([&first["node"], &second["node"]], [1, 2]);
+            assert_eq!([&first["axes"][0]["supported_modes"], &second["serial_number"]], [1007, 2]);
+            assert!(output.status.success());
+            return;
+        }
+        assert!(Instant::now() < end, "{found} {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
 /// What happens in the guest.
 fn run_the_program() {
     let binary = PathBuf::from(std::env::var_os(BINARY).expect("the binary is named"));
@@ -86,6 +107,7 @@ fn run_the_program() {
         start(name, &binary, &at(log), &words)
     };
     let _drives = [drive("drive 1", "drive1", 1), drive("drive 2", "drive2", 2)];
+    scan(&binary);
     let words = format!("run --config {}", at("box.toml").display());
     let mut gateway = start("the box", &binary, &at("box"), &words);
     wait_for(&at("box"), &["node 1 is in operation", "node 2 is in operation"]);

@@ -59,6 +59,9 @@ const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
 /// After how many milliseconds a CAN controller that is off the bus starts again by itself.
 const CAN_RESTART_MS: u32 = 100;
 
+/// Frames that the transmit queue of a CAN interface holds: the RPDOs of a cycle, and more. Linux gives ten.
+const CAN_QUEUE: u32 = 128;
+
 /// How long a box that is asked to end waits for its axes to stop.
 const STOP_TIME_OUT: Duration = Duration::from_secs(5);
 
@@ -269,6 +272,7 @@ fn can_port(
         let settings = can_interface::Settings {
             bit_rate: Some(bit_rate),
             restart_ms: Some(CAN_RESTART_MS),
+            queue: Some(CAN_QUEUE),
             ..can_interface::Settings::default()
         };
         can_interface::configure(name, &settings)?;
