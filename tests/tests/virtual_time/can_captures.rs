@@ -120,3 +120,16 @@ fn the_home_switch_is_seen_from_one_cycle_to_the_next() {
     // Two cycles of 4 ms at a turn a second.
     assert!((0..=9 * NANO / 1_000).contains(&late), "{late}");
 }
+
+/// A probe that works for one edge is let go and begins anew when the other one is wanted as well.
+#[test]
+fn an_edge_that_is_wanted_later_is_caught_too() {
+    for captures in [CaptureMode::ServiceChannel, CaptureMode::Cyclic] {
+        let mut rig = running(captures);
+        assert_eq!(want(&mut rig, 200, &[ONE_UP]), []);
+        assert_eq!(rig.number(FUNCTION, 0), 0x0011, "{captures:?}");
+        let kinds = [ONE_UP, ONE_DOWN];
+        assert_eq!(want(&mut rig, 200, &kinds), []);
+        assert_eq!(rig.number(FUNCTION, 0), 0x0031, "{captures:?}");
+    }
+}

@@ -353,3 +353,28 @@ proptest! {
         prop_assert!(lost <= lsb.max(1.0), "{lost} of {lsb}");
     }
 }
+
+/// 607A is set-point and target: what a drive follows at once in csp is never where it shall go to by itself.
+#[test]
+fn a_target_counts_only_in_a_drive_that_shows_that_it_goes_to_targets() {
+    let target = ModeSelection::by_drive(OperatingMode::Position);
+    let mut needs = axis(&ALL[..1]);
+    needs.modes.push(target);
+    let mut facts = servo();
+    facts.note_data(object(0x6502, 0), &0x81_u32.to_le_bytes());
+    let program = shipped().cia402_program(&needs, &facts).unwrap();
+    let mut command = AxisCommand::default();
+    command.set(Signal::PositionCommand, 1_000_000_000);
+    command.set(Signal::TargetPosition, -1_000_000_000);
+    let placed = |selection: ModeSelection, status| {
+        let mut command = command;
+        command.select(selection);
+        let (mut bytes, mut report) = ([0; 19], ConversionReport::default());
+        let control = program.encode(&command, Action::Enable, 0, status, &mut bytes, &mut report);
+        (control >> 16, i32::from_le_bytes([bytes[3], bytes[4], bytes[5], bytes[6]]))
+    };
+    assert_eq!(placed(target, 0x08_1027), (1, 3600), "told pp, and still in csp");
+    assert_eq!(placed(target, 0x01_0027), (1, -3600));
+    assert_eq!(placed(OperatingMode::Position.into(), 0x01_0027), (8, 3600));
+    assert_eq!(placed(OperatingMode::Position.into(), 0x08_1027), (8, 3600));
+}
