@@ -249,6 +249,11 @@ impl Stage {
         Ok(Self { axes, layout: self.layout.clone(), mapping })
     }
 
+    /// Axes of a configuration whose frames are not translated: those on DeviceNet.
+    pub fn absent<'a>(&'a self, config: &'a Config) -> impl Iterator<Item = &'a str> {
+        config.axes.iter().map(|axis| axis.name.as_str()).filter(|name| self.axis(name).is_none())
+    }
+
     /// The axis with this name.
     #[must_use]
     pub fn axis(&self, name: &str) -> Option<usize> {
