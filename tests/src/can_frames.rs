@@ -8,6 +8,7 @@ use axisbridge::simulate::can_drive;
 use axisbridge::translate::{CanMember, Stage, StageError};
 use profile_cia402::eds;
 use profile_cia402::wire::NodeId;
+use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
@@ -21,7 +22,7 @@ pub fn folder() -> PathBuf {
 }
 
 /// A drive by its factor group; one behind a spindle of 10 mm; one that counts 3600 in a turn and velocities in 0.1 revolutions per
-/// minute, which the configuration says.
+/// minute, which the configuration says, and adds the trims of velocity and torque.
 ///
 /// # Errors
 /// The tables make no program for one of them.
@@ -61,7 +62,7 @@ pub fn stage(mapping: Mapping) -> Result<Stage, StageError> {
         (
             "index",
             "drive-c",
-            Cia402Axis { counts, ..needs },
+            Cia402Axis { counts, offsets: vec![Signal::VelocityOffset, Signal::TorqueOffset], ..needs },
             scaling(UnitKind::Rotary, 360_000, Some(360_000)),
         ),
     ];

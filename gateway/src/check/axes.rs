@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
@@ -261,6 +262,7 @@ fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
         counts: [Quantity::Position, Quantity::Velocity, Quantity::Acceleration]
             .map(|of| (of, count))
             .to_vec(),
+        offsets: Signal::OFFSETS.to_vec(),
         ..Cia402Axis::default()
     };
     let place = |row: &RowNumbers| {

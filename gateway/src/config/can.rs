@@ -38,6 +38,9 @@ pub(super) const MODES: [(&str, OperatingMode); 3] = [
 const ACTUAL_VALUES: [(&str, Signal); 2] =
     [("velocity", Signal::VelocityActual), ("torque", Signal::TorqueActual)];
 
+/// Offsets that can be sent.
+const OFFSETS: [(&str, Signal); 2] = [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
+
 impl Checker {
     /// All CAN buses.
     pub(super) fn can(&mut self, tables: &[Spanned<CanTable>]) -> Option<Vec<Can>> {
@@ -160,6 +163,10 @@ impl Checker {
             let all = ACTUAL_VALUES.iter().map(|(_, signal)| *signal);
             all.filter(|signal| !sent.contains(signal)).collect()
         });
+        let offsets = match &table.offsets {
+            None => Some(Vec::new()),
+            Some(names) => self.words(names, "offset", &OFFSETS),
+        };
         let way_of_a_turn = match &table.millimetres_per_turn {
             None => Some(None),
             Some(value) => self.exact(value, "the way of a turn").map(Some),
@@ -174,6 +181,7 @@ impl Checker {
             axis: axis?,
             modes: modes?,
             left_out: left_out?,
+            offsets: offsets?,
             acknowledges: table.acknowledges.unwrap_or(true),
             way_of_a_turn: way_of_a_turn?,
             counts: counts?,

@@ -323,6 +323,9 @@ pub struct CanDriveTable {
     /// Which actual values beside the position are sent in every cycle: `"velocity"`, `"torque"`, each of which makes the
     /// bus fuller. Default: both.
     pub actual_values: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Which trims go to the drive in every cycle, for it to add them: `"velocity"` (60B1) in position control, `"torque"` (60B2)
+    /// in position and velocity control. Default: none, and such a trim of the controller has no effect.
+    pub offsets: Option<Spanned<Vec<Spanned<String>>>>,
     /// Whether its statusword tells by bit 12 that it follows command values. Default: true.
     pub acknowledges: Option<bool>,
     /// Millimetres that a linear axis makes in a turn of its motor; needed for a linear axis whose drive counts turns.

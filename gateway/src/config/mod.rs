@@ -537,6 +537,8 @@ pub struct CanDrive {
     pub modes: Vec<OperatingMode>,
     /// Actual values that are not sent in every cycle.
     pub left_out: Vec<Signal>,
+    /// Offsets that the drive adds to its set-points.
+    pub offsets: Vec<Signal>,
     /// Whether its statusword tells that it follows command values.
     pub acknowledges: bool,
     /// Nanounits of a linear axis in a nanoturn.

@@ -199,7 +199,8 @@ pub fn bench(criterion: &mut Criterion) {
     assert_eq!(axis.saturated, 0, "nothing was clamped");
     let mut telegram = [0; TELEGRAM_MAX];
     telegram[..3].copy_from_slice(&CSP_OPERATING.to_le_bytes()[..3]);
-    group.bench_function("tpdos_in_and_rpdos_out", |bencher| bencher.iter(|| axis.step(black_box(&telegram))));
+    group
+        .bench_function("tpdos_in_and_rpdos_out", |bencher| bencher.iter(|| axis.step(black_box(&telegram))));
     group.bench_function("tpdo_bytes_to_values", |bencher| {
         bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
     });

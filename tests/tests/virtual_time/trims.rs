@@ -253,6 +253,40 @@ fn what_cannot_be_added_is_refused_or_reads_zero() {
     succeeds(&mut rig);
 }
 
+/// 60B1 in counts a second and 60B2 in 0.1 %; a trim that is not sent to the drive has no effect, and reads as that.
+#[test]
+fn a_canopen_drive_adds_the_offsets_that_its_configuration_names() {
+    for (offsets, velocity, torque) in
+        [("\"velocity\", \"torque\"", 0.5, 12.5), ("\"torque\"", 0.0, 12.5), ("", 0.0, 0.0)]
+    {
+        let drive = "name = \"drive-a\"\nnode = 1\n";
+        let configuration = include_str!("can.toml");
+        assert!(configuration.contains(drive));
+        let configuration = configuration.replace(drive, &format!("{drive}offsets = [{offsets}]\n"));
+        let mut rig = Rig::ready(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+        rig.connect(vec![
+            lists((0, 0.0, 0.0)),
+            Step::Enable(turntable()),
+            write((2_500, 0.5, 12.5)),
+            counts((2_500, velocity, torque)),
+            dwell(0.3),
+            Step::Disable(turntable()),
+            counts((0, 0.0, 0.0)),
+            dwell(0.1),
+        ]);
+        let sent = |rig: &Rig| {
+            let node = rig.can[0].bus.nodes().next().expect("the turntable");
+            [0x60B1, 0x60B2].map(|index| node.dictionary().number(index, 0))
+        };
+        to_step(&mut rig, 4);
+        let wanted = [if velocity > 0.0 { 65_536 / 2 } else { 0 }, if torque > 0.0 { 125 } else { 0 }];
+        assert_eq!(sent(&rig), wanted, "{offsets}");
+        to_step(&mut rig, 7);
+        assert_eq!(sent(&rig), [0, 0], "without torque nothing is added");
+        succeeds(&mut rig);
+    }
+}
+
 /// Kvff (440) is S-0-0296 of a lag-less drive: the part of the velocity that its position loop need not make from an error.
 #[test]
 fn velocity_feed_forward_takes_the_following_error_away() {

@@ -133,6 +133,7 @@ pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
         parameters: parameters(axis),
         silent: !drive.acknowledges,
         left_out: drive.left_out.clone(),
+        offsets: drive.offsets.clone(),
         captures: axis.events,
     }
 }

@@ -1,5 +1,6 @@
 //! What is written to and read from a drive before it takes part in the cycle.
 
+use profile_generic::image::Signal;
 use profile_generic::time::DurationNs;
 
 use super::compile::{Cia402Axis, Cia402Error};
@@ -122,13 +123,14 @@ impl Cia402Tables {
 
     /// The objects of the signals that the modes of an axis can have. What is only there in a mode of operation, which 6502 tells,
     /// is not asked for.
-    fn asked_signals(&self, axis: &Cia402Axis) -> impl Iterator<Item = Object> + '_ {
+    fn asked_signals<'a>(&'a self, axis: &'a Cia402Axis) -> impl Iterator<Item = Object> + 'a {
         let modes = axis.modes.clone();
         let used = move |signal| {
             let rules = self.modes.iter().filter(|rule| modes.contains(&rule.selection));
             rules.flat_map(|rule| rule.command.iter().chain(&rule.actual)).any(|known| *known == signal)
         };
-        let rules = self.signals.iter().filter(move |rule| used(rule.signal));
+        let wanted = |signal| !Signal::OFFSETS.contains(&signal) || axis.offsets.contains(&signal);
+        let rules = self.signals.iter().filter(move |rule| used(rule.signal) && wanted(rule.signal));
         rules.filter(|rule| rule.modes.is_empty() || !rule.refuse).map(|rule| rule.value.object)
     }
 

@@ -46,6 +46,8 @@ pub struct Cia402Axis {
     pub silent: bool,
     /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
+    /// Offsets that the drive is to add to its set-points; they go to it in every cycle, so none does unless it is named here.
+    pub offsets: Vec<Signal>,
     /// How its captures are used.
     pub captures: CaptureMode,
 }
@@ -309,7 +311,8 @@ impl Cia402Tables {
         for (signal, mode) in chosen.iter().flat_map(of) {
             let signal = &signal;
             let Some(rule) = self.signal(*signal, mode) else { continue };
-            let unwanted = !rule.refuse && axis.left_out.contains(signal);
+            let no_offset = Signal::OFFSETS.contains(signal) && !axis.offsets.contains(signal);
+            let unwanted = no_offset || !rule.refuse && axis.left_out.contains(signal);
             if unwanted || rules.iter().any(|known| known.signal == *signal) {
                 continue;
             }
