@@ -1,5 +1,6 @@
 //! The buses behind the engine: what they have in common.
 
+mod backoff;
 pub mod can;
 pub mod devicenet;
 pub mod sercos;

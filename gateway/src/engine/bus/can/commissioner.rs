@@ -172,13 +172,19 @@ struct Work {
 /// Commissions the drives of a bus.
 #[derive(Debug)]
 pub struct Commissioner {
-    mapping: Mapping,
-    /// The network, with the PDOs that its devices have been given.
-    network: MasterConfig,
+    desk: Desk,
     devices: Vec<Work>,
     jobs: rtrb::Consumer<Job>,
     done: rtrb::Producer<Done>,
-    /// What the queue had no room for.
+}
+
+/// What the work on every device needs.
+#[derive(Debug)]
+struct Desk {
+    mapping: Mapping,
+    /// The network, with the PDOs that its devices have been given.
+    network: MasterConfig,
+    /// What is done, until the queue has room for it.
     waiting: VecDeque<Done>,
 }
 
@@ -205,7 +211,8 @@ impl Commissioner {
         };
         let devices = devices.into_iter().map(work).collect();
         let end = CommissionerEnd { jobs: jobs_in, done: done_out };
-        (Self { mapping, network, devices, jobs, done, waiting: VecDeque::new() }, end)
+        let desk = Desk { mapping, network, waiting: VecDeque::new() };
+        (Self { desk, devices, jobs, done }, end)
     }
 
     /// Whether the cycle thread has gone.
@@ -217,17 +224,17 @@ impl Commissioner {
     /// Does what there is to do, without waiting.
     pub fn poll(&mut self) {
         while let Ok(job) = self.jobs.pop() {
-            let Self { mapping, network, devices, waiting, .. } = self;
+            let Self { desk, devices, .. } = self;
             match job {
                 Job::Begin(run) => {
                     if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.begin(run, mapping, network, waiting);
+                        work.begin(run, desk);
                     }
                 }
                 Job::Outcome(run, outcome) => {
                     let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
                     if let Some(work) = work {
-                        work.handle(&outcome, mapping, network, waiting);
+                        work.handle(&outcome, desk);
                     }
                 }
                 Job::Unsent(run, _) => {
@@ -237,9 +244,9 @@ impl Commissioner {
                 Job::Spent(_) | Job::Unused(_) => {}
             }
         }
-        while let Some(done) = self.waiting.pop_front() {
+        while let Some(done) = self.desk.waiting.pop_front() {
             if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
-                self.waiting.push_front(done);
+                self.desk.waiting.push_front(done);
                 return;
             }
         }
@@ -247,17 +254,11 @@ impl Commissioner {
 }
 
 impl Work {
-    fn begin(
-        &mut self,
-        run: Run,
-        mapping: &Mapping,
-        network: &mut MasterConfig,
-        waiting: &mut VecDeque<Done>,
-    ) {
+    fn begin(&mut self, run: Run, desk: &mut Desk) {
         self.give_up();
         self.run = run;
         self.pdos = [Vec::new(), Vec::new()];
-        self.set_out(0, Plan::Ask, mapping, network, waiting);
+        self.set_out(0, Plan::Ask, desk);
     }
 
     fn give_up(&mut self) {
@@ -268,31 +269,24 @@ impl Work {
     }
 
     /// Begins a plan of an axis.
-    fn set_out(
-        &mut self,
-        place: usize,
-        plan: Plan,
-        mapping: &Mapping,
-        network: &mut MasterConfig,
-        waiting: &mut VecDeque<Done>,
-    ) {
+    fn set_out(&mut self, place: usize, plan: Plan, desk: &mut Desk) {
         let Some(setup) = self.axes.get(place) else { return };
         if plan == Plan::Ask {
             self.facts = ObjectFacts::new();
         }
-        match mapping.cia402_steps(plan, &setup.needs, &self.facts) {
+        match desk.mapping.cia402_steps(plan, &setup.needs, &self.facts) {
             Ok(steps) => {
                 self.at = Some((place, plan));
                 self.steps = steps.into();
-                self.go_on(mapping, network, waiting);
+                self.go_on(desk);
             }
-            Err(error) => self.fail(place, error.into(), waiting),
+            Err(error) => self.fail(place, error.into(), desk),
         }
     }
 
-    fn fail(&mut self, place: usize, error: Misfit, waiting: &mut VecDeque<Done>) {
+    fn fail(&mut self, place: usize, error: Misfit, desk: &mut Desk) {
         let axis = self.number(place);
-        waiting.push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
+        desk.waiting.push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
         self.give_up();
     }
 
@@ -301,7 +295,7 @@ impl Work {
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.
-    fn go_on(&mut self, mapping: &Mapping, network: &mut MasterConfig, waiting: &mut VecDeque<Done>) {
+    fn go_on(&mut self, desk: &mut Desk) {
         while self.sent.len() < WINDOW
             && let Some((place, _)) = self.at
             && let Some(step) = self.steps.pop_front()
@@ -309,71 +303,59 @@ impl Work {
             let Some(request) = request(&step, &self.axes[place].needs) else {
                 // A device without this axis has been told of already, by the axis that it does not have.
                 let axis = self.axes[place].needs.axis;
-                self.fail(place, Cia402Error::Axis(axis).into(), waiting);
+                self.fail(place, Cia402Error::Axis(axis).into(), desk);
                 return;
             };
-            waiting.push_back(Done::Submit(self.run, request));
+            desk.waiting.push_back(Done::Submit(self.run, request));
             self.sent.push_back(step);
         }
         if let Some((place, plan)) = self.at
             && self.sent.is_empty()
         {
             self.at = None;
-            self.through(place, plan, mapping, network, waiting);
+            self.through(place, plan, desk);
         }
     }
 
-    fn through(
-        &mut self,
-        place: usize,
-        plan: Plan,
-        mapping: &Mapping,
-        network: &mut MasterConfig,
-        waiting: &mut VecDeque<Done>,
-    ) {
+    fn through(&mut self, place: usize, plan: Plan, desk: &mut Desk) {
         if plan == Plan::Ask {
-            self.set_out(place, Plan::Tell, mapping, network, waiting);
+            self.set_out(place, Plan::Tell, desk);
             return;
         }
         let axis = self.number(place);
         if !self.passed_over.is_empty() {
             let failures = std::mem::take(&mut self.passed_over);
-            waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
+            desk.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
         }
         let setup = &self.axes[place];
-        let made = mapping
+        let made = desk
+            .mapping
             .cia402_program(&setup.needs, &self.facts)
             .map_err(Misfit::from)
-            .and_then(|program| Ok((spread(mapping, setup, &program)?, program)));
+            .and_then(|program| Ok((spread(&desk.mapping, setup, &program)?, program)));
         let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
             Ok(made) => made,
-            Err(error) => return self.fail(place, error, waiting),
+            Err(error) => return self.fail(place, error, desk),
         };
         self.pdos[0].extend(receive);
         self.pdos[1].extend(transmit);
         let which = u8::try_from(place).unwrap_or(u8::MAX);
-        waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
+        desk.waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
         if place + 1 < self.axes.len() {
-            self.set_out(place + 1, Plan::Ask, mapping, network, waiting);
+            self.set_out(place + 1, Plan::Ask, desk);
         } else {
             let [receive, transmit] = std::mem::take(&mut self.pdos);
-            match PdoSet::new(network, self.node, receive, transmit) {
+            match PdoSet::new(&desk.network, self.node, receive, transmit) {
                 Ok(set) => {
-                    network.take_pdos(&set);
-                    waiting.push_back(Done::Pdos(self.run, set));
+                    desk.network.take_pdos(&set);
+                    desk.waiting.push_back(Done::Pdos(self.run, set));
                 }
-                Err(error) => self.fail(place, error.into(), waiting),
+                Err(error) => self.fail(place, error.into(), desk),
             }
         }
     }
 
-    fn handle(
-        &mut self,
-        outcome: &SdoOutcome,
-        mapping: &Mapping,
-        network: &mut MasterConfig,
-        waiting: &mut VecDeque<Done>,
-    ) {
+    fn handle(&mut self, outcome: &SdoOutcome, desk: &mut Desk) {
         let (Some(step), Some((place, _))) = (self.sent.pop_front(), self.at) else { return };
         let (object, what, must) = match &step {
             ObjectStep::Read { object, fail } => (*object, "reading", *fail),
@@ -393,14 +375,14 @@ impl Work {
                 if must || gone {
                     let (axis, node) = (self.number(place), self.node);
                     let notice = Notice::NodeCommissioning { axis, node, failure };
-                    waiting.push_back(Done::Failed(self.run, notice));
+                    desk.waiting.push_back(Done::Failed(self.run, notice));
                     self.give_up();
                     return;
                 }
                 self.passed_over.push(failure);
             }
         }
-        self.go_on(mapping, network, waiting);
+        self.go_on(desk);
     }
 }
 

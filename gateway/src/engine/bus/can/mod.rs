@@ -23,6 +23,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::commissioner::{AxisSetup, CommissionerEnd, Done, Job, Run, WINDOW};
 use self::layout::{BYTES_MAX, PDOS_MAX, Spread};
+use super::backoff::Backoff;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
@@ -44,12 +45,6 @@ const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
 
 /// Longest wait for what comes in: answers come at any time.
 const PATIENCE: DurationNs = DurationNs::from_millis(1);
-
-/// Pause before a device that could not be used is brought up anew; it doubles with every vain attempt.
-const RETRY_PAUSE: DurationNs = DurationNs::from_secs(10);
-
-/// Longest such pause.
-const RETRY_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
 
 /// Where a device is on its way.
 #[derive(Debug)]
@@ -102,8 +97,7 @@ struct Device {
     drives: ArrayVec<Drive, AXES_MAX>,
     stage: Stage,
     runs: u32,
-    retry_at: Option<MonotonicTime>,
-    retry_pause: DurationNs,
+    backoff: Backoff,
 }
 
 /// A frame that waits for room in the transmit queue.
@@ -158,8 +152,7 @@ impl CanBus {
             drives: axes.iter().take(AXES_MAX).map(drive).collect(),
             stage: Stage::Absent,
             runs: 0,
-            retry_at: None,
-            retry_pause: RETRY_PAUSE,
+            backoff: Backoff::NONE,
         };
         Ok(Self {
             number,
@@ -221,7 +214,7 @@ impl CanBus {
             Event::AwaitingApplication { node, .. } => self.begin(now, *node),
             Event::Operational { node } => {
                 if let Some(device) = self.devices.iter_mut().find(|device| device.node == *node) {
-                    (device.retry_at, device.retry_pause) = (None, RETRY_PAUSE);
+                    device.backoff = Backoff::NONE;
                 }
             }
             Event::BootFailed { node, .. } => {
@@ -291,8 +284,7 @@ impl CanBus {
 
     fn try_later(&mut self, now: MonotonicTime, node: NodeId) {
         if let Some(device) = self.devices.iter_mut().find(|device| device.node == node) {
-            device.retry_at = Some(now + device.retry_pause);
-            device.retry_pause = (device.retry_pause * 2).min(RETRY_PAUSE_MAX);
+            device.backoff.begin(now);
         }
     }
 
@@ -300,8 +292,7 @@ impl CanBus {
     fn retry(&mut self, now: MonotonicTime) {
         let Self { master, devices, .. } = self;
         for device in devices {
-            if device.retry_at.is_some_and(|at| now >= at) {
-                device.retry_at = None;
+            if device.backoff.take(now) {
                 // One that is on its way by itself, or in operation, needs no other try.
                 let _ = master.retry(now, device.node);
             }

@@ -22,6 +22,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::end::{End, Row};
 use self::setup::{SetupFailure, SetupStep};
+use super::backoff::Backoff;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
@@ -44,34 +45,6 @@ const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
 
 /// Longest wait for what comes in: answers come at any time.
 const PATIENCE: DurationNs = DurationNs::from_millis(1);
-
-/// Pause before a drive that could not be set up is tried anew, and before the box asks again for a MAC ID that another node
-/// has; it doubles with every vain attempt.
-const RETRY_PAUSE: DurationNs = DurationNs::from_secs(10);
-
-/// Longest such pause.
-const RETRY_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
-
-/// A pause that grows.
-#[derive(Debug, Clone, Copy)]
-struct Backoff {
-    at: Option<MonotonicTime>,
-    pause: DurationNs,
-}
-
-impl Backoff {
-    const NONE: Self = Self { at: None, pause: RETRY_PAUSE };
-
-    fn begin(&mut self, now: MonotonicTime) {
-        self.at = Some(now + self.pause);
-        self.pause = (self.pause * 2).min(RETRY_PAUSE_MAX);
-    }
-
-    /// Whether the pause is over, once.
-    fn take(&mut self, now: MonotonicTime) -> bool {
-        self.at.take_if(|at| now >= *at).is_some()
-    }
-}
 
 /// Where a drive is on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
