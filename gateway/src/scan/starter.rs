@@ -29,28 +29,7 @@ pub fn starter(bus: &Bus, link: &Link) -> Option<String> {
     }
     let mut out = String::new();
     let names: Vec<_> = drives.iter().map(|slave| format!("\"axis-{}\"", slave.address)).collect();
-    let _ = write!(
-        out,
-        "\
-[box]
-name = \"axisbridge\"
-
-[[device]]
-name = \"front\"
-listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
-axes = [{}]
-power_structure_class_id = 0
-update_period = {{ min = \"2 ms\", max = \"32 ms\" }}
-
-[device.identity]
-vendor_id = 1 # CHANGE: the number ODVA gave you
-product_code = 1
-revision = \"1.1\"
-serial_number = 1 # CHANGE: every box has its own
-product_name = \"Axisbridge\"
-",
-        names.join(", ")
-    );
+    head(&mut out, &names, "min = \"2 ms\", max = \"32 ms\"");
     let interfaces = match link {
         Link::InProcess { ring: false } => "interface = \"in-process\"\n".to_owned(),
         Link::InProcess { ring: true } => {
@@ -85,6 +64,32 @@ address = {}
         );
     }
     Some(out)
+}
+
+/// The box and the device in front, with axes of these names.
+pub(super) fn head(out: &mut String, names: &[String], update_period: &str) {
+    let _ = write!(
+        out,
+        "\
+[box]
+name = \"axisbridge\"
+
+[[device]]
+name = \"front\"
+listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
+axes = [{}]
+power_structure_class_id = 0
+update_period = {{ {update_period} }}
+
+[device.identity]
+vendor_id = 1 # CHANGE: the number ODVA gave you
+product_code = 1
+revision = \"1.1\"
+serial_number = 1 # CHANGE: every box has its own
+product_name = \"Axisbridge\"
+",
+        names.join(", ")
+    );
 }
 
 /// Whether a slave says that it is a drive, or has operation modes as a drive has.

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use clap::ValueEnum;
+
 use super::CONFIGURATION;
 
 /// A kind of drives behind the box.
@@ -13,6 +15,17 @@ pub enum DriveKind {
     Can,
     /// DeviceNet with CIP Motion.
     Devicenet,
+}
+
+impl DriveKind {
+    /// The bus of such drives.
+    const fn bus(self) -> &'static str {
+        match self {
+            Self::Sercos => SERCOS,
+            Self::Can => CAN,
+            Self::Devicenet => DEVICENET,
+        }
+    }
 }
 
 /// What the demonstration moves when nothing is said.
@@ -97,27 +110,22 @@ pub fn configuration(kinds: &[DriveKind]) -> String {
         true => format!("{}{THIRD}{REALTIME}", head.replace(MEMBERS[0], MEMBERS[1])),
         false => format!("{head}{REALTIME}"),
     };
-    let of = |wanted| names.iter().enumerate().filter(move |(place, _)| kind(*place) == wanted);
-    if of(DriveKind::Sercos).count() > 0 {
-        text.push_str(SERCOS);
-    }
-    for (place, (name, _)) in of(DriveKind::Sercos) {
-        let _ = write!(text, "\n[[south.sercos.drive]]\nname = \"{name}\"\naddress = {}\n", place + 1);
-    }
-    if of(DriveKind::Can).count() > 0 {
-        text.push_str(CAN);
-    }
-    for (place, (name, more)) in of(DriveKind::Can) {
-        let _ = write!(text, "\n[[south.can.drive]]\nname = \"{name}\"\nnode = {}\n{more}", place + 1);
-    }
-    if of(DriveKind::Devicenet).count() > 0 {
-        text.push_str(DEVICENET);
-    }
-    for (place, (name, more)) in of(DriveKind::Devicenet) {
-        let head = "[[south.devicenet.drive]]";
-        let number = place + 1;
-        let _ =
-            write!(text, "\n{head}\nname = \"{name}\"\nmac_id = {number}\nresolution = 1_048_576\n{more}");
+    for wanted in DriveKind::value_variants() {
+        let mut drives = names.iter().enumerate().filter(|(place, _)| kind(*place) == *wanted).peekable();
+        if drives.peek().is_some() {
+            text.push_str(wanted.bus());
+        }
+        for (place, (name, more)) in drives {
+            let number = place + 1;
+            let (table, own) = match wanted {
+                DriveKind::Sercos => ("sercos", format!("address = {number}\n")),
+                DriveKind::Can => ("can", format!("node = {number}\n{more}")),
+                DriveKind::Devicenet => {
+                    ("devicenet", format!("mac_id = {number}\nresolution = 1_048_576\n{more}"))
+                }
+            };
+            let _ = write!(text, "\n[[south.{table}.drive]]\nname = \"{name}\"\n{own}");
+        }
     }
     text
 }

@@ -7,6 +7,7 @@ use profile_cia402::drive::modes::SupportedModes;
 use super::Found;
 use super::report::title;
 use crate::config::AXES_MAX;
+use crate::scan::starter::head;
 
 /// Which modes of a drive give which mode of the box.
 const USES: [(&str, SupportedModes); 3] = [
@@ -44,28 +45,7 @@ pub fn starter(found: &[Found], interface: &str, bit_rate: Option<u32>) -> Optio
         drives.iter().map(|(device, axis, _)| format!("\"axis-{}\"", name(device, *axis))).collect();
     let own = (1..=OWN_NODE).rev().find(|own| found.iter().all(|device| device.node.get() != *own))?;
     let mut out = String::new();
-    let _ = write!(
-        out,
-        "\
-[box]
-name = \"axisbridge\"
-
-[[device]]
-name = \"front\"
-listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
-axes = [{}]
-power_structure_class_id = 0
-update_period = {{ min = \"10 ms\", max = \"80 ms\" }}
-
-[device.identity]
-vendor_id = 1 # CHANGE: the number ODVA gave you
-product_code = 1
-revision = \"1.1\"
-serial_number = 1 # CHANGE: every box has its own
-product_name = \"Axisbridge\"
-",
-        names.join(", ")
-    );
+    head(&mut out, &names, "min = \"10 ms\", max = \"80 ms\"");
     for (place, (device, axis, _)) in drives.iter().enumerate() {
         let (name, instance) = (name(device, *axis), place + 1);
         let _ = write!(
