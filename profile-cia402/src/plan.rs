@@ -28,6 +28,8 @@ pub enum Purpose {
     Tpdo(u8, u16),
     /// Heartbeat of this node.
     Heartbeat(u8),
+    /// Node guarding of this node: the request, and the answer with the same identifier.
+    Guarding(u8),
     /// Requests or answers of SDO.
     Sdo,
     /// Anything else that comes regularly and has time.
@@ -48,6 +50,7 @@ impl fmt::Display for Purpose {
             Purpose::Rpdo(node, number) => write!(f, "RPDO {number} of node {node}"),
             Purpose::Tpdo(node, number) => write!(f, "TPDO {number} of node {node}"),
             Purpose::Heartbeat(node) => write!(f, "heartbeat of node {node}"),
+            Purpose::Guarding(node) => write!(f, "guarding of node {node}"),
             Purpose::Sdo => f.write_str("SDO"),
             Purpose::Other => f.write_str("other traffic"),
         }
@@ -184,7 +187,12 @@ impl Plan<'_> {
             if one.cadence == Cadence::Unbounded {
                 return Err(PlanError::Unbounded { purpose: one.purpose });
             }
-            let same = |other: &&Traffic| other.id == one.id && other.purpose != Purpose::Sdo;
+            let guards = matches!(one.purpose, Purpose::Guarding(_));
+            let same = |other: &&Traffic| {
+                other.id == one.id
+                    && other.purpose != Purpose::Sdo
+                    && !(guards && other.purpose == one.purpose)
+            };
             if let Some(other) =
                 self.traffic[..place].iter().find(same).filter(|_| one.purpose != Purpose::Sdo)
             {
@@ -381,6 +389,28 @@ mod tests {
         traffic[7].id = Id::Standard(0x181);
         let error = check(BitRate::MAX_CLASSIC, 4_000, &traffic).unwrap_err();
         assert_eq!(error.to_string(), "TPDO 1 of node 1 and TPDO 1 of node 2 have the same identifier 181");
+    }
+
+    #[test]
+    fn guarding_asks_and_answers_with_one_identifier() {
+        let classic = Shape::classic(8).unwrap();
+        let mut traffic = axes(2, 1, classic);
+        let without = check(BitRate::MAX_CLASSIC, 4_000, &traffic).unwrap();
+        let (beat, id) = (Cadence::Every(DurationNs::from_millis(1)), Id::Standard(0x703));
+        for len in [0, 1] {
+            let shape = Shape::classic(len).unwrap();
+            traffic.push(Traffic { purpose: Purpose::Guarding(3), id, shape, cadence: beat });
+        }
+        let load = check(BitRate::MAX_CLASSIC, 4_000, &traffic).unwrap();
+        // 55 and 65 us in each millisecond.
+        assert_eq!(load.total_load, without.total_load + 120);
+        assert_eq!(load.cyclic, without.cyclic);
+        traffic.last_mut().unwrap().id = Id::Standard(0x701);
+        let error = check(BitRate::MAX_CLASSIC, 4_000, &traffic).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "heartbeat of node 1 and guarding of node 3 have the same identifier 701"
+        );
     }
 
     #[test]

@@ -135,7 +135,7 @@ fn layouts(description: &DeviceDescription) -> String {
         let modes = if axis.modes.is_some() { modes.join(" ") } else { "unknown".to_owned() };
         writeln!(text, "axis {}: type {kind}, modes {modes}", axis.number).unwrap();
     }
-    for direction in [Direction::Receive, Direction::Transmit] {
+    for direction in Direction::BOTH {
         description.pdos(direction, NODE).iter().for_each(|pdo| writeln!(text, "{}", pdo_line(pdo)).unwrap());
     }
     let axes = description.axes();
@@ -573,7 +573,7 @@ proptest! {
             prop_assert!(!pdo.write_mapping || pdo.entries.len() <= usize::from(own.entries_max));
             prop_assert!(pdo.write_mapping || pdo.entries == own.mapping);
         }
-        for direction in [Direction::Receive, Direction::Transmit] {
+        for direction in Direction::BOTH {
             for wish in &wanted {
                 let found = layout.find(direction, wish.index, wish.sub).is_some();
                 let left = layout.left_out.iter().any(|left| {
@@ -595,6 +595,7 @@ fn the_simulated_drive_carries_a_good_data_sheet() {
             identity: identity(axes, 1),
             boot_time: DurationNs::from_millis(10),
             has_blocks: true,
+            has_mapping: true,
         };
         let node = Node::new(&config, device);
         let Reading { description, diagnostics } = read(node.eds()).expect("not refused");

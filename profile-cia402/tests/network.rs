@@ -61,6 +61,7 @@ fn node(number: Option<u8>, serial: u32) -> Node<Device> {
         identity: identity(1, serial),
         boot_time: DurationNs::from_millis(20),
         has_blocks: true,
+        has_mapping: true,
     };
     Node::new(&config, Device::new(&[ServoParameters::default()]).unwrap())
 }

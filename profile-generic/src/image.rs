@@ -254,6 +254,14 @@ bitflags! {
         const HOMING_FAILED = 1 << 22;
         /// The drive has come to the target that it went to by itself.
         const TARGET_REACHED = 1 << 23;
+        /// The home switch is active.
+        const HOME_SWITCH = 1 << 24;
+        /// The drive tells its limit switches; without this bit nothing follows from the two below.
+        const LIMIT_SWITCHES = 1 << 25;
+        /// The switch at the end of the way forward is active: the axis has gone too far.
+        const POSITIVE_LIMIT_SWITCH = 1 << 26;
+        /// The switch at the end of the way backward is active.
+        const NEGATIVE_LIMIT_SWITCH = 1 << 27;
 
         // Bits above are kept when they come from a newer table.
         const _ = !0;
@@ -261,6 +269,12 @@ bitflags! {
 }
 
 impl StatusBits {
+    /// What is wired to the drive: it counts while the drive is heard.
+    pub const INPUTS: Self = Self::HOME_SWITCH
+        .union(Self::LIMIT_SWITCHES)
+        .union(Self::POSITIVE_LIMIT_SWITCH)
+        .union(Self::NEGATIVE_LIMIT_SWITCH);
+
     /// Every named status bit with its name in snake case.
     pub const NAMED: &'static [(Self, &'static str)] = &[
         (Self::READY, "ready"),
@@ -287,6 +301,10 @@ impl StatusBits {
         (Self::HOME_FOUND, "home_found"),
         (Self::HOMING_FAILED, "homing_failed"),
         (Self::TARGET_REACHED, "target_reached"),
+        (Self::HOME_SWITCH, "home_switch"),
+        (Self::LIMIT_SWITCHES, "limit_switches"),
+        (Self::POSITIVE_LIMIT_SWITCH, "positive_limit_switch"),
+        (Self::NEGATIVE_LIMIT_SWITCH, "negative_limit_switch"),
     ];
 
     /// The single bit with this exact name.

@@ -43,6 +43,8 @@ bitflags! {
         const RESTART_DELAY = 1 << 15;
         /// The drive reports an inhibit of its own that has no generic name.
         const DRIVE_SPECIFIC = 1 << 16;
+        /// The controller wants the limit switches checked, and the drive does not tell them.
+        const LIMIT_SWITCHES_NOT_TOLD = 1 << 17;
 
         // Bits above are kept when they come from a newer table.
         const _ = !0;
@@ -75,6 +77,7 @@ impl Inhibits {
         (Self::BRAKE, "brake"),
         (Self::RESTART_DELAY, "restart_delay"),
         (Self::DRIVE_SPECIFIC, "drive_specific"),
+        (Self::LIMIT_SWITCHES_NOT_TOLD, "limit_switches_not_told"),
     ];
 
     /// The single inhibit with this exact name.

@@ -259,7 +259,12 @@ const fn narrow(value: i128) -> Option<i64> {
 
 /// The rounded quotient, and whether it was rounded. `den` is above zero.
 const fn divide(num: i128, den: i128, rounding: Rounding) -> (i128, bool) {
-    let (quotient, rest) = (num / den, num % den);
+    // Nearly every value of a cycle takes this way: one division of the processor instead of two of the library.
+    let (quotient, rest) = match (narrow(num), narrow(den)) {
+        (Some(num), Some(1)) => (num as i128, 0),
+        (Some(num), Some(den)) => ((num / den) as i128, (num % den) as i128),
+        _ => (num / den, num % den),
+    };
     if rest == 0 {
         return (quotient, false);
     }
@@ -481,6 +486,17 @@ mod tests {
             if let Ok(result) = ratio.apply(value, Rounding::Floor) {
                 let error = exact - i128::from(result) * i128::from(ratio.den());
                 prop_assert!(error >= 0 && error < i128::from(ratio.den()));
+            }
+        }
+
+        /// What fits 64 bits takes another way, to the same place.
+        #[test]
+        fn short_and_long_division_agree(num in any::<i64>(), small in -1_000_i64..1_000, den in 1..i64::MAX, step in 1..100_i64) {
+            for rounding in [Rounding::Nearest, Rounding::Floor, Rounding::TowardZero] {
+                for (num, den) in [(num, den), (num, step), (small, step), (num, 1), (i64::MIN, den), (i64::MIN, 1)] {
+                    let (num, den) = (i128::from(num), i128::from(den));
+                    prop_assert_eq!(divide(num, den, rounding), divide(num << 63, den << 63, rounding));
+                }
             }
         }
 

@@ -93,7 +93,13 @@ impl WrapTracker {
             self.total = raw;
             return raw;
         };
-        let step = (i128::from(raw) - i128::from(last)).rem_euclid(self.modulus);
+        let difference = i128::from(raw) - i128::from(last);
+        // Values that a drive sends lie within one modulus: no division for them.
+        let step = match difference {
+            0.. if difference < self.modulus => difference,
+            ..0 if difference >= -self.modulus => difference + self.modulus,
+            _ => difference.rem_euclid(self.modulus),
+        };
         let step = if step >= self.modulus - step { step - self.modulus } else { step };
         // Half of at most 2^64, so it fits 64 bits.
         self.total = self.total.wrapping_add(i64::try_from(step).unwrap_or(0));

@@ -36,6 +36,7 @@ pub fn stage(mapping: Mapping) -> Result<Stage, StageError> {
     let needs = Cia402Axis {
         modes: modes.into_iter().map(Into::into).collect(),
         cycle: DurationNs::from_millis(2),
+        left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
         ..Cia402Axis::default()
     };
     let scaling = |kind, counts, unwind| CipScaling {
@@ -75,6 +76,7 @@ pub fn stage(mapping: Mapping) -> Result<Stage, StageError> {
             node: NodeId::new(number).expect("a node-id"),
             pdos: AxisPdos::new(0, 3, &mut SpareIds::new(Vec::new()))
                 .expect("the first axis has them by default"),
+            found: None,
             needs,
             scaling,
         };

@@ -88,7 +88,7 @@ impl Finished {
 #[derive(Debug, Clone)]
 pub struct Kernel {
     interfaces: Vec<String>,
-    modules: Vec<&'static str>,
+    modules: Vec<String>,
     writable: Vec<PathBuf>,
     limit: Duration,
     user: u32,
@@ -122,7 +122,7 @@ impl Kernel {
     #[must_use]
     pub fn interfaces(mut self, names: &[&str]) -> Self {
         if names.iter().any(|name| name.contains(':')) {
-            self.modules.push("drivers/net/can/vxcan");
+            self.modules.push("drivers/net/can/vxcan".to_owned());
         }
         self.interfaces = names.iter().map(|&name| name.to_owned()).collect();
         self
@@ -130,8 +130,8 @@ impl Kernel {
 
     /// With a further module of the kernel, such as `drivers/net/can/slcan/slcan`.
     #[must_use]
-    pub fn module(mut self, path: &'static str) -> Self {
-        self.modules.push(path);
+    pub fn module(mut self, path: &str) -> Self {
+        self.modules.push(path.to_owned());
         self
     }
 
@@ -219,8 +219,9 @@ impl Kernel {
         let folder = command.get_current_dir().map(Path::to_owned);
         let folder = folder.or_else(|| std::env::current_dir().ok()).unwrap_or_else(|| "/".into());
         let modules = modules_folder().expect("the modules of the kernel are there");
-        let path = |module: &&str| modules.join(format!("{module}.ko")).display().to_string();
-        let modules: Vec<String> = CAN_MODULES.iter().chain(&self.modules).map(path).collect();
+        let path = |module: &str| modules.join(format!("{module}.ko")).display().to_string();
+        let named = self.modules.iter().map(String::as_str);
+        let modules: Vec<String> = CAN_MODULES.iter().copied().chain(named).map(path).collect();
         let writable: Vec<String> = self.writable.iter().map(|path| path.display().to_string()).collect();
         format!(
             "folder={}\nlimit={}\nuser={}\ninterfaces={}\nmodules={}\nwritable={}\n",

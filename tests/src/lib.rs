@@ -6,12 +6,15 @@
 
 pub mod can_frames;
 pub mod can_kernel;
+pub mod can_led;
 pub mod expected;
+pub mod fuzz;
 pub mod host;
 pub mod modbus;
 pub mod namespace;
 pub mod peer;
 pub mod process;
 pub mod rig;
+pub mod slcan;
 pub mod tables;
 pub mod tshark;

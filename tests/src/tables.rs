@@ -24,6 +24,10 @@ pub fn listing(mapping: &Mapping, stage: &Stage) -> String {
                     section(&mut text, &title, &format!("{plan:?}"));
                 }
             }
+            Behind::Devicenet(drive) => {
+                let program = mapping.devicenet_program(&drive.needs);
+                section(&mut text, &format!("program of {}", axis.drive), &format!("{program:?}"));
+            }
             Behind::Can(drive) => {
                 for plan in [Plan::Ask, Plan::Tell] {
                     let steps = mapping.cia402_steps(plan, &drive.needs, &drive.facts);

@@ -4,7 +4,7 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use allocation_counter::measure;
+use allocation_counter::{measure, opt_out};
 use axisbridge::config::Config;
 use axisbridge::engine::notice::Notice;
 use axisbridge::mapping::{CyclicValues, Mapping};
@@ -338,5 +338,84 @@ fn neither_an_emergency_nor_a_lost_can_drive_nor_its_return_allocates() {
     }
     let back = told.lines().filter(|line| *line == "CAN bus 1: node 1 is in operation").count();
     assert_eq!(back, 2, "{told}");
+    assert_eq!(found, []);
+}
+
+/// A box with a CIP Motion drive and a velocity drive on DeviceNet that has just been switched on.
+fn on_devicenet_from_the_start() -> Rig {
+    let configuration = include_str!("virtual_time/devicenet.toml");
+    let (head, tail) =
+        configuration.split_once("[axis.limits]\nfollowing_error = 0.5\n").expect("the turntable's limits");
+    let velocity_drive =
+        format!("{head}{tail}").replace("mac_id = 5\nresolution = 1_048_576", "mac_id = 5\nkind = \"ac-dc\"");
+    let mut rig =
+        Rig::new(Settings { configuration: velocity_drive, drives: Vec::new(), ..Settings::default() });
+    // The simulated drives make their explicit answers on the heap.
+    rig.devicenet[0].aside = |run| opt_out(run);
+    rig
+}
+
+/// Both axes in motion: the turntable in velocity control, the slide on a long way.
+fn on_devicenet() -> Rig {
+    let mut rig = on_devicenet_from_the_start();
+    rig.run_until(millis(20_000), "the network up", |rig| rig.status().state == BoxState::READY);
+    let limits = Limits { velocity: 10.0, acceleration: 100.0, jerk: 2_000.0 };
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    let program = vec![
+        Step::Enable(AxisSet::first(2)),
+        Step::RunAt { axis: 1, velocity: 2.0, acceleration: 20.0, jerk: 400.0 },
+        Step::MoveAbsolute { axis: 2, position: 900.0, limits },
+    ];
+    rig.connect_with(config, program);
+    rig.run_until(millis(5_000), "both in motion", |rig| (0..2).all(|drive| turns_on_devicenet(rig, drive)));
+    rig
+}
+
+fn turns_on_devicenet(rig: &Rig, drive: usize) -> bool {
+    let node = rig.devicenet[0].bus.nodes().nth(drive).expect("a drive");
+    node.actual().velocity.get() > 1_000_000_000
+}
+
+#[test]
+fn cycles_with_two_devicenet_axes_in_motion_allocate_nothing() {
+    let mut rig = on_devicenet();
+    let before: Vec<u64> = rig.engine.axes().iter().map(|axis| axis.counters().commands).collect();
+    assert_eq!(weigh(&mut rig, 2_000, |_, _| ()), []);
+    for (axis, before) in rig.engine.axes().iter().zip(before) {
+        assert!(axis.counters().commands > before + 50, "both axes were led");
+    }
+    assert!((0..2).all(|drive| turns_on_devicenet(&rig, drive)));
+}
+
+/// There is no commissioner: access, allocation and set-up are all steps of the cycle.
+#[test]
+fn devicenet_drives_come_up_without_allocating() {
+    let mut rig = on_devicenet_from_the_start();
+    assert_eq!(weigh(&mut rig, 8_000, |_, _| ()), []);
+    assert_eq!(rig.status().state, BoxState::READY, "{}", rig.told());
+    assert!(rig.engine.axes().iter().all(|axis| axis.south().is_some()), "{}", rig.told());
+}
+
+#[test]
+fn neither_a_lost_devicenet_drive_nor_its_return_nor_a_fault_allocates() {
+    let mut rig = on_devicenet();
+    let found = weigh(&mut rig, 12_000, |rig, number| {
+        let now = rig.now();
+        let bus = &mut rig.devicenet[0].bus;
+        match number {
+            200 => bus.nodes_mut().nth(1).expect("a drive").servo_mut().raise_fault(FaultCause::OVER_CURRENT),
+            1_000 => bus.connect(now, 0, false),
+            2_000 => bus.connect(now, 0, true),
+            _ => {}
+        }
+    });
+    let told = rig.told();
+    let back = told.lines().filter(|line| *line == "DeviceNet 1: slave 5: exchanging").count();
+    assert_eq!(back, 2, "{told}");
+    assert!(
+        rig.engine.axes()[1].fault().is_some_and(|fault| fault.cause == FaultCause::OVER_CURRENT),
+        "{told}"
+    );
     assert_eq!(found, []);
 }

@@ -1,18 +1,25 @@
-//! The box on a CAN bus as a user has it: four processes, a kernel with CAN and nothing in between.
+//! The box on CANopen and on DeviceNet as a user has it: four processes, a kernel with CAN and nothing in between.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use axisbridge::sys::can_interface::{self, Settings};
 use axisbridge_tests::can_kernel::{self, Kernel};
 use axisbridge_tests::host::in_real_time;
-use axisbridge_tests::peer::can_kernel_or_skip;
+use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
 use axisbridge_tests::process::{Running, axisbridge};
+use axisbridge_tests::slcan::{self, Adapters};
+use profile_generic::can::timing::BitRate;
 
 /// What is shipped for two drives on CAN; the test changes only where it runs and how patient everybody is: four processes share
 /// the one processor of the guest, which the host stops whenever it likes.
 const EXAMPLE: &str = include_str!("../../examples/two-axes-can.toml");
+
+/// The same for two drives on DeviceNet.
+const DEVICENET: &str = include_str!("../../examples/two-axes-devicenet.toml");
 
 /// Names the binary inside the guest, where nothing can be built.
 const BINARY: &str = "AXISBRIDGE_BINARY";
@@ -59,9 +66,114 @@ fn two_can_drives_run_the_whole_program_of_a_controller() {
         run_the_program();
         return;
     }
-    let kernel = Kernel::new().user(65_534).urgent().limit(Duration::from_secs(90));
-    let kernel = kernel.environment(BINARY, axisbridge().as_os_str());
+    outside(test);
+}
+
+#[test]
+fn two_devicenet_drives_run_the_whole_program_of_a_controller() {
+    let test = "two_devicenet_drives_run_the_whole_program_of_a_controller";
+    if !can_kernel_or_skip(test) {
+        return;
+    }
+    if can_kernel::is_inside() {
+        run_the_program_on_devicenet();
+        return;
+    }
+    outside(test);
+}
+
+/// Starts a guest that runs the test again.
+fn outside(test: &str) {
+    runs_in(test, Kernel::new().user(65_534).limit(Duration::from_secs(90)));
+}
+
+/// Runs a test again in a guest, one guest after the other: each has four processes that keep time on one processor of the host.
+fn runs_in(test: &str, kernel: Kernel) {
+    static ALONE: Mutex<()> = Mutex::new(());
+    let kernel = kernel.urgent().environment(BINARY, axisbridge().as_os_str());
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     in_real_time(test, || assert!(!kernel.inside(test)));
+}
+
+/// The same over the driver of a real controller, which the box sets up, loses and restarts.
+#[test]
+fn a_controller_that_is_bus_off_is_restarted_by_the_box() {
+    let test = "a_controller_that_is_bus_off_is_restarted_by_the_box";
+    let Some(python) = python_or_skip(test, "fcntl") else { return };
+    if !can_kernel_or_skip(test) {
+        return;
+    }
+    if can_kernel::is_inside() {
+        lose_the_bus(&python);
+        return;
+    }
+    runs_in(test, Kernel::new().interfaces(&[]).module(slcan::MODULE).limit(Duration::from_secs(120)));
+}
+
+/// A box with two drives on `interface`, and what it is given to do, in a guest.
+struct Guest {
+    binary: PathBuf,
+    folder: PathBuf,
+}
+
+impl Guest {
+    fn new() -> Self {
+        let binary = std::env::var_os(BINARY).expect("the binary is named").into();
+        Self { binary, folder: std::env::temp_dir() }
+    }
+
+    fn log(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    fn drives(&self, interface: &str) -> [Running; 2] {
+        [("drive 1", "drive1", 1), ("drive 2", "drive2", 2)].map(|(name, log, node)| {
+            let words = format!("simulate can-drive --interface {interface} --node {node} --sync-losses 50");
+            start(name, &self.binary, &self.log(log), &words)
+        })
+    }
+
+    /// Starts the box with an example that is shipped but for these changes.
+    fn start_box(&self, example: &str, changes: &[(&str, &str)]) -> Running {
+        let path = self.folder.join("box.toml");
+        std::fs::write(&path, changed(example, changes))
+            .expect("the guest's temporary folder can be written");
+        start("the box", &self.binary, &self.log("box"), &format!("run --config {}", path.display()))
+    }
+
+    /// Has a controller move both axes; gives what it tells of them.
+    fn moves_two_axes(&self) -> serde_json::Value {
+        let output = Command::new(&self.binary)
+            .args(["simulate", "controller", "--target", "127.0.0.2", "--bind", "127.0.0.3", "--axes", "2"])
+            .args(["--update-period-us", "80000", "--counts-per-unit", "1000000,10000"])
+            .args(["--speed", "0.5,5", "--seconds", "6", "--json"])
+            .stdin(Stdio::null())
+            .output()
+            .expect("the controller can be started");
+        let told = || format!("{}\n{}", String::from_utf8_lossy(&output.stderr), read(&self.log("box")));
+        let result: serde_json::Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}\n{}", told()));
+        assert!(output.status.success(), "{result}\n{}", told());
+        assert!(result.get("failure").is_none(), "{result}");
+        let axes = result["axes"].as_array().expect("an array `axes`");
+        assert_eq!(axes.len(), 2, "{result}");
+        for (number, axis) in (1..).zip(axes) {
+            let value = |key: &str| axis[key].as_f64().unwrap_or_else(|| panic!("{key} in {axis}"));
+            assert_eq!(axis["axis"], number);
+            assert!(value("target").abs() > 1.0, "the axis is asked to move: {axis}");
+            assert!((value("target") - value("reached")).abs() <= value("window"), "{axis}\n{}", told());
+            // A servo behind a bus lags: one that follows without any error did not move on set-points of this controller.
+            assert!(value("max_following_error") > 0.0, "{axis}");
+            assert!(value("cycles") > 75.0, "{axis}");
+        }
+        result
+    }
+
+    /// Ends the box.
+    fn end(&self, mut gateway: Running) {
+        let status = gateway.terminate(PATIENCE);
+        assert!(status.success(), "the box ended with {status}\n{}", read(&self.log("box")));
+    }
 }
 
 /// Both drives are found once they have started, which takes them a while.
@@ -85,57 +197,95 @@ fn scan(binary: &Path) {
     }
 }
 
-/// What happens in the guest.
-fn run_the_program() {
-    let binary = PathBuf::from(std::env::var_os(BINARY).expect("the binary is named"));
-    let folder = std::env::temp_dir();
-    let at = |name: &str| folder.join(name);
-    let configuration = changed(
-        EXAMPLE,
-        &[
-            ("192.168.1.10", "127.0.0.2"),
-            ("\"can0\"", "\"vcan0\""),
-            ("set_bit_rate = true\n", ""),
-            ("cycle_time = \"4 ms\"", "cycle_time = \"10 ms\""),
-            ("heartbeat = \"100 ms\"", "heartbeat = \"500 ms\"\nallowed_losses = 100"),
-            ("min = \"4 ms\", max = \"32 ms\"", "min = \"10 ms\", max = \"80 ms\""),
-        ],
-    );
-    std::fs::write(at("box.toml"), configuration).expect("the guest's temporary folder can be written");
-    let drive = |name, log: &str, node: u8| {
-        let words = format!("simulate can-drive --interface vcan0 --node {node} --sync-losses 50");
-        start(name, &binary, &at(log), &words)
-    };
-    let _drives = [drive("drive 1", "drive1", 1), drive("drive 2", "drive2", 2)];
-    scan(&binary);
-    let words = format!("run --config {}", at("box.toml").display());
-    let mut gateway = start("the box", &binary, &at("box"), &words);
-    wait_for(&at("box"), &["node 1 is in operation", "node 2 is in operation"]);
+/// What is changed of the example in any guest.
+const PATIENT: [(&str, &str); 2] = [
+    ("192.168.1.10", "127.0.0.2"),
+    ("heartbeat = \"100 ms\"", "heartbeat = \"500 ms\"\nallowed_losses = 100"),
+];
 
-    let output = Command::new(&binary)
-        .args(["simulate", "controller", "--target", "127.0.0.2", "--bind", "127.0.0.3", "--axes", "2"])
-        .args(["--update-period-us", "80000", "--counts-per-unit", "1000000,10000"])
-        .args(["--speed", "0.5,5", "--seconds", "6", "--json"])
-        .stdin(Stdio::null())
-        .output()
-        .expect("the controller can be started");
-    let told = || format!("{}\n{}", String::from_utf8_lossy(&output.stderr), read(&at("box")));
-    let result: serde_json::Value =
-        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}\n{}", told()));
-    assert!(output.status.success(), "{result}\n{}", told());
-    assert!(result.get("failure").is_none(), "{result}");
-    let axes = result["axes"].as_array().expect("an array `axes`");
-    assert_eq!(axes.len(), 2, "{result}");
-    for (number, axis) in (1..).zip(axes) {
-        let value = |key: &str| axis[key].as_f64().unwrap_or_else(|| panic!("{key} in {axis}"));
-        assert_eq!(axis["axis"], number);
-        assert!(value("target").abs() > 1.0, "the axis is asked to move: {axis}");
-        assert!((value("target") - value("reached")).abs() <= value("window"), "{axis}\n{}", told());
-        // A servo behind a bus lags: one that follows without any error did not move on set-points of this controller.
-        assert!(value("max_following_error") > 0.0, "{axis}");
-        assert!(value("cycles") > 75.0, "{axis}");
-    }
-    let status = gateway.terminate(PATIENCE);
-    assert!(status.success(), "the box ended with {status}\n{}", read(&at("box")));
+fn run_the_program() {
+    let guest = Guest::new();
+    let _drives = guest.drives("vcan0");
+    scan(&guest.binary);
+    let changes = [
+        ("\"can0\"", "\"vcan0\""),
+        ("set_bit_rate = true\n", ""),
+        ("cycle_time = \"4 ms\"", "cycle_time = \"10 ms\""),
+        ("min = \"4 ms\", max = \"32 ms\"", "min = \"10 ms\", max = \"80 ms\""),
+    ];
+    let gateway = guest.start_box(EXAMPLE, &[&PATIENT[..], &changes].concat());
+    wait_for(&guest.log("box"), &["node 1 is in operation", "node 2 is in operation"]);
+    let result = guest.moves_two_axes();
+    guest.end(gateway);
     println!("{result}");
+}
+
+/// The second drive is a CIP Motion drive as well here, so that both have positions to go to.
+fn run_the_program_on_devicenet() {
+    let guest = Guest::new();
+    let drive = |name, log: &str, more: &str| {
+        let words = format!("simulate devicenet-drive --interface vcan0 {more}");
+        start(name, &guest.binary, &guest.log(log), &words)
+    };
+    let _drives =
+        [drive("drive 5", "drive5", "--mac 5"), drive("drive 9", "drive9", "--mac 9 --resolution 65536")];
+    let changes = [
+        ("192.168.1.10", "127.0.0.2"),
+        ("\"can0\"", "\"vcan0\""),
+        ("set_bit_rate = true\n", "allowed_losses = 50\n"),
+        ("cycle_time = \"10 ms\"", "cycle_time = \"20 ms\""),
+        ("resolution = 1_048_576", "packet_rate = \"250 ms\"\nresolution = 1_048_576"),
+        ("kind = \"ac-dc\"\n", "packet_rate = \"250 ms\"\nresolution = 65_536\n"),
+    ];
+    let gateway = guest.start_box(DEVICENET, &changes);
+    wait_for(&guest.log("box"), &["slave 5: exchanging", "slave 9: exchanging"]);
+    let result = guest.moves_two_axes();
+    guest.end(gateway);
+    println!("{result}");
+}
+
+fn lose_the_bus(python: &Path) {
+    let guest = Guest::new();
+    let adapters = Adapters::start(python, 2);
+    // The drives' end of the bus is set up by hand; the box sets up its own.
+    let rate = Settings { bit_rate: BitRate::classic(1_000_000), queue: Some(128), ..Settings::default() };
+    can_interface::configure("can1", &rate).expect("the driver takes 1 Mbit/s");
+    let opened = ["up", "1 C", "1 S8", "1 O"];
+    adapters.have_said(&opened);
+    let _drives = guest.drives("can1");
+    let changes = [
+        // Serial lines of a guest are slow: what two drives send in 40 ms has room, and nobody moves here.
+        ("cycle_time = \"4 ms\"", "cycle_time = \"40 ms\""),
+        ("min = \"4 ms\", max = \"32 ms\"", "min = \"40 ms\", max = \"80 ms\""),
+    ];
+    let gateway = guest.start_box(EXAMPLE, &[&PATIENT[..], &changes].concat());
+    let log = guest.log("box");
+    wait_for(&log, &["node 1 is in operation", "node 2 is in operation"]);
+    let opened = [&opened[..], &["0 C", "0 S8", "0 O"]].concat();
+    adapters.have_said(&opened);
+
+    // Warnings are told with what was counted; they stop nobody.
+    let before = read(&log).len();
+    adapters.say("sp020130");
+    wait_for(&log, &["CAN controller: error passive interface=\"can0\""]);
+    adapters.say("sa000000");
+    wait_for(&log, &["CAN controller: error active interface=\"can0\""]);
+    adapters.say("sb000256");
+    // The driver has no restart: the box takes its interface down and up.
+    adapters.have_said(&[&opened[..], &["0 C", "0 C", "0 S8", "0 O"]].concat());
+    for words in [
+        "the controller is off the bus",
+        "CAN controller: bus off",
+        "the CAN controller is restarted",
+        "the controller is back on the bus",
+        "node 1 is in operation",
+        "node 2 is in operation",
+    ] {
+        let end = Instant::now() + PATIENCE;
+        while !read(&log)[before..].contains(words) {
+            assert!(Instant::now() < end, "`{words}` is not told:\n{}", read(&log));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+    guest.end(gateway);
 }

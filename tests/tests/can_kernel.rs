@@ -1,14 +1,17 @@
 //! The CAN socket and the settings of CAN interfaces, in a kernel that has CAN.
 
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use axisbridge::sys::can_interface::{self, ConfigureError, Settings};
+use axisbridge::sys::can_error::BusState;
+use axisbridge::sys::can_interface::{self, ConfigureError, Settings, State};
 use axisbridge::sys::can_socket::{CanSocket, Content, Filter, OpenError, Options, Received};
 use axisbridge::sys::clock::realtime_now;
 use axisbridge::sys::link::{LinkError, LinkState};
 use axisbridge_tests::can_kernel::Kernel;
-use axisbridge_tests::peer::can_kernel_or_skip;
+use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
+use axisbridge_tests::slcan::{self, Adapters};
 use profile_generic::can::timing::BitRate;
 use profile_generic::can::{Frame, Id};
 
@@ -271,4 +274,91 @@ fn without_privilege_frames_go_and_settings_do_not() {
         "not allowed to set up `vcan0`: the process needs CAP_NET_ADMIN (run as root, or set the transmit queue beforehand: \
          `ip link set vcan0 txqueuelen 200`)"
     );
+}
+
+/// A kernel with the driver, and a Python for the adapters.
+fn with_adapters(test: &str) -> Option<PathBuf> {
+    let python = python_or_skip(test, "fcntl")?;
+    inside(test, &Kernel::new().interfaces(&[]).module(slcan::MODULE)).then_some(python)
+}
+
+#[test]
+fn a_controller_gets_its_bit_rate_and_one_that_has_it_is_left_alone() {
+    let Some(python) = with_adapters("a_controller_gets_its_bit_rate_and_one_that_has_it_is_left_alone")
+    else {
+        return;
+    };
+    let adapters = Adapters::start(&python, 1);
+    let state = can_interface::state("can0").unwrap();
+    assert_eq!((state.link, state.has_bit_rate, state.nominal), (LinkState::Down, true, None));
+    assert_eq!((state.state, state.queue), (None, 10));
+    // The rates of the driver are a list; it cannot restart by itself.
+    let refused = Settings { bit_rate: BitRate::classic(333_000), ..Settings::default() };
+    let refused = can_interface::configure("can0", &refused).unwrap_err().to_string();
+    assert_eq!(refused, "the driver of `can0` refuses 333 kbit/s: Invalid argument (os error 22)");
+    let settings = Settings {
+        bit_rate: BitRate::classic(500_000),
+        restart_ms: Some(100),
+        queue: Some(128),
+        ..Settings::default()
+    };
+    let state = can_interface::configure("can0", &settings).unwrap();
+    assert!(
+        matches!(state.link, LinkState::Up | LinkState::NoCarrier),
+        "the carrier is told later: {state:?}"
+    );
+    assert_eq!((state.nominal, state.queue), (Some(500_000), 128));
+    assert_eq!((state.state, state.restart_ms), (Some(BusState::Active), Some(0)));
+    let opened = ["up", "0 C", "0 S6", "0 O"];
+    adapters.have_said(&opened);
+    // Once more: nothing is done to an interface that has what is asked for.
+    let again = can_interface::configure("can0", &settings).unwrap();
+    assert_eq!(State { link: state.link, ..again }, state);
+    adapters.have_said(&opened);
+    let other = Settings { bit_rate: BitRate::classic(250_000), ..settings };
+    assert_eq!(
+        can_interface::configure("can0", &other).unwrap_err().to_string(),
+        "`can0` is up with 500 kbit/s, restart 0 ms, expected 250 kbit/s, restart 100 ms: set it down first (`ip link set can0 \
+         down`)"
+    );
+}
+
+#[test]
+fn what_a_controller_says_of_its_bus_is_told_and_it_comes_back_after_bus_off() {
+    let test = "what_a_controller_says_of_its_bus_is_told_and_it_comes_back_after_bus_off";
+    let Some(python) = with_adapters(test) else { return };
+    let adapters = Adapters::start(&python, 2);
+    let settings = Settings { bit_rate: BitRate::classic(1_000_000), ..Settings::default() };
+    for interface in ["can0", "can1"] {
+        can_interface::configure(interface, &settings).unwrap();
+    }
+    adapters.have_said(&["up", "0 C", "0 S8", "0 O", "1 C", "1 S8", "1 O"]);
+    let (mut a, mut b) = (open("can0"), open("can1"));
+    b.send(&frame(0x181, &[0x27, 6])).unwrap();
+    assert_eq!(text(next(&mut a)), "181#27 06");
+    for (said, told) in [
+        ("sw100020", "controller: receive warning; error counters 20 transmit, 100 receive"),
+        ("sp020130", "controller: transmit passive; error counters 130 transmit, 20 receive"),
+        ("sa000000", "controller: active; error counters 0 transmit, 0 receive"),
+        ("e1a", "protocol violation: unspecified at ACK slot; no acknowledge; bus error"),
+        ("sb000256", "bus off"),
+    ] {
+        adapters.say(said);
+        assert_eq!(text(next(&mut a)), told);
+    }
+    let state = can_interface::state("can0").unwrap();
+    assert_eq!((state.state, state.restart_ms), (Some(BusState::Off), Some(0)));
+    b.send(&frame(0x181, &[1])).unwrap();
+    // The driver has no restart: the interface goes down and up.
+    can_interface::restart("can0").unwrap();
+    let begun = ["up", "0 C", "0 S8", "0 O", "1 C", "1 S8", "1 O"];
+    adapters.have_said(&[&begun[..], &["0 C", "0 C", "0 S8", "0 O"]].concat());
+    assert_eq!(can_interface::state("can0").unwrap().state, Some(BusState::Active));
+    // The socket is told that its interface was down, and goes on.
+    assert!(a.wait(Duration::from_secs(5)).unwrap());
+    assert_eq!(a.recv(), Err(LinkError::Down));
+    b.send(&frame(0x181, &[2])).unwrap();
+    assert_eq!(text(next(&mut a)), "181#02");
+    a.send(&frame(0x201, &[3])).unwrap();
+    assert_eq!(text(next(&mut b)), "201#03");
 }

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use axisbridge::capture::can_bus::{CanBuses, CanProtocol};
+use axisbridge::capture::reader::Reader;
+use axisbridge::decode::{Options, decode};
 use profile_cip::devicenet::connection::ConnectionKind;
 use profile_cip::devicenet::master::Master;
 use profile_cip::devicenet::master::config::{DataRate, MasterConfig, SlaveConfig as Planned};
@@ -16,6 +19,7 @@ use profile_cip::wire::status::{GeneralStatus, Service};
 use profile_generic::can::{Frame, Id};
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::wire::describe::NoNames;
 
 use axisbridge_tests::tshark;
 
@@ -207,6 +211,64 @@ fn tshark_reads_identifiers_and_duplicate_mac_checks_of_a_run_as_we_do() {
         }
     }
     assert_eq!(checks, 6, "three nodes, twice each");
+}
+
+/// What `decode` says of the frames of a run, against tshark as far as that goes, and against what was sent.
+#[test]
+fn decode_reads_a_run_as_tshark_does_and_puts_its_messages_together() {
+    let mut net = Net::new();
+    net.exchange();
+    let start = || MotionEnd::new(SetPoint::Position(0), Watched::Position);
+    let mut ends = [start(), start()];
+    for step in 0..100 {
+        if step % 10 == 0 {
+            net.command(&mut ends);
+        }
+        net.step();
+    }
+    let path = std::env::temp_dir().join(format!("axisbridge-devicenet-decode-{}.pcap", std::process::id()));
+    write(&path, &net.trace);
+    let reader = Reader::open(&path).expect("our own file opens");
+    let can = CanBuses::default().with_rest(Some(CanProtocol::Devicenet));
+    let mut text = Vec::new();
+    let summary =
+        decode(reader, &Options { can, ..Options::default() }, &NoNames, &mut text).expect("it is read");
+    std::fs::remove_file(&path).expect("it was there");
+    assert_eq!(summary.printed, net.trace.len() as u64);
+    let text = String::from_utf8(text).expect("text");
+    let trees: Vec<&str> = text.split("frame ").skip(1).collect();
+    assert_eq!(trees.len(), net.trace.len());
+    for bad in ["not readable", "dropped", "not seen", "because it fits", "no identifier"] {
+        assert!(!text.contains(bad), "{bad}: {text}");
+    }
+    let mut updates = 0;
+    for ((_, frame), tree) in net.trace.iter().zip(&trees) {
+        let Id::Standard(bits) = frame.id() else { panic!("{frame}") };
+        let identifier = Identifier::parse(bits).expect("ours");
+        let is_poll = matches!(identifier, Identifier::PollCommand(_) | Identifier::PollResponse(_));
+        // The last of three fragments: the update is whole.
+        let whole = is_poll && frame.data().first().is_some_and(|head| head >> 6 == 2);
+        assert_eq!(whole, tree.contains("fixed format, update"), "{tree}");
+        updates += u32::from(whole);
+    }
+    assert!(updates >= 36, "both drives were polled and have answered: {updates}");
+    assert_eq!(text.matches("device type 0x25").count(), 2);
+    assert_eq!(text.matches("consumed connection size 16 bytes").count(), 2);
+    let dissected = dissect("decoded", &net.trace);
+    for (seen, tree) in dissected.iter().zip(&trees) {
+        let told = tree.lines().nth(1).expect("what it is").trim();
+        let field = |name: &str| number(seen, &format!("devicenet.{name}"));
+        let group = (1..=4).find(|group| seen.field(&format!("devicenet.grp_msg{group}.id")).is_some());
+        assert!(told.starts_with(&format!("group {}: ", group.expect("a group"))), "{tree}");
+        let mac = field("src_mac_id").expect("a MAC ID");
+        assert!(told.ends_with(&format!(", MAC ID {mac}")), "{tree}");
+        if let Some(serial) = field("dup_mac_id.serial_number") {
+            let vendor = field("dup_mac_id.vendor").expect("a vendor");
+            let port = field("dup_mac_id.physical_port_number").expect("a port");
+            let wanted = format!("check request, port {port}, vendor {vendor:#06x}, serial {serial:#010x}");
+            assert!(tree.contains(&wanted), "{tree}");
+        }
+    }
 }
 
 /// tshark looks into explicit messages of group 3 only; header and body are the same there.

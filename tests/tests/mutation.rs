@@ -2,7 +2,7 @@
 //!
 //! A change is noticed by the checks of the tables themselves, by a worked example, or by the snapshot of everything that the
 //! tables say (`tables.rs`). The count of each is printed; what nobody notices is a survivor. With `AXISBRIDGE_TEST_SPLIT` set, what the snapshot
-//! notices is put to the golden texts of `tests/frames` as well, and those changes are named that no frame shows.
+//! notices is put to the golden texts of `tests/frames` and `tests/frames-can` as well, and those changes are named that no frame shows.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,12 +15,12 @@ use axisbridge::config::Config;
 use axisbridge::finding::Findings;
 use axisbridge::mapping::Mapping;
 use axisbridge::translate::{RowNames, Stage, translate_list};
-use axisbridge_tests::tables;
+use axisbridge_tests::{can_frames, can_led, tables};
 
 /// What a key says to people alone.
 const REMARKS: [&str; 5] = ["source", "note", "examples", "reason", "name"];
 
-/// Set to see how many of the changes a frame of `tests/frames` shows, and which do not show in any.
+/// Set to see how many of the changes a frame of `tests/frames` or `tests/frames-can` shows, and which do not show in any.
 const SPLIT: &str = "AXISBRIDGE_TEST_SPLIT";
 
 /// The mapping tables.
@@ -228,14 +228,13 @@ fn mutants() -> Vec<Mutant> {
     mutants
 }
 
-/// The golden texts with the lists that they belong to, the shortest first.
+/// The golden texts of a stage with the lists that they belong to, the shortest first.
 struct Golden {
     lists: Vec<(String, Vec<String>)>,
 }
 
 impl Golden {
-    fn new(stage: &Arc<Stage>) -> Self {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("frames");
+    fn new(stage: &Arc<Stage>, folder: &Path) -> Self {
         let mut lists: Vec<_> = std::fs::read_dir(folder)
             .expect("the folder of frames")
             .map(|entry| entry.expect("an entry").path())
@@ -269,6 +268,9 @@ struct Judge {
     mapping: Mapping,
     stage: Arc<Stage>,
     golden: Golden,
+    /// The same on CiA 402 drives, and what is led there by generic commands.
+    golden_can: Golden,
+    generic: Option<String>,
     listing: String,
     /// Warnings and notes of the shipped tables.
     findings: usize,
@@ -282,7 +284,10 @@ impl Judge {
             Config::parse(include_str!("../frames/config.toml"), "config.toml").expect("a configuration");
         let mapping = Mapping::embedded().expect("the shipped tables");
         let stage = Arc::new(Stage::rehearse(&config, mapping.clone()).expect("its drives"));
-        let golden = Golden::new(&stage);
+        let golden = Golden::new(&stage, &Path::new(env!("CARGO_MANIFEST_DIR")).join("frames"));
+        let can = Arc::new(can_frames::stage(mapping.clone()).expect("its drives"));
+        let golden_can = Golden::new(&can, &can_frames::folder());
+        let generic = can_led::text(&mapping).ok();
         let listing = tables::listing(&mapping, &stage);
         let mut findings = Findings::default();
         check::tables(&mapping, &mut findings);
@@ -290,6 +295,8 @@ impl Judge {
             mapping,
             stage,
             golden,
+            golden_can,
+            generic,
             listing,
             findings: findings.list().len(),
             splits: std::env::var_os(SPLIT).is_some(),
@@ -313,7 +320,14 @@ impl Judge {
         if !self.splits {
             return Noticed::Listing;
         }
+        if can_led::text(&mapping).ok() != self.generic {
+            return Noticed::Golden;
+        }
         // What is not a program any more does not move anything either.
+        let can = can_frames::stage(mapping.clone());
+        if can.map_or(true, |stage| self.golden_can.notices(&Arc::new(stage))) {
+            return Noticed::Golden;
+        }
         let Ok(stage) = self.stage.with_mapping(mapping) else { return Noticed::Golden };
         if self.golden.notices(&Arc::new(stage)) { Noticed::Golden } else { Noticed::Listing }
     }

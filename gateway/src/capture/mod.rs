@@ -5,6 +5,7 @@
 //! dissects the file.
 
 pub mod can;
+pub mod can_bus;
 pub mod reader;
 pub mod recorder;
 pub mod synth;

@@ -39,6 +39,7 @@ const BLOCK_ENHANCED: u32 = 6;
 const OPTION_END: u16 = 0;
 const OPTION_COMMENT: u16 = 1;
 const OPTION_IF_NAME: u16 = 2;
+const OPTION_IF_DESCRIPTION: u16 = 3;
 const OPTION_IF_TSRESOL: u16 = 9;
 const OPTION_IF_TSOFFSET: u16 = 14;
 
@@ -122,6 +123,8 @@ pub struct Frame<'a> {
     pub interface: u32,
     /// Name of the interface, where the file has one.
     pub interface_name: Option<&'a str>,
+    /// What the file says about the interface.
+    pub interface_description: Option<&'a str>,
     /// Link type; 1 is Ethernet.
     pub link_type: u16,
     /// Length the frame had on the network.
@@ -193,6 +196,7 @@ struct Interface {
     snap_len: u32,
     unit: TimeUnit,
     name: Option<String>,
+    description: Option<String>,
 }
 
 #[derive(Debug)]
@@ -285,6 +289,7 @@ impl<R: Read> Reader<R> {
             at: Some(KernelTime(seconds * 1_000_000_000 + fraction)),
             interface: 0,
             interface_name: None,
+            interface_description: None,
             link_type,
             original_len: endian.u32(&header, 12),
             data: &self.body,
@@ -307,6 +312,7 @@ impl<R: Read> Reader<R> {
             at: packet.units.map(|units| interface.unit.to_time(units)),
             interface: packet.interface,
             interface_name: interface.name.as_deref(),
+            interface_description: interface.description.as_deref(),
             link_type: interface.link_type,
             original_len: packet.original_len,
             data: &self.body[packet.data_at..packet.data_at + packet.captured],
@@ -462,11 +468,14 @@ fn interface_description(body: &[u8], endian: Endian, start: u64) -> Result<Inte
         snap_len: endian.u32(body, 4),
         unit: TimeUnit::MICROSECONDS,
         name: None,
+        description: None,
     };
     let mut offset_s = 0;
+    let utf8 = |text| std::str::from_utf8(text).ok().map(str::to_owned);
     for (code, value) in Options::new(body, 8, endian) {
         match (code, value) {
-            (OPTION_IF_NAME, text) => interface.name = std::str::from_utf8(text).ok().map(str::to_owned),
+            (OPTION_IF_NAME, text) => interface.name = utf8(text),
+            (OPTION_IF_DESCRIPTION, text) => interface.description = utf8(text),
             (OPTION_IF_TSRESOL, &[byte]) => {
                 interface.unit = TimeUnit::from_resolution(byte).ok_or(ReadError::BadValue {
                     offset: start,

@@ -2,7 +2,7 @@
 
 use crate::config::{AxisKind, Written};
 use crate::engine::build::BuildError;
-use crate::engine::build::can::{Network, network};
+use crate::engine::build::can::{Network, described, network};
 use crate::engine::bus::can::load::{plan, traffic};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem};
@@ -12,6 +12,7 @@ use profile_generic::quantity::Quantity;
 /// Plans each bus as the box would set it up with drives that lack nothing.
 pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
     scaling(written, findings);
+    mappings(written, findings);
     for (place, (bus, table)) in written.config.can.iter().zip(&written.file.south.get_ref().can).enumerate()
     {
         let table = table.get_ref();
@@ -50,6 +51,24 @@ fn unfit(written: &Written, error: &BuildError) -> Problem {
     };
     let problem = Problem::new(code::AXIS_TABLES, span);
     problem.title(format!("the tables make no PDOs for the axis `{name}`")).expected(what)
+}
+
+/// Which PDOs a device has must be told by a file where they are not mapped.
+fn mappings(written: &Written, findings: &mut Findings) {
+    for (bus, table) in written.config.can.iter().zip(&written.file.south.get_ref().can) {
+        for (device, table) in bus.devices.iter().zip(&table.get_ref().device) {
+            if let Some(word) = &table.get_ref().pdo_mapping
+                && device.keeps_mapping
+                && described(bus, device.node).is_none()
+            {
+                let problem = Problem::new(code::DRIVE_MAPPING, word.span());
+                let problem =
+                    problem.title(format!("the PDOs of the device with node-id {} are its own", device.node));
+                findings
+                    .push(&written.text, problem.expected("what they carry is not known before it is there"));
+            }
+        }
+    }
 }
 
 /// What the counts of a drive are must be known of it, or be told by the configuration.

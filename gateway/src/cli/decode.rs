@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use profile_sercos::wire::describe::Names;
 use profile_sercos::wire::idn::Idn;
 
-use super::{CliError, DecodeArguments, Side};
+use super::{CanKind, CliError, DecodeArguments, Side};
+use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::Reader;
+use crate::config::Config;
 use crate::decode::{DecodeError, Options, Protocol, decode};
 use crate::mapping::{Mapping, SercosDictionary, SercosIdn};
 
@@ -24,7 +26,15 @@ fn print(arguments: &DecodeArguments, out: &mut dyn Write) -> Result<ExitCode, C
     let reader = Reader::open(&arguments.file).map_err(|error| format!("{file}: {error}"))?;
     let mapping = Mapping::embedded().map_err(|errors| errors.to_string())?;
     let names = DictionaryNames(&mapping.dictionaries.sercos);
-    let outcome = decode(reader, &options(arguments), &names, out);
+    let configured = match &arguments.config {
+        Some(path) => CanBuses::of(&Config::load(path)?),
+        None => CanBuses::default(),
+    };
+    let can = configured.with_rest(arguments.can.map(|protocol| match protocol {
+        CanKind::Canopen => CanProtocol::Canopen,
+        CanKind::Devicenet => CanProtocol::Devicenet,
+    }));
+    let outcome = decode(reader, &options(arguments, can), &names, out);
     // What was read before an error has to be seen before the error is.
     let outcome = match (outcome, out.flush()) {
         (Ok(_), Err(error)) => Err(DecodeError::Write(error)),
@@ -39,7 +49,7 @@ fn print(arguments: &DecodeArguments, out: &mut dyn Write) -> Result<ExitCode, C
     }
 }
 
-fn options(arguments: &DecodeArguments) -> Options {
+fn options(arguments: &DecodeArguments, can: CanBuses) -> Options {
     let first = arguments.from.max(1);
     let last = arguments.count.map_or(u64::MAX, |count| first.saturating_add(count).saturating_sub(1));
     let only = arguments.only.map(|side| match side {
@@ -47,7 +57,7 @@ fn options(arguments: &DecodeArguments) -> Options {
         Side::Cip => Protocol::EtherNetIp,
         Side::Can => Protocol::Can,
     });
-    Options { first, last, only, ..Options::default() }
+    Options { first, last, only, can, ..Options::default() }
 }
 
 /// Names and lengths of the SERCOS dictionary.
@@ -84,7 +94,7 @@ mod tests {
         concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/captures/sercos3_startup_line2_part.pcap");
 
     fn arguments(file: impl Into<PathBuf>) -> DecodeArguments {
-        DecodeArguments { file: file.into(), from: 1, count: None, only: None }
+        DecodeArguments { file: file.into(), from: 1, count: None, only: None, config: None, can: None }
     }
 
     /// The outcome, and the numbers of the frames printed.

@@ -239,6 +239,21 @@ struct DecodeArguments {
     /// Print frames of this side only.
     #[arg(long, value_enum)]
     only: Option<Side>,
+    /// Tells CANopen and DeviceNet apart by the interfaces of this configuration. Recordings of the box tell it themselves.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// What CAN interfaces have that nothing else tells of; without it they are read as CANopen, and the tree says so.
+    #[arg(long, value_enum)]
+    can: Option<CanKind>,
+}
+
+/// What runs on a CAN interface of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum CanKind {
+    /// CANopen.
+    Canopen,
+    /// DeviceNet.
+    Devicenet,
 }
 
 /// Which protocol `decode` prints.
@@ -248,7 +263,7 @@ enum Side {
     Sercos,
     /// EtherNet/IP, CIP and CIP Motion.
     Cip,
-    /// CAN with CANopen.
+    /// CAN with CANopen or DeviceNet.
     Can,
 }
 
@@ -345,6 +360,8 @@ enum Simulate {
     SercosDrive(SercosDriveArguments),
     /// A simulated CiA 402 drive on a CAN interface.
     CanDrive(CanDriveArguments),
+    /// A drive on a CAN interface that speaks DeviceNet.
+    DevicenetDrive(DevicenetDriveArguments),
     /// A CIP Motion controller that configures, enables and moves the axes of a device.
     Controller(ControllerArguments),
 }
@@ -396,6 +413,38 @@ struct CanDriveArguments {
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
+}
+
+/// Arguments of `simulate devicenet-drive`.
+#[derive(Debug, Args)]
+struct DevicenetDriveArguments {
+    /// The CAN interface, such as can0; its bit rate is set already.
+    #[arg(long, value_name = "IF")]
+    interface: String,
+    /// MAC ID of the drive.
+    #[arg(long, value_name = "MAC", value_parser = clap::value_parser!(u8).range(0..=63))]
+    mac: u8,
+    /// What it is.
+    #[arg(long, value_enum, default_value_t = DevicenetDriveKind::Motion)]
+    kind: DevicenetDriveKind,
+    /// Position counts of a CIP Motion drive in a revolution.
+    #[arg(long, value_name = "COUNTS", default_value_t = 1_048_576, value_parser = clap::value_parser!(u32).range(1..=0x7FFF_FFFF))]
+    resolution: u32,
+    /// Output assembly of a velocity drive: 20, 21, 22 or 23.
+    #[arg(long, value_name = "N", default_value_t = 21, value_parser = clap::value_parser!(u8).range(20..=23))]
+    assembly: u8,
+    /// End by itself after this many seconds.
+    #[arg(long, value_name = "N")]
+    seconds: Option<u64>,
+}
+
+/// What a simulated drive on DeviceNet is, by the names of the configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum DevicenetDriveKind {
+    /// A CIP Motion drive with the fixed connection format.
+    Motion,
+    /// A velocity drive of the AC/DC drive profile.
+    AcDc,
 }
 
 /// Arguments of `simulate controller`.
@@ -459,6 +508,7 @@ pub fn main() -> ExitCode {
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
         Command::Simulate(Simulate::CanDrive(arguments)) => simulate::can_drive(&arguments),
+        Command::Simulate(Simulate::DevicenetDrive(arguments)) => simulate::devicenet_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),
     };
     match result {

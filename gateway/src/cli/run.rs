@@ -1,5 +1,6 @@
 //! `axisbridge run`: the box.
 
+use std::io::IsTerminal as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -142,6 +143,8 @@ fn log_to_stderr(level: LogLevel) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level.name()));
     let logger =
         tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
+    // A log file or a journal has no colours.
+    let logger = logger.with_ansi(std::io::stderr().is_terminal());
     // Refused only when a logger is set already.
     let _ = logger.try_init();
 }

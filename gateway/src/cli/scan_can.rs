@@ -42,27 +42,32 @@ pub fn run(interface: &str, json: bool) -> Result<ExitCode, CliError> {
     let mut scanner = Scanner::new();
     loop {
         let now = clock::monotonic_now();
-        if scanner.step(now, &mut port) || stop.load(Ordering::Relaxed) {
+        if stop.load(Ordering::Relaxed) {
+            scanner.give_up(now, "interrupted");
+        }
+        if scanner.step(now, &mut port) {
             break;
         }
         let latest = now + PATIENCE;
         clock::sleep_until(scanner.wake_at().map_or(latest, |at| at.min(latest)))?;
     }
-    let found = scanner.finish();
+    let bus = scanner.finish();
     let output = if json {
-        format!("{:#}\n", can::json(&found))
+        format!("{:#}\n", can::json(&bus))
     } else {
-        let remarks = format!("axisbridge scan of {interface}: {}", can::text(&found));
+        let remarks = format!("axisbridge scan of {interface}: {}", can::text(&bus));
         let mut out = String::new();
         for line in remarks.lines() {
             out.push_str(format!("# {line}").trim_end());
             out.push('\n');
         }
-        if let Some(starter) = can::starter(&found, interface, rate) {
+        if let Some(starter) = can::starter(&bus, interface, rate) {
             out.push('\n');
             out.push_str(&starter);
         }
+        out.push_str(&can::hints(&bus));
         out
     };
-    print(output, if found.is_empty() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    let good = bus.findings.is_empty() && !(bus.nodes.is_empty() && bus.unassigned.is_empty());
+    print(output, if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

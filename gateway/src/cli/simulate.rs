@@ -8,17 +8,28 @@ use std::time::Duration;
 
 use arrayvec::ArrayVec;
 use profile_cia402::wire::NodeId;
+use profile_cip::devicenet::master::config::DataRate;
+use profile_cip::devicenet::wire::MacId;
+use profile_cip::devicenet::wire::speed::Assembly;
+use profile_generic::mode::OperatingMode;
 use profile_generic::scaling::UnitKind;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
-use super::{CanDriveArguments, CliError, ControllerArguments, SercosDriveArguments, script, signal};
+use super::{
+    CanDriveArguments, CliError, ControllerArguments, DevicenetDriveArguments, DevicenetDriveKind,
+    SercosDriveArguments, script, signal,
+};
+use crate::config::DevicenetKind;
 use crate::mapping::Mapping;
 use crate::simulate::can_drive;
+use crate::simulate::can_process;
 use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::devicenet_drive;
 use crate::simulate::drives;
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
+use crate::sys::can_interface;
 use crate::sys::can_socket::{self, CanSocket};
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
 use crate::sys::realtime;
@@ -101,7 +112,41 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
         node.map_or("waiting for a node-id".into(), |node| format!("node {node}")),
         refused
     ));
-    can_drive::run(&mut drive, &mut socket, &stop)?;
+    can_process::run(&mut drive, &mut socket, &stop)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A simulated drive on a DeviceNet.
+pub fn devicenet_drive(arguments: &DevicenetDriveArguments) -> Result<ExitCode, CliError> {
+    let mac = MacId::new(arguments.mac).ok_or("expected a MAC ID of 0 to 63")?;
+    let (kind, shown) = match arguments.kind {
+        DevicenetDriveKind::Motion => {
+            let modes = vec![OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
+            (
+                DevicenetKind::Motion { modes, resolution: arguments.resolution },
+                "a CIP Motion drive".to_owned(),
+            )
+        }
+        DevicenetDriveKind::AcDc => {
+            let assembly = Assembly(arguments.assembly);
+            (DevicenetKind::Speed { assembly, scale: 0 }, format!("a velocity drive with {assembly}"))
+        }
+    };
+    let mut socket = CanSocket::open(&arguments.interface, &can_socket::Options::default())?;
+    // A virtual interface has no rate.
+    let rate = can_interface::state(&arguments.interface).ok().and_then(|state| state.nominal);
+    let known = [DataRate::Rate125, DataRate::Rate250, DataRate::Rate500];
+    let rate = known.into_iter().find(|known| rate == Some(known.bits_per_second()));
+    let mut node = devicenet_drive::node(mac, rate.unwrap_or_default(), &kind);
+    let stop = signal::stop_on_signals()?;
+    if let Some(seconds) = arguments.seconds {
+        end_after(Arc::clone(&stop), seconds);
+    }
+    // Without it the drive answers later; nothing else changes.
+    let refused = ask_for_real_time();
+    let mut progress = Progress::new(false);
+    progress.step(&format!("{shown} on {}, MAC ID {mac}{refused}", arguments.interface));
+    can_process::run(&mut node, &mut socket, &stop)?;
     Ok(ExitCode::SUCCESS)
 }
 

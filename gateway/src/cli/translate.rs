@@ -36,8 +36,6 @@ struct Output<'a> {
     failed: usize,
     /// Drives whose scaling is that of simulated ones.
     simulated_scaling: Vec<&'a str>,
-    /// Axes whose frames are not translated.
-    absent: Vec<&'a str>,
 }
 
 /// Translates and prints.
@@ -60,17 +58,12 @@ pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
             simulated.join(", ")
         );
     }
-    let absent: Vec<&str> = stage.absent(&config).collect();
-    if !absent.is_empty() && !arguments.json {
-        eprintln!("{}: on DeviceNet, whose frames are not translated", absent.join(", "));
-    }
     let text = if arguments.json {
         let output = Output {
             frames: &list.frames,
             passed_over: list.passed_over,
             failed: list.failed,
             simulated_scaling: simulated,
-            absent,
         };
         serde_json::to_string_pretty(&output)? + "\n"
     } else {

@@ -20,9 +20,9 @@ const BIT_RATES: core::ops::RangeInclusive<i64> = 10_000..=1_000_000;
 const DEFAULT_BIT_RATE: u32 = 1_000_000;
 const CYCLE_NS: core::ops::RangeInclusive<i64> = 500_000..=1_000_000_000;
 const CYCLE_STEP_NS: i64 = 100_000;
-const NODES: core::ops::RangeInclusive<i64> = 1..=127;
+pub(super) const NODES: core::ops::RangeInclusive<i64> = 1..=127;
 const DEFAULT_NODE: u8 = 127;
-const HEARTBEAT_MS: core::ops::RangeInclusive<i64> = 10..=10_000;
+const WATCH_MS: core::ops::RangeInclusive<i64> = 10..=10_000;
 const DEFAULT_HEARTBEAT_MS: u16 = 100;
 const DEFAULT_ALLOWED_LOSSES: u16 = 3;
 const AXES: core::ops::RangeInclusive<i64> = 0..=7;
@@ -34,9 +34,13 @@ pub(super) const MODES: [(&str, OperatingMode); 3] = [
     ("torque", OperatingMode::Torque),
 ];
 
-/// Actual values that can be left out.
-const ACTUAL_VALUES: [(&str, Signal); 2] =
-    [("velocity", Signal::VelocityActual), ("torque", Signal::TorqueActual)];
+/// Actual values that can be left out, and whether they are where nothing is said.
+const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
+    ("velocity", (Signal::VelocityActual, true)),
+    ("torque", (Signal::TorqueActual, true)),
+    ("following-error", (Signal::FollowingError, false)),
+    ("inputs", (Signal::DigitalInputs, false)),
+];
 
 /// Offsets that can be sent.
 const OFFSETS: [(&str, Signal); 2] = [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
@@ -54,7 +58,10 @@ impl Checker {
         let bit_rate = self.number_or(table.bit_rate.as_ref(), "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
         let cycle_time = self.sync_time(&table.cycle_time);
         let node = self.number_or(table.node.as_ref(), "the node-id of the box", NODES, DEFAULT_NODE);
-        let heartbeat_ms = self.heartbeat(table.heartbeat.as_ref());
+        let heartbeat_ms = match &table.heartbeat {
+            None => Some(DEFAULT_HEARTBEAT_MS),
+            Some(text) => self.watch_time(text, "the time between heartbeats"),
+        };
         let allowed_losses = self.number_or(
             table.allowed_losses.as_ref(),
             "the number of allowed losses",
@@ -70,6 +77,7 @@ impl Checker {
         }
         self.can_places(table, node);
         let drives: Vec<_> = table.drive.iter().map(|drive| self.can_drive(drive.get_ref())).collect();
+        let devices = self.can_devices(table);
         Some(Can {
             link: link?,
             bit_rate: BitRate::classic(bit_rate?)?,
@@ -78,6 +86,7 @@ impl Checker {
             heartbeat_ms: heartbeat_ms?,
             allowed_losses: allowed_losses?,
             drives: drives.into_iter().collect::<Option<_>>()?,
+            devices: devices?,
         })
     }
 
@@ -130,16 +139,16 @@ impl Checker {
         )
     }
 
-    fn heartbeat(&mut self, text: Option<&Spanned<String>>) -> Option<u16> {
-        let Some(text) = text else { return Some(DEFAULT_HEARTBEAT_MS) };
+    /// A time between two signs of life, ms.
+    pub(super) fn watch_time(&mut self, text: &Spanned<String>, what: &str) -> Option<u16> {
         let time = self.time_span(text)?;
         let ms = time.0 / 1_000_000;
-        if time.0 % 1_000_000 == 0 && HEARTBEAT_MS.contains(&ms) {
+        if time.0 % 1_000_000 == 0 && WATCH_MS.contains(&ms) {
             return u16::try_from(ms).ok();
         }
         self.report(
             text.span(),
-            format_args!("{} cannot be the time between heartbeats", duration::show(time)),
+            format_args!("{} cannot be {what}", duration::show(time)),
             "expected 10 ms to 10 s in whole milliseconds",
         )
     }
@@ -156,12 +165,14 @@ impl Checker {
             self.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");
         }
         let sent = match &table.actual_values {
-            None => Some(ACTUAL_VALUES.iter().map(|(_, signal)| *signal).collect::<Vec<_>>()),
+            None => {
+                Some(ACTUAL_VALUES.map(|(_, value)| value).into_iter().filter(|(_, usual)| *usual).collect())
+            }
             Some(names) => self.words(names, "actual value", &ACTUAL_VALUES),
         };
         let left_out = sent.map(|sent| {
-            let all = ACTUAL_VALUES.iter().map(|(_, signal)| *signal);
-            all.filter(|signal| !sent.contains(signal)).collect()
+            let all = ACTUAL_VALUES.iter().map(|(_, value)| value);
+            all.filter(|value| !sent.contains(value)).map(|(signal, _)| *signal).collect()
         });
         let offsets = match &table.offsets {
             None => Some(Vec::new()),

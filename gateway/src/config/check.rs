@@ -189,7 +189,7 @@ impl Checker {
         })
     }
 
-    fn path(&mut self, path: &Spanned<String>, what: &str) {
+    pub(super) fn path(&mut self, path: &Spanned<String>, what: &str) {
         if path.get_ref().is_empty() {
             self.report::<()>(path.span(), format_args!("the path of {what} is empty"), "expected a path");
         }

@@ -305,6 +305,9 @@ pub struct CanTable {
     pub allowed_losses: Option<Spanned<i64>>,
     /// The drives, at least one.
     pub drive: Vec<Spanned<CanDriveTable>>,
+    /// What is said of devices as a whole, each once.
+    #[serde(default)]
+    pub device: Vec<Spanned<CanDeviceTable>>,
 }
 
 /// `[[south.can.drive]]`
@@ -320,8 +323,9 @@ pub struct CanDriveTable {
     /// What the axis is to be used for: `"position"`, `"velocity"`, `"torque"`; set-points of others are not sent.
     /// Default: all three.
     pub modes: Option<Spanned<Vec<Spanned<String>>>>,
-    /// Which actual values beside the position are sent in every cycle: `"velocity"`, `"torque"`, each of which makes the
-    /// bus fuller. Default: both.
+    /// Which actual values beside the position are sent in every cycle, each of which makes the bus fuller: `"velocity"`, `"torque"`,
+    /// `"following-error"` (60F4), which the box works out otherwise, and `"inputs"` (60FD): limit switches and home switch. Default:
+    /// velocity and torque.
     pub actual_values: Option<Spanned<Vec<Spanned<String>>>>,
     /// Which trims go to the drive in every cycle, for it to add them: `"velocity"` (60B1) in position control, `"torque"` (60B2)
     /// in position and velocity control. Default: none, and such a trim of the controller has no effect.
@@ -332,6 +336,47 @@ pub struct CanDriveTable {
     pub millimetres_per_turn: Option<Spanned<f64>>,
     /// What its counts are, for a drive whose factor group does not say it, or says it wrong. Default: what the drive says.
     pub counts: Option<CountsTable>,
+}
+
+/// `[[south.can.device]]`: what is said of a device as a whole, whatever axes it has.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CanDeviceTable {
+    /// Its node-id, which is that of a drive.
+    pub node: Spanned<i64>,
+    /// What it has to be (1018); a device that is something else is not led. Default: any, or what `configuration` is for.
+    pub identity: Option<Spanned<CanIdentityTable>>,
+    /// What happens when nobody answers under its node-id: `"assign"`, a device with all of this `identity` that has no node-id is
+    /// given it by LSS; `"store"`, and keeps it. Default: nothing.
+    pub lss: Option<Spanned<String>>,
+    /// Its configuration, written at boot-up before anything else: a device configuration file (DCF) of CiA 306, or a concise one
+    /// as in 1F22. A path that counts from the folder of this file. Default: none.
+    pub configuration: Option<Spanned<String>>,
+    /// Whether it is told to keep its configuration (1010:1) when that was written; it has to have 1020, which tells that it is
+    /// there already. Default: false.
+    pub store: Option<Spanned<bool>>,
+    /// `"write"`: its PDOs are mapped as its axes need them; `"keep"`: they are used as they are. Default: `"write"`.
+    pub pdo_mapping: Option<Spanned<String>>,
+    /// Node guarding in place of a heartbeat, for a device without 1017: the time between two requests, `10 ms` to `10 s`.
+    /// Default: none, it has a heartbeat.
+    pub guarding: Option<Spanned<String>>,
+    /// How many requests in a row may stay without an answer, or the device without a request, until the other one is missed: 2
+    /// to 255. Default: 3.
+    pub life_time_factor: Option<Spanned<i64>>,
+}
+
+/// `identity` of a `[[south.can.device]]`; what is not given is not compared.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CanIdentityTable {
+    /// Vendor-ID (1018:1).
+    pub vendor_id: Option<Spanned<i64>>,
+    /// Product code (1018:2).
+    pub product_code: Option<Spanned<i64>>,
+    /// Revision number (1018:3).
+    pub revision_number: Option<Spanned<i64>>,
+    /// Serial number (1018:4).
+    pub serial_number: Option<Spanned<i64>>,
 }
 
 /// `counts` of a `[[south.can.drive]]`; each is left to the drive where it is not given.

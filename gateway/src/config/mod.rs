@@ -5,8 +5,10 @@
 //! that show each fault at its line.
 
 mod can;
+mod can_device;
 mod check;
 mod connection_format;
+mod device_file;
 mod devicenet;
 pub(crate) mod duration;
 pub mod file;
@@ -15,7 +17,10 @@ mod rated;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
+use profile_cia402::eds::drive::Pdo;
+use profile_cia402::master::config::{Expected, GuardingConfig, Stamp, Write};
 use profile_cia402::wire::NodeId;
+use profile_cia402::wire::lss::LssAddress;
 use profile_cip::devicenet::master::config::{DataRate, ExpectedIdentity};
 use profile_cip::devicenet::wire::MacId;
 use profile_cip::devicenet::wire::speed::Assembly;
@@ -162,24 +167,30 @@ impl Written {
     /// Reads and checks a file; `None` with errors. Paths in it count from the file's own folder.
     pub fn load(path: &Path, findings: &mut Findings) -> Option<Self> {
         let source = read_file(path, FILE_LEN_MAX).map_err(|found| findings.extend(found)).ok()?;
-        let mut written = Self::parse(&source, &path.display().to_string(), findings)?;
-        if let Some(folder) = path.parent() {
-            let config = &mut written.config;
-            let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
-            for path in paths.chain(&mut config.settings_file) {
-                *path = folder.join(&*path);
-            }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut written = Self::parse_in(folder, &source, &path.display().to_string(), findings)?;
+        let config = &mut written.config;
+        let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
+        for path in paths.chain(&mut config.settings_file) {
+            *path = folder.join(&*path);
         }
         Some(written)
     }
 
-    /// Checks the text of a file, whose name is shown in errors; `None` with them.
+    /// Checks the text of a file, whose name is shown in errors; `None` with them. Paths count from the working directory.
     pub fn parse(source: &str, name: &str, findings: &mut Findings) -> Option<Self> {
+        Self::parse_in(Path::new(""), source, name, findings)
+    }
+
+    fn parse_in(folder: &Path, source: &str, name: &str, findings: &mut Findings) -> Option<Self> {
         let text = Source::new(name, source);
         let tree = tree(source, &text, findings)?;
         let file: file::File = deserialize(tree, &text, findings)?;
         match check::check(&file) {
-            Ok(config) => Some(Self { text, file, config }),
+            Ok(config) => {
+                let mut written = Self { text, file, config };
+                device_file::load(folder, &mut written, findings).then_some(written)
+            }
             Err(problems) => {
                 problems.into_iter().for_each(|problem| findings.push(&text, problem));
                 None
@@ -508,6 +519,55 @@ pub struct Can {
     pub allowed_losses: u16,
     /// The drives on it.
     pub drives: Vec<CanDrive>,
+    /// What is said of devices as a whole; of those that are not here nothing is.
+    pub devices: Vec<CanDevice>,
+}
+
+impl Can {
+    /// What is said of the device with this node-id.
+    #[must_use]
+    pub fn device(&self, node: NodeId) -> Option<&CanDevice> {
+        self.devices.iter().find(|device| device.node == node)
+    }
+}
+
+/// A CANopen device, with one axis or several.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CanDevice {
+    /// Its node-id.
+    pub node: NodeId,
+    /// What it has to be.
+    pub expected: Expected,
+    /// How it gets its node-id, where it has none.
+    pub lss: Option<Lss>,
+    /// What it is given at its boot-up.
+    pub file: Option<DeviceFile>,
+    /// Whether it keeps that.
+    pub stores: bool,
+    /// Whether its PDOs are used as they are.
+    pub keeps_mapping: bool,
+    /// Node guarding, in place of a heartbeat.
+    pub guarding: Option<GuardingConfig>,
+}
+
+/// A device that is given its node-id by LSS.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lss {
+    /// Who it is.
+    pub address: LssAddress,
+    /// Whether it is to keep the node-id.
+    pub stores: bool,
+}
+
+/// What a device is given at its boot-up, by its file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceFile {
+    /// Its values, in the order of writing.
+    pub writes: Vec<Write>,
+    /// By what the device tells that it has them (1020); another one for other values.
+    pub stamp: Stamp,
+    /// The PDOs that it has then, where the file tells them.
+    pub pdos: Option<[Vec<Pdo>; 2]>,
 }
 
 /// How a CAN bus, or a DeviceNet network, is reached.

@@ -1,11 +1,13 @@
-//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, SERCOS III, and CANopen.
+//! Prints a recording as an indented tree, frame by frame: EtherNet/IP with CIP and CIP Motion, SERCOS III, CANopen and DeviceNet.
 //!
 //! A frame is understood with what came before it: TCP streams are put together, class-1 data are known by
 //! the Forward_Open that opened their connection, SERCOS telegrams by the layout that the master wrote over
-//! the service channel, CANopen PDOs by the mapping that it wrote by SDO. So every frame is read, also those that are not printed; none is kept.
+//! the service channel, CANopen PDOs by the mapping that it wrote by SDO, I/O messages of DeviceNet by the sizes of their
+//! connections. So every frame is read, also those that are not printed; none is kept.
 
 mod canopen;
 mod connections;
+mod devicenet;
 mod ethernet_ip;
 mod explicit;
 pub(crate) mod packet;
@@ -20,10 +22,12 @@ use thiserror::Error;
 
 use crate::capture::Side;
 use crate::capture::can::{self, LINK_TYPE_CAN, Record};
+use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
 use crate::sys::clock::KernelTime;
 
 use canopen::Canopen;
+use devicenet::Devicenet;
 use ethernet_ip::EtherNetIp;
 use packet::Packet;
 use text::Text;
@@ -39,14 +43,14 @@ pub enum Protocol {
     EtherNetIp,
     /// SERCOS III.
     Sercos,
-    /// CAN, and CANopen on it.
+    /// CAN, and CANopen or DeviceNet on it.
     Can,
     /// Everything else; one line tells what it is.
     Other,
 }
 
 /// What to print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Options {
     /// Number of the first frame to print, from 1.
     pub first: u64,
@@ -56,12 +60,14 @@ pub struct Options {
     pub only: Option<Protocol>,
     /// Print no more lines than this.
     pub lines_max: u64,
+    /// What is known of its CAN buses; one that nothing is known of is read as CANopen, and the tree says so.
+    pub can: CanBuses,
 }
 
 impl Default for Options {
     /// Everything.
     fn default() -> Self {
-        Self { first: 1, last: u64::MAX, only: None, lines_max: u64::MAX }
+        Self { first: 1, last: u64::MAX, only: None, lines_max: u64::MAX, can: CanBuses::default() }
     }
 }
 
@@ -99,7 +105,7 @@ pub fn decode<R: Read>(
     names: &dyn Names,
     out: &mut dyn Write,
 ) -> Result<Summary, DecodeError> {
-    let mut decoder = Decoder::new(names);
+    let mut decoder = Decoder { can: options.can.clone(), ..Decoder::new(names) };
     let mut summary = Summary::default();
     let mut lines_left = options.lines_max;
     while let Some(frame) = reader.next_frame()? {
@@ -129,13 +135,29 @@ pub fn decode<R: Read>(
     Ok(summary)
 }
 
+/// What is known of a CAN bus.
+enum CanBus {
+    Canopen(Canopen),
+    Devicenet(Devicenet),
+}
+
+impl CanBus {
+    fn new(protocol: CanProtocol) -> Self {
+        match protocol {
+            CanProtocol::Canopen => Self::Canopen(Canopen::default()),
+            CanProtocol::Devicenet => Self::Devicenet(Devicenet::default()),
+        }
+    }
+}
+
 /// What is known of a recording so far.
 pub(crate) struct Decoder<'n> {
     names: &'n dyn Names,
     /// By interface; `None` for the ports of this box.
     buses: Vec<(Option<u32>, DecodeContext<'n>)>,
+    can: CanBuses,
     /// By interface.
-    can_buses: Vec<(u32, Canopen)>,
+    can_buses: Vec<(u32, CanBus)>,
     ethernet_ip: EtherNetIp,
     start: Option<KernelTime>,
     text: Text,
@@ -146,6 +168,7 @@ impl<'n> Decoder<'n> {
         Self {
             names,
             buses: Vec::new(),
+            can: CanBuses::default(),
             can_buses: Vec::new(),
             ethernet_ip: EtherNetIp::default(),
             start: None,
@@ -212,12 +235,19 @@ impl<'n> Decoder<'n> {
         let Ok(Record::Frame(content)) = record else { return };
         let known = self.can_buses.iter().position(|(interface, _)| *interface == frame.interface);
         let index = known.unwrap_or_else(|| {
+            let protocol = self.can.find(frame).map(|bus| bus.protocol);
+            if protocol.is_none() {
+                self.text.line(1, format_args!("nothing tells what runs on this bus: read as CANopen"));
+            }
             if self.can_buses.len() < BUSES_MAX {
-                self.can_buses.push((frame.interface, Canopen::default()));
+                self.can_buses.push((frame.interface, CanBus::new(protocol.unwrap_or(CanProtocol::Canopen))));
             }
             self.can_buses.len() - 1
         });
-        self.can_buses[index].1.frame(&content, &mut self.text);
+        match &mut self.can_buses[index].1 {
+            CanBus::Canopen(bus) => bus.frame(&content, &mut self.text),
+            CanBus::Devicenet(bus) => bus.frame(&content, &mut self.text),
+        }
     }
 
     fn heading(&mut self, frame: &Frame<'_>) {

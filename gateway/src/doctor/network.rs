@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::{Check, Verdict};
 use crate::config::{CanLink, Config, Link};
-use crate::sys::can_interface;
+use crate::sys::can_interface::{self, State};
 use crate::sys::ethtool::{self, Features};
 use crate::sys::interfaces;
 use crate::sys::link::LinkState;
@@ -17,6 +17,9 @@ const AREA: &str = "network";
 
 /// Speed and duplex that SERCOS III has at least.
 const SPEED_MIN: u32 = 100;
+
+/// Frames that the box sends in a cycle: SYNC, and for each drive its RPDOs and a message of commissioning.
+const FRAMES_OF_A_DRIVE: usize = 4;
 
 /// TCP port of EtherNet/IP.
 const ENCAPSULATION_PORT: u16 = 44818;
@@ -44,10 +47,16 @@ pub(super) fn checks(root: &Path, config: Option<&Config>) -> Vec<Check> {
         Some(Link::InProcess { .. }) => simulated = true,
         None => {}
     }
-    let devicenet = config.devicenet.iter().map(|network| (&network.link, network.bit_rate()));
-    for (link, bit_rate) in config.can.iter().map(|bus| (&bus.link, bus.bit_rate)).chain(devicenet) {
+    let can_open = config.can.iter().map(|bus| (&bus.link, bus.bit_rate, bus.drives.len()));
+    let devicenet = config.devicenet.iter().map(|bus| (&bus.link, bus.bit_rate(), bus.drives.len()));
+    for (link, bit_rate, drives) in can_open.chain(devicenet) {
         match link {
-            CanLink::Interface { name, set_bit_rate } => checks.push(can(name, bit_rate, *set_bit_rate)),
+            CanLink::Interface { name, set_bit_rate } => {
+                checks.push(can(name, bit_rate, *set_bit_rate));
+                if !set_bit_rate && let Ok(state) = can_interface::state(name) {
+                    checks.extend(left_to_the_user(name, &state, drives));
+                }
+            }
             CanLink::InProcess => simulated = true,
         }
     }
@@ -229,6 +238,23 @@ fn can(name: &str, wanted: BitRate, set_bit_rate: bool) -> Check {
     }
 }
 
+/// What the box would set of a CAN interface and leaves to the user here.
+fn left_to_the_user(name: &str, state: &State, drives: usize) -> Vec<Check> {
+    let mut checks = Vec::new();
+    let frames = 1 + FRAMES_OF_A_DRIVE * drives;
+    if usize::try_from(state.queue).is_ok_and(|queue| queue < frames) {
+        let found = format!("{} frames, the box may send {frames} in a cycle", state.queue);
+        let advice = format!("ip link set {name} txqueuelen 128, or set_bit_rate");
+        checks.push(Check::doubtful(AREA, format!("transmit queue of {name}"), found, advice));
+    }
+    if state.has_bit_rate && !state.restarts() {
+        let advice = format!("ip link set {name} type can restart-ms 100 while it is down, or set_bit_rate");
+        let found = "none: it stays off the bus";
+        checks.push(Check::doubtful(AREA, format!("restart of {name} after bus off"), found, advice));
+    }
+    checks
+}
+
 /// Whether the box can listen there.
 fn address(what: &str, at: SocketAddr) -> Check {
     let found = |text: &str| format!("{at}: {text}");
@@ -262,6 +288,36 @@ mod tests {
 
     fn told(check: &Check) -> (Verdict, &str, Option<&str>) {
         (check.verdict, &check.found, check.advice.as_deref())
+    }
+
+    #[test]
+    fn a_can_interface_that_the_user_sets_up_wants_a_queue_and_a_restart() {
+        let state = State {
+            link: LinkState::Up,
+            has_bit_rate: true,
+            nominal: Some(1_000_000),
+            sample_point: None,
+            data: None,
+            fd: false,
+            state: None,
+            restart_ms: Some(0),
+            errors: None,
+            queue: 10,
+        };
+        let checks = |state: &State, drives| {
+            let checks = left_to_the_user("can0", state, drives);
+            checks.iter().map(|check| format!("{}: {}", check.what, check.found)).collect::<Vec<_>>()
+        };
+        let none = "restart of can0 after bus off: none: it stays off the bus";
+        assert_eq!(checks(&state, 2), [none]);
+        let short = "transmit queue of can0: 10 frames, the box may send 13 in a cycle";
+        assert_eq!(checks(&state, 3), [short, none]);
+        assert_eq!(checks(&State { restart_ms: Some(100), queue: 13, ..state }, 3), [""; 0]);
+        // A virtual interface is never off the bus.
+        assert_eq!(
+            checks(&State { has_bit_rate: false, restart_ms: None, queue: 1000, ..state }, 3),
+            [""; 0]
+        );
     }
 
     #[test]

@@ -323,6 +323,7 @@ impl DeviceChannel {
                 }
                 let mut inhibits = Inhibits::empty();
                 inhibits.set(Inhibits::CONFIGURATION_INCOMPLETE, !member.scaled);
+                inhibits.set(Inhibits::LIMIT_SWITCHES_NOT_TOLD, axis.misses_limit_switches());
                 axis.set_inhibits(now, system, inhibits);
                 axis.from_controller(now, system, &image);
             }
@@ -616,6 +617,7 @@ impl Member {
             },
             deceleration: value(rows.ramp_deceleration).map(Acceleration).or(self.stops.deceleration),
             flying_start: raw(rows.flying_start) != 0 && by_velocity,
+            checks_overtravel: raw(rows.overtravel_checking) != 0,
         };
         (settings, stopping.map(|row| row.abort).unwrap_or_default())
     }

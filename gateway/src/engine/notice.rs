@@ -16,6 +16,7 @@ use profile_sercos::master::topology::Topology;
 
 use super::axis::{Loss, OwnWords};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
+use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
@@ -87,6 +88,13 @@ pub enum Notice {
         bus: u8,
         /// What it tells.
         event: CanEvent,
+    },
+    /// A device on a CAN bus was to be given its node-id.
+    Lss {
+        /// The bus, from 0 among those of CAN.
+        bus: u8,
+        /// What came of it.
+        told: LssNotice,
     },
     /// The master of a DeviceNet network.
     Devicenet {
@@ -225,6 +233,7 @@ impl Notice {
                     | CanEvent::Sdo { .. },
                 ..
             }
+            | Self::Lss { told: LssNotice::Given { .. }, .. }
             | Self::Devicenet {
                 event:
                     DevicenetEvent::Online | DevicenetEvent::Exchanging(_) | DevicenetEvent::Released { .. },
@@ -238,9 +247,12 @@ impl Notice {
     #[must_use]
     pub fn axis(&self) -> Option<u8> {
         match self {
-            Self::Sercos(_) | Self::Can { .. } | Self::Devicenet { .. } | Self::Retry | Self::Node { .. } => {
-                None
-            }
+            Self::Sercos(_)
+            | Self::Can { .. }
+            | Self::Lss { .. }
+            | Self::Devicenet { .. }
+            | Self::Retry
+            | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
             | Self::PassedOver { axis, .. }
@@ -276,6 +288,7 @@ impl fmt::Display for Notice {
                 )
             }
             Self::Can { bus, event } => write!(f, "CAN bus {}: {event}", bus + 1),
+            Self::Lss { bus, told } => write!(f, "CAN bus {}: {told}", bus + 1),
             Self::Devicenet { network, event } => write!(f, "DeviceNet {}: {event}", network + 1),
             Self::SlaveSetup { mac, failure, .. } => {
                 write!(f, "the drive with MAC ID {mac} cannot be used: {failure}; it is left out")

@@ -245,22 +245,31 @@ impl fmt::Display for Findings {
 
 impl std::error::Error for Findings {}
 
+/// Reads a file of limited length.
+///
+/// # Errors
+/// It cannot be read, or is longer than `most` bytes: the code, and what was expected.
+pub(crate) fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, (Code, String)> {
+    use std::io::Read;
+    let mut bytes = Vec::new();
+    // The length that the system tells may change until it is read, and a pipe has none.
+    let read = std::fs::File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes));
+    match read {
+        Err(error) => Err((code::UNREADABLE, format!("expected a file, got: {error}"))),
+        Ok(length) if length as u64 > most => Err((code::TOO_LONG, format!("expected at most {most} bytes"))),
+        Ok(_) => Ok(bytes),
+    }
+}
+
 /// Reads a text file of limited length.
 ///
 /// # Errors
 /// It cannot be read, is longer than `most` bytes, or is not UTF-8, with the place of the first byte that is none.
 pub fn read_file(path: &Path, most: u64) -> Result<String, Findings> {
-    use std::io::Read;
     let mut findings = Findings::default();
-    let mut bytes = Vec::new();
-    // The length that the system tells may change until it is read, and a pipe has none.
-    let read = std::fs::File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes));
-    match read {
-        Err(error) => findings.push_file(code::UNREADABLE, path, format!("expected a file, got: {error}")),
-        Ok(length) if length as u64 > most => {
-            findings.push_file(code::TOO_LONG, path, format!("expected at most {most} bytes"));
-        }
-        Ok(_) => match String::from_utf8(bytes) {
+    match read_bytes(path, most) {
+        Err((code, expected)) => findings.push_file(code, path, expected),
+        Ok(bytes) => match String::from_utf8(bytes) {
             Ok(text) => return Ok(text),
             Err(error) => {
                 let at = error.utf8_error().valid_up_to();

@@ -368,6 +368,18 @@ registry! {
         "Without `set_scaling` the box reads the scaling when the drive is there; range and precision cannot be told before.",
         "[[south.sercos.drive]]\nname = \"a\"\naddress = 1",
         "Nothing; or `set_scaling = true`, which makes it the same for every drive.";
+    DEVICE_FILE = 87 Error "a device's configuration that cannot be used":
+        "The file that `configuration` of a [[south.can.device]] names has an entry that cannot be read, has no values, or is for another device. A device is given all of its configuration or is not led.",
+        "[[south.can.device]]\nnode = 1\nconfiguration = \"of-another-drive.dcf\"",
+        "Correct the file where it is shown, or export it again from the tool that made it.";
+    DEVICE_FILE_ODD = 88 Warning "a device's configuration with something odd":
+        "The file contradicts itself in something that its values do not depend on, was made for another node-id, or has values that the box does not write: it maps the PDOs, sets SYNC and supervision, and moves the drive.",
+        "[1017]\nParameterValue=50",
+        "Nothing, where it is as it was meant; else correct the file.";
+    DRIVE_MAPPING = 89 Note "the drive's own PDO mapping counts":
+        "With `pdo_mapping = \"keep\"` the box uses the PDOs as they are when the drive is there. Without a `configuration` that tells them, the load of the bus is that of PDOs that the box would have mapped.",
+        "[[south.can.device]]\nnode = 1\npdo_mapping = \"keep\"",
+        "Nothing; or name the data sheet of the drive (EDS, DCF) as its `configuration`.";
     SCRIPT = 95 Error "a script that cannot be run":
         "A step of a script for the simulated controller is none, or cannot be done.",
         "[[step]]\nenabel = 1",

@@ -63,6 +63,20 @@ impl Source {
             .map_or(("", 0, 0), |place| (&place.part.path, place.line, place.column))
     }
 
+    /// What stands in a line of the first file from a column on, both from 1.
+    pub(crate) fn rest_of_line(&self, line: usize, column: usize) -> Option<Range<usize>> {
+        let part = self.parts.first()?;
+        let whole = (1..=part.lines.len()).contains(&line).then(|| part.line(line))?;
+        let before = part.text[whole.clone()].char_indices().nth(column.saturating_sub(1));
+        Some(before.map_or(whole.end, |(at, _)| whole.start + at)..whole.end)
+    }
+
+    /// The first line of the first file that is the wanted one.
+    pub(crate) fn find_line(&self, wanted: impl Fn(&str) -> bool) -> Option<Range<usize>> {
+        let part = self.parts.first()?;
+        (1..=part.lines.len()).map(|line| part.line(line)).find(|line| wanted(&part.text[line.clone()]))
+    }
+
     pub(super) fn locate(&self, span: &Range<usize>) -> Option<Place<'_>> {
         let at = self.parts.partition_point(|part| part.start <= span.start).checked_sub(1)?;
         let part = &self.parts[at];

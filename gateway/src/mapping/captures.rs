@@ -45,6 +45,14 @@ impl CaptureRule {
         }
     }
 
+    /// The word of an input that is looked at in every cycle.
+    pub(super) fn input(&self) -> Option<Idn> {
+        match self.by {
+            CaptureBy::Input { word, .. } => Some(word),
+            _ => None,
+        }
+    }
+
     /// What the drive's telegram should carry: words before values.
     fn feedback_idns(&self) -> [Option<Idn>; 2] {
         match self.by {

@@ -14,7 +14,7 @@ use profile_generic::state::{DriveState, Request};
 
 use super::cip_events::EventTables;
 use super::compile_cip::{
-    CipFault, CipRequest, CipState, CipStopping, InhibitRule, MissingValue, StatusRule,
+    CipFault, CipRequest, CipState, CipStopping, InhibitRule, IoStatusRule, MissingValue, StatusRule,
 };
 use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::{CipAttribute, CipType};
@@ -116,6 +116,8 @@ pub struct SequenceAttributes {
     pub ramp_deceleration: u16,
     /// Whether an axis may be started while it moves.
     pub flying_start: u16,
+    /// Whether a limit switch stops the axis.
+    pub overtravel_checking: u16,
 }
 
 #[derive(Debug, Clone)]
@@ -223,7 +225,10 @@ pub struct CipTables {
     pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
     pub(super) states: [CipState; DriveState::ALL.len()],
     pub(super) status: Vec<StatusRule>,
+    pub(super) io_status: Vec<IoStatusRule>,
     pub(super) faults: Vec<(FaultCause, CipFault)>,
+    /// Causes, and those as which they are told a controller that has inverted the direction.
+    pub(super) opposites: Vec<(FaultCause, FaultCause)>,
     /// Exceptions and their actions.
     pub exceptions: Vec<ExceptionRow>,
     pub(super) reactions: [u8; Reaction::ALL.len()],

@@ -151,7 +151,7 @@ impl Compiler<'_> {
                 let both = telegram.command.into_iter().chain(telegram.feedback);
                 let mut idns: Vec<Idn> = both.filter_map(Item::idn).collect();
                 // Whether they come into it shows only now.
-                let words = self.tables.status_words();
+                let words = self.tables.added_words();
                 idns.extend(words.into_iter().filter(|idn| !self.facts.is_missing(*idn)));
                 read(steps, idns, &DESCRIPTION);
             }

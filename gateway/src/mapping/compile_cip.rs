@@ -36,6 +36,9 @@ pub const MAX_REQUESTS: usize = 16;
 /// The most rules for Axis Status bits.
 pub const MAX_STATUS_RULES: usize = 48;
 
+/// The most rules for Axis I/O Status bits.
+pub const MAX_IO_STATUS_RULES: usize = 32;
+
 /// The most fault causes a table names.
 pub const MAX_FAULTS: usize = 128;
 
@@ -179,6 +182,17 @@ pub(super) struct StatusRule {
     pub axis_status: u32,
 }
 
+/// A bit of Axis I/O Status.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct IoStatusRule {
+    /// Bits that must all be set.
+    pub status: StatusBits,
+    /// Bits none of which may be set.
+    pub without: StatusBits,
+    /// The bit as it stands in the word, and for a controller that has inverted the direction.
+    pub bits: [u32; 2],
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(super) struct InhibitRule {
     pub inhibit: Inhibits,
@@ -275,6 +289,9 @@ pub struct CipProgram {
     requests: ArrayVec<CipRequest, MAX_REQUESTS>,
     states: [CipState; DriveState::ALL.len()],
     status: ArrayVec<StatusRule, MAX_STATUS_RULES>,
+    io_status: ArrayVec<IoStatusRule, MAX_IO_STATUS_RULES>,
+    /// Whether the controller has inverted the direction.
+    inverted: bool,
     /// Sorted by cause.
     faults: ArrayVec<(FaultCause, CipFault), MAX_FAULTS>,
     reactions: [u8; Reaction::ALL.len()],
@@ -288,6 +305,14 @@ impl CipProgram {
     /// The program for an axis with this scaling.
     pub(super) fn compile(tables: &CipTables, scaling: &CipScaling) -> Option<Self> {
         let position_counts = scaling.nanounits_per_count().inverse()?;
+        let opposite = |cause| {
+            let other = tables.opposites.iter().find(|(known, _)| scaling.inverted && *known == cause);
+            other.map_or(cause, |(_, other)| *other)
+        };
+        let row = |cause| tables.faults.iter().find(|(known, _)| *known == cause);
+        let told = |(cause, own): &(FaultCause, CipFault)| {
+            (*cause, row(opposite(*cause)).map_or(*own, |(_, fault)| *fault))
+        };
         let mut program = Self {
             commands: [None; ELEMENTS],
             trims: ArrayVec::new(),
@@ -302,7 +327,9 @@ impl CipProgram {
             requests: tables.requests.iter().copied().collect(),
             states: tables.states,
             status: tables.status.iter().copied().collect(),
-            faults: tables.faults.iter().copied().collect(),
+            io_status: tables.io_status.iter().copied().collect(),
+            inverted: scaling.inverted,
+            faults: tables.faults.iter().map(told).collect(),
             reactions: tables.reactions,
             inhibits: tables.inhibits.iter().copied().collect(),
             stoppings: tables.stoppings.iter().copied().collect(),
@@ -503,6 +530,14 @@ impl CipProgram {
             .filter(|rule| feedback.status.contains(rule.status))
             .filter(|rule| rule.mode.is_none_or(|mode| mode == feedback.mode))
             .fold(0, |word, rule| word | rule.axis_status)
+    }
+
+    /// The Axis I/O Status bits (attribute 653) that follow from the drive.
+    pub fn io_status(&self, feedback: &AxisFeedback) -> u32 {
+        let rules = self.io_status.iter();
+        rules
+            .filter(|rule| feedback.status.contains(rule.status) && !feedback.status.intersects(rule.without))
+            .fold(0, |word, rule| word | rule.bits[usize::from(self.inverted)])
     }
 
     /// How CIP reports a cause; `None` for a cause that no row names.

@@ -134,7 +134,7 @@ impl Telegram {
                 *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
             }
         }
-        for idn in tables.status_words() {
+        for idn in tables.added_words() {
             let width = facts.width(idn, dictionary).and_then(|width| u16::try_from(width.bytes()).ok());
             let listed = captures::is_listed(tables.configurable[0], idn, facts);
             if let Some(width) = width.filter(|_| listed && !telegram.feedback.contains(&idn.into())) {
@@ -172,7 +172,7 @@ impl Telegram {
                 list.extend(signals.iter().filter_map(|signal| Some(tables.signal(*signal)?.idn)));
             }
         }
-        idns[1].extend(tables.status_words());
+        idns[1].extend(tables.added_words());
         if axis.captures == CaptureMode::Cyclic {
             // In either direction: which, the drive says.
             let captures = super::captures::idns(tables);

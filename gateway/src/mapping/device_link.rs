@@ -3,7 +3,7 @@
 use profile_cip::target::drive_link::{
     DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
 };
-use profile_cip::wire::motion::codes::{AxisStatus, FaultType};
+use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::Reaction;
 use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
@@ -78,6 +78,10 @@ impl CipProgram {
         image.power_enabled = feedback.status.contains(StatusBits::ENABLED);
         image.tracking = feedback.status.contains(StatusBits::TRACKING);
         image.axis_status = AxisStatus::from_bits_retain(self.axis_status(feedback));
+        image.io_status = match image.online {
+            true => AxisIoStatus::from_bits_retain(self.io_status(feedback)),
+            false => AxisIoStatus::empty(),
+        };
         (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
         image.conditions = self.conditions(faults);
         image.captured_at = feedback.at.0;

@@ -100,6 +100,15 @@ pub struct SpeedAxis {
     pub extended: bool,
 }
 
+/// A drive of either kind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DevicenetAxis {
+    /// A CIP Motion drive.
+    Motion(MotionAxis),
+    /// A velocity drive.
+    Speed(SpeedAxis),
+}
+
 /// Why a drive has no program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DevicenetError {
@@ -130,6 +139,17 @@ pub enum DevicenetError {
 }
 
 impl Mapping {
+    /// The program of a drive on DeviceNet.
+    ///
+    /// # Errors
+    /// The tables lack something, or a ratio does not fit 64 bits.
+    pub fn devicenet_program(&self, axis: &DevicenetAxis) -> Result<DriveProgram, DevicenetError> {
+        match axis {
+            DevicenetAxis::Motion(axis) => self.devicenet_motion_program(axis),
+            DevicenetAxis::Speed(axis) => self.devicenet_speed_program(axis),
+        }
+    }
+
     /// The program of a CIP Motion drive on DeviceNet.
     ///
     /// # Errors

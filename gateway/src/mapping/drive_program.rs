@@ -384,8 +384,12 @@ impl DriveProgram {
             *octet = mode;
         }
         let hidden = self.hidden(self.told(order, command.selection()), status);
-        let command = AxisCommand { present: command.present.difference(hidden), ..*command };
-        self.command.encode(&command, telegram, report);
+        if hidden.is_empty() {
+            self.command.encode(command, telegram, report);
+        } else {
+            let shown = AxisCommand { present: command.present.difference(hidden), ..*command };
+            self.command.encode(&shown, telegram, report);
+        }
         control
     }
 
@@ -561,6 +565,11 @@ impl DriveProgram {
             Some(item) => words.iter().any(|(known, word)| *known == item && row.pattern.matches(*word)),
         };
         self.status.iter().filter(shows).fold(StatusBits::empty(), |bits, row| bits | row.bit)
+    }
+
+    /// Whether the drive tells this status bit.
+    pub fn knows_status(&self, bit: StatusBits) -> bool {
+        self.known_status.contains(bit)
     }
 
     /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.

@@ -86,6 +86,14 @@ impl Mapping {
         find(&file.text, "state", &file.rows.state, |row| &row.state, state.name())
     }
 
+    /// The `[[state]]` row of an Axis State code.
+    #[must_use]
+    pub fn axis_state_row(&self, code: u8) -> Option<Origin> {
+        let states = DriveState::ALL.iter().zip(&self.cip.states);
+        let (state, _) = states.into_iter().find(|(_, row)| row.axis_state == code)?;
+        self.state_row(*state)
+    }
+
     /// The `[[fault]]` row of a cause.
     #[must_use]
     pub fn exception_row(&self, cause: FaultCause) -> Option<Origin> {

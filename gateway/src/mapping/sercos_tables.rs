@@ -189,6 +189,13 @@ impl SercosTables {
         words
     }
 
+    /// Those of them that are put into the telegram for their status bits. The input of a capture is there where captures are
+    /// wanted, and its status bits with it.
+    pub(super) fn added_words(&self) -> Vec<Idn> {
+        let input = |idn: Idn| self.captures.iter().any(|rule| rule.input() == Some(idn));
+        self.status_words().into_iter().filter(|idn| !input(*idn)).collect()
+    }
+
     pub(super) fn procedure(&self, selection: ModeSelection) -> Option<&ProcedureRule> {
         self.procedures.iter().find(|rule| rule.selection == selection)
     }

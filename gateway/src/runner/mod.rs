@@ -5,6 +5,7 @@
 //! tokio:         TCP and UDP 44818, Modbus TCP, log of the engine's notices
 //! ```
 
+mod can_watch;
 mod cycle;
 mod indicators;
 pub mod port;
@@ -26,9 +27,11 @@ use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
 use tracing::{info, warn};
 
+use self::can_watch::CanWatch;
 use self::cycle::{CycleThread, Setup};
 use self::indicators::{Change, Shown};
 use self::port::{CanSocketPort, OpenPort, PacketPort, UdpPort};
+use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
 use crate::config::{CanLink, Config, Link};
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
@@ -162,15 +165,16 @@ pub fn start(
             None => Box::new(InProcessDrives::of(config, sercos, tap())),
         }));
     }
+    let mut watches = Vec::new();
     for (number, can) in (0..).zip(&config.can) {
         let tap = tap().map(|tap| (tap, number));
-        south.push(OpenPort::Can(can_port(&can.link, can.bit_rate, tap, |tap| {
+        south.push(OpenPort::Can(can_port(&can.link, can.bit_rate, &mut watches, tap, |tap| {
             Box::new(InProcessCan::of(can, tap).in_host_time(can.cycle_time))
         })?));
     }
     for (number, network) in (config.can.len()..).zip(&config.devicenet) {
         let tap = tap().zip(u8::try_from(number).ok());
-        south.push(OpenPort::Can(can_port(&network.link, network.bit_rate(), tap, |tap| {
+        south.push(OpenPort::Can(can_port(&network.link, network.bit_rate(), &mut watches, tap, |tap| {
             Box::new(InProcessCan::of_devicenet(network, tap).in_host_time(network.cycle_time))
         })?));
     }
@@ -251,6 +255,7 @@ pub fn start(
     let devices = config.devices.iter().map(|device| device.name.clone()).collect();
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_indicators(status.clone(), devices, axes, Arc::clone(&stop_notices)));
+    runtime.spawn(can_watch::watch(watches, Arc::clone(&stop_notices)));
 
     commission(commissioners)?;
     let setup = Setup { engine, north, south, realtime: config.realtime };
@@ -264,6 +269,7 @@ pub fn start(
 fn can_port(
     link: &CanLink,
     bit_rate: BitRate,
+    watches: &mut Vec<CanWatch>,
     tap: Option<(Tap, u8)>,
     in_process: impl FnOnce(Option<(Tap, u8)>) -> Box<dyn CanPort + Send>,
 ) -> Result<Box<dyn CanPort + Send>, StartError> {
@@ -277,7 +283,9 @@ fn can_port(
         };
         can_interface::configure(name, &settings)?;
     }
-    Ok(Box::new(CanSocketPort::open(name)?.recorded(tap)))
+    let port = CanSocketPort::open(name)?.recorded(tap);
+    watches.push(CanWatch::new(name.clone(), *set_bit_rate, port.back()));
+    Ok(Box::new(port))
 }
 
 /// Runs the commissioning of drives that come later, until the cycle thread has gone.
@@ -340,12 +348,8 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
         }
         None => ["not used"; 2].map(str::to_owned),
     };
-    let named = |link: &CanLink, simulated: &str| match link {
-        CanLink::InProcess => simulated.to_owned(),
-        CanLink::Interface { name, .. } => name.clone(),
-    };
-    let can = config.can.iter().map(|bus| named(&bus.link, "simulated CAN"));
-    let devicenet = config.devicenet.iter().map(|network| named(&network.link, "simulated DeviceNet"));
+    let can = config.can.iter().map(|bus| CanProtocol::Canopen.describe(&bus.link));
+    let devicenet = config.devicenet.iter().map(|network| CanProtocol::Devicenet.describe(&network.link));
     settings.can = can.chain(devicenet).collect();
     settings.depth = 4096;
     // The buses, and for each device its I/O and its explicit side.

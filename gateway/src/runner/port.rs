@@ -1,10 +1,12 @@
 //! The engine's ports on real sockets, with the recording beside them.
 
 use std::net::SocketAddrV4;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use arrayvec::ArrayVec;
 use profile_generic::can::Frame;
-use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 
 use crate::capture::Side;
@@ -13,7 +15,7 @@ use crate::engine::port::{CanInput, CanPort, CanSent, EthernetPort, NorthPort, S
 use crate::sys::can_error::BusEvent;
 use crate::sys::can_socket::{self, CanSocket, Content, Options};
 use crate::sys::clock;
-use crate::sys::link::{LinkError, LinkState};
+use crate::sys::link::LinkError;
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
 use crate::sys::udp::IoSocket;
 
@@ -144,15 +146,43 @@ impl EthernetPort for PacketPort {
     }
 }
 
-/// How often a CAN interface that is off the bus is looked at, whether it is back.
-const CAN_LOOK_INTERVAL: DurationNs = DurationNs::from_millis(100);
+/// A question of the cycle thread about a CAN interface, and the answer of who watches it: whether it is on the bus. Interface
+/// flags tell it up to a second late, and what the driver knows is to be had over netlink only, which waits.
+#[derive(Debug, Default)]
+pub struct BackOnBus {
+    asked: AtomicU32,
+    answered: AtomicU32,
+}
+
+impl BackOnBus {
+    /// From now on the answer is no.
+    fn ask(&self) {
+        self.asked.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Whether the last question was answered.
+    fn is_answered(&self) -> bool {
+        self.asked.load(Ordering::Relaxed) == self.answered.load(Ordering::Acquire)
+    }
+
+    /// The question, to be fetched before the interface is looked at.
+    pub(super) fn question(&self) -> u32 {
+        self.asked.load(Ordering::Relaxed)
+    }
+
+    /// The interface is on the bus.
+    pub(super) fn answer(&self, question: u32) {
+        self.answered.store(question, Ordering::Release);
+    }
+}
 
 /// A CAN interface.
 #[derive(Debug)]
 pub struct CanSocketPort {
     socket: CanSocket,
-    /// When to look whether it is back, while it is off the bus.
-    off: Option<MonotonicTime>,
+    /// It is off the bus.
+    off: bool,
+    back: Arc<BackOnBus>,
     /// The recording, and the number of the bus in it.
     tap: Option<(Tap, u8)>,
 }
@@ -164,7 +194,13 @@ impl CanSocketPort {
     /// It cannot be opened.
     pub fn open(name: &str) -> Result<Self, can_socket::OpenError> {
         let socket = CanSocket::open(name, &Options::default())?;
-        Ok(Self { socket, off: None, tap: None })
+        Ok(Self { socket, off: false, back: Arc::default(), tap: None })
+    }
+
+    /// Where whoever watches the interface says that it is back on the bus.
+    #[must_use]
+    pub fn back(&self) -> Arc<BackOnBus> {
+        Arc::clone(&self.back)
     }
 
     /// The same, with a recording of what goes to and fro.
@@ -174,34 +210,23 @@ impl CanSocketPort {
     }
 
     /// It is off the bus; `None` when that was told already.
-    fn go_off(&mut self, now: MonotonicTime) -> Option<CanInput> {
-        let told = self.off.replace(now + CAN_LOOK_INTERVAL).is_some();
+    fn go_off(&mut self) -> Option<CanInput> {
+        self.back.ask();
+        let told = std::mem::replace(&mut self.off, true);
         (!told).then_some(CanInput::BusOff)
-    }
-
-    /// Whether an interface that was off is back.
-    fn is_back(&mut self, now: MonotonicTime) -> bool {
-        if self.off.is_none_or(|at| now < at) {
-            return false;
-        }
-        self.off = Some(now + CAN_LOOK_INTERVAL);
-        let back = self.socket.link_state() == LinkState::Up;
-        if back {
-            self.off = None;
-        }
-        back
     }
 }
 
 impl CanPort for CanSocketPort {
-    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
-        if self.is_back(now) {
+    fn receive(&mut self, _now: MonotonicTime) -> Option<CanInput> {
+        if self.off && self.back.is_answered() {
+            self.off = false;
             return Some(CanInput::BusOn);
         }
         loop {
             let received = match self.socket.recv() {
                 Ok(received) => received?,
-                Err(_) => return self.go_off(now),
+                Err(_) => return self.go_off(),
             };
             match received.content {
                 Content::Frame(frame) => {
@@ -216,8 +241,10 @@ impl CanPort for CanSocketPort {
                     let mut told = None;
                     for event in error.events() {
                         match event {
-                            BusEvent::Off => told = self.go_off(now).or(told),
-                            BusEvent::Restarted if self.off.take().is_some() => told = Some(CanInput::BusOn),
+                            BusEvent::Off => told = self.go_off().or(told),
+                            BusEvent::Restarted if std::mem::take(&mut self.off) => {
+                                told = Some(CanInput::BusOn)
+                            }
                             _ => {}
                         }
                     }
@@ -240,5 +267,26 @@ impl CanPort for CanSocketPort {
             Err(LinkError::Full) => CanSent::Full,
             Err(_) => CanSent::Failed,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_to_an_earlier_question_brings_no_bus_back() {
+        let back = BackOnBus::default();
+        back.ask();
+        assert!(!back.is_answered());
+        // Who looked before the bus went off once more has seen another bus.
+        let earlier = back.question();
+        back.ask();
+        back.answer(earlier);
+        assert!(!back.is_answered());
+        back.answer(back.question());
+        assert!(back.is_answered());
+        back.ask();
+        assert!(!back.is_answered());
     }
 }

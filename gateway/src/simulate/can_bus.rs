@@ -5,12 +5,13 @@
 
 use std::collections::VecDeque;
 
+use profile_cia402::drive::ErrorCode;
 use profile_cip::devicenet::wire::{Identifier, MacId};
 use profile_generic::can::Frame;
 use profile_generic::can::bus::{Bus, Output, QUEUE_DEFAULT, SendError, State, Station};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::can_drive::{DriveNode, drive};
+use super::can_drive::{DriveNode, stand_in};
 use super::devicenet_drive::{self, DevicenetNode};
 use crate::capture::recorder::Tap;
 use crate::config::{Can, Devicenet};
@@ -42,6 +43,12 @@ pub trait CanNode {
 
     /// Its controller is off the bus.
     fn bus_off(&mut self, now: MonotonicTime);
+
+    /// Its controller is on the bus again.
+    fn bus_on(&mut self) {}
+
+    /// Frames for it were lost because there was no room for them.
+    fn overrun(&mut self) {}
 }
 
 impl CanNode for DriveNode {
@@ -65,6 +72,15 @@ impl CanNode for DriveNode {
 
     fn bus_off(&mut self, _now: MonotonicTime) {
         self.bus_off();
+    }
+
+    fn bus_on(&mut self) {
+        self.report_controller(ErrorCode::RECOVERED_FROM_BUS_OFF, true);
+        self.report_controller(ErrorCode::RECOVERED_FROM_BUS_OFF, false);
+    }
+
+    fn overrun(&mut self) {
+        self.report_controller(ErrorCode::CAN_OVERRUN, true);
     }
 }
 
@@ -119,9 +135,10 @@ impl InProcessCan {
                 None => devices.push((known.node, axes)),
             }
         }
-        let devices =
-            devices.into_iter().map(|(node, axes)| drive(Some(node), axes).expect("1 to 8 axes")).collect();
-        Self::new(Bus::new(config.bit_rate), devices, tap)
+        let devices = devices
+            .into_iter()
+            .map(|(node, axes)| stand_in(node, axes, config.device(node)).expect("1 to 8 axes"));
+        Self::new(Bus::new(config.bit_rate), devices.collect(), tap)
     }
 }
 

@@ -1,31 +1,15 @@
-//! A simulated CiA 402 drive on a CAN interface.
+//! A simulated CiA 402 drive on CANopen.
 
-use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-
-use profile_cia402::drive::ErrorCode;
 use profile_cia402::node::drive::{Device, DeviceError, identity};
 use profile_cia402::node::{Config, Node};
 use profile_cia402::wire::NodeId;
-use profile_generic::can::Frame;
 use profile_generic::servo::ServoParameters;
-use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_generic::time::DurationNs;
 
-use crate::sys::can_error::BusEvent;
-use crate::sys::can_socket::{CanSocket, Content};
-use crate::sys::clock;
-use crate::sys::link::LinkError;
+use crate::config::CanDevice;
 
 /// From a reset to the boot-up message.
 const BOOT_TIME: DurationNs = DurationNs::from_millis(50);
-
-/// How long it waits for a frame before it lets the time pass that is over: frames wake it, and what it says by itself may be
-/// so much late.
-const WAIT: Duration = Duration::from_millis(4);
-
-/// Frames taken before the time is looked after again.
-const FRAMES_PER_WAKE: usize = 64;
 
 /// A node on a bus.
 pub type DriveNode = Node<Device>;
@@ -36,90 +20,43 @@ pub type DriveNode = Node<Device>;
 /// # Errors
 /// Another number of axes.
 pub fn drive(node: Option<NodeId>, axes: u8) -> Result<DriveNode, DeviceError> {
+    made(node, axes, |_| {})
+}
+
+/// A device that stands in for one of a configuration, with so many axes: it is what the configuration expects it to be. One that
+/// is to get its node-id by LSS has none.
+///
+/// # Errors
+/// Another number of axes than 1 to 8.
+pub fn stand_in(node: NodeId, axes: u8, device: Option<&CanDevice>) -> Result<DriveNode, DeviceError> {
+    made(Some(node), axes, |config| {
+        let Some(device) = device else { return };
+        let (own, expected) = (&mut config.identity, device.expected);
+        let numbers = [
+            (&mut own.vendor, expected.vendor),
+            (&mut own.product, expected.product),
+            (&mut own.revision, expected.revision),
+            (&mut own.serial, expected.serial),
+        ];
+        for (own, expected) in numbers {
+            *own = expected.unwrap_or(*own);
+        }
+        config.has_mapping = !device.keeps_mapping;
+        config.node = config.node.filter(|_| device.lss.is_none());
+    })
+}
+
+fn made(node: Option<NodeId>, axes: u8, change: impl FnOnce(&mut Config)) -> Result<DriveNode, DeviceError> {
     let servos = vec![ServoParameters::default(); usize::from(axes)];
-    let config = Config {
+    let mut config = Config {
         node,
         identity: identity(servos.len(), node.map_or(0, |node| u32::from(node.get()))),
         boot_time: BOOT_TIME,
         has_blocks: true,
+        has_mapping: true,
     };
+    change(&mut config);
     Ok(Node::new(&config, Device::new(&servos)?))
-}
-
-/// Runs a node on an interface until `stop` is set.
-///
-/// # Errors
-/// The interface is gone.
-pub fn run(node: &mut DriveNode, socket: &mut CanSocket, stop: &AtomicBool) -> io::Result<()> {
-    // What the transmit queue had no room for.
-    let mut held: Option<Frame> = None;
-    while !stop.load(Ordering::Relaxed) {
-        socket.wait(WAIT)?;
-        for _ in 0..FRAMES_PER_WAKE {
-            match socket.recv() {
-                Ok(Some(received)) => {
-                    let now = clock::monotonic_now();
-                    match received.content {
-                        Content::Frame(frame) => node.handle_frame(now, &frame),
-                        Content::Error(error) => error.events().for_each(|event| tell(node, event)),
-                    }
-                    send(node, socket, &mut held, now)?;
-                }
-                Ok(None) => break,
-                Err(LinkError::Gone) => return Err(gone(socket)),
-                // It may come back; the master is gone as long as it is down.
-                Err(_) => {
-                    node.bus_off();
-                    break;
-                }
-            }
-        }
-        if socket.take_dropped() > 0 {
-            node.report_controller(ErrorCode::CAN_OVERRUN, true);
-        }
-        let now = clock::monotonic_now();
-        node.handle_time(now);
-        send(node, socket, &mut held, now)?;
-    }
-    Ok(())
-}
-
-fn gone(socket: &CanSocket) -> io::Error {
-    io::Error::other(format!("the CAN interface `{}` is gone", socket.name()))
-}
-
-/// What the controller says of the bus.
-fn tell(node: &mut DriveNode, event: BusEvent) {
-    match event {
-        BusEvent::Off => node.bus_off(),
-        BusEvent::Restarted => {
-            node.report_controller(ErrorCode::RECOVERED_FROM_BUS_OFF, true);
-            node.report_controller(ErrorCode::RECOVERED_FROM_BUS_OFF, false);
-        }
-        _ => {}
-    }
-}
-
-/// Sends what the node has to say, as far as the transmit queue has room.
-fn send(
-    node: &mut DriveNode,
-    socket: &CanSocket,
-    held: &mut Option<Frame>,
-    now: MonotonicTime,
-) -> io::Result<()> {
-    while let Some(frame) = held.take().or_else(|| node.poll(now)) {
-        match socket.send(&frame) {
-            Ok(()) => {}
-            Err(LinkError::Full) => {
-                *held = Some(frame);
-                break;
-            }
-            Err(LinkError::Gone) => return Err(gone(socket)),
-            // A frame that cannot be sent is one that was lost on the way.
-            Err(_) => {}
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

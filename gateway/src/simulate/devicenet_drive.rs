@@ -1,6 +1,7 @@
 //! Simulated drives on DeviceNet.
 
 use arrayvec::ArrayString;
+use profile_cip::devicenet::master::config::DataRate;
 use profile_cip::devicenet::slave::application::Application;
 use profile_cip::devicenet::slave::motion_drive::{MotionDrive, MotionDriveConfig};
 use profile_cip::devicenet::slave::speed_drive::{SpeedDrive, SpeedDriveConfig};
@@ -73,8 +74,17 @@ fn slave<A: Application>(mac: MacId, device_type: u16, rate: u8, drive: A) -> Bo
 /// Never with a checked configuration: encoders have counts, and assemblies are assemblies.
 #[must_use]
 pub fn drive(network: &Devicenet, drive: &DevicenetDrive) -> DevicenetNode {
-    let rate = network.rate.code();
-    match &drive.kind {
+    node(drive.mac, network.rate, &drive.kind)
+}
+
+/// A drive of this kind, with this MAC ID on a network of this rate: a servo of 1 Nm and 3000 revolutions per minute.
+///
+/// # Panics
+/// With an encoder without counts, or an assembly that is no output assembly.
+#[must_use]
+pub fn node(mac: MacId, rate: DataRate, kind: &DevicenetKind) -> DevicenetNode {
+    let rate = rate.code();
+    match kind {
         DevicenetKind::Motion { resolution, .. } => {
             let attribute = |(id, name): &(u16, &str)| AttributeDefinition {
                 settable_in_running: true,
@@ -86,7 +96,7 @@ pub fn drive(network: &Devicenet, drive: &DevicenetDrive) -> DevicenetNode {
                 servo: ServoParameters { encoder_counts: *resolution, ..ServoParameters::default() },
             };
             let motion = MotionDrive::new(config).expect("a servo with an encoder");
-            DevicenetNode::Motion(slave(drive.mac, DEVICE_TYPE_CIP_MOTION_DRIVE, rate, motion))
+            DevicenetNode::Motion(slave(mac, DEVICE_TYPE_CIP_MOTION_DRIVE, rate, motion))
         }
         DevicenetKind::Speed { assembly, .. } => {
             let config = SpeedDriveConfig {
@@ -95,7 +105,7 @@ pub fn drive(network: &Devicenet, drive: &DevicenetDrive) -> DevicenetNode {
                 servo: ServoParameters::default(),
             };
             let speed = SpeedDrive::new(config).expect("an output assembly");
-            DevicenetNode::Speed(slave(drive.mac, DEVICE_TYPE_AC_DRIVE, rate, speed))
+            DevicenetNode::Speed(slave(mac, DEVICE_TYPE_AC_DRIVE, rate, speed))
         }
     }
 }

@@ -7,11 +7,12 @@ use std::io;
 use std::os::fd::AsFd;
 
 use profile_generic::can::timing::BitRate;
-use socketcan::nl::{CanCtrlModes, CanState, InterfaceDetails};
-use socketcan::{CanCtrlMode, CanInterface, InterfaceCanParams};
+use socketcan::nl::{CanState, InterfaceDetails};
+use socketcan::{CanCtrlMode, CanInterface};
 use thiserror::Error;
 
 use super::can_error::BusState;
+use super::can_netlink::{self, Parameters, Timing};
 use super::link::{self, LinkState};
 
 /// Highest sample point, thousandths of a bit.
@@ -26,7 +27,8 @@ pub struct Settings {
     pub sample_point: Option<u16>,
     /// The same for the data of FD frames.
     pub data_sample_point: Option<u16>,
-    /// After how many milliseconds a controller that is off the bus starts again by itself; 0 is never.
+    /// After how many milliseconds a controller that is off the bus is to start again by itself; 0 is never. A wish: an
+    /// interface that is up keeps what it has, and some drivers cannot ([`State::restart_ms`] tells).
     pub restart_ms: Option<u32>,
     /// Frames that the transmit queue holds.
     pub queue: Option<u32>,
@@ -159,14 +161,15 @@ pub fn configure(name: &str, settings: &Settings) -> Result<State, ConfigureErro
     if let Some(queue) = settings.queue.filter(|queue| *queue != now.queue) {
         interface.set_queue(queue)?;
     }
-    let differs = settings.bit_rate.is_some_and(|rate| !now.has(rate))
-        || settings.restart_ms.is_some_and(|wanted| now.restart_ms != Some(wanted));
-    if differs {
+    let is_down = now.link == LinkState::Down;
+    let other_rate = settings.bit_rate.is_some_and(|rate| !now.has(rate));
+    let other_restart = settings.restart_ms.is_some_and(|wanted| now.restart_ms != Some(wanted));
+    if other_rate || other_restart {
         if !now.has_bit_rate {
             let what = if settings.bit_rate.is_some() { "bit rate" } else { "restart time" };
             return Err(ConfigureError::Virtual { name: name.to_owned(), what });
         }
-        if now.link != LinkState::Down {
+        if other_rate && !is_down {
             let found = now.to_string();
             return Err(ConfigureError::IsUp {
                 name: name.to_owned(),
@@ -174,26 +177,39 @@ pub fn configure(name: &str, settings: &Settings) -> Result<State, ConfigureErro
                 expected: settings.to_string(),
             });
         }
-        interface.set_parameters(settings)?;
+        if is_down {
+            interface.set_parameters(settings)?;
+        }
     }
-    if now.link == LinkState::Down {
+    if is_down {
         interface.switch_on()?;
     }
     interface.state()
 }
 
-/// Starts a controller again that is off the bus and does not do so by itself.
+/// Starts a controller again that is off the bus and does not do so by itself: as its driver does it, else by switching the
+/// interface off and on.
 ///
 /// # Errors
 /// [`ConfigureError`].
 pub fn restart(name: &str) -> Result<(), ConfigureError> {
     let interface = Interface::find(name)?;
-    let done = interface.netlink.restart();
+    let done = match can_netlink::restart(interface.index) {
+        Err(error) if is_unsupported(&error) => can_netlink::switch(interface.index, false)
+            .and_then(|()| can_netlink::switch(interface.index, true)),
+        done => done,
+    };
     let command = format!("ip link set {name} type can restart");
-    done.map_err(|error| interface.refused("a restart", &command, "a restart".to_owned(), &error))
+    done.map_err(|error| interface.refused("a restart", &command, "a restart".to_owned(), error))
 }
 
 impl State {
+    /// Whether it comes back by itself after it was off the bus.
+    #[must_use]
+    pub fn restarts(&self) -> bool {
+        self.restart_ms.is_some_and(|restart| restart > 0)
+    }
+
     /// Whether it is set to this rate.
     #[must_use]
     pub fn has(&self, rate: BitRate) -> bool {
@@ -295,20 +311,18 @@ impl<'a> Interface<'a> {
     }
 
     fn set_parameters(&self, settings: &Settings) -> Result<(), ConfigureError> {
-        let timing = |bitrate: u32, sample_point: Option<u16>| socketcan::nl::CanBitTiming {
-            bitrate,
+        let timing = |rate: u32, sample_point: Option<u16>| Timing {
+            rate,
             sample_point: sample_point.map_or(0, u32::from),
-            ..Default::default()
         };
-        let mut parameters = InterfaceCanParams { restart_ms: settings.restart_ms, ..Default::default() };
+        let mut parameters = Parameters { restart_ms: settings.restart_ms, ..Parameters::default() };
         let mut command = format!("ip link set {} type can", self.name);
         if let Some(rate) = settings.bit_rate {
-            parameters.bit_timing = Some(timing(rate.nominal(), settings.sample_point));
+            parameters.nominal = Some(timing(rate.nominal(), settings.sample_point));
             command += &format!(" bitrate {}", rate.nominal());
-            parameters.data_bit_timing = rate.data().map(|data| timing(data, settings.data_sample_point));
+            parameters.data = rate.data().map(|data| timing(data, settings.data_sample_point));
             // A driver that knows classic frames only refuses to be told of FD at all.
-            let fd = rate.is_fd() || self.state()?.fd;
-            parameters.ctrl_mode = fd.then(|| CanCtrlModes::from_mode(CanCtrlMode::Fd, rate.is_fd()));
+            parameters.fd = (rate.is_fd() || self.state()?.fd).then_some(rate.is_fd());
             if let Some(data) = rate.data() {
                 command += &format!(" dbitrate {data} fd on");
             }
@@ -316,26 +330,25 @@ impl<'a> Interface<'a> {
         if let Some(restart) = settings.restart_ms {
             command += &format!(" restart-ms {restart}");
         }
-        let done = self.netlink.set_can_params(&parameters);
-        done.map_err(|error| self.refused("the bit rate", &command, settings.to_string(), &error))
+        let done = match can_netlink::set(self.index, &parameters) {
+            Err(error) if is_unsupported(&error) && parameters.restart_ms.take().is_some() => {
+                can_netlink::set(self.index, &parameters)
+            }
+            done => done,
+        };
+        done.map_err(|error| self.refused("the bit rate", &command, settings.to_string(), error))
     }
 
     fn switch_on(&self) -> Result<(), ConfigureError> {
         let command = format!("ip link set {} up", self.name);
-        let done = self.netlink.bring_up();
+        let done = can_netlink::switch(self.index, true);
         done.map_err(|error| {
-            self.refused("the interface up", &command, "to be switched on".to_owned(), &error)
+            self.refused("the interface up", &command, "to be switched on".to_owned(), error)
         })
     }
 
-    fn refused(
-        &self,
-        what: &'static str,
-        command: &str,
-        asked: String,
-        error: &socketcan::Error,
-    ) -> ConfigureError {
-        let (name, source) = (self.name.to_owned(), plain(error));
+    fn refused(&self, what: &'static str, command: &str, asked: String, source: io::Error) -> ConfigureError {
+        let name = self.name.to_owned();
         match source.raw_os_error() {
             Some(libc::EPERM | libc::EACCES) => {
                 ConfigureError::NotPermitted { name, what, command: command.to_owned() }
@@ -354,6 +367,11 @@ fn bus_state(state: CanState) -> Option<BusState> {
         CanState::BusOff => Some(BusState::Off),
         CanState::Stopped | CanState::Sleeping => None,
     }
+}
+
+/// Whether a driver says that it has no such thing.
+fn is_unsupported(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(libc::EOPNOTSUPP)
 }
 
 /// The system's error behind one of the crate.

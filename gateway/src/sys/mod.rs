@@ -8,6 +8,7 @@
 
 pub mod can_error;
 pub mod can_interface;
+mod can_netlink;
 pub mod can_socket;
 pub mod clock;
 pub mod ethtool;

@@ -5,20 +5,22 @@ use profile_cia402::wire::Function;
 use profile_cia402::wire::emcy::Emcy;
 use profile_generic::can::{Frame, Id};
 
-use super::stage::{CanDrive, CanPdo};
+use super::stage::{CanDrive, CanPdo, StageAxis};
 use super::tree::hex;
 use super::{Node, TranslateError, Translator};
 use crate::mapping::Item;
 
 impl Translator {
-    /// Takes a frame of a CAN bus; `None` of one that says nothing of a drive.
-    pub(super) fn can(&mut self, frame: &Frame) -> Option<Result<Node, TranslateError>> {
+    /// Takes a frame of a CANopen bus; `None` of one that says nothing of a drive. `bus` is its number in the configuration,
+    /// where it is known.
+    pub(super) fn can(&mut self, bus: Option<usize>, frame: &Frame) -> Option<Result<Node, TranslateError>> {
         let Id::Standard(id) = frame.id() else { return None };
         if frame.is_remote() || frame.is_fd() {
             return None;
         }
         let mut found = Vec::new();
-        for (number, axis) in self.stage.axes.iter().enumerate() {
+        let on_bus = |axis: &StageAxis| axis.may_be_on(bus);
+        for (number, axis) in self.stage.axes.iter().enumerate().filter(|(_, axis)| on_bus(axis)) {
             let pdos = axis.can().map(|drive| drive.pdos.as_slice()).unwrap_or_default();
             found.extend(pdos.iter().filter(|pdo| pdo.id == id).map(|pdo| (number, pdo.clone())));
         }
@@ -38,10 +40,11 @@ impl Translator {
         }
         match Function::of(frame.id())? {
             Function::Sync => {
-                self.states.iter_mut().for_each(|state| state.heard.clear());
+                let states = self.states.iter_mut().zip(&self.stage.axes);
+                states.filter(|(_, axis)| on_bus(axis)).for_each(|(state, _)| state.heard.clear());
                 Some(Ok(Node::new("SYNC")))
             }
-            Function::Emcy(node) => self.emcy(node.get(), frame.data()),
+            Function::Emcy(node) => self.emcy(bus, node.get(), frame.data()),
             _ => None,
         }
     }
@@ -102,8 +105,8 @@ impl Translator {
     }
 
     /// What a drive says is wrong.
-    fn emcy(&self, id: u8, data: &[u8]) -> Option<Result<Node, TranslateError>> {
-        let axes = self.stage.axes.iter().enumerate();
+    fn emcy(&self, bus: Option<usize>, id: u8, data: &[u8]) -> Option<Result<Node, TranslateError>> {
+        let axes = self.stage.axes.iter().enumerate().filter(|(_, axis)| axis.may_be_on(bus));
         let of_node = axes.filter(|(_, axis)| axis.can().is_some_and(|drive| drive.node == id));
         let of_node: Vec<_> =
             of_node.map(|(number, axis)| (number, axis.name.clone(), axis.drive.clone())).collect();

@@ -10,7 +10,8 @@ use profile_generic::state::{Action, DriveState};
 
 use super::stage::{Behind, CanDrive, StageAxis};
 use super::tree::hex;
-use super::{Node, Translator, shown};
+use super::{Node, Translator, devicenet, shown};
+use crate::mapping::devicenet::ROW_LEN;
 use crate::mapping::{Cia402Dictionary, CyclicValues, Item};
 
 /// The longest telegram of a drive.
@@ -117,12 +118,21 @@ impl Translator {
         }
         fill(&mut command, state.feedback.position);
         let mut bytes = [0; TELEGRAM_MAX];
-        let len = usize::from(axis.south.telegram.command_bytes).min(TELEGRAM_MAX);
+        let len = match &axis.behind {
+            Behind::Devicenet(_) => ROW_LEN,
+            _ => usize::from(axis.south.telegram.command_bytes).min(TELEGRAM_MAX),
+        };
         let mut report = ConversionReport::default();
         let (control, status) = (state.control, state.status);
         let word = axis.south.encode(&command, action, control, status, &mut bytes[..len], &mut report);
         (state.control, state.command) = (word, command);
-        let mut node = Node::new(sent(axis, &bytes[..len]));
+        let mut node = match &axis.behind {
+            Behind::Devicenet(_) => match self.message_of(number, &bytes[..len]) {
+                Some(message) => Node::new(devicenet::poll_of(axis, &message)),
+                None => Node::new(format!("poll of {} without data: it cannot carry this", axis.drive)),
+            },
+            _ => Node::new(sent(axis, &bytes[..len])),
+        };
         if !led {
             node.push(Node::new("the drive does not follow: set-points are withheld"));
         }
@@ -144,6 +154,17 @@ impl Translator {
         if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
             let text = format!("{} {octet}: mode {}", self.named(*item), command.mode);
             node.push(Node::new(text).by(axis.mode_row(mapping, selection)));
+        }
+        if let (Some(drive), Some(row)) = (axis.devicenet(), bytes.first_chunk()) {
+            let text = format!("{}: action {action}, mode {}", devicenet::asked(axis, row), command.mode);
+            node.push(Node::new(text).by(devicenet::rows_of(axis, mapping, row)));
+            for field in devicenet::values_to(axis, row) {
+                let value = command.get(field.signal).unwrap_or_default();
+                let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, &bytes));
+                let generic = shown(axis, field.signal, value);
+                let text = format!("{name}: {raw} <- {} {generic}", field.signal);
+                node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
+            }
         }
         for (field, item) in axis.south.command_fields() {
             let value = command.get(field.signal).unwrap_or_default();
@@ -215,6 +236,7 @@ fn sent(axis: &StageAxis, bytes: &[u8]) -> String {
             format!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
         }
         Behind::Can(drive) => frames(&axis.drive, drive, Direction::Receive, bytes),
+        Behind::Devicenet(_) => devicenet::poll_of(axis, bytes),
     }
 }
 

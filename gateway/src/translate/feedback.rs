@@ -12,7 +12,7 @@ use profile_generic::state::{Action, BasicDrive, Report, Request};
 use super::command::{frames, raw};
 use super::stage::Behind;
 use super::tree::hex;
-use super::{AxisState, Node, Translator, flags, shown};
+use super::{AxisState, Node, Translator, devicenet, flags, shown};
 use crate::mapping::{CipValue, CyclicValues, DriveProgram};
 
 /// Octets of the longest cyclic actual block that is made here.
@@ -43,15 +43,21 @@ impl AxisState {
 impl Translator {
     /// Takes what a drive sent in a cycle, without C-CON.
     pub(super) fn feedback(&mut self, number: usize, bytes: &[u8]) -> Node {
-        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
-        let mapping = &self.stage.mapping;
+        let axis = &self.stage.axes[number];
         let came = match &axis.behind {
             Behind::Sercos(_) => {
                 format!("AT of {}, connection 1, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
             }
             Behind::Can(drive) => frames(&axis.drive, drive, Direction::Transmit, bytes),
+            Behind::Devicenet(_) => return self.answered_alone(number, bytes),
         };
-        let mut node = Node::new(came);
+        self.understood(number, Node::new(came), bytes)
+    }
+
+    /// What the values of a drive say, behind what they came in.
+    pub(super) fn understood(&mut self, number: usize, mut node: Node, bytes: &[u8]) -> Node {
+        let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
+        let mapping = &self.stage.mapping;
         let mut report = ConversionReport::default();
         let needed = usize::from(axis.south.telegram.feedback_bytes);
         let Some(word) = axis.south.decode(bytes, false, &mut state.feedback, &mut state.south, &mut report)
@@ -89,6 +95,25 @@ impl Translator {
             if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
                 let row = mode.and_then(|mode| axis.mode_row(mapping, mode));
                 node.push(Node::new(format!("{} {octet}: mode {shown}", self.named(*item))).by(row));
+            }
+        }
+        if let Some(drive) = axis.devicenet() {
+            let mode = axis.south.mode(word);
+            let shown_mode = mode.map_or_else(|| "none that was set up".to_owned(), |mode| mode.to_string());
+            let told = format!("{}: {told}, mode {shown_mode}", devicenet::told(axis, bytes));
+            let mode_row = mode.and_then(|mode| axis.mode_row(mapping, mode));
+            let mut status = Node::new(told).by(axis.report_row(mapping, word)).by(mode_row);
+            let bits = axis.south.status_bits(word, &[]);
+            if !bits.is_empty() {
+                status.push(Node::new(format!("status: {}", flags(bits.iter_names()))));
+            }
+            node.push(status);
+            for field in axis.south.feedback.fields() {
+                let Some(value) = state.feedback.get(field.signal) else { continue };
+                let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, bytes));
+                let generic = shown(axis, field.signal, value);
+                let text = format!("{name}: {raw} -> {} {generic}", field.signal);
+                node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
             }
         }
         for (field, item) in axis.south.feedback_fields() {

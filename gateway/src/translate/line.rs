@@ -6,6 +6,7 @@
 //! at drive-a 08 c0 00 00 ...        what a SERCOS drive sent in a cycle, without C-CON
 //! idn drive-a S-0-0011 04 00        element 7 of a parameter, as the drive gives it
 //! can 183 27 16 08 00 ...           a CAN frame: a PDO or EMCY of a drive, SYNC
+//! devicenet 42d 00 02 02 01 ...     a frame of DeviceNet: of a poll or its answer
 //! object drive-c 603F:00 20 23      an object, as the drive gives it
 //! set turntable 473 00 00 20 41     the controller sets an attribute
 //! writes turntable 431 491          the attributes of the controller's cyclic write data
@@ -41,8 +42,10 @@ pub enum Line<'t> {
         /// Element 7, or the value of the object.
         bytes: Vec<u8>,
     },
-    /// A CAN frame.
+    /// A frame of CANopen.
     Can(Frame),
+    /// A frame of DeviceNet.
+    Devicenet(Frame),
     /// What the frames before have told is forgotten.
     Restart,
     /// The list of an axis's cyclic write data.
@@ -99,15 +102,15 @@ impl<'t> Line<'t> {
                 let object = Object::parse(word).ok_or_else(|| words.error(word, "an object, as 603F:00"))?;
                 Self::Held { drive, item: Item::Object(object), bytes: words.bytes()? }
             }
-            "can" => {
+            "can" | "devicenet" => {
                 let word = words.expect("an identifier, as 183")?;
                 let wanted = "an identifier of 11 bits in hexadecimal, as 183";
                 let id = u16::from_str_radix(word, 16).map_err(|_| words.error(word, wanted))?;
                 let bytes = words.bytes()?;
                 let frame = Frame::new(Id::Standard(id), &bytes);
-                Self::Can(
-                    frame.map_err(|_| words.error(word, "an identifier up to 7FF, and at most 8 bytes"))?,
-                )
+                let frame =
+                    frame.map_err(|_| words.error(word, "an identifier up to 7FF, and at most 8 bytes"))?;
+                if first == "can" { Self::Can(frame) } else { Self::Devicenet(frame) }
             }
             "set" => {
                 let axis = words.expect("the name of an axis")?;
@@ -205,6 +208,7 @@ mod tests {
         assert_eq!(parse("object d 603F:00 20 23 # I2t"), held(Item::object(0x603F, 0), vec![0x20, 0x23]));
         let frame = Frame::new(Id::Standard(0x183), &[0x27, 6, 8]).unwrap();
         assert_eq!(parse("can 183 2706 08"), Some(Line::Can(frame)));
+        assert_eq!(parse("devicenet 183 2706 08"), Some(Line::Devicenet(frame)));
         let set = Line::Set { axis: "a", attribute: 473, bytes: vec![0, 0, 0x20, 0x41] };
         assert_eq!(parse("set a 473 0x00002041"), Some(set));
         assert_eq!(

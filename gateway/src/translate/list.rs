@@ -9,8 +9,9 @@ use profile_cip::wire::encapsulation::IO_PORT;
 use profile_sercos::wire::describe::Names;
 use profile_sercos::wire::header::{Header, Phase};
 
-use super::{Line, LineError, Node, Stage, Translator};
+use super::{Line, LineError, Node, Stage, TranslateError, Translator};
 use crate::capture::can::{self, LINK_TYPE_CAN, Record};
+use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::{ReadError, Reader};
 use crate::config::Config;
 use crate::decode::Decoder;
@@ -83,7 +84,8 @@ fn heading(line: &str) -> String {
     }
 }
 
-/// Translates the updates of CIP Motion connections, the cyclic SERCOS telegrams, and PDOs and EMCY of CiA 402 drives in a recording.
+/// Translates the updates of CIP Motion connections, the cyclic SERCOS telegrams, PDOs and EMCY of CiA 402 drives, and polls of
+/// drives on DeviceNet in a recording.
 ///
 /// # Errors
 /// The recording cannot be read on.
@@ -96,12 +98,32 @@ pub fn translate_capture<R: Read>(
     let mut translator = Translator::new(Arc::clone(stage));
     let mut decoder = Decoder::new(names);
     let mut list = List::default();
+    let buses = CanBuses::of(config);
+    let mut unknown: Vec<u32> = Vec::new();
     while let Some(frame) = reader.next_frame()? {
         if frame.link_type == LINK_TYPE_CAN {
             let record = can::parse(frame.data);
-            let translated = match &record {
-                // One each cycle, and nothing in it to read.
-                Ok(Record::Frame(record)) => translator.can(record).filter(|_| record.id() != cob_id::SYNC),
+            let translated = match (&record, buses.find(&frame)) {
+                (Ok(Record::Frame(record)), Some(bus)) if bus.protocol == CanProtocol::Devicenet => {
+                    translator.devicenet(bus.number, record).map(Ok)
+                }
+                // Without CAN buses in the configuration the drives come from data sheets, and those are of CANopen.
+                (Ok(Record::Frame(record)), bus)
+                    if bus.is_some() || config.can.len() + config.devicenet.len() == 0 =>
+                {
+                    // One each cycle, and nothing in it to read.
+                    let number = bus.and_then(|bus| bus.number);
+                    translator.can(number, record).filter(|_| record.id() != cob_id::SYNC)
+                }
+                (Ok(_), None) if !unknown.contains(&frame.interface) => {
+                    unknown.push(frame.interface);
+                    let text =
+                        "expected a CAN interface of the configuration, which has CANopen and DeviceNet, got";
+                    let name = frame
+                        .interface_name
+                        .map_or_else(|| "one without name".to_owned(), |name| format!("`{name}`"));
+                    Some(Err(TranslateError::Value(format!("{text} {name}: all its frames are left out"))))
+                }
                 _ => None,
             };
             match (translated, record) {

@@ -1,8 +1,8 @@
 //! Frames through the mapping tables: what the box makes of them, and which row of which file made each value.
 //!
 //! ```text
-//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT, RPDOs
-//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT, TPDOs
+//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT, RPDOs, polls
+//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT, TPDOs, answers
 //! Set attribute --AttributeTable--> generic parameter --DriveProgram--> element 7 of an IDN, object, and back
 //! diagnostic word --DriveProgram--> faults --CipProgram--> exceptions
 //! ```
@@ -15,6 +15,7 @@
 mod access;
 mod can;
 mod command;
+mod devicenet;
 mod feedback;
 mod frame;
 mod line;
@@ -40,11 +41,13 @@ use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
 
 use crate::mapping::CipTrackers;
 
+use devicenet::Listener;
 pub use frame::{FrameError, Recognised, recognise};
 pub use line::{Line, LineError};
 pub use list::{List, ListError, translate_capture, translate_list};
 pub use stage::{
-    Behind, CanDrive, CanMember, CanPart, CanPdo, SercosDrive, Stage, StageAxis, StageError, ValuesError,
+    Behind, CanDrive, CanMember, CanPart, CanPdo, DevicenetDrive, SercosDrive, Stage, StageAxis, StageError,
+    ValuesError,
 };
 pub use tree::{Node, RowNames};
 
@@ -70,6 +73,8 @@ struct AxisState {
     /// What has come of the values of a drive on CANopen, and by which of its TPDOs.
     came: Vec<u8>,
     heard: Vec<u16>,
+    /// The poll connection of a drive on DeviceNet.
+    listener: Option<Listener>,
 }
 
 /// Translates frame after frame.
@@ -125,6 +130,7 @@ impl Translator {
             pulse: false,
             came: vec![0; usize::from(axis.south.telegram.feedback_bytes)],
             heard: Vec::new(),
+            listener: axis.devicenet().map(Listener::new),
         });
         states.collect()
     }
@@ -155,9 +161,13 @@ impl Translator {
                 let axis = self.drive(drive)?;
                 self.held(axis, *item, bytes)
             }
-            Line::Can(frame) => self.can(frame).unwrap_or_else(|| {
+            Line::Can(frame) => self.can(None, frame).unwrap_or_else(|| {
                 Err(TranslateError::Value(format!("{}: no PDO and no EMCY of a drive here", frame.id())))
             }),
+            // A message has several frames; only the last one tells something.
+            Line::Devicenet(frame) => Ok(self
+                .devicenet(None, frame)
+                .unwrap_or_else(|| Node::new("no whole poll or answer of a drive here"))),
             Line::Restart => {
                 self.states = Self::unheard(&self.stage);
                 Ok(Node::new("restart"))

@@ -13,6 +13,7 @@ impl StageAxis {
     pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(_) => mapping.signal_row(signal),
+            Behind::Devicenet(drive) => drive.is_motion().then(|| mapping.cyclic_row(signal))?,
             Behind::Can(_) => {
                 let mut fields = self.south.command_fields().chain(self.south.feedback_fields());
                 let (_, item) = fields.find(|(field, _)| field.signal == signal)?;
@@ -26,6 +27,7 @@ impl StageAxis {
     pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(_) => mapping.mode_row(selection),
+            Behind::Devicenet(_) => mapping.control_mode_row(selection.mode),
             Behind::Can(_) => {
                 let told = self.south.control(Action::None, selection, 0, 0);
                 mapping.object_mode_row(selection, self.south.mode_octet(told)?)
@@ -38,6 +40,8 @@ impl StageAxis {
         match &self.behind {
             Behind::Sercos(_) => mapping.action_row(action),
             Behind::Can(_) => mapping.object_action_row(action, status),
+            // What is asked for has its row by the code of the request.
+            Behind::Devicenet(_) => None,
         }
     }
 
@@ -45,12 +49,17 @@ impl StageAxis {
         match &self.behind {
             Behind::Sercos(drive) => mapping.report_row(status, drive.silent),
             Behind::Can(drive) => mapping.object_report_row(self.known(status), drive.needs.silent),
+            Behind::Devicenet(drive) => {
+                let [code, ..] = status.to_le_bytes();
+                drive.is_motion().then(|| mapping.axis_state_row(code))?
+            }
         }
     }
 
     pub(super) fn status_rows(&self, mapping: &Mapping, status: u32, words: &[(Item, u32)]) -> Vec<Origin> {
         match &self.behind {
             Behind::Sercos(drive) => mapping.status_rows(status, words, drive.silent),
+            Behind::Devicenet(_) => Vec::new(),
             Behind::Can(_) => {
                 let first = |item: &Item| match *item {
                     Item::Object(object) => {
@@ -87,6 +96,8 @@ impl StageAxis {
         match &self.behind {
             Behind::Sercos(_) => mapping.parameter_row(parameter),
             Behind::Can(_) => mapping.object_parameter_row(parameter),
+            // The program of a drive on DeviceNet has none.
+            Behind::Devicenet(_) => None,
         }
     }
 }

@@ -4,6 +4,7 @@
 //! for those of the machine.
 
 mod can;
+mod devicenet;
 mod values;
 
 use std::net::SocketAddrV4;
@@ -12,6 +13,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::wire::layout::Layout;
 
 pub use can::{CanDrive, CanMember, CanPart, CanPdo};
+pub use devicenet::DevicenetDrive;
 pub use values::ValuesError;
 
 use crate::config::Config;
@@ -38,6 +40,8 @@ pub struct StageAxis {
     pub instance: u8,
     /// Name of its drive.
     pub drive: String,
+    /// Number of its bus among the CAN buses of the configuration, which has those of CANopen first; 0 for SERCOS.
+    pub bus: usize,
     /// The drive, by its profile.
     pub behind: Behind,
     /// Whether what is known of the drive's scaling is that of a simulated one.
@@ -59,6 +63,8 @@ pub enum Behind {
     Sercos(SercosDrive),
     /// A CiA 402 drive on CANopen.
     Can(CanDrive),
+    /// A drive on DeviceNet.
+    Devicenet(DevicenetDrive),
 }
 
 /// A SERCOS III drive.
@@ -77,12 +83,18 @@ pub struct SercosDrive {
 }
 
 impl StageAxis {
+    /// Whether its drive is on a CAN bus; every one may be the bus where that is not known.
+    #[must_use]
+    pub fn may_be_on(&self, bus: Option<usize>) -> bool {
+        bus.is_none_or(|bus| bus == self.bus)
+    }
+
     /// The drive, where it is a SERCOS drive.
     #[must_use]
     pub fn sercos(&self) -> Option<&SercosDrive> {
         match &self.behind {
             Behind::Sercos(drive) => Some(drive),
-            Behind::Can(_) => None,
+            Behind::Can(_) | Behind::Devicenet(_) => None,
         }
     }
 
@@ -91,7 +103,16 @@ impl StageAxis {
     pub fn can(&self) -> Option<&CanDrive> {
         match &self.behind {
             Behind::Can(drive) => Some(drive),
-            Behind::Sercos(_) => None,
+            Behind::Sercos(_) | Behind::Devicenet(_) => None,
+        }
+    }
+
+    /// The drive, where it is on DeviceNet.
+    #[must_use]
+    pub fn devicenet(&self) -> Option<&DevicenetDrive> {
+        match &self.behind {
+            Behind::Devicenet(drive) => Some(drive),
+            Behind::Sercos(_) | Behind::Can(_) => None,
         }
     }
 }
@@ -184,6 +205,9 @@ impl Stage {
         for bus in 0..config.can.len() {
             axes.extend(can::configured(config, bus, &mapping)?);
         }
+        for network in 0..config.devicenet.len() {
+            axes.extend(devicenet::configured(config, network, &mapping)?);
+        }
         for ((number, axis), channel) in config.axes.iter().enumerate().zip(engine.axes()) {
             let unready = || {
                 let about = told.iter().rev().find(|line| !line.contains(" -> ")).cloned();
@@ -203,6 +227,7 @@ impl Stage {
                 device: axis.device,
                 instance: axis.instance,
                 drive: drive.name.clone(),
+                bus: 0,
                 behind: Behind::Sercos(SercosDrive {
                     address: drive.address,
                     topology: slave.topology_address(),
@@ -239,6 +264,9 @@ impl Stage {
                 Behind::Can(drive) => mapping
                     .cia402_program(&drive.needs, &drive.facts)
                     .map_err(|error| failed(error.to_string()))?,
+                Behind::Devicenet(drive) => {
+                    mapping.devicenet_program(&drive.needs).map_err(|error| failed(error.to_string()))?
+                }
             };
             let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
             let north = mapping.cip_program(&axis.scaling).ok_or_else(no_ratio)?;
@@ -247,11 +275,6 @@ impl Stage {
         });
         let axes = axes.collect::<Result<_, StageError>>()?;
         Ok(Self { axes, layout: self.layout.clone(), mapping })
-    }
-
-    /// Axes of a configuration whose frames are not translated: those on DeviceNet.
-    pub fn absent<'a>(&'a self, config: &'a Config) -> impl Iterator<Item = &'a str> {
-        config.axes.iter().map(|axis| axis.name.as_str()).filter(|name| self.axis(name).is_none())
     }
 
     /// The axis with this name.

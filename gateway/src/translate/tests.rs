@@ -4,6 +4,7 @@ use profile_cip::wire::motion::{
 };
 
 mod can;
+mod devicenet;
 
 use super::*;
 use crate::config::Config;
@@ -49,6 +50,16 @@ fn text(node: &Node) -> String {
     let mut text = String::new();
     node.write(&mut text, 0, RowNames::Keys).unwrap();
     text
+}
+
+/// What lines of a list become, one after the other.
+fn lines(translator: &mut Translator, lines: &[&str]) -> String {
+    let mut all = String::new();
+    for line in lines {
+        let line = Line::parse(line).unwrap().unwrap();
+        all += &translator.line(&line).map_or_else(|error| format!("error: {error}\n"), |node| text(&node));
+    }
+    all
 }
 
 #[test]

@@ -204,7 +204,7 @@ impl DeviceDescription {
             }
         };
         plain_values(&mut { plain });
-        for direction in [Direction::Receive, Direction::Transmit] {
+        for direction in Direction::BOTH {
             for communication in direction.communication() {
                 let objects = [communication, communication + 0x200].map(|index| self.object(index));
                 if objects.iter().flatten().any(|object| set(object)) {

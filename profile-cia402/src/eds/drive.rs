@@ -1,9 +1,9 @@
 //! What follows from a description for a drive: axes, modes, PDOs.
 
 use core::fmt;
-use core::ops::RangeInclusive;
 
 use super::description::DeviceDescription;
+pub use crate::wire::pdo::Direction;
 
 /// The number of the drive profile, as the low word of device types has it.
 pub const PROFILE: u16 = 402;
@@ -21,63 +21,11 @@ const MODES: u16 = 0x6502;
 const AXIS_TYPE: u16 = 0x67FF;
 const DEVICE_TYPE: u16 = 0x1000;
 
-/// PDOs of a device in each direction.
-const PDOS_MAX: u16 = 512;
-
 /// Bit 31 of a COB-ID: the PDO does not exist.
 const NOT_VALID: u32 = 1 << 31;
 
 /// Bit 29 of a COB-ID: the identifier has 29 bits.
 const EXTENDED: u32 = 1 << 29;
-
-/// From the view of the device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// RPDOs: from the master.
-    Receive,
-    /// TPDOs: to the master.
-    Transmit,
-}
-
-impl Direction {
-    const fn base(self) -> u16 {
-        match self {
-            Self::Receive => 0x1400,
-            Self::Transmit => 0x1800,
-        }
-    }
-
-    /// Numbers of the communication parameters.
-    #[must_use]
-    pub const fn communication(self) -> RangeInclusive<u16> {
-        self.base()..=self.base() + (PDOS_MAX - 1)
-    }
-
-    /// Numbers of the mapping parameters.
-    #[must_use]
-    pub const fn mapping(self) -> RangeInclusive<u16> {
-        self.base() + 0x200..=self.base() + 0x200 + (PDOS_MAX - 1)
-    }
-
-    /// The identifier of one of the first four PDOs, counted from 0, in the default connection set.
-    #[must_use]
-    pub fn default_cob_id(self, pdo: u16, node: u8) -> Option<u32> {
-        let first = match self {
-            Self::Receive => 0x200,
-            Self::Transmit => 0x180,
-        };
-        (pdo < 4).then(|| first + u32::from(pdo) * 0x100 + u32::from(node))
-    }
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Receive => "an RPDO",
-            Self::Transmit => "a TPDO",
-        })
-    }
-}
 
 /// One entry of a PDO mapping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -152,7 +100,7 @@ impl Pdo {
     /// The number of the object with its communication parameters.
     #[must_use]
     pub const fn communication(&self) -> u16 {
-        self.direction.base() + self.number
+        self.direction.first_communication() + self.number
     }
 
     /// The number of the object with its mapping.
@@ -220,11 +168,14 @@ impl DeviceDescription {
     #[must_use]
     pub fn pdos(&self, direction: Direction, node: u8) -> Vec<Pdo> {
         let objects = self.objects.iter().filter(|object| direction.communication().contains(&object.index));
-        objects.map(|object| self.pdo(direction, object.index - direction.base(), node)).collect()
+        objects
+            .map(|object| self.pdo(direction, object.index - direction.first_communication(), node))
+            .collect()
     }
 
     fn pdo(&self, direction: Direction, number: u16, node: u8) -> Pdo {
-        let (communication, mapping) = (direction.base() + number, direction.base() + 0x200 + number);
+        let (communication, mapping) =
+            (direction.first_communication() + number, direction.first_mapping() + number);
         let word = self.number(communication, 1, node);
         let identifier =
             word.filter(|word| word & EXTENDED == 0).map(|word| word & 0x7FF).filter(|id| *id != 0);

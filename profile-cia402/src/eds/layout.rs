@@ -84,7 +84,7 @@ pub enum Reason {
     #[error("the device does not have it")]
     NotThere,
     /// No PDO of this direction can carry it.
-    #[error("{0} cannot carry it")]
+    #[error("{0}s cannot carry it")]
     NotMappable(Direction),
     /// Nobody knows its length.
     #[error("its type {0:?} has no length of its own")]
@@ -107,7 +107,7 @@ pub struct LeftOut {
 
 impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} in {}: {}", self.wanted, self.direction, self.reason)
+        write!(f, "{} in {}s: {}", self.wanted, self.direction, self.reason)
     }
 }
 

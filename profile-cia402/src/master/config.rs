@@ -6,6 +6,7 @@ use profile_generic::can::Id;
 use profile_generic::time::DurationNs;
 
 use crate::sdo::request::SdoData;
+pub use crate::wire::pdo::Direction;
 use crate::wire::pdo::{MAPPING_MAX, PDO_LEN_MAX, PDO_NUMBER_MAX, mapped_len};
 use crate::wire::pdo::{MappingEntry, TransmissionType};
 use crate::wire::sync::COUNTER_MAX;
@@ -31,30 +32,15 @@ pub struct SyncConfig {
     pub counter_overflow: u8,
 }
 
-/// Which way a PDO goes, as the device sees it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Direction {
-    /// The device receives: RPDO.
-    Receive,
-    /// The device transmits: TPDO.
-    Transmit,
-}
-
-impl core::fmt::Display for Direction {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Receive => "RPDO",
-            Self::Transmit => "TPDO",
-        })
-    }
-}
-
-/// What to do when a device does not take the mapping of a PDO.
+/// Whether the mapping of a PDO is written, and what to do when a device does not take it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum MappingPolicy {
-    /// It does not come up.
+    /// It is written; a device that does not take it does not come up.
     #[default]
     Exact,
+    /// It is not written: the device has it already, or does not come up. Of the communication parameters it need not take what it
+    /// has.
+    Keep,
     /// The mapping that it has is used. The application is told before the device starts, and must read what that is.
     Adopt,
 }
@@ -76,7 +62,7 @@ pub struct PdoConfig {
     pub sync_start: u8,
     /// What is in it.
     pub mapping: Vec<MappingEntry>,
-    /// What if the device does not take that.
+    /// Whether that is written, and what if the device does not take it.
     pub policy: MappingPolicy,
     /// TPDO: how many may be missing in a row before the application is told.
     pub allowed_losses: u16,
@@ -192,6 +178,9 @@ pub struct NodeConfig {
     pub stamp: Option<Stamp>,
     /// Its configuration, in the order of writing.
     pub writes: Vec<Write>,
+    /// Whether it is told to keep its configuration (1010:1) when it was written. Only with a stamp, which it then must take: what
+    /// is written again at every boot-up would wear out its memory.
+    pub store: bool,
     /// Its heartbeat; `None` leaves it as it is and watches nothing.
     pub heartbeat: Option<HeartbeatConfig>,
     /// Node guarding, in place of a heartbeat.
@@ -214,6 +203,7 @@ impl NodeConfig {
             program: None,
             stamp: None,
             writes: vec![],
+            store: false,
             heartbeat: None,
             guarding: None,
             rpdos: vec![],
@@ -370,6 +360,9 @@ pub enum ConfigError {
     /// A program has no bytes, or no identification.
     #[error("node {0}: expected a program with a software identification other than 0 and at least one byte")]
     EmptyProgram(NodeId),
+    /// A configuration is to be stored, and nothing would tell that it is there already.
+    #[error("node {0}: expected a date and time of the configuration that is stored, got none")]
+    StoreUnstamped(NodeId),
     /// A value to write has no bytes.
     #[error("node {node}: nothing to write to {object}")]
     EmptyWrite {
@@ -460,6 +453,9 @@ impl MasterConfig {
             };
             if device.program.as_ref().is_some_and(empty) {
                 return Err(ConfigError::EmptyProgram(node));
+            }
+            if device.store && device.stamp.is_none() {
+                return Err(ConfigError::StoreUnstamped(node));
             }
             if let Some(write) = device.writes.iter().find(|write| write.data.as_slice().is_empty()) {
                 return Err(ConfigError::EmptyWrite { node, object: write.object });
@@ -620,6 +616,7 @@ mod tests {
                 config.nodes[0].writes =
                     vec![Write { object: Mux::new(0x6060, 0), data: SdoData::default() }];
             }),
+            said(|config| config.nodes[0].store = true),
             said(|config| config.nodes[0].tpdos = vec![position(1); 17]),
             said(|config| config.nodes[0].tpdos = vec![position(1); 2]),
             pdo(|pdo| pdo.number = 5),

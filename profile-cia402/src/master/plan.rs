@@ -1,7 +1,9 @@
 //! The steps of the boot-up, in the order that devices accept.
 //!
-//! A mapping is changed while its PDO does not exist: COB-ID with bit 31 set, number of entries 0, entries, number of entries,
-//! communication parameters, COB-ID valid. Then all of it is read back.
+//! A mapping that is not to be written is only read. Else it is changed while its PDO does not exist: COB-ID with bit 31 set,
+//! number of entries 0, entries, number of entries, communication parameters, COB-ID valid. Then all of it is read back.
+
+use profile_generic::time::DurationNs;
 
 use super::boot::{BootState, BootStatus};
 use super::config::{
@@ -12,13 +14,18 @@ use super::report::RowOutcome;
 use super::station::Station;
 use crate::sdo::request::{SdoFailure, SdoOutcome, SdoRequest};
 use crate::wire::pdo::{
-    MAPPING_MAX, MappingEntry, RPDO_COMMUNICATION, RPDO_MAPPING, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT,
-    SUB_SYNC_START, SUB_TYPE, TPDO_COMMUNICATION, TPDO_MAPPING,
+    MAPPING_MAX, MappingEntry, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT, SUB_SYNC_START, SUB_TYPE,
 };
 use crate::wire::{CobId, Mux};
 
 /// PDOs that devices have by default; those that are not configured are switched off.
 const DEFAULT_PDOS: u16 = 4;
+
+/// "save", what 1010 wants to be written.
+const SAVE: u32 = 0x6576_6173;
+
+/// Longest time for the answer to it: pages of a memory are erased before.
+const STORE_TIME: DurationNs = DurationNs::from_secs(10);
 
 /// A step with one PDO.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +58,7 @@ pub(super) enum Step {
     Write(usize),
     StampDate,
     StampTime,
+    Store,
     /// The period is 0 while the counter overflow is changed.
     PeriodOff,
     Overflow,
@@ -92,7 +100,7 @@ pub(super) enum Verdict {
 pub(super) fn steps_max(node: &NodeConfig) -> usize {
     let pdos = [&node.rpdos, &node.tpdos].into_iter().flatten();
     let map: usize = pdos.map(|pdo| pdo.mapping.len() + 16).sum();
-    map + 4 + 2 * usize::from(DEFAULT_PDOS) + node.writes.len() + ProgramStep::ALL.len()
+    map + 5 + 2 * usize::from(DEFAULT_PDOS) + node.writes.len() + ProgramStep::ALL.len()
 }
 
 /// Fills in the steps of a state.
@@ -120,6 +128,9 @@ pub(super) fn fill(
             if node.stamp.is_some() {
                 steps.extend([Step::StampDate, Step::StampTime]);
             }
+            if node.store {
+                steps.push(Step::Store);
+            }
         }
         BootState::Map => {
             if let Some(sync) = config.sync.filter(|_| !kept) {
@@ -128,7 +139,7 @@ pub(super) fn fill(
                 }
                 steps.extend([Step::Period, Step::Window]);
             }
-            for direction in [Direction::Receive, Direction::Transmit] {
+            for direction in Direction::BOTH {
                 let pdos = node.pdos(direction);
                 let other = |number: &u16| !kept && !pdos.iter().any(|pdo| pdo.number == *number);
                 let others = (1..=DEFAULT_PDOS).filter(other);
@@ -166,9 +177,13 @@ fn fill_pdo(
     let counter = config.sync.is_some_and(|sync| sync.counter_overflow > 0);
     let mut push = |step| steps.push(Step::Pdo(direction, place, step));
     if !kept {
-        [P::ReadOld, P::Disable, P::Clear].into_iter().for_each(&mut push);
-        (1..=u8::try_from(pdo.mapping.len()).unwrap_or(u8::MAX)).map(P::Entry).for_each(&mut push);
-        [P::Count, P::Type].into_iter().for_each(&mut push);
+        [P::ReadOld, P::Disable].into_iter().for_each(&mut push);
+        if pdo.policy != MappingPolicy::Keep {
+            push(P::Clear);
+            (1..=u8::try_from(pdo.mapping.len()).unwrap_or(u8::MAX)).map(P::Entry).for_each(&mut push);
+            push(P::Count);
+        }
+        push(P::Type);
         if transmits {
             push(P::Inhibit);
         }
@@ -181,22 +196,6 @@ fn fill_pdo(
         push(P::Enable);
     }
     [P::ReadCount, P::ReadType, P::ReadCobId].into_iter().for_each(&mut push);
-}
-
-fn communication(direction: Direction, number: u16, sub: u8) -> Mux {
-    let base = match direction {
-        Direction::Receive => RPDO_COMMUNICATION,
-        Direction::Transmit => TPDO_COMMUNICATION,
-    };
-    Mux::new(base + (number - 1), sub)
-}
-
-fn mapping(direction: Direction, number: u16, sub: u8) -> Mux {
-    let base = match direction {
-        Direction::Receive => RPDO_MAPPING,
-        Direction::Transmit => TPDO_MAPPING,
-    };
-    Mux::new(base + (number - 1), sub)
 }
 
 fn number(object: Mux, value: impl Into<u64>, len: usize) -> SdoRequest {
@@ -233,13 +232,14 @@ pub(super) fn request(
         }
         Step::StampDate => number(Mux::CONFIGURATION_DATE, stamp.map_or(0, |stamp| stamp.date), 4),
         Step::StampTime => number(Mux::CONFIGURATION_TIME, stamp.map_or(0, |stamp| stamp.time), 4),
+        Step::Store => number(Mux::STORE, SAVE, 4).within(STORE_TIME),
         Step::PeriodOff => number(Mux::CYCLE_PERIOD, 0_u32, 4),
         Step::Overflow => number(Mux::SYNC_OVERFLOW, sync.map_or(0, |sync| sync.counter_overflow), 1),
         Step::Period => number(Mux::CYCLE_PERIOD, sync.map_or(0, |sync| sync.period_ns / 1000), 4),
         Step::Window => number(Mux::SYNC_WINDOW, sync.map_or(0, |sync| sync.window_ns / 1000), 4),
-        Step::OtherPdo(direction, pdo) => SdoRequest::upload(communication(direction, pdo, SUB_COB_ID)),
+        Step::OtherPdo(direction, pdo) => SdoRequest::upload(direction.communication_object(pdo, SUB_COB_ID)),
         Step::OtherPdoOff(direction, pdo) => {
-            number(communication(direction, pdo, SUB_COB_ID), station.other.with_valid(false).0, 4)
+            number(direction.communication_object(pdo, SUB_COB_ID), station.other.with_valid(false).0, 4)
         }
         Step::MasterHeartbeat => {
             let word = heartbeat.map_or(0, |own| u32::from(own.node.get()) << 16 | u32::from(own.timeout_ms));
@@ -270,8 +270,8 @@ fn pdo_request(
     station: &Station,
 ) -> SdoRequest {
     use PdoStep as P;
-    let parameter = |sub| communication(direction, pdo.number, sub);
-    let map = |sub| mapping(direction, pdo.number, sub);
+    let parameter = |sub| direction.communication_object(pdo.number, sub);
+    let map = |sub| direction.mapping_object(pdo.number, sub);
     let id = cob_id(direction, pdo, node, station);
     let count = u8::try_from(pdo.mapping.len()).unwrap_or(u8::MAX);
     match step {
@@ -341,12 +341,13 @@ pub(super) fn judge(
             let (row, verdict) = optional();
             (row, if finished { Verdict::Finish } else { verdict })
         }
+        Step::StampDate | Step::StampTime if node.store => required(row),
         Step::StampDate | Step::StampTime | Step::PeriodOff | Step::Period | Step::Window => optional(),
         Step::MasterHeartbeat | Step::HeartbeatOff => optional(),
         // It answers nevertheless; that the master is lost it does not see then.
         Step::GuardTime | Step::LifeTimeFactor if refused.is_some_and(SdoFailure::is_absent) => optional(),
         Step::GuardTime | Step::LifeTimeFactor => required(row),
-        Step::Write(_) | Step::Overflow | Step::Heartbeat => required(row),
+        Step::Write(_) | Step::Store | Step::Overflow | Step::Heartbeat => required(row),
         Step::OtherPdo(direction, number) => match value.map(CobId) {
             Some(id) if id.is_valid() => {
                 station.other = id;
@@ -414,7 +415,7 @@ impl PdoJudge<'_> {
         station: &mut Station,
     ) -> (RowOutcome, Verdict) {
         use PdoStep as P;
-        let adopts = self.pdo.policy == MappingPolicy::Adopt;
+        let lenient = self.pdo.policy != MappingPolicy::Exact;
         let tolerated = |failure| (RowOutcome::Tolerated(failure), Verdict::Next);
         match (step, refused) {
             (P::ReadOld, _) => {
@@ -422,10 +423,10 @@ impl PdoJudge<'_> {
                 required(row)
             }
             // What the device does not take it may have already: that is read at the end.
-            (P::Disable | P::Clear | P::Entry(_) | P::Count, Some(failure)) if adopts => {
+            (P::Disable | P::Clear | P::Entry(_) | P::Count, Some(failure)) if lenient => {
                 (RowOutcome::Tolerated(failure), Verdict::SkipTo(self.step(P::Type)))
             }
-            (P::Type | P::Enable, Some(failure)) if adopts => tolerated(failure),
+            (P::Type | P::Enable, Some(failure)) if lenient => tolerated(failure),
             (P::Inhibit, Some(failure)) if self.pdo.inhibit_100us == 0 => tolerated(failure),
             (P::EventTimer, Some(failure)) if self.pdo.event_timer_ms == 0 => tolerated(failure),
             (P::SyncStart, Some(failure)) if self.pdo.sync_start == 0 => tolerated(failure),
@@ -461,7 +462,7 @@ impl PdoJudge<'_> {
         station.found_count =
             value.and_then(|value| usize::try_from(value).ok()).unwrap_or(0).min(MAPPING_MAX);
         let (row, verdict) = match self.pdo.policy {
-            MappingPolicy::Exact => {
+            MappingPolicy::Exact | MappingPolicy::Keep => {
                 self.same(value, u32::try_from(self.pdo.mapping.len()).unwrap_or(u32::MAX), row)
             }
             MappingPolicy::Adopt => required(row),
@@ -483,7 +484,7 @@ impl PdoJudge<'_> {
         station: &mut Station,
     ) -> (RowOutcome, Verdict) {
         let (row, verdict) = match (self.pdo.policy, self.pdo.mapping.get(usize::from(place) - 1)) {
-            (MappingPolicy::Exact, Some(entry)) => self.same(value, entry.0, row),
+            (MappingPolicy::Exact | MappingPolicy::Keep, Some(entry)) => self.same(value, entry.0, row),
             _ => required(row),
         };
         if verdict != Verdict::Next {

@@ -372,6 +372,12 @@ impl Dictionary {
         }
     }
 
+    /// Lets nobody write these objects any more.
+    pub fn make_constant(&mut self, which: impl Fn(u16) -> bool) {
+        let entries = self.entries.iter_mut().filter(|entry| which(entry.mux.index));
+        entries.for_each(|entry| entry.definition.access = Access::Constant);
+    }
+
     /// The objects, ascending.
     #[must_use]
     pub fn objects(&self) -> &[Object] {

@@ -94,6 +94,8 @@ pub struct Config {
     pub boot_time: DurationNs,
     /// Whether its SDO server has block transfers.
     pub has_blocks: bool,
+    /// Whether the mapping of its PDOs can be written.
+    pub has_mapping: bool,
 }
 
 /// What a node has met.
@@ -149,6 +151,11 @@ impl<A: Application> Node<A> {
         let mut dictionary = Dictionary::new(config.node);
         communication::define(&mut dictionary, config);
         application.define(&mut dictionary);
+        if !config.has_mapping {
+            dictionary.make_constant(|index| {
+                wire::pdo::Direction::BOTH.iter().any(|way| way.mapping().contains(&index))
+            });
+        }
         let eds = eds::write(&dictionary, &config.identity);
         dictionary.fill(wire::Mux::new(object::EDS, 0), eds.as_bytes());
         let capacity =

@@ -11,8 +11,8 @@ use super::communication::is_free;
 use super::dictionary::{Access, DataType, Definition, Dictionary, Handle, Mapping, Object, Shape};
 use crate::wire::cob_id::CobId;
 use crate::wire::pdo::{
-    MappingEntry, PDO_LEN_MAX, RPDO_COMMUNICATION, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT, SUB_SYNC_START,
-    SUB_TYPE, TPDO_COMMUNICATION, TransmissionType,
+    Direction, MappingEntry, PDO_LEN_MAX, RPDO_COMMUNICATION, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT,
+    SUB_SYNC_START, SUB_TYPE, TPDO_COMMUNICATION, TransmissionType,
 };
 use crate::wire::{AbortCode, Mux};
 
@@ -24,15 +24,6 @@ pub const ENTRIES: u8 = 8;
 pub const PDOS_MAX: usize = 32;
 /// From the first PDO of one axis to that of the next one.
 pub const AXIS_STEP: u16 = 0x40;
-
-/// Which way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// From the master: the device receives.
-    Receive,
-    /// To the master.
-    Transmit,
-}
 
 /// A PDO to begin with.
 #[derive(Debug, Clone, Copy)]
@@ -133,12 +124,11 @@ fn entry_of(number: i64) -> MappingEntry {
 
 /// Direction of the object whose index is that of a communication or mapping parameter, and the index of the former.
 fn place(index: u16) -> Option<(Direction, u16, bool)> {
-    Some(match index {
-        0x1400..=0x15FF => (Direction::Receive, index, false),
-        0x1600..=0x17FF => (Direction::Receive, index - TO_MAPPING, true),
-        0x1800..=0x19FF => (Direction::Transmit, index, false),
-        0x1A00..=0x1BFF => (Direction::Transmit, index - TO_MAPPING, true),
-        _ => return None,
+    Direction::BOTH.into_iter().find_map(|way| {
+        if way.communication().contains(&index) {
+            return Some((way, index, false));
+        }
+        way.mapping().contains(&index).then(|| (way, index - TO_MAPPING, true))
     })
 }
 

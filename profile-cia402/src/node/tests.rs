@@ -33,6 +33,7 @@ impl Rig {
             identity: identity(axes, 1),
             boot_time: DurationNs::from_millis(10),
             has_blocks: true,
+            has_mapping: true,
         };
         let mut rig =
             Self { node: Node::new(&config, device), now: MonotonicTime(1_000_000_000), sent: Vec::new() };

@@ -127,6 +127,11 @@ impl Client {
         self.state
     }
 
+    /// Longest time for an answer to what is under way.
+    fn timeout(&self) -> DurationNs {
+        self.request.as_ref().and_then(|request| request.timeout).unwrap_or(self.config.timeout)
+    }
+
     /// Whether a request can be started: nothing is under way, and the last outcome has been taken.
     #[must_use]
     pub fn is_free(&self) -> bool {
@@ -196,15 +201,15 @@ impl Client {
     /// The next frame to send.
     pub fn poll(&mut self, now: MonotonicTime) -> Option<[u8; SDO_LEN]> {
         if let Some(frame) = self.frame.take() {
-            self.deadline = now + self.config.timeout;
+            self.deadline = now + self.timeout();
             return Some(frame);
         }
         if self.has_segment() {
-            self.deadline = now + self.config.timeout;
+            self.deadline = now + self.timeout();
             return Some(self.next_block_segment().emit());
         }
         if self.state != ClientState::Idle && now >= self.deadline {
-            let milliseconds = u32::try_from(self.config.timeout.0 / 1_000_000).unwrap_or(u32::MAX);
+            let milliseconds = u32::try_from(self.timeout().0 / 1_000_000).unwrap_or(u32::MAX);
             self.abort(AbortCode::TIMEOUT);
             self.finish(Err(SdoFailure::Timeout { milliseconds }));
             return self.frame.take();
@@ -237,7 +242,7 @@ impl Client {
                 None => Err(protocol(AbortCode::COMMAND)),
             }
         };
-        self.deadline = now + self.config.timeout;
+        self.deadline = now + self.timeout();
         match step {
             Ok(Some(frame)) => self.frame = Some(frame.emit()),
             Ok(None) => {}
@@ -306,7 +311,7 @@ impl Client {
         }
         self.state = state;
         self.frame = Some(frame.emit());
-        self.deadline = now + self.config.timeout;
+        self.deadline = now + self.timeout();
     }
 
     /// Tells the server that the transfer has ended.

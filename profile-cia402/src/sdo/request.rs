@@ -3,6 +3,7 @@
 use core::fmt;
 
 use arrayvec::ArrayVec;
+use profile_generic::time::DurationNs;
 
 use crate::wire::{AbortCode, Mux};
 
@@ -113,13 +114,16 @@ pub struct SdoRequest {
     pub method: Method,
     /// Bytes to write, or the place for bytes to read.
     pub data: SdoData,
+    /// Longest time for an answer, where it is another one than that of the client.
+    pub timeout: Option<DurationNs>,
 }
 
 impl SdoRequest {
     /// Reads an object of at most [`INLINE_LEN`] bytes.
     #[must_use]
     pub fn upload(object: Mux) -> Self {
-        Self { object, operation: SdoOperation::Upload, method: Method::Auto, data: SdoData::default() }
+        let (operation, method) = (SdoOperation::Upload, Method::Auto);
+        Self { object, operation, method, data: SdoData::default(), timeout: None }
     }
 
     /// Reads an object of at most the capacity of `buffer`.
@@ -131,7 +135,7 @@ impl SdoRequest {
     /// Writes `data` to an object.
     #[must_use]
     pub fn download(object: Mux, data: SdoData) -> Self {
-        Self { object, operation: SdoOperation::Download, method: Method::Auto, data }
+        Self { object, operation: SdoOperation::Download, method: Method::Auto, data, timeout: None }
     }
 
     /// Writes the lowest `len` bytes of a number, 1 to 8, to an object.
@@ -146,6 +150,12 @@ impl SdoRequest {
     #[must_use]
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
+    }
+
+    /// The same request to a device that may take so long for an answer.
+    #[must_use]
+    pub fn within(self, timeout: DurationNs) -> Self {
+        Self { timeout: Some(timeout), ..self }
     }
 }
 

@@ -26,6 +26,8 @@ impl Mux {
     pub const GUARD_TIME: Self = Self::new(0x100C, 0);
     /// Node guarding: guard times without a request after which the master is lost; 0 for never.
     pub const LIFE_TIME_FACTOR: Self = Self::new(0x100D, 0);
+    /// Store parameters: all of them.
+    pub const STORE: Self = Self::new(0x1010, 1);
     /// COB-ID of EMCY; bit 31 when there is none.
     pub const EMCY_COB_ID: Self = Self::new(0x1014, 0);
     /// Time between two heartbeats, ms; 0 for none.

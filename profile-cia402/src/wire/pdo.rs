@@ -1,6 +1,7 @@
 //! What PDO parameters hold: transmission types and mapping entries.
 
 use core::fmt;
+use core::ops::RangeInclusive;
 
 use super::mux::Mux;
 
@@ -31,6 +32,81 @@ pub const SUB_INHIBIT: u8 = 3;
 pub const SUB_EVENT_TIMER: u8 = 5;
 /// Sub-index of the SYNC start value; TPDO.
 pub const SUB_SYNC_START: u8 = 6;
+
+/// Which way a PDO goes, as the device sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Direction {
+    /// The device receives: RPDO, from the master.
+    Receive,
+    /// The device transmits: TPDO, to the master.
+    Transmit,
+}
+
+impl Direction {
+    /// Both, that to the device first.
+    pub const BOTH: [Self; 2] = [Self::Receive, Self::Transmit];
+
+    /// Number of the communication parameters of the first PDO.
+    #[must_use]
+    pub const fn first_communication(self) -> u16 {
+        match self {
+            Self::Receive => RPDO_COMMUNICATION,
+            Self::Transmit => TPDO_COMMUNICATION,
+        }
+    }
+
+    /// Number of the mapping of the first PDO.
+    #[must_use]
+    pub const fn first_mapping(self) -> u16 {
+        match self {
+            Self::Receive => RPDO_MAPPING,
+            Self::Transmit => TPDO_MAPPING,
+        }
+    }
+
+    /// A communication parameter of a PDO, whose number counts from 1.
+    #[must_use]
+    pub const fn communication_object(self, number: u16, sub: u8) -> Mux {
+        Mux::new(self.first_communication() + (number - 1), sub)
+    }
+
+    /// An entry of the mapping of a PDO, whose number counts from 1; entry 0 is how many there are.
+    #[must_use]
+    pub const fn mapping_object(self, number: u16, sub: u8) -> Mux {
+        Mux::new(self.first_mapping() + (number - 1), sub)
+    }
+
+    /// Numbers of the communication parameters.
+    #[must_use]
+    pub const fn communication(self) -> RangeInclusive<u16> {
+        self.first_communication()..=self.first_communication() + (PDO_NUMBER_MAX - 1)
+    }
+
+    /// Numbers of the mappings.
+    #[must_use]
+    pub const fn mapping(self) -> RangeInclusive<u16> {
+        self.first_mapping()..=self.first_mapping() + (PDO_NUMBER_MAX - 1)
+    }
+
+    /// The identifier of one of the first four PDOs, counted from 0, in the default connection set.
+    #[must_use]
+    pub fn default_cob_id(self, pdo: u16, node: u8) -> Option<u32> {
+        let first = match self {
+            Self::Receive => 0x200,
+            Self::Transmit => 0x180,
+        };
+        (pdo < 4).then(|| first + u32::from(pdo) * 0x100 + u32::from(node))
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Receive => "RPDO",
+            Self::Transmit => "TPDO",
+        })
+    }
+}
 
 /// Transmission type: when a TPDO is sent, and when an RPDO takes effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -204,7 +204,10 @@ impl<'a> Segment<'a> {
         let link_length = if extended_link { usize::from(r.u8("link address length")?) } else { 1 };
         let port = match first & 0x0F {
             0 => return Err(unsupported("port", start, first)),
-            EXTENDED_PORT => r.u16("extended port")?,
+            EXTENDED_PORT => match r.u16("extended port")? {
+                0 => return Err(unsupported("extended port", start, first)),
+                port => port,
+            },
             port => u16::from(port),
         };
         let link = r.take("link address", link_length)?;

@@ -149,6 +149,8 @@ fn reserved_and_unsupported_segments_are_refused_where_they_stand() {
         (&[0x20, 1, 0xA0, 0], "segment type"),
         (&[0x20, 1, 0xE0, 0], "segment type"),
         (&[0x20, 1, 0x00, 0], "port"),
+        // Port 0 is reserved however it is written.
+        (&[0x20, 1, 0x0F, 0, 0, 8], "extended port"),
     ] {
         let found = u32::from(bytes[2]);
         let error = Error::Invalid { what, offset: 2, found, expected: 0x20 };

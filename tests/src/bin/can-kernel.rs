@@ -1,4 +1,4 @@
-//! `can-kernel [--interfaces A,B] [--writable FOLDER] [--] COMMAND [ARGUMENT...]`: runs a command in a kernel with CAN.
+//! `can-kernel [--interfaces A,B] [--module PATH] [--writable FOLDER] [--] COMMAND [ARGUMENT...]`: runs a command in a kernel with CAN.
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -15,6 +15,7 @@ fn main() -> ExitCode {
         let value = words.next().unwrap_or_default();
         kernel = match option.as_str() {
             "--interfaces" => kernel.interfaces(&value.split(',').collect::<Vec<_>>()),
+            "--module" => kernel.module(&value),
             "--writable" => kernel.writable(Path::new(&value)),
             _ => {
                 eprintln!("error: unknown option {option}");

@@ -241,14 +241,14 @@ impl GenericCan {
     ) -> Self {
         let text = CAN_BOX.replace("axis = 0", &format!("axis = {axis}"));
         let config = Config::parse(&text, "generic-can.toml").expect("the configuration is sound");
-        let Network { master, mut devices } = network(&config, 0, &mapping()).expect("a network");
+        let Network { master, mut devices, .. } = network(&config, 0, &mapping()).expect("a network");
         let mut bus = InProcessCan::of(&config.can[0], None);
         let needs = &mut devices[0].1[0].needs;
         needs.modes = modes.into_iter().collect();
         prepare(needs, bus.nodes_mut().next().expect("a device"));
         let (commissioner, end) =
             can::commissioner::Commissioner::new(mapping(), master.clone(), devices.iter().cloned());
-        let master = CanBus::new(0, master, &devices, end).expect("the master's configuration is sound");
+        let master = CanBus::new(0, master, &devices, &[], end).expect("the master's configuration is sound");
         let south = CanSouth { bus, commissioner, axis, connected: true };
         Self::on(AnyBus::Can(Box::new(master)), south, limits)
     }

@@ -242,8 +242,15 @@ impl Rig {
     #[must_use]
     pub fn ready(settings: Settings) -> Self {
         let mut rig = Self::new(settings);
-        rig.run_until(DurationNs::from_secs(20), "the buses up", |rig| rig.status().state == BoxState::READY);
+        rig.until_ready();
         rig
+    }
+
+    /// Lets the buses come up.
+    pub fn until_ready(&mut self) {
+        self.run_until(DurationNs::from_secs(20), "the buses up", |rig| {
+            rig.status().state == BoxState::READY
+        });
     }
 
     // ---- time -----------------------------------------------------------------------------------

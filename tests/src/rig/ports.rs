@@ -153,20 +153,25 @@ pub struct CanWire<N = DriveNode> {
     pub bus: InProcessCan<N>,
     /// What happens to frames that the box receives.
     pub tamper: Option<TamperCan>,
+    /// Runs what happens on the bus and in its drives; a test that weighs the box leaves it out.
+    pub aside: fn(&mut dyn FnMut()),
 }
 
 impl<N: CanNode> CanWire<N> {
     /// All there is, as it is.
     #[must_use]
     pub fn new(bus: InProcessCan<N>) -> Self {
-        Self { bus, tamper: None }
+        Self { bus, tamper: None, aside: |run| run() }
     }
 }
 
 impl<N: CanNode> CanPort for CanWire<N> {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
         loop {
-            match self.bus.receive(now)? {
+            let Self { bus, aside, .. } = self;
+            let mut input = None;
+            aside(&mut || input = bus.receive(now));
+            match input? {
                 CanInput::Frame(mut frame) => {
                     if self.tamper.as_mut().is_none_or(|tamper| tamper(now, &mut frame)) {
                         return Some(CanInput::Frame(frame));
@@ -178,6 +183,9 @@ impl<N: CanNode> CanPort for CanWire<N> {
     }
 
     fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
-        self.bus.send(now, frame)
+        let Self { bus, aside, .. } = self;
+        let mut sent = CanSent::Failed;
+        aside(&mut || sent = bus.send(now, frame));
+        sent
     }
 }

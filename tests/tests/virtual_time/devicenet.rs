@@ -141,9 +141,14 @@ fn count(rig: &Rig, text: &str) -> usize {
     rig.told().lines().filter(|line| *line == text).count()
 }
 
-/// Type and code of the faults of the turntable that the controller got.
+/// Type and code of the faults of an axis that the controller got.
+fn codes_of(rig: &Rig, axis: usize) -> Vec<(FaultType, u8)> {
+    rig.report().axes[axis].faults.kept().iter().map(|fault| (fault.fault_type, fault.code)).collect()
+}
+
+/// Those of the turntable.
 fn codes(rig: &Rig) -> Vec<(FaultType, u8)> {
-    rig.report().axes[0].faults.kept().iter().map(|fault| (fault.fault_type, fault.code)).collect()
+    codes_of(rig, 0)
 }
 
 /// The turntable's axis has stopped because nothing good comes from its drive.
@@ -155,9 +160,9 @@ fn silent(rig: &Rig) {
     assert!(matches!(axis.state(), DriveState::FaultReaction | DriveState::Faulted), "{:?}", axis.state());
 }
 
-/// A station that nobody has asked for, which says that it has the MAC ID of the box.
-fn claim(rig: &mut Rig, from: Station, response: bool) {
-    let mac = MacId::new(1).expect("a MAC ID");
+/// A station that nobody has asked for asks for a MAC ID, or says that it has it.
+fn claim(rig: &mut Rig, from: Station, mac: u8, response: bool) {
+    let mac = MacId::new(mac).expect("a MAC ID");
     let message = DuplicateMac { response, port: 0, vendor: 0x0777, serial: 0x1234_5678 };
     let mut data = [0; 7];
     message.emit(&mut data).expect("seven bytes");
@@ -273,7 +278,7 @@ fn a_box_whose_mac_id_another_node_has_stays_off_the_network_until_it_is_free() 
     let mut rig = Rig::new(settings());
     let other = intruder(&mut rig);
     rig.run_for(millis(500));
-    claim(&mut rig, other, true);
+    claim(&mut rig, other, 1, true);
     rig.run_for(millis(5_000));
     assert_ne!(rig.status().state, BoxState::READY);
     assert!(!rig.told().contains("on line") && !rig.told().contains("exchanging"), "{}", rig.told());
@@ -287,7 +292,7 @@ fn a_box_whose_mac_id_another_node_has_stays_off_the_network_until_it_is_free() 
 fn a_node_that_asks_for_the_mac_id_of_the_box_is_told_and_changes_nothing() {
     let mut rig = in_motion(BOX, 1.0);
     let other = intruder(&mut rig);
-    claim(&mut rig, other, false);
+    claim(&mut rig, other, 1, false);
     go_for(&mut rig, 300);
     assert!(turntable_turns(&rig), "{}", rig.told());
     runs_again(&mut rig);
@@ -340,5 +345,124 @@ fn a_velocity_drive_that_is_lost_stops_and_comes_back() {
     silent(&rig);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, true);
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_box_that_is_bus_off_stops_both_axes_and_leads_them_again_when_it_is_back() {
+    let mut rig = in_motion(BOX, 30.0);
+    let (now, own) = (rig.now(), rig.devicenet[0].bus.own_station());
+    rig.devicenet[0].bus.bus_mut().take_off(now, own);
+    // The drives miss four polls, and stop by themselves.
+    let still = |rig: &Rig| (0..2).all(|place| velocity(rig, place).abs() < NANO / 100);
+    rig.run_until(millis(1_500), "rest", still);
+    let stands = [turns(&rig, 0), turns(&rig, 1)];
+    rig.run(millis(60_000));
+    for (axis, stands) in stands.into_iter().enumerate() {
+        assert_eq!(codes_of(&rig, axis), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
+        assert!((turns(&rig, axis) - stands).abs() < 0.001);
+    }
+    let now = rig.now();
+    rig.devicenet[0].bus.bus_mut().restart(now, own);
+    rig.run_until(millis(20_000), "both drives taken anew", |rig| {
+        rig.engine.axes().iter().all(|axis| axis.south().is_some())
+    });
+    rig.run_for(millis(500));
+    assert!(still(&rig) && rig.torque_free(), "nobody moves by itself");
+    let program = vec![
+        Step::Dwell { seconds: 0.1 },
+        Step::FaultReset(both()),
+        Step::Enable(both()),
+        turn(2.0),
+        Step::MoveRelative { axis: 2, distance: 48.0, limits: SLIDE },
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "both in motion", |rig| turntable_turns(rig) && slide_moves(rig));
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert!(rig.torque_free());
+}
+
+/// The axis of the drive with MAC ID 5 is as it was, and its node has a fault.
+fn with_node_fault(frame: &mut Frame) {
+    const FAULT: u8 = 1 << 3;
+    let of = Identifier::PollResponse(MacId::new(5).expect("a MAC ID")).can();
+    // The fourth byte of the update, in its first fragment.
+    if frame.id() == of && frame.data().first() == Some(&0) {
+        let mut data: Vec<u8> = frame.data().to_vec();
+        data[4] |= FAULT;
+        *frame = Frame::new(of, &data).expect("as long as it was");
+    }
+}
+
+#[test]
+fn a_fault_of_a_node_stops_its_axis_until_it_is_reset() {
+    let mut rig = in_motion(BOX, 4.0);
+    rig.devicenet[0].tamper = Some(Box::new(|_, frame| {
+        with_node_fault(frame);
+        true
+    }));
+    stops_within(&mut rig, 1_000);
+    // The axis of the drive knows of no fault, and half a second is waited for a cause.
+    go_for(&mut rig, 500);
+    assert_eq!(codes(&rig), [(FaultType::AXIS_MFG, 1)], "{}", rig.told());
+    rig.devicenet[0].tamper = None;
+    go_for(&mut rig, 300);
+    assert!(rig.engine.axes()[0].fault().is_some(), "a fault stays until somebody resets it");
+    runs_again(&mut rig);
+}
+
+#[test]
+fn a_velocity_drive_with_the_basic_assembly_turns_forward_and_comes_back() {
+    let mut rig = in_motion(&velocity_drive(20), 9.0);
+    let seen = rig.engine.axes()[0].feedback().velocity.get();
+    assert!((seen - 2 * NANO).abs() < NANO / 20, "the drive says {seen}, in whole rpm");
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, false);
+    stops_within(&mut rig, 6_000);
+    silent(&rig);
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, true);
+    runs_again(&mut rig);
+}
+
+#[test]
+fn the_basic_assembly_has_no_reverse_and_a_command_for_it_is_a_fault() {
+    let mut rig = Rig::ready(with(&velocity_drive(20)));
+    let program = vec![
+        Step::Enable(TURNTABLE),
+        turn(1.0),
+        Step::Dwell { seconds: 0.5 },
+        turn(-1.0),
+        Step::Dwell { seconds: 5.0 },
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "forward", |rig| (velocity(rig, 0) - NANO).abs() < NANO / 50);
+    let mut least = NANO;
+    rig.run_until(millis(10_000), "the fault", |rig| {
+        least = least.min(velocity(rig, 0));
+        rig.engine.axes()[0].fault().is_some()
+    });
+    rig.run_until(millis(3_000), "rest", |rig| {
+        least = least.min(velocity(rig, 0));
+        velocity(rig, 0).abs() < NANO / 100
+    });
+    assert!(least > -NANO / 100, "it never ran in reverse: {least}");
+    rig.run_for(millis(500));
+    let fault = rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::POSITION_COMMAND_LIMIT), "{}", rig.told());
+    assert_eq!(codes(&rig), [(FaultType::AXIS_MFG, 6)], "{}", rig.told());
+}
+
+#[test]
+fn a_node_that_asks_for_the_mac_id_of_a_drive_is_told_and_changes_nothing() {
+    let mut rig = in_motion(BOX, 2.0);
+    let other = intruder(&mut rig);
+    claim(&mut rig, other, 5, false);
+    go_for(&mut rig, 500);
+    assert!(turntable_turns(&rig), "{}", rig.told());
+    let named = "DeviceNet 1: slave 5: another node wants its MAC ID: vendor 0x0777, serial 0x12345678";
+    assert_eq!(count(&rig, named), 1, "{}", rig.told());
     runs_again(&mut rig);
 }

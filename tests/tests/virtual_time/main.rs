@@ -3,6 +3,7 @@
 mod attributes;
 mod can;
 mod can_captures;
+mod can_device;
 mod can_faults;
 mod can_modes;
 mod devicenet;
@@ -13,6 +14,7 @@ mod fixed;
 mod hookup;
 mod hot_plug;
 mod indicators;
+mod inputs;
 mod loss;
 mod modes;
 mod network;

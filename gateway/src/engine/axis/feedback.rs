@@ -92,9 +92,11 @@ impl AxisChannel {
         }
         self.count_saturated(conversions.saturated);
         let report = self.feedback.report;
+        let moved = self.may_move();
         self.report(now, system, report);
         self.go_on_with_procedure(now);
         self.watch(system);
+        self.watch_limit_switches(system, moved);
     }
 
     /// Begins, carries on with or ends the procedure that the chosen mode stands for.

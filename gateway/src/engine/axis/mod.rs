@@ -17,6 +17,7 @@ mod history;
 mod hookup;
 mod image;
 mod north;
+mod overtravel;
 mod own_words;
 pub mod procedure;
 mod sequence;
@@ -33,7 +34,7 @@ use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
-use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
+use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
 use profile_generic::mode::ModeSelection;
 use profile_generic::program::Trackers;
@@ -194,6 +195,7 @@ pub struct AxisChannel {
     counters: AxisCounters,
     captures: capture::CaptureUnit,
     procedure: ProcedureUnit,
+    overtravel: overtravel::Overtravel,
     handover: handover::Handover,
     /// Since when the drive is told the operating mode that it is told now.
     told_since: MonotonicTime,
@@ -265,6 +267,7 @@ impl AxisChannel {
             counters: AxisCounters::default(),
             captures: capture::CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
+            overtravel: overtravel::Overtravel::default(),
             handover: handover::Handover::default(),
             told_since: MonotonicTime::default(),
             halted_at: None,
@@ -363,7 +366,7 @@ impl AxisChannel {
         self.procedure.restart(&[]);
         self.shown = None;
         self.follows = false;
-        self.feedback.status.remove(ProcedureUnit::STATUS);
+        self.feedback.status.remove(ProcedureUnit::STATUS | StatusBits::INPUTS);
     }
 
     /// Tells what events need captured, in each cycle and after [`AxisChannel::poll_capture`] gives no more.

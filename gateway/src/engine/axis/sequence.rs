@@ -25,7 +25,7 @@ use profile_generic::sequence::{Order, Sensed, SequenceStep, SequenceTimes, Stop
 use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
-/// How an axis is to start and stop, as controller and configuration have it.
+/// How an axis is to start and stop, and what stops it, as controller and configuration have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StopSettings {
     /// How a disable stops it.
@@ -36,6 +36,8 @@ pub struct StopSettings {
     pub deceleration: Option<Acceleration>,
     /// It may be started while it moves, at the speed it has.
     pub flying_start: bool,
+    /// A limit switch stops it.
+    pub checks_overtravel: bool,
 }
 
 impl AxisChannel {

@@ -7,10 +7,11 @@ use profile_cia402::wire::NodeId;
 use profile_generic::mode::{ModeSelection, OperatingMode};
 
 use super::{BuildError, kind, parameters};
-use crate::config::{Axis, AxisFunction, Can, CanDrive, CanLink, Config, DriveAt};
+use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
 use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, pdos};
-use crate::engine::bus::can::layout::{AxisPdos, SpareIds};
+use crate::engine::bus::can::layout::{AxisPdos, FoundPdo, FoundPdos, SpareIds};
+use crate::engine::bus::can::lss::Assignment;
 use crate::mapping::{AxisUnits, Cia402Axis, Mapping, Reference};
 
 /// Heartbeats that may be missing.
@@ -29,6 +30,8 @@ pub struct Network {
     pub master: MasterConfig,
     /// The axes of each device.
     pub devices: Vec<(NodeId, Vec<AxisSetup>)>,
+    /// The devices that are given their node-ids.
+    pub assignments: Vec<Assignment>,
 }
 
 /// The network of a CAN bus, with PDOs as drives that lack nothing need them.
@@ -52,10 +55,13 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
         };
         let misfit = |error| BuildError::CanDrive { name: axis.name.clone(), error };
         let needs = needs(axis, bus, drive);
-        let axis_pdos = AxisPdos::new(drive.axis, bus.allowed_losses, &mut spare)
+        let mut axis_pdos = AxisPdos::new(drive.axis, bus.allowed_losses, &mut spare)
             .ok_or_else(|| misfit(Misfit::Identifiers))?;
+        axis_pdos.kept = bus.device(drive.node).is_some_and(|device| device.keeps_mapping);
         let telegram = mapping.cia402_telegram(&needs).map_err(|error| misfit(error.into()))?;
-        let both = pdos(mapping, &axis_pdos, &telegram.command, &telegram.feedback).map_err(misfit)?;
+        let found = described(bus, drive.node);
+        let both = pdos(mapping, &axis_pdos, &telegram.command, &telegram.feedback, found.as_ref());
+        let both = both.map_err(misfit)?;
         if let Some(known) = nodes.iter_mut().find(|known| known.node == drive.node) {
             let [(receive, _), (transmit, _)] = both;
             known.rpdos.extend(receive);
@@ -84,15 +90,37 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
         sdo_frames_per_cycle: u8::try_from(sdo_frames).unwrap_or(1),
         ..MasterConfig::default()
     };
-    Ok(Network { master, devices })
+    let assignment = |device: &CanDevice| {
+        let Lss { address, stores } = device.lss?;
+        Some(Assignment { node: device.node, address, stores })
+    };
+    let assignments = bus.devices.iter().filter_map(assignment).collect();
+    Ok(Network { master, devices, assignments })
+}
+
+/// The PDOs that a device keeps, where its file tells them.
+#[must_use]
+pub fn described(bus: &Can, node: NodeId) -> Option<FoundPdos> {
+    let device = bus.device(node).filter(|device| device.keeps_mapping)?;
+    let pdos = device.file.as_ref()?.pdos.as_ref()?;
+    Some(pdos.each_ref().map(|pdos| pdos.iter().map(FoundPdo::described).collect()))
 }
 
 fn node(bus: &Can, node: NodeId) -> NodeConfig {
+    let device = bus.device(node);
+    let guarding = device.and_then(|device| device.guarding);
+    let file = device.and_then(|device| device.file.as_ref());
+    let heartbeat = HeartbeatConfig {
+        producer_ms: bus.heartbeat_ms,
+        timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
+    };
     NodeConfig {
-        heartbeat: Some(HeartbeatConfig {
-            producer_ms: bus.heartbeat_ms,
-            timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
-        }),
+        expected: device.map(|device| device.expected).unwrap_or_default(),
+        stamp: file.filter(|file| !file.writes.is_empty()).map(|file| file.stamp),
+        writes: file.map(|file| file.writes.clone()).unwrap_or_default(),
+        store: device.is_some_and(|device| device.stores),
+        heartbeat: guarding.is_none().then_some(heartbeat),
+        guarding,
         ..NodeConfig::new(node)
     }
 }
@@ -103,14 +131,14 @@ pub(super) fn bus(
     place: usize,
     mapping: &Mapping,
 ) -> Result<(CanBus, Commissioner), BuildError> {
-    let Network { master, devices } = network(config, place, mapping)?;
+    let Network { master, devices, assignments } = network(config, place, mapping)?;
     let (commissioner, end) = Commissioner::new(mapping.clone(), master.clone(), devices.iter().cloned());
     let number = u8::try_from(place).unwrap_or(u8::MAX);
     let name = match &config.can[place].link {
         CanLink::InProcess => "in-process",
         CanLink::Interface { name, .. } => name,
     };
-    let bus = CanBus::new(number, master, &devices, end)
+    let bus = CanBus::new(number, master, &devices, &assignments, end)
         .map_err(|error| BuildError::Can { bus: name.to_owned(), error })?;
     Ok((bus, commissioner))
 }

@@ -11,7 +11,7 @@ use crate::config::{Axis, AxisFunction, CanLink, Config, Devicenet, DevicenetDri
 use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
 use crate::engine::bus::devicenet::setup::{SetupStep, motion_steps, speed_steps};
 use crate::engine::bus::devicenet::{DevicenetBus, DrivePlan};
-use crate::mapping::devicenet::{DevicenetError, MotionAxis, SpeedAxis};
+use crate::mapping::devicenet::{DevicenetAxis, DevicenetError, MotionAxis, SpeedAxis};
 use crate::mapping::{CipScaling, DriveProgram, Mapping};
 
 /// Highest SpeedScale and, with a minus, the lowest one that a ratio has room for.
@@ -82,8 +82,21 @@ fn plan(
     number: usize,
     mapping: &Mapping,
 ) -> Result<DrivePlan, DevicenetError> {
-    let (end, program, steps) = parts(network, drive, axis, mapping)?;
+    let Parts { end, program, steps, .. } = parts(network, drive, axis, mapping)?;
     Ok(DrivePlan { axis: number, mac: drive.mac, end, program, steps })
+}
+
+/// What a drive is led by.
+#[derive(Debug, Clone)]
+pub struct Parts {
+    /// The box's end of its poll connection.
+    pub end: End,
+    /// What its program is made of.
+    pub needs: DevicenetAxis,
+    /// How its axis speaks to it.
+    pub program: DriveProgram,
+    /// How it is set up.
+    pub steps: Vec<SetupStep>,
 }
 
 /// What a drive is led by.
@@ -95,7 +108,7 @@ pub fn parts(
     drive: &DevicenetDrive,
     axis: &Axis,
     mapping: &Mapping,
-) -> Result<(End, DriveProgram, Vec<SetupStep>), DevicenetError> {
+) -> Result<Parts, DevicenetError> {
     match &drive.kind {
         DevicenetKind::Motion { modes, resolution } => {
             let modes: &[OperatingMode] = match axis.function {
@@ -104,7 +117,8 @@ pub fn parts(
                 AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
             };
             let scaling = scaling(drive, axis, *resolution)?;
-            let program = mapping.devicenet_motion_program(&MotionAxis { scaling, modes: modes.to_vec() })?;
+            let needs = MotionAxis { scaling, modes: modes.to_vec() };
+            let program = mapping.devicenet_motion_program(&needs)?;
             let limits = parameters(axis);
             let limits = limits
                 .into_iter()
@@ -116,14 +130,17 @@ pub fn parts(
                 _ => ControlMode::POSITION,
             };
             let link = MotionLink::new(first, *resolution, network.cycle_time);
-            Ok((End::Motion(link), program, motion_steps(&limits)))
+            let (end, needs) = (End::Motion(link), DevicenetAxis::Motion(needs));
+            Ok(Parts { end, needs, program, steps: motion_steps(&limits) })
         }
         DevicenetKind::Speed { assembly, scale } => {
             let speed = speed(drive, axis, *scale).ok_or(DevicenetError::Overflow)?;
             let extended = assembly.is_extended();
-            let program = mapping.devicenet_speed_program(&SpeedAxis { speed, extended })?;
+            let needs = SpeedAxis { speed, extended };
+            let program = mapping.devicenet_speed_program(&needs)?;
             let link = SpeedLink::new(*assembly).map_err(|_| DevicenetError::Assembly(*assembly))?;
-            Ok((End::Speed(link), program, speed_steps(*scale, extended)))
+            let (end, needs) = (End::Speed(link), DevicenetAxis::Speed(needs));
+            Ok(Parts { end, needs, program, steps: speed_steps(*scale, extended) })
         }
     }
 }

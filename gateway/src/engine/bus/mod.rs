@@ -3,6 +3,7 @@
 mod backoff;
 pub mod can;
 pub mod devicenet;
+mod outlet;
 pub mod sercos;
 
 use profile_generic::state::Action;

@@ -458,8 +458,16 @@ impl<'a> Builder<'a> {
             let set = if object == self.tables.words.status { "Statusword" } else { "Digital inputs" };
             let pattern = self.pattern(set, &row.pattern);
             let modes = self.mode_codes(&row.modes);
-            let (Some(bit), Some(state), Some(pattern)) = (bit, state, pattern) else { continue };
-            self.tables.status.push(StatusRule { object, pattern: both(state, pattern), modes, bit });
+            let inverted = match &row.inverted {
+                Some(name) => status_bit(&mut self.resolver, name),
+                None => bit,
+            };
+            let (Some(bit), Some(inverted), Some(state), Some(pattern)) = (bit, inverted, state, pattern)
+            else {
+                continue;
+            };
+            let rule = StatusRule { object, pattern: both(state, pattern), modes, bit, inverted };
+            self.tables.status.push(rule);
         }
     }
 
@@ -515,6 +523,8 @@ impl<'a> Builder<'a> {
     fn parameter(&mut self, row: &Cia402ParameterRow) {
         let parameter = parameter(&mut self.resolver, &self.dictionaries.generic, &row.parameter);
         let value = self.value("object", &row.object);
+        let inverted = self.like("inverted", row.inverted.as_ref(), value.as_ref());
+        let common = self.like("common", row.common.as_ref(), value.as_ref());
         let direction = directions(&mut self.resolver, &row.direction);
         let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
         let factor = match &row.factor {
@@ -540,8 +550,29 @@ impl<'a> Builder<'a> {
             let message = "the parameter is there twice";
             self.resolver.error(code::TWICE, row.parameter.span(), "parameter", message);
         }
-        let rule = ParameterRule { parameter, quantity, value, to_drive, from_drive, reject, factor };
+        let rule = ParameterRule {
+            parameter,
+            quantity,
+            value,
+            inverted,
+            common,
+            to_drive,
+            from_drive,
+            reject,
+            factor,
+        };
         self.tables.parameters.push(rule);
+    }
+
+    /// An object that takes the place of another one, whose unit it has.
+    fn like(&mut self, key: &str, name: Option<&Name>, other: Option<&(Value, &Cia402Sub)>) -> Option<Value> {
+        let name = name?;
+        let (value, _) = self.value(key, name)?;
+        if let Some((other, _)) = other.filter(|(other, _)| other.unit != value.unit) {
+            let message = format!("the unit of {} is not that of {}", value.object, other.object);
+            self.resolver.error(code::UNIT, name.span(), key, message);
+        }
+        Some(value)
     }
 
     fn capture(&mut self, row: &Cia402CaptureRow) {

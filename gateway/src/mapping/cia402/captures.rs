@@ -8,7 +8,7 @@ use profile_generic::image::Signal;
 use profile_generic::program::{BitPattern, Conversion};
 use profile_generic::quantity::Quantity;
 
-use super::compile::{Cia402Axis, Cia402Error};
+use super::compile::{Cia402Axis, Cia402Error, Places};
 use super::facts::ObjectFacts;
 use super::{Cia402Tables, FULL_RANGE, Object, Value};
 use crate::mapping::capture_program::{CaptureMode, CaptureProgram, Gate, Input, Latch, Place, Stored};
@@ -54,12 +54,13 @@ impl Cia402Tables {
         objects
     }
 
-    /// What stands in the telegrams behind the signals: functions, then words.
+    /// What stands in the telegrams behind the signals: functions, then words. A word that is a signal stands with these.
     pub(super) fn cyclic_of_captures(
         &self,
         axis: &Cia402Axis,
         facts: &ObjectFacts,
         to_drive: bool,
+        places: &Places<'_>,
     ) -> Vec<&Value> {
         let mut values: Vec<&Value> = Vec::new();
         if axis.captures != CaptureMode::Cyclic {
@@ -70,22 +71,24 @@ impl Cia402Tables {
                 true => rule.latch.as_ref().map(|latch| &latch.function),
                 false => Some(&rule.word),
             };
-            values.extend(value.filter(|value| !values.contains(value)));
+            let signal = |value: &Value| places.iter().any(|(rule, _)| rule.value.object == value.object);
+            values.extend(value.filter(|value| !values.contains(value) && !signal(value)));
         }
         values
     }
 
-    /// The program of the captures of an axis; `telegram` has what stands in it, and where.
+    /// The program of the captures of an axis; `telegram` has what stands in it, and `places` where its signals stand.
     pub(super) fn capture_program(
         &self,
         axis: &Cia402Axis,
         facts: &ObjectFacts,
         telegram: &Telegram,
+        places: &Places<'_>,
     ) -> Result<CaptureProgram, Cia402Error> {
         let mut program = CaptureProgram::default();
         for rule in self.captures.iter().filter(|rule| is_usable(rule, axis, facts)) {
             // A capture that does not fit is one that the axis does not have.
-            let _ = self.capture(rule, axis, facts, telegram, &mut program)?;
+            let _ = self.capture(rule, axis, facts, telegram, places, &mut program)?;
         }
         Ok(program)
     }
@@ -96,6 +99,7 @@ impl Cia402Tables {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
         telegram: &Telegram,
+        places: &Places<'_>,
         program: &mut CaptureProgram,
     ) -> Result<Option<()>, Cia402Error> {
         let place = |value: &Value, to_drive: bool| -> Result<Place, Cia402Error> {
@@ -104,10 +108,11 @@ impl Cia402Tables {
                 true => (&telegram.command, telegram.command_bytes),
                 false => (&telegram.feedback, telegram.feedback_bytes),
             };
-            // They are the last ones, in this order.
+            // What is no signal is among the last ones, in this order.
             let mut offset = end;
-            let mut found = None;
-            for cyclic in self.cyclic_of_captures(axis, facts, to_drive).into_iter().rev() {
+            let signal = places.iter().find(|(rule, _)| rule.value.object == value.object);
+            let mut found = signal.map(|(_, at)| *at);
+            for cyclic in self.cyclic_of_captures(axis, facts, to_drive, places).into_iter().rev() {
                 offset -= u16::try_from(cyclic.width.bytes()).unwrap_or(u16::MAX);
                 if cyclic.object == value.object && items.contains(&item) {
                     found = Some(offset);

@@ -1,11 +1,11 @@
 //! What is written to and read from a drive before it takes part in the cycle.
 
-use profile_generic::image::Signal;
 use profile_generic::time::DurationNs;
 
 use super::compile::{Cia402Axis, Cia402Error};
 use super::facts::ObjectFacts;
-use super::{Cia402Tables, Object, StepKind, Value};
+use super::{Cia402Tables, Object, ParameterRule, StepKind, Value};
+use crate::mapping::drive_program::ParameterEntry;
 use crate::mapping::item::Item;
 
 /// One SDO access.
@@ -99,7 +99,9 @@ impl Cia402Tables {
                 }
                 (Plan::Tell, StepKind::WriteParameter(parameter)) => {
                     for (_, generic) in axis.parameters.iter().filter(|(known, _)| known == parameter) {
-                        steps.extend(self.write_parameter(*parameter, *generic, axis, facts, fail)?);
+                        let step = self.write_parameter(*parameter, *generic, axis, facts, fail)?;
+                        // Two parameters may fall to one object.
+                        steps.extend(step.filter(|step| !steps.contains(step)));
                     }
                 }
                 (Plan::Tell, StepKind::WriteCycle(value, exponent)) => {
@@ -129,8 +131,7 @@ impl Cia402Tables {
             let rules = self.modes.iter().filter(|rule| modes.contains(&rule.selection));
             rules.flat_map(|rule| rule.command.iter().chain(&rule.actual)).any(|known| *known == signal)
         };
-        let wanted = |signal| !Signal::OFFSETS.contains(&signal) || axis.offsets.contains(&signal);
-        let rules = self.signals.iter().filter(move |rule| used(rule.signal) && wanted(rule.signal));
+        let rules = self.signals.iter().filter(move |rule| used(rule.signal) && axis.wants(rule));
         rules.filter(|rule| rule.modes.is_empty() || !rule.refuse).map(|rule| rule.value.object)
     }
 
@@ -145,13 +146,49 @@ impl Cia402Tables {
         let Some(rule) = self.parameters.iter().find(|rule| rule.parameter == parameter) else {
             return Ok(None);
         };
-        let object = rule.value.object;
-        let Some(entry) = self.entry(rule, axis, facts)? else { return Ok(None) };
-        let Some((bytes, len, clamped)) = entry.encode(generic) else { return Ok(None) };
-        if clamped {
-            return Err(Cia402Error::Range { object, value: generic });
+        let (object, bytes) = match (self.entry(rule, axis, facts)?, &rule.common) {
+            (Some(entry), _) => {
+                let inverted = rule.inverted.as_ref().filter(|_| self.inverts_positions(facts));
+                let object = inverted.unwrap_or(&rule.value).object;
+                (object, octets(object, &entry, generic)?)
+            }
+            (None, Some(common)) => (common.object, self.least_of(common, axis, facts)?),
+            (None, None) => return Ok(None),
+        };
+        Ok(bytes.map(|bytes| ObjectStep::Write { object, bytes, fail }))
+    }
+
+    /// The least of what the configuration gives the parameters that fall to an object which limits both directions.
+    fn least_of(
+        &self,
+        common: &Value,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Option<Vec<u8>>, Cia402Error> {
+        let mut least: Option<(u64, Option<Vec<u8>>)> = None;
+        for (parameter, generic) in &axis.parameters {
+            let falls =
+                |rule: &&ParameterRule| rule.parameter == *parameter && rule.common.as_ref() == Some(common);
+            let Some(rule) = self.parameters.iter().find(falls) else { continue };
+            if self.entry(rule, axis, facts)?.is_some() {
+                continue;
+            }
+            let Some(entry) = self.entry_at(common, rule, axis, facts)? else { continue };
+            let size = generic.unsigned_abs();
+            if least.as_ref().is_none_or(|(known, _)| size < *known) {
+                least = Some((size, octets(common.object, &entry, *generic)?));
+            }
         }
-        Ok(Some(ObjectStep::Write { object, bytes: bytes[..len].to_vec(), fail }))
+        Ok(least.and_then(|(_, bytes)| bytes))
+    }
+}
+
+/// A generic value as an object holds it; `None` where the parameter is only read.
+fn octets(object: Object, entry: &ParameterEntry, generic: i64) -> Result<Option<Vec<u8>>, Cia402Error> {
+    match entry.encode(generic) {
+        Some((_, _, true)) => Err(Cia402Error::Range { object, value: generic }),
+        Some((bytes, len, false)) => Ok(Some(bytes[..len].to_vec())),
+        None => Ok(None),
     }
 }
 

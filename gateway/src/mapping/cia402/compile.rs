@@ -59,6 +59,17 @@ impl Cia402Axis {
         Some(Item::object(Cia402Dictionary::on_axis(object.index, self.axis)?, object.sub))
     }
 
+    /// Whether a value is to stand in the telegrams, if the drive has it. Where captures do, their inputs are there for all who
+    /// look at them.
+    pub(super) fn wants(&self, rule: &SignalRule) -> bool {
+        let signal = rule.signal;
+        if Signal::OFFSETS.contains(&signal) {
+            return self.offsets.contains(&signal);
+        }
+        let seen = signal == Signal::DigitalInputs && self.captures == CaptureMode::Cyclic;
+        rule.refuse || seen || !self.left_out.contains(&signal)
+    }
+
     /// What the configuration says of the counts of a quantity.
     pub(super) fn count_of(&self, quantity: Quantity) -> Option<Ratio> {
         self.counts.iter().find(|(known, _)| *known == quantity).map(|(_, ratio)| *ratio)
@@ -129,7 +140,7 @@ pub enum Cia402Error {
 }
 
 /// Signals, and where they stand in their telegram.
-type Places<'a> = Vec<(&'a SignalRule, u16)>;
+pub(super) type Places<'a> = Vec<(&'a SignalRule, u16)>;
 
 impl Cia402Tables {
     /// The modes of an axis that the controller leads, or that go to targets, with what they are in the drive. The first rule
@@ -211,8 +222,8 @@ impl Cia402Tables {
         let shares_target =
             shares(Signal::TargetPosition).is_some_and(|at| shares(Signal::PositionCommand) == Some(at));
         let mut fields = Vec::new();
-        for (rule, at) in places {
-            fields.push(self.field(rule, at, axis, facts)?);
+        for (rule, at) in &places {
+            fields.push(self.field(rule, *at, axis, facts)?);
         }
         let mut program = DriveProgram::new(telegram, false);
         program.mode_octets = Some([WORD_BYTES, WORD_BYTES]);
@@ -225,8 +236,18 @@ impl Cia402Tables {
             full.map_err(|_| Cia402Error::Full("the cyclic values"))?;
         }
         self.mode_entries(&chosen, &self.procedures_of(axis, facts), &mut program)?;
-        self.words(axis, &chosen, &mut program)?;
-        program.captures = self.capture_program(axis, facts, &program.telegram)?;
+        for (rule, at) in &places {
+            let object = rule.value.object;
+            if object != self.words.status && self.status.iter().any(|rule| rule.object == object) {
+                let place = Place { item: item(object)?, width: rule.value.width, offset: Some(*at) };
+                program
+                    .status_words
+                    .try_push(place)
+                    .map_err(|_| Cia402Error::Full("the words of status bits"))?;
+            }
+        }
+        self.words(axis, &chosen, facts, &mut program)?;
+        program.captures = self.capture_program(axis, facts, &program.telegram, &places)?;
         let error = item(self.words.error)?;
         for row in &self.faults {
             let row = FaultRow { word: error, ..*row };
@@ -287,7 +308,7 @@ impl Cia402Tables {
                 known.push((object, *bytes));
                 *bytes += octets(rule.value.width);
             }
-            for value in self.cyclic_of_captures(axis, facts, to_drive) {
+            for value in self.cyclic_of_captures(axis, facts, to_drive, &places) {
                 items.push(item(value.object)?);
                 *bytes += octets(value.width);
             }
@@ -311,9 +332,7 @@ impl Cia402Tables {
         for (signal, mode) in chosen.iter().flat_map(of) {
             let signal = &signal;
             let Some(rule) = self.signal(*signal, mode) else { continue };
-            let no_offset = Signal::OFFSETS.contains(signal) && !axis.offsets.contains(signal);
-            let unwanted = no_offset || !rule.refuse && axis.left_out.contains(signal);
-            if unwanted || rules.iter().any(|known| known.signal == *signal) {
+            if !axis.wants(rule) || rules.iter().any(|known| known.signal == *signal) {
                 continue;
             }
             match facts.is_missing(rule.value.object) {
@@ -406,10 +425,19 @@ impl Cia402Tables {
     /// Whether the sign of a value is not that of the axis: the drive inverts positions and velocities by bits of their own, and
     /// torques not at all.
     fn is_inverted(&self, rule: &SignalRule, facts: &ObjectFacts) -> bool {
-        let word = facts.integer(self.words.polarity, Width::U8).unwrap_or(0);
-        let bit = |bit: u32| word >> bit & 1 != 0;
-        let own = rule.polarity.is_some_and(bit);
-        own != bit(self.words.direction)
+        // What has no unit has no sign either.
+        let own = rule.polarity.is_some_and(|bit| self.inverts(bit, facts));
+        rule.signal.quantity() != Quantity::None && own != self.inverts_positions(facts)
+    }
+
+    /// Whether the drive inverts its positions. What it does not invert, torques, their limits and the switches at the ends of
+    /// the way, is the other way round in the box.
+    pub(super) fn inverts_positions(&self, facts: &ObjectFacts) -> bool {
+        self.inverts(self.words.direction, facts)
+    }
+
+    fn inverts(&self, bit: u32, facts: &ObjectFacts) -> bool {
+        facts.integer(self.words.polarity, Width::U8).is_some_and(|word| word >> bit & 1 != 0)
     }
 
     /// Actions, reports and status bits.
@@ -417,6 +445,7 @@ impl Cia402Tables {
         &self,
         axis: &Cia402Axis,
         chosen: &[(&ModeRule, &DriveMode)],
+        facts: &ObjectFacts,
         program: &mut DriveProgram,
     ) -> Result<(), Cia402Error> {
         for rule in &self.actions {
@@ -444,11 +473,12 @@ impl Cia402Tables {
             if word.is_some_and(|word| !program.status_words.iter().any(|place: &Place| place.item == word)) {
                 continue;
             }
+            let bit = if self.inverts_positions(facts) { rule.inverted } else { rule.bit };
             for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
-                let row = StatusRow { word, pattern, bit: rule.bit };
+                let row = StatusRow { word, pattern, bit };
                 program.status.try_push(row).map_err(|_| Cia402Error::Full("the table of status bits"))?;
             }
-            program.known_status |= rule.bit;
+            program.known_status |= bit;
         }
         Ok(())
     }
@@ -460,7 +490,18 @@ impl Cia402Tables {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Option<ParameterEntry>, Cia402Error> {
-        let value = &rule.value;
+        let inverted = rule.inverted.as_ref().filter(|_| self.inverts_positions(facts));
+        self.entry_at(inverted.unwrap_or(&rule.value), rule, axis, facts)
+    }
+
+    /// The entry of a parameter in this object.
+    pub(super) fn entry_at(
+        &self,
+        value: &Value,
+        rule: &ParameterRule,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Option<ParameterEntry>, Cia402Error> {
         if facts.is_missing(value.object) {
             return Ok(None);
         }
@@ -489,6 +530,8 @@ impl Cia402Tables {
             parameter: Parameter::default(),
             quantity: scaling.map_or(Quantity::None, |rule| rule.quantity),
             value,
+            inverted: None,
+            common: None,
             to_drive: true,
             from_drive: true,
             reject: false,

@@ -138,6 +138,8 @@ pub(super) struct StatusRule {
     pub pattern: BitPattern,
     pub modes: Vec<i8>,
     pub bit: StatusBits,
+    /// The same in a drive that inverts its positions.
+    pub inverted: StatusBits,
 }
 
 #[derive(Debug, Clone)]
@@ -145,6 +147,10 @@ pub(super) struct ParameterRule {
     pub parameter: Parameter,
     pub quantity: Quantity,
     pub value: Value,
+    /// The same in a drive that inverts its positions, where it is another one.
+    pub inverted: Option<Value>,
+    /// What limits both directions in a drive without it.
+    pub common: Option<Value>,
     pub to_drive: bool,
     pub from_drive: bool,
     pub reject: bool,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::cast::f64_from_i64;
-use profile_generic::image::{AxisCommand, AxisFeedback};
+use profile_generic::image::{AxisCommand, AxisFeedback, StatusBits};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::scaling::UnitKind;
@@ -21,6 +21,7 @@ fn axis(modes: &[OperatingMode]) -> Cia402Axis {
     Cia402Axis {
         modes: modes.iter().map(|mode| (*mode).into()).collect(),
         cycle: DurationNs::from_millis(2),
+        left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
         ..Cia402Axis::default()
     }
 }
@@ -184,11 +185,11 @@ fn captures_are_those_whose_objects_the_drive_has() {
         let offset = (captures == CaptureMode::Cyclic).then_some(7);
         assert!(places.iter().all(|place| (place.item, place.offset) == (Item::object(0x68B8, 0), offset)));
         let words: Vec<_> = program.captures().words.iter().map(|place| (place.item, place.offset)).collect();
-        assert_eq!(words, [(Item::object(0x68B9, 0), (captures == CaptureMode::Cyclic).then_some(13))]);
+        assert_eq!(words, [(Item::object(0x68B9, 0), (captures == CaptureMode::Cyclic).then_some(17))]);
     }
     let cyclic = of(CaptureMode::Cyclic);
     let input = cyclic.captures().inputs[0].word;
-    assert_eq!((input.item, input.offset), (Item::object(0x68FD, 0), Some(15)));
+    assert_eq!((input.item, input.offset), (Item::object(0x68FD, 0), Some(13)));
     assert_eq!((cyclic.telegram.command_bytes, cyclic.telegram.feedback_bytes), (9, 19));
 }
 
@@ -263,6 +264,71 @@ fn what_a_drive_is_asked_and_told() {
     let of = |number| step.item(&Cia402Axis { axis: number, ..Cia402Axis::default() });
     assert_eq!(of(1), Some(Item::object(0x6864, 0)));
     assert_eq!(of(8), None);
+}
+
+/// What is written of two limits of the torque, 150 % forward and 120 % backward.
+fn torque_limits(facts: &ObjectFacts) -> Vec<String> {
+    let limit = |name: &str, value| (Parameter::from_name(name).unwrap(), value);
+    let parameters =
+        vec![limit("torque_limit_positive", 1_500_000), limit("torque_limit_negative", -1_200_000)];
+    let axis = Cia402Axis { parameters, ..axis(&ALL) };
+    let steps = shipped().cia402_steps(Plan::Tell, &axis, facts).unwrap();
+    let written = steps.iter().filter_map(|step| match step {
+        ObjectStep::Write { object, bytes, .. } if [0x6072, 0x60E0, 0x60E1].contains(&object.index) => {
+            Some(format!("{object} {}", u16::from_le_bytes([bytes[0], bytes[1]])))
+        }
+        _ => None,
+    });
+    written.collect()
+}
+
+#[test]
+fn limits_of_the_torque_are_exchanged_where_positions_are_inverted_and_torques_are_not() {
+    for (polarity, expected) in [
+        (0x00, ["60E0:00 1500", "60E1:00 1200"]),
+        (0x40, ["60E0:00 1500", "60E1:00 1200"]),
+        (0x80, ["60E1:00 1500", "60E0:00 1200"]),
+        (0xC0, ["60E1:00 1500", "60E0:00 1200"]),
+    ] {
+        let mut facts = servo();
+        facts.note_data(object(0x607E, 0), &[polarity]);
+        assert_eq!(torque_limits(&facts), expected, "{polarity:02X}");
+        let program = shipped().cia402_program(&axis(&ALL), &facts).unwrap();
+        let held = |name| program.parameter(Parameter::from_name(name).unwrap()).unwrap();
+        let both = ["torque_limit_positive", "torque_limit_negative"].map(held);
+        let shown = both.map(|entry| {
+            let (bytes, len, clamped) = entry
+                .encode(if entry.parameter == both[0].parameter { 1_500_000 } else { -1_200_000 })
+                .unwrap();
+            assert!(!clamped);
+            format!("{} {}", entry.item, entry.width.integer(&bytes[..len]).unwrap())
+        });
+        assert_eq!(shown, expected, "{polarity:02X}, by the controller");
+    }
+}
+
+#[test]
+fn a_drive_with_one_limit_for_both_directions_is_told_the_lesser_one() {
+    let mut facts = servo();
+    facts.note_missing(object(0x60E1, 0));
+    assert_eq!(torque_limits(&facts), ["60E0:00 1500", "6072:00 1200"]);
+    facts.note_missing(object(0x60E0, 0));
+    assert_eq!(torque_limits(&facts), ["6072:00 1200"], "once");
+    let program = shipped().cia402_program(&axis(&ALL), &facts).unwrap();
+    let limit = Parameter::from_name("torque_limit_positive").unwrap();
+    assert_eq!(program.parameter(limit), None, "a controller that sets one of them would move the other");
+}
+
+#[test]
+fn both_speeds_of_homing_are_parameters() {
+    let program = program(&ALL);
+    for (name, object) in [("homing_velocity", "6099:01"), ("homing_creep_velocity", "6099:02")] {
+        let entry = program.parameter(Parameter::from_name(name).unwrap()).unwrap();
+        // Two turns a second of 3600 counts.
+        let (bytes, len, clamped) = entry.encode(2_000_000_000).unwrap();
+        assert_eq!((entry.item.to_string().as_str(), clamped), (object, false));
+        assert_eq!(entry.width.integer(&bytes[..len]), Some(7_200));
+    }
 }
 
 #[test]
@@ -377,4 +443,75 @@ fn a_target_counts_only_in_a_drive_that_shows_that_it_goes_to_targets() {
     assert_eq!(placed(target, 0x01_0027), (1, -3600));
     assert_eq!(placed(OperatingMode::Position.into(), 0x01_0027), (8, 3600));
     assert_eq!(placed(OperatingMode::Position.into(), 0x08_1027), (8, 3600));
+}
+
+/// What a drive tells whose 60FD stands in its telegram, by the bits that are set in it.
+fn inputs(
+    facts: &ObjectFacts,
+    captures: CaptureMode,
+    left_out: Vec<Signal>,
+    word: u32,
+) -> Option<StatusBits> {
+    let axis = Cia402Axis { captures, left_out, ..axis(&ALL[..1]) };
+    let program = shipped().cia402_program(&axis, facts).unwrap();
+    let mut telegram = vec![0; usize::from(program.telegram.feedback_bytes)];
+    let place = program.place_of_feedback(Item::object(0x60FD, 0));
+    if let Some((at, len)) = place {
+        telegram[at..at + len].copy_from_slice(&word.to_le_bytes());
+    }
+    let mut feedback = AxisFeedback::default();
+    let mut report = ConversionReport::default();
+    program.decode(&telegram, false, &mut feedback, &mut program.feedback.trackers(), &mut report);
+    let seen = feedback.get(Signal::DigitalInputs);
+    assert_eq!(seen, place.map(|_| i64::from(word)), "the word as it is");
+    assert_eq!(program.knows_status(StatusBits::LIMIT_SWITCHES), place.is_some());
+    place.map(|_| feedback.status & StatusBits::INPUTS)
+}
+
+#[test]
+fn switches_are_status_bits_where_the_inputs_are_sent() {
+    let told = StatusBits::LIMIT_SWITCHES;
+    let [positive, negative] = [StatusBits::POSITIVE_LIMIT_SWITCH, StatusBits::NEGATIVE_LIMIT_SWITCH];
+    for (polarity, low, high) in
+        [(0, negative, positive), (0x40, negative, positive), (0x80, positive, negative)]
+    {
+        let mut facts = servo();
+        facts.note_data(object(0x607E, 0), &[polarity]);
+        let cases = [
+            (0, told),
+            (0x1, told | low),
+            (0x2, told | high),
+            (0x4, told | StatusBits::HOME_SWITCH),
+            (0xFFFF_0008, told),
+            (0x7, told | low | high | StatusBits::HOME_SWITCH),
+        ];
+        for (word, expected) in cases {
+            let here = inputs(&facts, CaptureMode::Off, Vec::new(), word);
+            assert_eq!(here, Some(expected), "607E {polarity:02X}, 60FD {word:08X}");
+        }
+    }
+    let left_out = vec![Signal::DigitalInputs];
+    assert_eq!(inputs(&servo(), CaptureMode::ServiceChannel, left_out.clone(), 0x7), None, "not asked for");
+    let with_events = inputs(&servo(), CaptureMode::Cyclic, left_out, 0x2);
+    assert_eq!(with_events, Some(told | positive), "there for the home switch, so all see it");
+    let mut without = servo();
+    without.note_missing(object(0x60FD, 0));
+    assert_eq!(inputs(&without, CaptureMode::Cyclic, Vec::new(), 0), None, "the drive has none");
+}
+
+#[test]
+fn the_following_error_is_that_of_the_drive_where_it_is_sent() {
+    for (polarity, expected) in [(0x00, 250_000_000), (0x80, 250_000_000)] {
+        let mut facts = servo();
+        facts.note_data(object(0x607E, 0), &[polarity]);
+        let axis = Cia402Axis { left_out: vec![Signal::DigitalInputs], ..axis(&ALL[..1]) };
+        let program = shipped().cia402_program(&axis, &facts).unwrap();
+        let (at, len) = program.place_of_feedback(Item::object(0x60F4, 0)).unwrap();
+        let mut telegram = vec![0; usize::from(program.telegram.feedback_bytes)];
+        telegram[at..at + len].copy_from_slice(&900_i32.to_le_bytes());
+        let mut feedback = AxisFeedback::default();
+        let mut report = ConversionReport::default();
+        program.decode(&telegram, false, &mut feedback, &mut program.feedback.trackers(), &mut report);
+        assert_eq!(feedback.get(Signal::FollowingError), Some(expected), "{polarity:02X}");
+    }
 }

@@ -18,8 +18,9 @@ use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::mapping::cip_events::{EventRule, EventTrigger};
 use crate::mapping::compile_cip::{
-    CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, MAX_FAULTS, MAX_INHIBITS,
-    MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue, StatusRule,
+    CipConditions, CipFault, CipRequest, CipState, CipStopping, InhibitRule, IoStatusRule, MAX_FAULTS,
+    MAX_INHIBITS, MAX_IO_STATUS_RULES, MAX_REQUESTS, MAX_STATUS_RULES, MAX_STOPPINGS, MissingValue,
+    StatusRule,
 };
 use crate::mapping::device_link::DRIVE_ACTIONS;
 use crate::mapping::dictionary::{Access, CipAttribute, Dictionaries, quantity};
@@ -60,6 +61,7 @@ impl CipTables {
         for row in &rows.fault {
             builder.fault(row);
         }
+        builder.io_status(rows);
         builder.reactions(rows);
         builder.inhibits(rows);
         builder.stoppings(rows);
@@ -321,15 +323,36 @@ impl Builder<'_> {
         }
     }
 
+    /// All of these status bits.
+    fn status_bits(&mut self, names: &[Name]) -> Option<StatusBits> {
+        let mut bits = StatusBits::empty();
+        for name in names {
+            bits |= status_bit(&mut self.resolver, name)?;
+        }
+        Some(bits)
+    }
+
+    fn io_status(&mut self, rows: &CipGenericFile) {
+        for row in &rows.io_status {
+            let status = self.status_bits(&row.status);
+            let without = self.status_bits(&row.without);
+            let bit = self.bit("Axis I/O Status", "io_status", &row.io_status);
+            let inverted = match &row.inverted {
+                Some(name) => self.bit("Axis I/O Status", "inverted", name),
+                None => bit,
+            };
+            let (Some(status), Some(without), Some(bit), Some(inverted)) = (status, without, bit, inverted)
+            else {
+                continue;
+            };
+            let bits = [1 << bit, 1 << inverted];
+            self.tables.io_status.push(IoStatusRule { status, without, bits });
+        }
+    }
+
     fn status(&mut self, rows: &CipGenericFile) {
         for row in &rows.status {
-            let mut status = StatusBits::empty();
-            for name in &row.status {
-                match status_bit(&mut self.resolver, name) {
-                    Some(bit) => status |= bit,
-                    None => return,
-                }
-            }
+            let Some(status) = self.status_bits(&row.status) else { continue };
             let mode = match &row.mode {
                 None => None,
                 Some(name) => match operating_mode(&mut self.resolver, name) {
@@ -388,6 +411,8 @@ impl Builder<'_> {
                 self.resolver.error(code::TWICE, row.cause.span(), "cause", "the cause is there twice");
             }
             self.tables.faults.push((cause, *fault));
+            let opposite = row.inverted.as_ref().and_then(|name| self::cause(&mut self.resolver, name));
+            self.tables.opposites.extend(opposite.map(|opposite| (cause, opposite)));
             self.exception(row, cause, *fault);
         }
     }
@@ -551,6 +576,7 @@ impl Builder<'_> {
             zero_speed_time: self.attribute_id("zero_speed_time", &row.zero_speed_time),
             ramp_deceleration: self.attribute_id("ramp_deceleration", &row.ramp_deceleration),
             flying_start: self.attribute_id("flying_start", &row.flying_start),
+            overtravel_checking: self.attribute_id("overtravel_checking", &row.overtravel_checking),
         };
     }
 
@@ -709,6 +735,7 @@ impl Builder<'_> {
         let limits = [
             ("request", tables.requests.len(), MAX_REQUESTS),
             ("status", tables.status.len(), MAX_STATUS_RULES),
+            ("io_status", tables.io_status.len(), MAX_IO_STATUS_RULES),
             ("fault", tables.faults.len(), MAX_FAULTS),
             ("inhibit", tables.inhibits.len(), MAX_INHIBITS),
             ("stopping", tables.stoppings.len(), MAX_STOPPINGS),

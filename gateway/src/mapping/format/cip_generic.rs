@@ -35,6 +35,8 @@ pub struct CipGenericFile {
     pub state: Vec<CipStateRow>,
     /// Status bits.
     pub status: Vec<StatusRow>,
+    /// Inputs and outputs.
+    pub io_status: Vec<IoStatusRow>,
     /// Faults.
     pub fault: Vec<CipFaultRow>,
     /// Reactions to faults.
@@ -267,6 +269,23 @@ pub struct StatusRow {
     pub source: Source,
 }
 
+/// A bit of Axis I/O Status and the status bits that it follows from.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IoStatusRow {
+    /// Generic status bits that must all be set.
+    pub status: Vec<Name>,
+    /// Generic status bits none of which may be set.
+    #[serde(default)]
+    pub without: Vec<Name>,
+    /// Axis I/O Status bit.
+    pub io_status: Name,
+    /// The bit in its place for a controller that has inverted Motion Polarity. Default: the same.
+    pub inverted: Option<Name>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
 /// A fault cause and how CIP reports it.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -292,6 +311,8 @@ pub struct CipFaultRow {
     pub least: Option<Name>,
     /// The action until another is set; Major Fault where it is absent.
     pub default: Option<Name>,
+    /// The cause as which it is told a controller that has inverted Motion Polarity. Default: the same.
+    pub inverted: Option<Name>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -362,6 +383,8 @@ pub struct SequenceRow {
     pub ramp_deceleration: Name,
     /// Whether an axis may be started while it moves.
     pub flying_start: Name,
+    /// Whether a limit switch stops it.
+    pub overtravel_checking: Name,
     /// Where it comes from.
     pub source: Source,
 }

@@ -258,6 +258,8 @@ pub struct Cia402StatusRow {
     pub modes: Vec<Name>,
     /// Generic status bit.
     pub status: Name,
+    /// The bit in its place in a drive that inverts its positions. Default: the same.
+    pub inverted: Option<Name>,
     /// Where it comes from.
     pub source: Source,
 }
@@ -298,6 +300,11 @@ pub struct Cia402ParameterRow {
     pub parameter: Name,
     /// Object.
     pub object: Name,
+    /// The object in its place in a drive that inverts its positions. Default: the same.
+    pub inverted: Option<Name>,
+    /// What limits both directions at once in a drive without the object: the least of the values that fall to it is written at
+    /// start.
+    pub common: Option<Name>,
     /// `both`, `to_drive` or `from_drive`.
     pub direction: Name,
     /// What happens when the drive has no such object: `shadow` or `reject`.

@@ -82,6 +82,7 @@ const CIP_GENERIC: &[Section] = &[
     section("drive_action", &["drive_action"]),
     section("state", &["state"]),
     section("status", &["status", "mode", "axis_status"]),
+    section("io_status", &["io_status"]),
     section("fault", &["cause"]),
     section("reaction", &["reaction"]),
     section("inhibit", &["inhibit"]),

@@ -87,6 +87,48 @@ fn fills_the_image_of_the_device() {
     assert_eq!(image.axis_status.bits(), 0x0042_002C);
     assert_eq!((image.start_inhibits, image.start_inhibits_mfg), (1 << 1, 1 << 5));
     assert!(image.conditions.as_slice().is_empty());
+    assert!(image.io_status.is_empty());
+}
+
+#[test]
+fn switches_become_axis_io_status_while_the_drive_is_heard() {
+    use profile_generic::fault::FaultCause;
+    let tells = StatusBits::LIMIT_SWITCHES;
+    let [forward, back] = [StatusBits::POSITIVE_LIMIT_SWITCH, StatusBits::NEGATIVE_LIMIT_SWITCH];
+    // Bits 1, 4 and 5 (Table 5-2.63); those of a controller that has inverted the direction behind them.
+    let cases = [
+        (StatusBits::empty(), [0, 0]),
+        (StatusBits::HOME_SWITCH, [0x02, 0x02]),
+        (tells, [0x30, 0x30]),
+        (tells | forward, [0x20, 0x10]),
+        (tells | back, [0x10, 0x20]),
+        (tells | forward | back | StatusBits::HOME_SWITCH, [0x02, 0x02]),
+    ];
+    for (place, inverted) in [false, true].into_iter().enumerate() {
+        let scaling = CipScaling { inverted, ..rotary_counts() };
+        let program = shipped().cip_program(&scaling).unwrap();
+        for (status, expected) in cases {
+            let feedback = AxisFeedback { status, ..AxisFeedback::default() };
+            for online in [false, true] {
+                let mut image = DriveImage { online, ..DriveImage::default() };
+                program.drive_image(&feedback, &FaultSet::new(), &mut image);
+                let expected = if online { expected[place] } else { 0 };
+                assert_eq!(image.io_status.bits(), expected, "{status:?}, inverted {inverted}, {online}");
+            }
+        }
+        // Bits 50 to 53 (Table 5-2.65).
+        let causes = [
+            FaultCause::HARDWARE_OVERTRAVEL_POSITIVE,
+            FaultCause::HARDWARE_OVERTRAVEL_NEGATIVE,
+            FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE,
+            FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE,
+        ];
+        let codes = causes.map(|cause| match program.fault(cause) {
+            Some(CipFault::Axis { code, .. }) => code,
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(codes, if inverted { [51, 50, 53, 52] } else { [50, 51, 52, 53] });
+    }
 }
 
 #[test]

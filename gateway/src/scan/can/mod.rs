@@ -2,10 +2,11 @@
 //!
 //! A [`Scanner`] asks every node-id for its device type, and who answers for its identity, name and modes. All of that is
 //! reading by SDO, which a device does in every state but stopped; no command of NMT is sent and nothing is written, so that
-//! nothing can move.
+//! nothing can move. Devices without a node-id are looked for in the end, by LSS; none is given one.
 
 mod report;
 mod starter;
+mod unassigned;
 
 #[cfg(test)]
 mod tests;
@@ -16,13 +17,15 @@ use profile_cia402::drive::index::{AXIS_OFFSET, SUPPORTED_MODES};
 use profile_cia402::drive::modes::SupportedModes;
 use profile_cia402::sdo::client::{Client, ClientConfig};
 use profile_cia402::sdo::request::{SdoFailure, SdoRequest};
+use profile_cia402::wire::lss::LssAddress;
 use profile_cia402::wire::{Function, Mux, NodeId, cob_id};
 use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use report::{json, text};
-pub use starter::starter;
+pub use starter::{hints, starter};
 
+use self::unassigned::Search;
 use crate::engine::port::{CanInput, CanPort, CanSent};
 
 /// How long a device may take for an answer: who is there answers within some milliseconds.
@@ -112,6 +115,17 @@ impl Found {
     }
 }
 
+/// What a scan has found.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Bus {
+    /// Devices with a node-id, by node-id.
+    pub nodes: Vec<Found>,
+    /// LSS addresses of devices without one, the lowest first.
+    pub unassigned: Vec<LssAddress>,
+    /// What was odd.
+    pub findings: Vec<String>,
+}
+
 /// A node-id that is being asked.
 #[derive(Debug)]
 struct Probe {
@@ -164,6 +178,8 @@ pub struct Scanner {
     waiting: VecDeque<NodeId>,
     probes: Vec<Probe>,
     found: Vec<Found>,
+    search: Search,
+    findings: Vec<String>,
     /// What the transmit queue had no room for.
     held: Option<Frame>,
     again: Option<MonotonicTime>,
@@ -182,7 +198,26 @@ impl Scanner {
     #[must_use]
     pub fn new() -> Self {
         let waiting = (1..=NodeId::MAX.get()).filter_map(|node| NodeId::new(node).ok()).collect();
-        Self { waiting, probes: Vec::new(), found: Vec::new(), held: None, again: None, full_since: None }
+        Self {
+            waiting,
+            probes: Vec::new(),
+            found: Vec::new(),
+            search: Search::new(),
+            findings: Vec::new(),
+            held: None,
+            again: None,
+            full_since: None,
+        }
+    }
+
+    /// Ends the scan at once; what is found counts. [`Scanner::step`] has still to leave the devices as they were.
+    pub fn give_up(&mut self, now: MonotonicTime, why: &str) {
+        if !self.findings.iter().any(|finding| finding == why) {
+            self.findings.push(why.to_owned());
+        }
+        self.waiting.clear();
+        self.probes.clear();
+        self.search.give_up(now);
     }
 
     /// Does what there is to do; `true` when all have been asked, or the bus is off or takes no frames.
@@ -209,12 +244,17 @@ impl Scanner {
             }
             !done
         });
+        let asked = self.probes.is_empty() && self.waiting.is_empty() && self.held.is_none();
+        let over = asked && self.search.run(now);
         self.send(now, port);
         let stuck = self.full_since.is_some_and(|since| now.since(since) > STUCK_MAX);
-        stuck || self.probes.is_empty() && self.waiting.is_empty()
+        stuck || over
     }
 
     fn take(&mut self, now: MonotonicTime, frame: &Frame) {
+        if frame.id() == cob_id::LSS_RESPONSE && !frame.is_remote() {
+            self.search.handle(now, frame.data());
+        }
         let Some(Function::SdoResponse(node)) = Function::of(frame.id()) else { return };
         if let Some(probe) = self.probes.iter_mut().find(|probe| probe.found.node == node) {
             // What is no answer leaves the time-out running.
@@ -225,11 +265,13 @@ impl Scanner {
     fn send(&mut self, now: MonotonicTime, port: &mut dyn CanPort) {
         self.again = None;
         loop {
+            let Self { probes, search, .. } = self;
             let next = self.held.take().or_else(|| {
-                self.probes.iter_mut().find_map(|probe| {
+                let question = probes.iter_mut().find_map(|probe| {
                     let bytes = probe.client.poll(now)?;
                     Frame::new(cob_id::sdo_request(probe.found.node), &bytes).ok()
-                })
+                });
+                question.or_else(|| search.poll(now))
             });
             let Some(frame) = next else { return };
             if port.send(now, &frame) == CanSent::Full {
@@ -244,13 +286,17 @@ impl Scanner {
     /// When to call [`Scanner::step`] again, unless a frame comes before.
     #[must_use]
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        self.probes.iter().filter_map(|probe| probe.client.wake_at()).chain(self.again).min()
+        // Nothing else can be done while the queue is full.
+        let clients = || self.probes.iter().filter_map(|probe| probe.client.wake_at());
+        self.again.or_else(|| clients().chain(self.search.wake_at()).min())
     }
 
-    /// Who was found, by node-id.
+    /// Who was found.
     #[must_use]
-    pub fn finish(mut self) -> Vec<Found> {
+    pub fn finish(mut self) -> Bus {
         self.found.sort_by_key(|found| found.node);
-        self.found
+        let (unassigned, findings) = self.search.finish();
+        self.findings.extend(findings);
+        Bus { nodes: self.found, unassigned, findings: self.findings }
     }
 }

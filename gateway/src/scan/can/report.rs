@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use profile_cia402::drive::modes::SupportedModes;
 use serde_json::{Value, json};
 
-use super::{DEVICE_TYPE, Found, HARDWARE, IDENTITY, NAME, SOFTWARE};
+use super::{Bus, DEVICE_TYPE, Found, HARDWARE, IDENTITY, NAME, SOFTWARE};
 
 /// Low word of the device type of CiA 402, and bit 17 of a servo drive.
 const PROFILE: u32 = 402;
@@ -29,11 +29,26 @@ const NUMBERS: [&str; 4] = ["vendor", "product", "revision", "serial number"];
 
 /// The findings as lines of text.
 #[must_use]
-pub fn text(found: &[Found]) -> String {
+pub fn text(bus: &Bus) -> String {
     let mut out = String::new();
-    let count = found.len();
-    let _ = writeln!(out, "{count} node{}", if count == 1 { "" } else { "s" });
-    for device in found {
+    let count = bus.nodes.len();
+    let _ = write!(out, "{count} node{}", if count == 1 { "" } else { "s" });
+    match bus.unassigned.len() {
+        0 => {}
+        1 => out.push_str(", 1 device without a node-id"),
+        many => {
+            let _ = write!(out, ", {many} devices without a node-id");
+        }
+    }
+    out.push('\n');
+    for finding in &bus.findings {
+        let _ = writeln!(out, "! {finding}");
+    }
+    if bus.nodes.is_empty() && bus.unassigned.is_empty() {
+        // Whoever is there may speak something else.
+        let _ = writeln!(out, "\nnobody answers by CANopen; drives on DeviceNet would not");
+    }
+    for device in &bus.nodes {
         let _ = writeln!(out, "\nnode {}: {}", device.node, title(device));
         let mut line = |what: &str, value: &str| {
             let _ = writeln!(out, "  {what:<14} {value}");
@@ -43,7 +58,7 @@ pub fn text(found: &[Found]) -> String {
         }
         for (what, object) in NUMBERS.into_iter().zip(IDENTITY) {
             if let Some(number) = device.number(object) {
-                line(what, &format!("{number:#010x} ({number})"));
+                line(what, &both(number));
             }
         }
         for (what, object) in [("hardware", HARDWARE), ("software", SOFTWARE)] {
@@ -62,13 +77,19 @@ pub fn text(found: &[Found]) -> String {
             }
         }
     }
+    for address in &bus.unassigned {
+        let _ = writeln!(out, "\nwithout a node-id: its LSS address");
+        for (what, number) in NUMBERS.into_iter().zip(address.0) {
+            let _ = writeln!(out, "  {what:<14} {}", both(number));
+        }
+    }
     out
 }
 
 /// The findings as one JSON object.
 #[must_use]
-pub fn json(found: &[Found]) -> Value {
-    let nodes = found.iter().map(|device| {
+pub fn json(bus: &Bus) -> Value {
+    let nodes = bus.nodes.iter().map(|device| {
         let [vendor, product, revision, serial] = IDENTITY.map(|object| device.number(object));
         let axes = device.axes().map(
             |(axis, modes)| json!({ "axis": axis, "supported_modes": modes.bits(), "modes": names(modes) }),
@@ -86,7 +107,20 @@ pub fn json(found: &[Found]) -> Value {
             "axes": axes.collect::<Vec<_>>(),
         })
     });
-    json!({ "nodes": nodes.collect::<Vec<_>>() })
+    let unassigned = bus.unassigned.iter().map(|address| {
+        let [vendor, product, revision, serial] = address.0;
+        json!({ "vendor": vendor, "product": product, "revision": revision, "serial_number": serial })
+    });
+    json!({
+        "nodes": nodes.collect::<Vec<_>>(),
+        "without_node_id": unassigned.collect::<Vec<_>>(),
+        "findings": bus.findings,
+    })
+}
+
+/// A number as data sheets have it and as type plates have it.
+fn both(number: u32) -> String {
+    format!("{number:#010x} ({number})")
 }
 
 /// What a device calls itself.

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use profile_cia402::drive::modes::SupportedModes;
 
-use super::Found;
 use super::report::title;
+use super::{Bus, Found};
 use crate::config::AXES_MAX;
 use crate::scan::starter::head;
 
@@ -27,8 +27,8 @@ const BIT_RATE: u32 = 1_000_000;
 ///
 /// `None` without a drive.
 #[must_use]
-pub fn starter(found: &[Found], interface: &str, bit_rate: Option<u32>) -> Option<String> {
-    let drives = found.iter().flat_map(|device| {
+pub fn starter(bus: &Bus, interface: &str, bit_rate: Option<u32>) -> Option<String> {
+    let drives = bus.nodes.iter().flat_map(|device| {
         let axes =
             device.axes().filter(|(_, modes)| USES.iter().any(|(_, wanted)| modes.intersects(*wanted)));
         axes.map(move |(axis, modes)| (device, axis, modes))
@@ -43,7 +43,7 @@ pub fn starter(found: &[Found], interface: &str, bit_rate: Option<u32>) -> Optio
     };
     let names: Vec<_> =
         drives.iter().map(|(device, axis, _)| format!("\"axis-{}\"", name(device, *axis))).collect();
-    let own = (1..=OWN_NODE).rev().find(|own| found.iter().all(|device| device.node.get() != *own))?;
+    let own = free(bus).next_back()?;
     let mut out = String::new();
     head(&mut out, &names, "min = \"10 ms\", max = \"80 ms\"");
     for (place, (device, axis, _)) in drives.iter().enumerate() {
@@ -102,4 +102,33 @@ node = {}
         }
     }
     Some(out)
+}
+
+/// Node-ids that nobody has.
+fn free(bus: &Bus) -> impl DoubleEndedIterator<Item = u8> + '_ {
+    (1..=OWN_NODE).filter(|own| bus.nodes.iter().all(|device| device.node.get() != *own))
+}
+
+/// What to add for the devices without a node-id, as remarks: which node-id each is to have, and whether it is given one at
+/// all, is not for a scan to say. Empty where there are none.
+#[must_use]
+pub fn hints(bus: &Bus) -> String {
+    let mut out = String::new();
+    let mut nodes = free(bus);
+    // That of the box.
+    nodes.next_back();
+    for (address, node) in bus.unassigned.iter().zip(nodes) {
+        let [vendor, product, revision, serial] = address.0;
+        let _ = write!(
+            out,
+            "
+# A device without a node-id: with these lines, and a drive with this node, the box gives it one.
+# [[south.can.device]]
+# node = {node} # CHANGE: the node-id that it is to have
+# identity = {{ vendor_id = {vendor:#010x}, product_code = {product:#010x}, revision_number = {revision:#010x}, serial_number = {serial:#010x} }}
+# lss = \"assign\"
+"
+        );
+    }
+    out
 }

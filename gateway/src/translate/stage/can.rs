@@ -10,10 +10,10 @@ use profile_generic::can::Id;
 
 use super::{Behind, Stage, StageAxis, StageError};
 use crate::config::Config;
-use crate::engine::build::can::network;
+use crate::engine::build::can::{described, network};
 use crate::engine::build::scaling;
 use crate::engine::bus::can::commissioner;
-use crate::engine::bus::can::layout::{AxisPdos, Part};
+use crate::engine::bus::can::layout::{AxisPdos, FoundPdos, Part};
 use crate::mapping::{Cia402Axis, CipScaling, DriveProgram, Item, Mapping, ObjectFacts, ObjectStep, Plan};
 use crate::simulate::can_bus::InProcessCan;
 
@@ -89,6 +89,8 @@ pub struct CanMember {
     pub node: NodeId,
     /// The PDOs that it may have.
     pub pdos: AxisPdos,
+    /// The PDOs that its device has, where they are used as they are.
+    pub found: Option<FoundPdos>,
     /// What it is needed for.
     pub needs: Cia402Axis,
     /// The scaling of the controller.
@@ -179,10 +181,11 @@ pub(super) fn configured(
                 drive,
                 node,
                 pdos: setup.pdos,
+                found: described(&config.can[bus], node),
                 needs: setup.needs,
                 scaling: scaling(axis),
             };
-            axes.push((setup.axis, on_can(mapping, member, &sheet)?));
+            axes.push((setup.axis, StageAxis { bus, ..on_can(mapping, member, &sheet)? }));
         }
     }
     Ok(axes)
@@ -196,6 +199,7 @@ fn on_can(mapping: &Mapping, member: CanMember, sheet: &DeviceDescription) -> Re
     Ok(StageAxis {
         north: mapping.cip_program(&member.scaling).ok_or_else(no_ratio)?,
         attributes: mapping.attribute_table(&member.scaling).ok_or_else(no_ratio)?,
+        bus: 0,
         behind: Behind::Can(behind),
         stands_in: member.needs.counts.is_empty(),
         south,
@@ -217,10 +221,16 @@ fn lead(
     let facts = asked(mapping, node.get(), needs, sheet)?;
     let program = mapping.cia402_program(needs, &facts).map_err(|error| error.to_string())?;
     let telegram = &program.telegram;
-    let both = commissioner::pdos(mapping, &member.pdos, &telegram.command, &telegram.feedback)
-        .map_err(|error| error.to_string())?;
+    let both = commissioner::pdos(
+        mapping,
+        &member.pdos,
+        &telegram.command,
+        &telegram.feedback,
+        member.found.as_ref(),
+    );
+    let both = both.map_err(|error| error.to_string())?;
     let mut pdos = Vec::new();
-    for (direction, (configs, spread)) in [Direction::Receive, Direction::Transmit].into_iter().zip(both) {
+    for (direction, (configs, spread)) in Direction::BOTH.into_iter().zip(both) {
         for (place, config) in configs.iter().enumerate() {
             let id = config.id(direction, node).and_then(|id| match id {
                 Id::Standard(id) => Some(id),

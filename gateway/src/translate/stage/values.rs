@@ -57,6 +57,10 @@ impl Stage {
                     let message = format!("{drive} is a SERCOS drive and has no objects");
                     return Err(ValuesError::Drive { line, message });
                 }
+                (Behind::Devicenet(_), _) => {
+                    let message = format!("{drive} is on DeviceNet: its scaling stands in the configuration");
+                    return Err(ValuesError::Drive { line, message });
+                }
                 (Behind::Can(_), Item::Idn(_) | Item::Attribute(_)) => {
                     let message = format!("{drive} is on CANopen and has no IDNs");
                     return Err(ValuesError::Drive { line, message });

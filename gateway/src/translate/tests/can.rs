@@ -4,6 +4,7 @@ use profile_cia402::eds;
 use profile_cia402::master::config::Direction;
 use profile_cia402::wire::NodeId;
 use profile_cip::wire::motion::codes::AxisControl;
+use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;
 use profile_generic::scaling::{NANO, UnitKind};
 use profile_generic::time::DurationNs;
@@ -32,10 +33,12 @@ fn stage() -> Stage {
             &mut SpareIds::new((5..=127).filter_map(|id| NodeId::new(id).ok()).collect()),
         )
         .unwrap(),
+        found: None,
         needs: Cia402Axis {
             axis,
             modes: MODES.into_iter().map(Into::into).collect(),
             cycle: DurationNs::from_millis(2),
+            left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
             ..Cia402Axis::default()
         },
         scaling: CipScaling {
@@ -48,15 +51,6 @@ fn stage() -> Stage {
     };
     let members = [member(0, 1, "turntable"), member(1, 2, "index")];
     Stage::of_sheets(Mapping::embedded().unwrap(), members.map(|member| (member, &sheet))).unwrap()
-}
-
-fn lines(translator: &mut Translator, lines: &[&str]) -> String {
-    let mut all = String::new();
-    for line in lines {
-        let line = Line::parse(line).unwrap().unwrap();
-        all += &translator.line(&line).map_or_else(|error| format!("error: {error}\n"), |node| text(&node));
-    }
-    all
 }
 
 #[test]

@@ -19,7 +19,7 @@ impl<'t> Reader<'_, 't> {
         self.unlisted(description);
         self.mandatory(description);
         self.pdo_counts(description);
-        for direction in [Direction::Receive, Direction::Transmit] {
+        for direction in Direction::BOTH {
             self.mappings(direction, description);
         }
     }
@@ -160,7 +160,7 @@ fn wrong_entry(entry: MappingEntry, direction: Direction, description: &DeviceDe
         Direction::Transmit => value.access.transmits(),
     };
     if !value.pdo_mapping || !allowed {
-        return Some(format!("an object that {direction} can carry"));
+        return Some(format!("an object that {direction}s can carry"));
     }
     match value.data_type.bits() {
         // A boolean may take a bit or a byte.

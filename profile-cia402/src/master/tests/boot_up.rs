@@ -62,12 +62,18 @@ fn the_frames_of_a_start() {
     );
 }
 
-#[test]
-fn a_configuration_of_the_same_date_is_not_written_again() {
+/// A network of one device, which is given a configuration with a date and time.
+fn stamped() -> MasterConfig {
     let mut config = network(1);
     config.nodes[0].writes =
         vec![Write { object: Mux::new(0x6060, 0), data: SdoData::inline(&[8]).unwrap() }];
     config.nodes[0].stamp = Some(Stamp { date: 15_000, time: 7 });
+    config
+}
+
+#[test]
+fn a_configuration_of_the_same_date_is_not_written_again() {
+    let config = stamped();
     for (date, time, written) in [(15_000, 7, 0), (15_000, 8, 1), (14_999, 7, 1), (0, 0, 1)] {
         let mut rig = rig(config.clone());
         rig.device(1).objects.set(Mux::CONFIGURATION_DATE, date);
@@ -80,6 +86,101 @@ fn a_configuration_of_the_same_date_is_not_written_again() {
         assert_eq!(objects.number(Mux::CONFIGURATION_DATE), 15_000);
         // The bytes are still there for the next time.
         assert_eq!(rig.master.config().nodes[0].writes[0].data.as_slice(), [8]);
+    }
+}
+
+/// What is stored comes last, may take its time, and is not stored again.
+#[test]
+fn a_configuration_is_stored_once() {
+    let mut config = stamped();
+    config.nodes[0].store = true;
+    let mut rig = rig(config);
+    rig.device(1).objects.values.insert(Mux::STORE, vec![0; 4]);
+    rig.master.start(rig.now);
+    rig.until("the stamp", |rig| rig.devices[0].objects.number(Mux::CONFIGURATION_TIME) == 7);
+    rig.device(1).answer_time = DurationNs::from_millis(2_000);
+    rig.until("store", |rig| rig.devices[0].objects.number(Mux::STORE) != 0);
+    rig.device(1).answer_time = DurationNs::from_micros(300);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    let configured = |rig: &Rig| -> Vec<(Mux, u64)> {
+        let all = rig.devices[0].objects.writes.iter();
+        all.filter(|(object, _)| [0x6060, 0x1020, 0x1010].contains(&object.index)).copied().collect()
+    };
+    let once = [
+        (Mux::new(0x6060, 0), 8),
+        (Mux::CONFIGURATION_DATE, 15_000),
+        (Mux::CONFIGURATION_TIME, 7),
+        (Mux::STORE, 0x6576_6173),
+    ];
+    assert_eq!(configured(&rig), once);
+    rig.master.stop(rig.now);
+    rig.forget();
+    rig.master.start(rig.now);
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    assert_eq!(configured(&rig), once, "nothing is written and nothing stored a second time");
+}
+
+#[test]
+fn what_cannot_be_told_to_be_there_is_not_stored() {
+    let mut config = stamped();
+    config.nodes[0].store = true;
+    let mut rig = rig(config);
+    rig.device(1).objects.values.insert(Mux::STORE, vec![0; 4]);
+    rig.device(1).objects.values.remove(&Mux::CONFIGURATION_TIME);
+    rig.master.start(rig.now);
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    let step = "configure write 1020:02: refused with 06020000: object does not exist";
+    assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, step.into()));
+    assert_eq!(rig.device(1).objects.number(Mux::STORE), 0);
+}
+
+/// A device whose PDOs are as they are: neither mapping nor communication parameters can be written.
+#[test]
+fn a_mapping_that_is_kept_is_not_written_and_must_be_the_one() {
+    let fixed = |rig: &mut Rig, entry: u32| {
+        let objects = &mut rig.device(1).objects;
+        objects.fixed_mapping = true;
+        for (communication, word) in [(0x1400, 0x201_u32), (0x1800, 0x4000_0181)] {
+            for sub in [1, 2] {
+                objects.refuse.insert(Mux::new(communication, sub), AbortCode::READ_ONLY);
+            }
+            assert_eq!(objects.number(Mux::new(communication, 1)), word);
+        }
+        objects.fixed = vec![
+            (Mux::new(0x1400, 2), 1),
+            (Mux::new(0x1800, 2), 1),
+            (Mux::new(0x1A00, 0), 2),
+            (Mux::new(0x1A00, 1), STATUSWORD.0),
+            (Mux::new(0x1A00, 2), entry),
+        ];
+        objects.default_pdos(id(1));
+    };
+    for entry in [POSITION.0, 0x606C_0020] {
+        let mut config = network(2);
+        let drive = &mut config.nodes[0];
+        for pdo in drive.rpdos.iter_mut().chain(&mut drive.tpdos) {
+            pdo.policy = MappingPolicy::Keep;
+        }
+        config.nodes[0].rpdos[0].mapping = vec![CONTROLWORD];
+        config.nodes[0].tpdos[0].mapping = vec![STATUSWORD, POSITION];
+        let mut rig = rig(config);
+        fixed(&mut rig, entry);
+        rig.master.start(rig.now);
+        if entry == POSITION.0 {
+            rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+            let written = rig.devices[0]
+                .objects
+                .writes
+                .iter()
+                .filter(|(object, _)| (0x1600..0x1C00).contains(&object.index));
+            assert_eq!(written.filter(|(object, _)| matches!(object.index, 0x1600 | 0x1A00)).count(), 0);
+            rig.comes_up(&[1, 2]);
+        } else {
+            rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+            let step = "map read 1A00:02: expected 0x60640020, got 0x606c0020";
+            assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, step.into()));
+            rig.comes_up(&[2]);
+        }
     }
 }
 

@@ -13,8 +13,10 @@ pub struct Objects {
     pub values: BTreeMap<Mux, Vec<u8>>,
     /// Objects that refuse to be written.
     pub refuse: BTreeMap<Mux, AbortCode>,
-    /// Whether mappings can be changed.
+    /// Whether mappings cannot be changed.
     pub fixed_mapping: bool,
+    /// What a reset of the communication gives to parameters of PDOs instead.
+    pub fixed: Vec<(Mux, u32)>,
     pub writes: Vec<(Mux, u64)>,
     /// Its flash, if it has one.
     pub flash: Option<Flash>,
@@ -111,6 +113,7 @@ impl Objects {
             values: BTreeMap::new(),
             refuse: BTreeMap::new(),
             fixed_mapping: false,
+            fixed: vec![],
             writes: vec![],
             flash: None,
             accesses: 0,
@@ -160,6 +163,9 @@ impl Objects {
                     self.values.insert(Mux::new(mapping, sub), vec![0; 4]);
                 }
             }
+        }
+        for (object, value) in self.fixed.clone() {
+            self.set(object, value);
         }
     }
 

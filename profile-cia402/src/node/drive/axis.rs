@@ -97,6 +97,8 @@ pub struct Axis {
     main_power: bool,
     remote: bool,
     limit_switches: [Position; 2],
+    /// It tells its limit switches, and does nothing about them.
+    ignores_limit_switches: bool,
 }
 
 impl Axis {
@@ -137,6 +139,7 @@ impl Axis {
             main_power: true,
             remote: true,
             limit_switches: [Position(i64::MIN), Position(i64::MAX)],
+            ignores_limit_switches: false,
         })
     }
 
@@ -173,6 +176,11 @@ impl Axis {
     /// Sets where the limit switches close, in positions of the servo: one at and below, the other at and above its place.
     pub fn set_limit_switches(&mut self, lower: Position, upper: Position) {
         self.limit_switches = [lower, upper];
+    }
+
+    /// Whether the drive leaves it to its master to stop the axis at a limit switch.
+    pub fn set_ignores_limit_switches(&mut self, ignores: bool) {
+        self.ignores_limit_switches = ignores;
     }
 
     /// Raises a fault, as writing its code to 2FFFh:1 does. One that comes while another one is present is not told.
@@ -785,20 +793,13 @@ impl Axis {
         let [negative, positive] = self.limit_switches;
         let window = self.servo.parameters().standstill_window.0;
         let velocity = self.actual.velocity.0;
-        // The switch at the end where positions are lowest is the negative one, whichever way the servo turns.
-        let sign = self.scales.position_sign();
-        let (mut limits, mut places) = ([here <= negative, here >= positive], [negative.0, positive.0]);
-        if sign < 0 {
-            limits.reverse();
-            places.reverse();
-        }
+        // 607Eh turns what positions and velocities are told as. Switches stay where they are, and homing looks for them there.
         Senses {
-            limits,
-            limit_places: places,
-            sign,
+            limits: [here <= negative, here >= positive],
+            limit_places: [negative.0, positive.0],
             home: self.actual.digital_inputs & profile_generic::servo::input::HOME_SWITCH != 0,
             passed,
-            moves: if velocity.abs() <= window { 0 } else { sign * velocity.signum() },
+            moves: if velocity.abs() <= window { 0 } else { velocity.signum() },
             span,
         }
     }
@@ -867,7 +868,7 @@ impl Axis {
         }
         let senses = self.senses(Passed::default(), 0);
         let into = senses.limits[0] && senses.moves < 0 || senses.limits[1] && senses.moves > 0;
-        if enabled && into && self.mode != Mode::HOMING {
+        if enabled && into && self.mode != Mode::HOMING && !self.ignores_limit_switches {
             self.raise_fault(ErrorCode::REFERENCE_LIMIT, dictionary);
         }
         self.watch_windows(elapsed, dictionary);

@@ -23,10 +23,8 @@ pub(super) struct Senses {
     pub home: bool,
     /// What passed since the last step.
     pub passed: Passed,
-    /// 1, 0 or -1: how the axis moves.
+    /// 1, 0 or -1: how the servo turns. All directions are its own, whichever way positions count.
     pub moves: i64,
-    /// -1 where the servo turns the other way than positions count. All other directions are those of positions.
-    pub sign: i64,
     /// Time since the last step, nanoseconds.
     pub span: i64,
 }
@@ -122,7 +120,7 @@ impl Homing {
         let rate = speeds.acceleration.max(1);
         let pace = Pace { velocity: speeds.fast.max(1), acceleration: rate, deceleration: rate };
         let go = |motion: &mut Motion, toward: Direction, speed: i64| {
-            motion.advance(senses.span, senses.sign * toward.sign() * speed.max(1), pace);
+            motion.advance(senses.span, toward.sign() * speed.max(1), pace);
         };
         match (self.step, self.plan) {
             (Step::Idle | Step::Done | Step::Failed, _) => motion.advance(senses.span, 0, pace),
@@ -134,7 +132,7 @@ impl Homing {
             }
             (Step::Index(toward, edge), _) => {
                 go(motion, toward, speeds.slow);
-                let ahead = senses.sign * toward.sign();
+                let ahead = toward.sign();
                 let beyond = |place: i64| edge.is_none_or(|edge| (place - edge) * ahead >= 0);
                 let found =
                     senses.passed.index.filter(|place| senses.moves == toward.sign() && beyond(*place));

@@ -7,8 +7,9 @@ use crate::drive::homing::Method;
 use crate::drive::index::*;
 use crate::drive::modes::SupportedModes;
 use crate::node::dictionary::{DataType, Definition, Dictionary, Mapping, Shape};
-use crate::node::pdo::{self, AXIS_STEP, Direction, Preset};
+use crate::node::pdo::{self, AXIS_STEP, Preset};
 use crate::wire::Mux;
+use crate::wire::pdo::Direction;
 use crate::wire::pdo::MappingEntry;
 
 /// Device type: 402, a servo drive.

@@ -375,7 +375,8 @@ fn the_time_of_day_is_taken() {
 fn a_node_id_comes_by_lss() {
     let device = Device::new(&[ServoParameters::default()]).unwrap();
     let boot_time = DurationNs::from_millis(10);
-    let config = Config { node: None, identity: identity(1, 77), boot_time, has_blocks: true };
+    let config =
+        Config { node: None, identity: identity(1, 77), boot_time, has_blocks: true, has_mapping: true };
     let mut rig = Rig { node: Node::new(&config, device), now: MonotonicTime(0), sent: Vec::new() };
     rig.run(100);
     rig.send(0, &[1, 0]);

@@ -245,6 +245,21 @@ impl MotionEnd {
         Ok(())
     }
 
+    /// Takes note of an update that somebody else has sent to the device: its next message answers that.
+    pub fn overhear(&mut self, command: &FixedCommand) {
+        self.expect(command.update_id);
+        match command.axis_control {
+            AxisControl::NONE if self.asked() == AxisControl::NONE => {}
+            AxisControl::NONE => self.handshake = Handshake::default(),
+            code => self.order(Some(code)),
+        }
+    }
+
+    /// The next message of the device answers this update.
+    pub const fn expect(&mut self, update_id: u8) {
+        self.update_id = update_id;
+    }
+
     /// Takes a message of the device.
     ///
     /// # Errors

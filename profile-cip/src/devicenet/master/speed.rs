@@ -43,6 +43,12 @@ impl SpeedEnd {
         Ok(end)
     }
 
+    /// The assembly that the drive consumes.
+    #[must_use]
+    pub const fn output(&self) -> Assembly {
+        self.output
+    }
+
     /// Lengths of the poll connection: to the drive, and from it.
     #[must_use]
     pub const fn lengths(&self) -> (usize, usize) {

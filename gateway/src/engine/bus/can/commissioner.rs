@@ -5,7 +5,7 @@
 //! cycle thread                          commissioner, on a thread of its own
 //!   Begin ---------------------------->  for each axis of the device: what is asked, what follows from that, its program
 //!   <------------------- Submit { request }, several at a time
-//!   Outcome, Unsent ------------------>
+//!   Outcome, Unsent ------------------>  where the mapping is kept, its PDOs
 //!   <------------------- Program of each axis, then Pdos; or Failed
 //! ```
 //!
@@ -19,7 +19,8 @@ use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{Mux, NodeId};
 
-use super::layout::{AxisPdos, NoRoom, Spread, object};
+use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, Spread, object};
+use super::look::Look;
 use crate::engine::notice::Notice;
 use crate::mapping::{
     Cia402Axis, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep, Plan,
@@ -142,6 +143,9 @@ pub enum Misfit {
     /// Its values do not fit its PDOs.
     #[error("{0}")]
     Room(#[from] NoRoom),
+    /// Its values are not in the PDOs that it keeps.
+    #[error("{0}")]
+    Mapped(#[from] NotMapped),
     /// More devices with several axes than there are free identifiers.
     #[error("no identifiers are left for its PDOs: expected fewer devices with several axes")]
     Identifiers,
@@ -153,6 +157,15 @@ pub enum Misfit {
     Length(Item),
 }
 
+/// What is done with an axis.
+#[derive(Debug)]
+enum Task {
+    /// A plan of the tables.
+    Plan(Plan),
+    /// The PDOs are read that its device keeps.
+    Look(Look),
+}
+
 /// One device.
 #[derive(Debug)]
 struct Work {
@@ -160,7 +173,7 @@ struct Work {
     axes: Vec<AxisSetup>,
     run: Run,
     /// The axis that is being set up, and what is done with it; `None` when nothing is.
-    at: Option<(usize, Plan)>,
+    at: Option<(usize, Task)>,
     facts: ObjectFacts,
     /// Steps that are to come, and those that were sent, in order.
     steps: VecDeque<ObjectStep>,
@@ -276,7 +289,7 @@ impl Work {
         }
         match desk.mapping.cia402_steps(plan, &setup.needs, &self.facts) {
             Ok(steps) => {
-                self.at = Some((place, plan));
+                self.at = Some((place, Task::Plan(plan)));
                 self.steps = steps.into();
                 self.go_on(desk);
             }
@@ -290,14 +303,28 @@ impl Work {
         self.give_up();
     }
 
+    /// A step failed that the axis cannot do without.
+    fn break_off(&mut self, place: usize, failure: StepFailure, desk: &mut Desk) {
+        let (axis, node) = (self.number(place), self.node);
+        desk.waiting.push_back(Done::Failed(self.run, Notice::NodeCommissioning { axis, node, failure }));
+        self.give_up();
+    }
+
     fn number(&self, place: usize) -> u8 {
         self.axes.get(place).map_or(u8::MAX, |setup| u8::try_from(setup.axis).unwrap_or(u8::MAX))
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.
     fn go_on(&mut self, desk: &mut Desk) {
+        if let Some((_, Task::Look(look))) = &mut self.at {
+            while look.under_way() < WINDOW
+                && let Some(object) = look.next()
+            {
+                desk.waiting.push_back(Done::Submit(self.run, SdoRequest::upload(object)));
+            }
+        }
         while self.sent.len() < WINDOW
-            && let Some((place, _)) = self.at
+            && let Some((place, Task::Plan(_))) = self.at
             && let Some(step) = self.steps.pop_front()
         {
             let Some(request) = request(&step, &self.axes[place].needs) else {
@@ -309,19 +336,26 @@ impl Work {
             desk.waiting.push_back(Done::Submit(self.run, request));
             self.sent.push_back(step);
         }
-        if let Some((place, plan)) = self.at
-            && self.sent.is_empty()
-        {
-            self.at = None;
-            self.through(place, plan, desk);
+        let is_through = match &self.at {
+            Some((_, Task::Look(look))) => look.under_way() == 0,
+            Some((_, Task::Plan(_))) => self.sent.is_empty(),
+            None => false,
+        };
+        if is_through && let Some((place, task)) = self.at.take() {
+            self.through(place, task, desk);
         }
     }
 
-    fn through(&mut self, place: usize, plan: Plan, desk: &mut Desk) {
-        if plan == Plan::Ask {
-            self.set_out(place, Plan::Tell, desk);
-            return;
-        }
+    fn through(&mut self, place: usize, task: Task, desk: &mut Desk) {
+        let found = match task {
+            Task::Plan(Plan::Ask) => return self.set_out(place, Plan::Tell, desk),
+            Task::Plan(_) if self.axes[place].pdos.kept => {
+                self.at = Some((place, Task::Look(Look::new(self.axes[place].pdos))));
+                return self.go_on(desk);
+            }
+            Task::Plan(_) => None,
+            Task::Look(look) => Some(look.found()),
+        };
         let axis = self.number(place);
         if !self.passed_over.is_empty() {
             let failures = std::mem::take(&mut self.passed_over);
@@ -332,7 +366,7 @@ impl Work {
             .mapping
             .cia402_program(&setup.needs, &self.facts)
             .map_err(Misfit::from)
-            .and_then(|program| Ok((spread(&desk.mapping, setup, &program)?, program)));
+            .and_then(|program| Ok((spread(&desk.mapping, setup, &program, found.as_ref())?, program)));
         let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
             Ok(made) => made,
             Err(error) => return self.fail(place, error, desk),
@@ -356,7 +390,18 @@ impl Work {
     }
 
     fn handle(&mut self, outcome: &SdoOutcome, desk: &mut Desk) {
-        let (Some(step), Some((place, _))) = (self.sent.pop_front(), self.at) else { return };
+        if let Some((place, Task::Look(look))) = &mut self.at {
+            let place = *place;
+            return match look.handle(outcome) {
+                Ok(()) => self.go_on(desk),
+                Err((object, failure)) => {
+                    let object = Object { index: object.index, sub: object.sub };
+                    self.break_off(place, StepFailure { what: "reading", object, failure }, desk);
+                }
+            };
+        }
+        let Some(place) = self.at.as_ref().map(|(place, _)| *place) else { return };
+        let Some(step) = self.sent.pop_front() else { return };
         let (object, what, must) = match &step {
             ObjectStep::Read { object, fail } => (*object, "reading", *fail),
             ObjectStep::Write { object, fail, .. } => (*object, "writing", *fail),
@@ -373,11 +418,7 @@ impl Work {
                 let gone = matches!(failure, SdoFailure::Timeout { .. } | SdoFailure::NodeLost);
                 let failure = StepFailure { what, object, failure };
                 if must || gone {
-                    let (axis, node) = (self.number(place), self.node);
-                    let notice = Notice::NodeCommissioning { axis, node, failure };
-                    desk.waiting.push_back(Done::Failed(self.run, notice));
-                    self.give_up();
-                    return;
+                    return self.break_off(place, failure, desk);
                 }
                 self.passed_over.push(failure);
             }
@@ -401,20 +442,22 @@ fn spread(
     mapping: &Mapping,
     setup: &AxisSetup,
     program: &DriveProgram,
+    found: Option<&FoundPdos>,
 ) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
     let telegram = &program.telegram;
-    pdos(mapping, &setup.pdos, &telegram.command, &telegram.feedback)
+    pdos(mapping, &setup.pdos, &telegram.command, &telegram.feedback, found)
 }
 
-/// RPDOs and TPDOs that carry these items.
+/// RPDOs and TPDOs that carry these items: those that were found, or such as the axis may have.
 ///
 /// # Errors
-/// There is no room, or no length is known.
+/// There is no room, no length is known, or an item is in none of those that were found.
 pub fn pdos(
     mapping: &Mapping,
     pdos: &AxisPdos,
     command: &[Item],
     feedback: &[Item],
+    found: Option<&FoundPdos>,
 ) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
     let values = |items: &[Item]| -> Result<Vec<(Object, u8)>, Misfit> {
         let value = |item: &Item| {
@@ -423,8 +466,12 @@ pub fn pdos(
         };
         items.iter().map(value).collect()
     };
-    Ok([
-        pdos.spread(Direction::Receive, &values(command)?)?,
-        pdos.spread(Direction::Transmit, &values(feedback)?)?,
-    ])
+    let (command, feedback) = (values(command)?, values(feedback)?);
+    if let Some([receive, transmit]) = found {
+        return Ok([
+            pdos.find(Direction::Receive, &command, receive)?,
+            pdos.find(Direction::Transmit, &feedback, transmit)?,
+        ]);
+    }
+    Ok([pdos.spread(Direction::Receive, &command)?, pdos.spread(Direction::Transmit, &feedback)?])
 }

@@ -1,13 +1,17 @@
 //! Which value goes in which PDO.
 //!
 //! A program sees the values of its drive as one row of bytes. They are spread over PDOs in their order, each in the first
-//! PDO that has room for it: control, mode and set-point of the first mode stand together.
+//! PDO that has room for it: control, mode and set-point of the first mode stand together. Where a device keeps its mapping, they
+//! are looked for in the PDOs that it has.
+
+use core::fmt;
 
 use arrayvec::ArrayVec;
 use profile_cia402::drive::index::AXIS_OFFSET;
-use profile_cia402::master::config::{Direction, PdoConfig};
+use profile_cia402::eds::drive::Pdo;
+use profile_cia402::master::config::{Direction, MappingPolicy, PdoConfig};
 use profile_cia402::wire::pdo::{MappingEntry, PDO_LEN_MAX};
-use profile_cia402::wire::{Mux, NodeId, cob_id};
+use profile_cia402::wire::{CobId, Mux, NodeId, cob_id};
 use profile_generic::can::Id;
 
 use crate::mapping::{Item, Object};
@@ -15,8 +19,14 @@ use crate::mapping::{Item, Object};
 /// PDOs of an axis, each way.
 pub const PDOS_MAX: usize = 4;
 
-/// Values of an axis, each way.
-pub const VALUES_MAX: usize = 16;
+/// Places of values of an axis, each way: as many as its PDOs have bytes.
+const PARTS_MAX: usize = BYTES_MAX;
+
+/// PDOs with identifiers of the default connection set.
+const DEFAULT_PDOS: u16 = 4;
+
+/// PDOs of an axis that are looked at where its device keeps its mapping, each way.
+pub const LOOKED_AT: u16 = 8;
 
 /// Bytes of an axis, each way.
 pub const BYTES_MAX: usize = PDOS_MAX * PDO_LEN_MAX;
@@ -40,7 +50,7 @@ pub struct Part {
 /// How the values of an axis are spread over its PDOs, one way.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Spread {
-    parts: ArrayVec<Part, VALUES_MAX>,
+    parts: ArrayVec<Part, PARTS_MAX>,
     numbers: ArrayVec<u16, PDOS_MAX>,
     len: usize,
 }
@@ -54,6 +64,72 @@ pub struct AxisPdos {
     pub ids: Option<[[Id; PDOS_MAX]; 2]>,
     /// How many TPDOs may be missing in a row.
     pub allowed_losses: u16,
+    /// Whether they are used as the device has them.
+    pub kept: bool,
+}
+
+/// A PDO as a device has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundPdo {
+    /// Its number, from 1.
+    pub number: u16,
+    /// Its identifier, if it has one.
+    pub id: Option<Id>,
+    /// What it carries.
+    pub mapping: Vec<MappingEntry>,
+}
+
+/// RPDOs and TPDOs as a device has them.
+pub type FoundPdos = [Vec<FoundPdo>; 2];
+
+impl FoundPdo {
+    /// A PDO by its COB-ID. One that does not exist yet has the identifier of the default connection set, if there is one.
+    #[must_use]
+    pub fn new(number: u16, cob_id: CobId, mapping: Vec<MappingEntry>) -> Self {
+        let own = cob_id.is_valid() || number > DEFAULT_PDOS;
+        Self { number, id: Some(cob_id.id()).filter(|id| own && *id != Id::Standard(0)), mapping }
+    }
+
+    /// A PDO by the description of its device.
+    #[must_use]
+    pub fn described(pdo: &Pdo) -> Self {
+        let word = CobId(pdo.cob_id.unwrap_or(0)).with_valid(pdo.valid);
+        let mapping = pdo.mapping.iter().map(|entry| MappingEntry(entry.word())).collect();
+        Self::new(pdo.number + 1, word, mapping)
+    }
+}
+
+/// `1: 6040:00 607A:00`.
+impl fmt::Display for FoundPdo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.number)?;
+        self.mapping.iter().try_for_each(|entry| write!(f, " {}", entry.mux()))
+    }
+}
+
+/// A value that is in none of the PDOs that a device keeps, or in none that can be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{object} is in no {direction} that can be used, and the mapping is kept: expected one{} got {found}", Only(*.direction))]
+pub struct NotMapped {
+    /// The value.
+    pub object: Object,
+    /// Which way it goes.
+    pub direction: Direction,
+    /// The PDOs that there are.
+    pub found: String,
+}
+
+/// What else may be in such a PDO.
+struct Only(Direction);
+
+impl fmt::Display for Only {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.0 {
+            // What nobody sets would be sent as zero.
+            Direction::Receive => " with nothing but what the axis is told,",
+            Direction::Transmit => ",",
+        })
+    }
 }
 
 /// Values that do not fit the PDOs of an axis.
@@ -95,7 +171,7 @@ impl AxisPdos {
             0 => None,
             _ => Some(spare.next()?),
         };
-        Some(Self { first: AXIS_STEP * axis + 1, ids, allowed_losses })
+        Some(Self { first: AXIS_STEP * axis + 1, ids, allowed_losses, kept: false })
     }
 
     /// Spreads values, with their lengths in bytes, over PDOs at every SYNC.
@@ -128,10 +204,7 @@ impl AxisPdos {
             used[pdo] += size;
             spread.len += size;
         }
-        let ids = self.ids.map(|[receive, transmit]| match direction {
-            Direction::Receive => receive,
-            Direction::Transmit => transmit,
-        });
+        let ids = self.ids_of(direction);
         let mut configs = Vec::with_capacity(pdos.len());
         for (number, (place, mapping)) in (self.first..).zip(pdos.into_iter().enumerate()) {
             spread.numbers.push(number);
@@ -144,6 +217,95 @@ impl AxisPdos {
         }
         Ok((configs, spread))
     }
+
+    fn ids_of(&self, direction: Direction) -> Option<[Id; PDOS_MAX]> {
+        self.ids.map(|[receive, transmit]| match direction {
+            Direction::Receive => receive,
+            Direction::Transmit => transmit,
+        })
+    }
+
+    /// Whether a PDO of a device may belong to the axis.
+    #[must_use]
+    pub fn numbers(&self) -> core::ops::Range<u16> {
+        self.first..self.first + LOOKED_AT
+    }
+
+    /// Finds values, with their lengths in bytes, in PDOs as a device has them. An RPDO is used if it brings nothing but these
+    /// values; a value that several of them bring is put into each.
+    ///
+    /// # Errors
+    /// A value is in none of them, or in too many different ones.
+    pub fn find(
+        &self,
+        direction: Direction,
+        values: &[(Object, u8)],
+        found: &[FoundPdo],
+    ) -> Result<(Vec<PdoConfig>, Spread), NotMapped> {
+        let found: Vec<&FoundPdo> = found.iter().filter(|pdo| self.numbers().contains(&pdo.number)).collect();
+        let listed = || {
+            let all: Vec<_> = found.iter().map(ToString::to_string).collect();
+            if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+        };
+        let missing = |object| NotMapped { object, direction, found: listed() };
+        let mut row = 0;
+        let mut froms = Vec::with_capacity(values.len());
+        for (_, len) in values {
+            froms.push(row);
+            row += usize::from(*len);
+        }
+        let usable = |pdo: &&FoundPdo| {
+            // Every bit is that of a value, or of a gap: nothing is sent that nobody has set.
+            let brought = values.iter().filter(|value| carries(pdo, value).is_some());
+            let brought: usize = brought.map(|(_, len)| usize::from(*len) * 8).sum();
+            let bits = |entry: &MappingEntry| usize::from(entry.bits());
+            let gaps: usize = pdo.mapping.iter().filter(|entry| entry.is_dummy()).map(bits).sum();
+            direction == Direction::Transmit || brought + gaps == pdo.mapping.iter().map(bits).sum::<usize>()
+        };
+        let mut free: Vec<&FoundPdo> = found.iter().copied().filter(usable).collect();
+        let mut rest: Vec<(Object, u8)> = values.to_vec();
+        let mut used: Vec<&FoundPdo> = Vec::new();
+        while let Some((first, _)) = rest.first() {
+            let brings = |pdo: &FoundPdo| rest.iter().filter(|value| carries(pdo, value).is_some()).count();
+            // The lowest number of those that bring as much.
+            let best = free.iter().copied().rev().max_by_key(|pdo| brings(pdo));
+            let best = best.filter(|pdo| brings(pdo) > 0 && used.len() < PDOS_MAX);
+            let best = best.ok_or_else(|| missing(*first))?;
+            rest.retain(|value| carries(best, value).is_none());
+            free.retain(|pdo| pdo.number != best.number);
+            used.push(best);
+        }
+        used.sort_by_key(|pdo| pdo.number);
+        let mut spread = Spread { len: row, ..Spread::default() };
+        let mut configs = Vec::with_capacity(used.len());
+        for (place, pdo) in used.iter().enumerate() {
+            spread.numbers.push(pdo.number);
+            for (value, from) in values.iter().zip(&froms) {
+                // What comes twice is taken from the first one.
+                let again =
+                    direction == Direction::Transmit && spread.parts.iter().any(|part| part.from == *from);
+                let Some(at) = carries(pdo, value).filter(|_| !again) else { continue };
+                let part = Part { pdo: place, at, from: *from, len: usize::from(value.1) };
+                spread.parts.try_push(part).map_err(|_| missing(value.0))?;
+            }
+            configs.push(PdoConfig {
+                id: pdo.id.or_else(|| Some(self.ids_of(direction)?[place])),
+                allowed_losses: self.allowed_losses,
+                policy: MappingPolicy::Keep,
+                ..PdoConfig::cyclic(pdo.number, pdo.mapping.clone())
+            });
+        }
+        Ok((configs, spread))
+    }
+}
+
+/// The byte of a PDO that a value begins at; `None` where it is not as a whole in it.
+fn carries(pdo: &FoundPdo, value: &(Object, u8)) -> Option<usize> {
+    let (object, len) = value;
+    let wanted = MappingEntry::new(Mux::new(object.index, object.sub), len * 8);
+    let place = pdo.mapping.iter().position(|entry| *entry == wanted)?;
+    let bits: usize = pdo.mapping[..place].iter().map(|entry| usize::from(entry.bits())).sum();
+    bits.is_multiple_of(8).then_some(bits / 8)
 }
 
 /// Identifiers of PDOs that belong to node-ids which nobody has.
@@ -243,5 +405,82 @@ mod tests {
         let third = AxisPdos::new(2, 1, &mut spare).unwrap();
         assert_eq!(third.ids.unwrap()[1][3], Id::Standard(0x4FD));
         assert_eq!((second.first, third.first), (0x41, 0x81));
+    }
+
+    fn found(number: u16, entries: &[u32]) -> FoundPdo {
+        let mapping = entries.iter().map(|entry| MappingEntry(*entry)).collect();
+        FoundPdo { number, id: None, mapping }
+    }
+
+    fn values(entries: &[(u16, u8)]) -> Vec<(Object, u8)> {
+        entries.iter().map(|(index, len)| (Object { index: *index, sub: 0 }, *len)).collect()
+    }
+
+    type Placed = (usize, usize, usize, usize);
+
+    fn parts(spread: &Spread) -> Vec<Placed> {
+        spread.parts().iter().map(|part| (part.pdo, part.at, part.from, part.len)).collect()
+    }
+
+    #[test]
+    fn values_are_found_where_they_are_mapped() {
+        let wanted = values(&[(0x6040, 2), (0x6060, 1), (0x607A, 4)]);
+        let pdos = [
+            found(1, &[0x6040_0010]),
+            found(2, &[0x6040_0010, 0x6060_0008]),
+            // A gap of a byte, which is of type UNSIGNED8.
+            found(3, &[0x0005_0008, 0x607A_0020, 0x6040_0010]),
+        ];
+        let (configs, spread) = first().find(Direction::Receive, &wanted, &pdos).unwrap();
+        let numbers: Vec<_> = configs.iter().map(|pdo| (pdo.number, pdo.policy)).collect();
+        assert_eq!(numbers, [(2, MappingPolicy::Keep), (3, MappingPolicy::Keep)]);
+        // The controlword goes into both.
+        assert_eq!(parts(&spread), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 5, 0, 2), (1, 1, 3, 4)]);
+        assert_eq!((spread.numbers(), spread.len()), (&[2, 3][..], 7));
+        // What is told twice is taken once, and what nobody wants is left.
+        let (_, spread) = first().find(Direction::Transmit, &wanted, &pdos).unwrap();
+        assert_eq!(parts(&spread), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 1, 3, 4)]);
+        let odd = [found(1, &[0x6040_0010, 0x6081_0020]), found(2, &[0x6060_0008, 0x607A_0020])];
+        let (configs, spread) = first().find(Direction::Transmit, &wanted, &odd).unwrap();
+        assert_eq!(configs.len(), 2);
+        assert_eq!(parts(&spread), [(0, 0, 0, 2), (1, 0, 2, 1), (1, 1, 3, 4)]);
+    }
+
+    /// Nothing is sent to a drive that nobody has set, and nothing is read where it does not stand.
+    #[test]
+    fn what_is_not_found_is_named_with_what_there_is() {
+        let wanted = values(&[(0x6040, 2), (0x607A, 4)]);
+        let said =
+            |direction, pdos: &[FoundPdo]| first().find(direction, &wanted, pdos).unwrap_err().to_string();
+        let head = "is in no RPDO that can be used, and the mapping is kept: expected one with nothing but what the axis is told, got";
+        let cases: [(&[u32], &str); 5] = [
+            (&[0x6040_0010], "607A:00 {} 1: 6040:00"),
+            // Something else beside it, another length, half of it twice, and bits that shift it.
+            (&[0x6040_0010, 0x607A_0020, 0x6081_0010], "6040:00 {} 1: 6040:00 607A:00 6081:00"),
+            (&[0x6040_0010, 0x607A_0010], "6040:00 {} 1: 6040:00 607A:00"),
+            (&[0x6040_0010, 0x607A_0020, 0x6040_0010], "6040:00 {} 1: 6040:00 607A:00 6040:00"),
+            (
+                &[0x0001_0001, 0x6040_0010, 0x607A_0020, 0x0001_0007],
+                "6040:00 {} 1: 0001:00 6040:00 607A:00 0001:00",
+            ),
+        ];
+        for (entries, expected) in cases {
+            assert_eq!(said(Direction::Receive, &[found(1, entries)]), expected.replace("{}", head));
+        }
+        let text = said(Direction::Transmit, &[found(9, &[0x6040_0010, 0x607A_0020])]);
+        assert_eq!(
+            text, "6040:00 is in no TPDO that can be used, and the mapping is kept: expected one, got none",
+            "it belongs to nobody"
+        );
+    }
+
+    #[test]
+    fn identifiers_are_those_that_the_device_has() {
+        let word = |word| FoundPdo::new(1, CobId(word), Vec::new()).id;
+        assert_eq!(word(0x0000_0195), Some(Id::Standard(0x195)));
+        assert_eq!(word(0x4000_0195), Some(Id::Standard(0x195)));
+        assert_eq!((word(0x8000_0195), word(0)), (None, None), "it has that of the default connection set");
+        let fifth = |word| FoundPdo::new(5, CobId(word), Vec::new()).id;
+        assert_eq!((fifth(0x8000_0195), fifth(0x8000_0000)), (Some(Id::Standard(0x195)), None));
     }
 }

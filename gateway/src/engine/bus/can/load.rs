@@ -3,6 +3,7 @@
 use profile_cia402::master::config::{Direction, MasterConfig, NodeConfig};
 use profile_cia402::plan::{Cadence, Plan, Purpose, SHARE_DEFAULT, Traffic};
 use profile_cia402::wire::cob_id;
+use profile_cia402::wire::error_control::HEARTBEAT_LEN;
 use profile_cia402::wire::pdo::mapped_len;
 use profile_generic::can::Id;
 use profile_generic::can::timing::{BitRate, Shape};
@@ -25,7 +26,7 @@ pub fn traffic(config: &MasterConfig) -> Vec<Traffic> {
     let every = |ms: u16| Cadence::Every(DurationNs::from_millis(i64::from(ms)));
     for node in &config.nodes {
         let number = node.node.get();
-        for direction in [Direction::Receive, Direction::Transmit] {
+        for direction in Direction::BOTH {
             for (number, id, len) in pdos(node, direction) {
                 let purpose = match direction {
                     Direction::Receive => Purpose::Rpdo(node.node.get(), number),
@@ -37,6 +38,13 @@ pub fn traffic(config: &MasterConfig) -> Vec<Traffic> {
         if let Some(heartbeat) = node.heartbeat {
             let id = cob_id::error_control(node.node);
             add(Purpose::Heartbeat(number), Some(id), 1, every(heartbeat.producer_ms));
+        }
+        if let Some(guarding) = node.guarding {
+            let id = cob_id::error_control(node.node);
+            // A remote frame has no data, whatever length it tells.
+            for len in [0, HEARTBEAT_LEN] {
+                add(Purpose::Guarding(number), Some(id), len, every(guarding.guard_time_ms));
+            }
         }
     }
     if let Some(own) = config.heartbeat {

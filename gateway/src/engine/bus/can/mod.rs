@@ -9,21 +9,24 @@
 pub mod commissioner;
 pub mod layout;
 pub mod load;
+mod look;
+pub mod lss;
 
 use arrayvec::ArrayVec;
-use profile_cia402::master::boot::BootState;
+use profile_cia402::master::boot::{BootState, BootStatus};
 use profile_cia402::master::config::{ConfigError, MasterConfig};
 use profile_cia402::master::event::{Event, Output, Refusal as FrameRefusal, Ticket};
 use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::master::{ConsumerState, Master, Priority};
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{AbortCode, Mux, NodeId};
-use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::commissioner::{AxisSetup, CommissionerEnd, Done, Job, Run, WINDOW};
 use self::layout::{BYTES_MAX, PDOS_MAX, Spread};
+use self::lss::{Assigner, Assignment};
 use super::backoff::Backoff;
+use super::outlet::Outlet;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
@@ -39,9 +42,6 @@ const FRAMES_PER_CALL: usize = 256;
 
 /// SDO accesses of one axis that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 4;
-
-/// How long a frame waits for room in the transmit queue before it is offered again.
-const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
 
 /// Longest wait for what comes in: answers come at any time.
 const PATIENCE: DurationNs = DurationNs::from_millis(1);
@@ -100,27 +100,17 @@ struct Device {
     backoff: Backoff,
 }
 
-/// A frame that waits for room in the transmit queue.
-#[derive(Debug, Clone, Copy)]
-struct Held {
-    frame: Frame,
-    since: MonotonicTime,
-    /// When it is offered again.
-    again: MonotonicTime,
-}
-
 /// The bus.
 #[derive(Debug)]
 pub struct CanBus {
     /// Its number among the CAN buses of the box.
     number: u8,
     master: Master,
-    cycle_time: DurationNs,
+    assigner: Assigner,
     devices: Vec<Device>,
     commissioner: CommissionerEnd,
     cycles_seen: u64,
-    /// A frame for which the transmit queue had no room.
-    held: Option<Held>,
+    outlet: Outlet,
     /// It was up since the bus was on last.
     up: bool,
     stopped: bool,
@@ -128,6 +118,7 @@ pub struct CanBus {
 
 impl CanBus {
     /// A bus that begins with the first call. `devices` have the axes of each device; the commissioner knows the same.
+    /// `assignments` are given their node-ids when they do not answer.
     ///
     /// # Errors
     /// What the master finds wrong with its configuration.
@@ -135,6 +126,7 @@ impl CanBus {
         number: u8,
         config: MasterConfig,
         devices: &[(NodeId, Vec<AxisSetup>)],
+        assignments: &[Assignment],
         commissioner: CommissionerEnd,
     ) -> Result<Self, ConfigError> {
         let cycle_time = DurationNs(config.sync.map_or(0, |sync| i64::from(sync.period_ns)));
@@ -157,11 +149,11 @@ impl CanBus {
         Ok(Self {
             number,
             master,
-            cycle_time,
+            assigner: Assigner::new(assignments),
             devices: devices.iter().map(device).collect(),
             commissioner,
             cycles_seen: 0,
-            held: None,
+            outlet: Outlet::new(cycle_time),
             up: false,
             stopped: false,
         })
@@ -235,7 +227,7 @@ impl CanBus {
             }
             Event::BusOff => {
                 self.up = false;
-                self.held = None;
+                self.outlet.clear();
                 for place in 0..self.devices.len() {
                     let node = self.devices[place].node;
                     self.lose(now, system, node, axes);
@@ -409,7 +401,7 @@ impl Device {
 
 impl Bus for CanBus {
     fn cycle_time(&self) -> DurationNs {
-        self.cycle_time
+        self.outlet.cycle_time()
     }
 
     fn patience(&self) -> DurationNs {
@@ -417,10 +409,8 @@ impl Bus for CanBus {
     }
 
     fn wake_at(&self) -> Option<MonotonicTime> {
-        match self.held {
-            Some(held) => Some(held.again),
-            None => self.master.wake_at(),
-        }
+        let own = || self.master.wake_at().into_iter().chain(self.assigner.wake_at()).min();
+        self.outlet.wake_at().or_else(own)
     }
 
     fn is_due(&self, now: MonotonicTime) -> bool {
@@ -449,7 +439,11 @@ impl Bus for CanBus {
         for _ in 0..FRAMES_PER_CALL {
             match port.receive(now) {
                 // A refused frame is counted by the master and changes nothing.
-                Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
+                Some(CanInput::Frame(frame)) => {
+                    if !self.assigner.handle(now, &frame) {
+                        let _ = self.master.handle_frame(now, &frame);
+                    }
+                }
                 Some(CanInput::BusOff) => self.master.bus_off(now),
                 Some(CanInput::BusOn) => self.master.bus_on(now),
                 None => break,
@@ -502,6 +496,12 @@ impl Bus for CanBus {
         }
         self.commission(now, axes, notice);
         self.retry(now);
+        if !self.stopped {
+            let Self { master, assigner, .. } = self;
+            if let Some(told) = assigner.run(now, |node| is_silent(master, node)) {
+                notice(Notice::Lss { bus: self.number, told });
+            }
+        }
         for device in 0..self.devices.len() {
             if !self.is_operational(&self.devices[device]) {
                 continue;
@@ -572,20 +572,14 @@ impl Bus for CanBus {
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().syncs;
         loop {
-            let held = self.held.take().map(|held| (held.frame, held.since));
-            let next = held.or_else(|| self.master.poll(now).map(|Output::Transmit(frame)| (frame, now)));
-            let Some((frame, since)) = next else { break };
-            // What has waited for a whole cycle is old: no drive shall act on it.
-            let result = match now.since(since) > self.cycle_time {
-                true => CanSent::Failed,
-                false => port.send(now, &frame),
-            };
-            match result {
+            let waiting = self.outlet.take();
+            let next = waiting
+                .or_else(|| self.master.poll(now).map(|Output::Transmit(frame)| (frame, now)))
+                .or_else(|| self.assigner.poll(now).map(|frame| (frame, now)));
+            let Some((frame, made)) = next else { break };
+            match self.outlet.send(now, *port, frame, made) {
                 CanSent::Sent => {}
-                CanSent::Full => {
-                    self.held = Some(Held { frame, since, again: now + FULL_PAUSE });
-                    break;
-                }
+                CanSent::Full => break,
                 CanSent::Failed => {
                     sent.failures += 1;
                     self.master.transmit_failed(frame.id());
@@ -603,8 +597,19 @@ impl Bus for CanBus {
 
     fn is_stopped(&self) -> bool {
         // The devices have been told, or cannot be.
-        self.stopped && !self.master.is_running() && (self.master.wake_at().is_none() && self.held.is_none())
+        self.stopped
+            && !self.master.is_running()
+            && (self.master.wake_at().is_none() && self.outlet.is_empty())
     }
+}
+
+/// Whether nobody answers under a node-id.
+fn is_silent(master: &Master, node: NodeId) -> bool {
+    master.node(node).is_some_and(|info| match info.state {
+        BootState::Retry => true,
+        BootState::Failed => info.status == Some(BootStatus::NO_ANSWER),
+        _ => false,
+    })
 }
 
 /// Whether a device is where it stays until something happens.

@@ -4,9 +4,11 @@
 
 use profile_cip::devicenet::master::motion::{MotionEnd, SetPoint, UPDATE_LEN, UpdateError, Watched};
 use profile_cip::devicenet::master::speed::{SpeedEnd, SpeedError};
-use profile_cip::devicenet::wire::speed::Assembly;
+use profile_cip::devicenet::wire::speed::{Assembly, SpeedCommand, SpeedControl};
 use profile_cip::wire::Error;
+use profile_cip::wire::motion::CommandPosition;
 use profile_cip::wire::motion::codes::{AxisControl, ControlMode, NodeStatus};
+use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};
 use profile_generic::time::DurationNs;
 
 use crate::mapping::devicenet::{MODE_AT, POSITION_AT, ROW_LEN, TORQUE_AT, VELOCITY_AT, motion, speed};
@@ -32,7 +34,7 @@ pub enum MessageError {
 }
 
 /// The box's end of a poll connection.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub enum End {
     /// Of a CIP Motion drive.
     Motion(MotionLink),
@@ -77,6 +79,24 @@ impl End {
         }
     }
 
+    /// Takes a message that somebody else has sent to the drive into a row of commands: the next message of the drive answers it.
+    ///
+    /// # Errors
+    /// It cannot be read, and the row stays as it was.
+    pub fn overhear(&mut self, message: &[u8], row: &mut Row) -> Result<(), MessageError> {
+        match self {
+            Self::Motion(link) => link.overhear(message, row),
+            Self::Speed(link) => link.overhear(message, row),
+        }
+    }
+
+    /// The next message of the drive is this one, whatever was sent before.
+    pub fn expect(&mut self, message: &[u8]) {
+        if let (Self::Motion(link), Ok(actual)) = (self, FixedActual::parse(message)) {
+            link.end.expect(actual.update_id);
+        }
+    }
+
     /// Takes a message of the drive into its row; `cycle` counts those of the bus.
     ///
     /// # Errors
@@ -99,7 +119,7 @@ impl End {
 }
 
 /// The end of a CIP Motion drive.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct MotionLink {
     end: MotionEnd,
     /// What it asks for while it has no other mode, with its value at rest.
@@ -161,6 +181,23 @@ impl MotionLink {
         self.end.set(set_point).is_ok() && self.end.emit(message).is_ok()
     }
 
+    fn overhear(&mut self, message: &[u8], row: &mut Row) -> Result<(), MessageError> {
+        let command = FixedCommand::parse(message).map_err(UpdateError::Malformed)?;
+        self.end.overhear(&command);
+        *row = [0; ROW_LEN];
+        row[..POSITION_AT].copy_from_slice(&[command.axis_control.0, 0, command.control_mode.0]);
+        if let Some(CommandPosition::Integer(position)) = command.values.position {
+            row[POSITION_AT..VELOCITY_AT].copy_from_slice(&position.to_le_bytes());
+        }
+        if let Some(velocity) = command.values.velocity {
+            row[VELOCITY_AT..TORQUE_AT].copy_from_slice(&velocity.to_le_bytes());
+        }
+        if let Some(torque) = command.values.torque {
+            row[TORQUE_AT..].copy_from_slice(&torque.to_le_bytes());
+        }
+        Ok(())
+    }
+
     fn handle(&mut self, cycle: u64, message: &[u8], row: &mut Row) -> Result<(), MessageError> {
         let actual = *self.end.handle(message)?;
         let mut flags = 0;
@@ -182,7 +219,7 @@ impl MotionLink {
 }
 
 /// The velocity of a drive whose updates have room for its position only.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct VelocityMeter {
     /// Units per second of one count in a cycle.
     per_count: f64,
@@ -224,7 +261,7 @@ fn narrow(value: f64) -> f32 {
 }
 
 /// The end of a velocity drive.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct SpeedLink {
     end: SpeedEnd,
 }
@@ -250,6 +287,21 @@ impl SpeedLink {
             return false;
         }
         self.end.emit(message).is_ok()
+    }
+
+    fn overhear(&mut self, message: &[u8], row: &mut Row) -> Result<(), MessageError> {
+        let SpeedCommand { control, speed, .. } = SpeedCommand::parse(self.end.output(), message)?;
+        let reverse = control.contains(SpeedControl::RUN_REVERSE);
+        let runs = control.intersects(SpeedControl::RUN_FORWARD | SpeedControl::RUN_REVERSE);
+        *row = [0; ROW_LEN];
+        row[0] = if runs { speed::RUN } else { 0 };
+        if control.contains(SpeedControl::FAULT_RESET) {
+            row[0] |= speed::RESET;
+        }
+        row[MODE_AT] = ControlMode::VELOCITY.0;
+        let speed = if reverse { speed.saturating_neg() } else { speed };
+        row[POSITION_AT..POSITION_AT + 2].copy_from_slice(&speed.to_le_bytes());
+        Ok(())
     }
 
     fn handle(&mut self, message: &[u8], row: &mut Row) -> Result<(), MessageError> {

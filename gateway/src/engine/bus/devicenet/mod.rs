@@ -17,12 +17,12 @@ use profile_cip::devicenet::master::config::{ConfigError, MasterConfig};
 use profile_cip::devicenet::master::event::{Event, Outcome, Ticket};
 use profile_cip::devicenet::master::station::Phase;
 use profile_cip::devicenet::wire::MacId;
-use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::end::{End, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::backoff::Backoff;
+use super::outlet::Outlet;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
@@ -39,9 +39,6 @@ const FRAMES_PER_CALL: usize = 256;
 
 /// Accesses of one axis that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 2;
-
-/// How long a frame waits for room in the transmit queue before it is offered again.
-const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
 
 /// Longest wait for what comes in: answers come at any time.
 const PATIENCE: DurationNs = DurationNs::from_millis(1);
@@ -87,14 +84,6 @@ struct Drive {
     accesses: ArrayVec<(Ticket, Purpose, Item), ACCESSES_MAX>,
 }
 
-/// A frame that waits for room in the transmit queue.
-#[derive(Debug, Clone, Copy)]
-struct Held {
-    frame: Frame,
-    /// When it is offered again.
-    again: MonotonicTime,
-}
-
 /// The bus.
 #[derive(Debug)]
 pub struct DevicenetBus {
@@ -105,7 +94,7 @@ pub struct DevicenetBus {
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
-    held: Option<Held>,
+    outlet: Outlet,
     /// When the frames that wait were made.
     made_at: MonotonicTime,
     /// It is on, or tries to be.
@@ -131,13 +120,14 @@ impl DevicenetBus {
             backoff: Backoff::NONE,
             accesses: ArrayVec::new(),
         };
+        let cycle = config.cycle;
         Ok(Self {
             number,
             master: Master::new(config)?,
             drives: drives.into_iter().map(drive).collect(),
             cycles_seen: 0,
             refused: 0,
-            held: None,
+            outlet: Outlet::new(cycle),
             made_at: MonotonicTime::ZERO,
             started: false,
             backoff: Backoff::NONE,
@@ -288,10 +278,7 @@ impl Bus for DevicenetBus {
     }
 
     fn wake_at(&self) -> Option<MonotonicTime> {
-        match self.held {
-            Some(held) => Some(held.again),
-            None => self.master.wake_at(),
-        }
+        self.outlet.wake_at().or_else(|| self.master.wake_at())
     }
 
     fn is_due(&self, now: MonotonicTime) -> bool {
@@ -322,7 +309,7 @@ impl Bus for DevicenetBus {
                 // A refused frame is counted by the master and changes nothing.
                 Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
                 Some(CanInput::BusOff) => {
-                    self.held = None;
+                    self.outlet.clear();
                     self.master.handle_bus_off(now);
                     self.drives.iter_mut().for_each(|drive| drive.tried = true);
                 }
@@ -439,23 +426,16 @@ impl Bus for DevicenetBus {
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().cycles;
         loop {
-            if self.held.is_none() && self.master.is_drained() {
+            if self.outlet.is_empty() && self.master.is_drained() {
                 // What comes now is made now; all of it has the same age.
                 self.made_at = now;
             }
-            let next = self.held.take().map(|held| held.frame).or_else(|| self.master.poll(now));
-            let Some(frame) = next else { break };
-            // What has waited for a whole cycle is old: no drive shall act on it.
-            let result = match now.since(self.made_at) > self.cycle_time() {
-                true => CanSent::Failed,
-                false => port.send(now, &frame),
-            };
-            match result {
+            let made = self.made_at;
+            let next = self.outlet.take().or_else(|| self.master.poll(now).map(|frame| (frame, made)));
+            let Some((frame, made)) = next else { break };
+            match self.outlet.send(now, *port, frame, made) {
                 CanSent::Sent => {}
-                CanSent::Full => {
-                    self.held = Some(Held { frame, again: now + FULL_PAUSE });
-                    break;
-                }
+                CanSent::Full => break,
                 CanSent::Failed => sent.failures += 1,
             }
         }
@@ -471,6 +451,6 @@ impl Bus for DevicenetBus {
 
     fn is_stopped(&self) -> bool {
         // The drives have been given back, or cannot be.
-        self.stopped && self.master.is_drained() && self.held.is_none()
+        self.stopped && self.master.is_drained() && self.outlet.is_empty()
     }
 }

@@ -426,6 +426,20 @@ fn a_limit_switch_ends_the_motion_into_it() {
     assert_eq!(rig.read(index::DIGITAL_INPUTS, 0).unwrap() & 0xF, 0);
 }
 
+/// Inverted positions do not move a switch: the one of the servo's way back is at the end where positions are highest.
+#[test]
+fn polarity_leaves_the_limit_switches_where_they_are() {
+    let mut rig = Rig::new(1);
+    rig.set(index::POLARITY, 0, 0xC0).unwrap();
+    rig.node.application_mut().axes_mut()[0]
+        .set_limit_switches(Position(-1_000_000_000), Position(1_000_000_000));
+    rig.enable(9);
+    rig.set(index::TARGET_VELOCITY, 0, 2 * TURN).unwrap();
+    assert!(rig.run_until(2_000, |rig| rig.state() == State::Fault));
+    assert_eq!(rig.read(index::DIGITAL_INPUTS, 0).unwrap() & 0xF, 1);
+    assert!(position(&rig) > TURN && rig.node.application().axes()[0].actual().position.0 < -1_000_000_000);
+}
+
 #[test]
 fn halt_is_a_bit_of_every_mode() {
     for mode in [1, 2, 3, 4, 6, 7, 8, 9, 10] {

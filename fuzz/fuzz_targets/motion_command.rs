@@ -1,0 +1,3 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| axisbridge_tests::fuzz::run("motion_command", data));
