@@ -3,6 +3,8 @@
 //! The guest sees the host's own file system, read only, and runs one command of it: a test binary, a script, the gateway.
 //! It has virtual CAN interfaces, a loopback interface of its own, and one processor; it starts within a second and is gone
 //! with its command. A system call takes it some 70 us: cycles of 10 ms hold in it, cycles of 1 ms belong to virtual time.
+//! The host gives it one processor too: the guest's processes are stopped and continued by its kernel at each system call,
+//! and to wake a process on another processor takes three times as long.
 //!
 //! [`Kernel::run`] runs a command. A test that wants to be inside calls [`Kernel::inside`] with its own name and goes on only
 //! there. `cargo run -p axisbridge-tests --bin can-kernel -- COMMAND` does it by hand.
@@ -12,7 +14,7 @@ use std::fmt::Write as _;
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// The kernel, and where its modules are (Debian package user-mode-linux).
@@ -236,8 +238,8 @@ impl Kernel {
 
     /// Runs the guest until it powers off, or past its time.
     fn boot(&self, job: &Job) {
-        let log = std::fs::File::create(job.0.join("log")).expect("the job folder can be written");
-        let folder = job.0.display();
+        let log = std::fs::File::create(job.folder.join("log")).expect("the job folder can be written");
+        let folder = job.folder.display();
         let scheduling: &[&str] = match self.urgent && is_permitted(&URGENT) {
             true => &URGENT,
             false => &[],
@@ -245,6 +247,7 @@ impl Kernel {
         // A guest must not outlive the test that started it.
         let mut kernel = Command::new("setpriv")
             .args(["--pdeathsig", "TERM"])
+            .args(job.processor())
             .args(scheduling)
             .arg(PROGRAM)
             .args(["mem=512M", "rootfstype=hostfs", "rootflags=/", "ro", "panic=1", "loglevel=4"])
@@ -276,8 +279,8 @@ impl Kernel {
 }
 
 /// Whether a command may be run in this way.
-fn is_permitted(way: &[&str]) -> bool {
-    let mut command = Command::new(way[0]);
+fn is_permitted(way: &[impl AsRef<OsStr>]) -> bool {
+    let mut command = Command::new(&way[0]);
     command.args(&way[1..]).arg("true").stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }
@@ -308,31 +311,75 @@ fn environment(command: &Command) -> Vec<OsString> {
     all
 }
 
+/// The processors that this process may use: the kernel's list, such as `0-1,4`.
+fn processors(list: &str) -> Vec<u32> {
+    let ranges = list.trim().split(',').filter_map(|range| {
+        let (first, last) = range.split_once('-').unwrap_or((range, range));
+        Some(first.parse().ok()?..=last.parse().ok()?)
+    });
+    ranges.flatten().collect()
+}
+
 /// The folder over which host and guest speak; removed with everything in it.
-struct Job(PathBuf);
+struct Job {
+    folder: PathBuf,
+    /// How many were before it in this process.
+    serial: usize,
+}
 
 impl Job {
     fn new() -> Self {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
+        static NEXT: AtomicUsize = AtomicUsize::new(0);
         let serial = NEXT.fetch_add(1, Ordering::Relaxed);
         // The name of a socket in it must stay below 108 bytes.
         let folder = PathBuf::from(format!("/var/tmp/axb-guest-{}-{serial}", std::process::id()));
         std::fs::create_dir(&folder).expect("/var/tmp can be written");
-        Self(folder)
+        Self { folder, serial }
+    }
+
+    /// What keeps its guest on one processor of the host: the next for each guest.
+    fn processor(&self) -> Vec<String> {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+        let processors = processors(list.unwrap_or_default());
+        let chosen = processors.get(self.serial.checked_rem(processors.len()).unwrap_or_default());
+        let way = |processor: &u32| ["taskset", "--cpu-list", &processor.to_string()].map(str::to_owned);
+        chosen.map(way).filter(|way| is_permitted(way)).map(Vec::from).unwrap_or_default()
     }
 
     fn write(&self, file: &str, content: &[u8]) {
-        std::fs::write(self.0.join(file), content).expect("the job folder can be written");
+        std::fs::write(self.folder.join(file), content).expect("the job folder can be written");
     }
 
     fn read(&self, file: &str) -> String {
-        let content = std::fs::read(self.0.join(file)).unwrap_or_default();
+        let content = std::fs::read(self.folder.join(file)).unwrap_or_default();
         String::from_utf8_lossy(&content).into_owned()
     }
 }
 
 impl Drop for Job {
     fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kernels_list_of_processors_is_read() {
+        assert_eq!(processors("\t0-1,4,6-7\n"), [0, 1, 4, 6, 7]);
+        assert_eq!(processors("3"), [3]);
+        assert_eq!(processors(""), [0_u32; 0]);
+    }
+
+    #[test]
+    fn guests_take_turns_on_the_processors() {
+        let job = |serial| Job { folder: PathBuf::from("/nowhere"), serial };
+        let ways: Vec<_> = (0..2).map(|serial| job(serial).processor()).collect();
+        assert!(ways.iter().all(|way| way.is_empty() || way.len() == 3), "{ways:?}");
+        let several = std::thread::available_parallelism().is_ok_and(|processors| processors.get() > 1);
+        assert_eq!(ways[0] == ways[1], !several || ways[0].is_empty());
     }
 }

@@ -84,7 +84,7 @@ fn two_devicenet_drives_run_the_whole_program_of_a_controller() {
 
 /// Starts a guest that runs the test again.
 fn outside(test: &str) {
-    runs_in(test, Kernel::new().user(65_534).limit(Duration::from_secs(90)));
+    runs_in(test, Kernel::new().user(65_534).limit(Duration::from_secs(120)));
 }
 
 /// Runs a test again in a guest, one guest after the other: each has four processes that keep time on one processor of the host.
