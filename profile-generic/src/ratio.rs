@@ -78,11 +78,12 @@ pub struct FloatOutcome<F> {
 pub struct Ratio {
     num: i64,
     den: i64,
+    by_den: Reciprocal,
 }
 
 impl Ratio {
     /// One to one.
-    pub const ONE: Self = Self { num: 1, den: 1 };
+    pub const ONE: Self = Self { num: 1, den: 1, by_den: Reciprocal::new(1) };
 
     /// The ratio in lowest terms, or `None` when the denominator is zero or the reduced ratio needs more than
     /// 64 bits (which only a term of -2^63 can cause).
@@ -101,7 +102,7 @@ impl Ratio {
         let (num, den) = (num / divisor, den / divisor);
         let (num, den) = if den < 0 { (-num, -den) } else { (num, den) };
         match (narrow(num), narrow(den)) {
-            (Some(num), Some(den)) => Some(Self { num, den }),
+            (Some(num), Some(den)) => Some(Self { num, den, by_den: Reciprocal::new(den.unsigned_abs()) }),
             _ => None,
         }
     }
@@ -119,6 +120,31 @@ impl Ratio {
     /// `value` times this ratio, and whether it was rounded or clamped.
     pub const fn convert(self, value: i64, rounding: Rounding) -> Outcome {
         clamp(self.quotient(value, rounding))
+    }
+
+    /// `value` times this ratio, and whether it was rounded, where the product fits 64 bits: the way of nearly every value of a
+    /// cycle, without a division and without operations of 128 bits. `None` for others.
+    #[inline]
+    pub(crate) const fn short_quotient(self, value: i64, rounding: Rounding) -> Option<(i64, bool)> {
+        let Some(product) = value.checked_mul(self.num) else { return None };
+        if self.den == 1 {
+            return Some((product, false));
+        }
+        let den = self.den.unsigned_abs();
+        // What lifts a magnitude to the next whole multiple of the denominator where it is rounded away from zero.
+        let lift = match rounding {
+            Rounding::Nearest => den / 2,
+            Rounding::Floor if product < 0 => den - 1,
+            Rounding::Floor | Rounding::TowardZero => 0,
+        };
+        let magnitude = product.unsigned_abs();
+        let lifted = magnitude + lift;
+        if lifted >= Reciprocal::LIMIT {
+            return None;
+        }
+        let quotient = self.by_den.divide(lifted);
+        let signed = quotient.cast_signed();
+        Some((if product < 0 { -signed } else { signed }, quotient * den != magnitude))
     }
 
     /// `value` times this ratio before clamping, and whether it was rounded. The magnitude is at most 2^126.
@@ -224,6 +250,39 @@ impl Ratio {
         }
         let (top, bottom) = (i64::try_from(last.0).ok()?, i64::try_from(last.1).ok()?);
         Self::new(if num < 0 { -top } else { top }, bottom).filter(|ratio| ratio.num != 0)
+    }
+}
+
+/// Division by a constant as multiplication: for every `n` below 2^63, `n / den` is `n * factor / 2^(64 + shift)`, rounded
+/// down.
+///
+/// With `2^shift < den <= 2^(shift + 1)` the factor is the next whole number above `2^(64 + shift) / den`; it exceeds that by at
+/// most one, so that the product is too large by less than `n / 2^(64 + shift) < 1 / den`: never as much as is missing to the
+/// next quotient (Granlund and Montgomery, Division by Invariant Integers using Multiplication, theorem 4.2).
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Reciprocal {
+    factor: u64,
+    shift: u8,
+}
+
+impl Reciprocal {
+    /// What is divided has to be below this.
+    const LIMIT: u64 = 1 << 63;
+
+    /// For a divisor above one; for one, which needs no division, there is none.
+    #[expect(clippy::cast_possible_truncation, reason = "the quotient is below 2^64 and the shift below 63")]
+    const fn new(den: u64) -> Self {
+        if den < 2 {
+            return Self { factor: 0, shift: 0 };
+        }
+        let shift = (den - 1).ilog2();
+        let factor = (1_u128 << (64 + shift)) / den as u128 + 1;
+        Self { factor: factor as u64, shift: shift as u8 }
+    }
+
+    #[inline]
+    const fn divide(self, number: u64) -> u64 {
+        ((number as u128 * self.factor as u128) >> 64) as u64 >> self.shift
     }
 }
 
@@ -442,6 +501,26 @@ mod tests {
         }
     }
 
+    /// Where a reciprocal that is wrong by the least would show: around every multiple at the ends of the range.
+    #[test]
+    fn reciprocals_divide_at_the_ends_of_their_range() {
+        let powers = (1..63).flat_map(|power| [(1 << power) - 1, 1 << power, (1 << power) + 1]);
+        for den in powers.chain([3, 7, 10, 641, 1_000_000_000, 6_700_417, Reciprocal::LIMIT - 1]) {
+            if den < 2 {
+                continue;
+            }
+            let reciprocal = Reciprocal::new(den);
+            let last = (Reciprocal::LIMIT - 1) / den;
+            for multiple in [0, 1, 2, last / 2, last - 1, last] {
+                let multiple = multiple * den;
+                for number in [multiple.saturating_sub(1), multiple, multiple + 1, multiple + (den - 1)] {
+                    let number = number.min(Reciprocal::LIMIT - 1);
+                    assert_eq!(reciprocal.divide(number), number / den, "{number} / {den}");
+                }
+            }
+        }
+    }
+
     fn any_ratio() -> impl Strategy<Value = Ratio> {
         (any::<i64>(), any::<i64>()).prop_filter_map("not a ratio", |(num, den)| Ratio::new(num, den))
     }
@@ -490,6 +569,25 @@ mod tests {
         }
 
         /// What fits 64 bits takes another way, to the same place.
+        #[test]
+        fn short_and_long_quotients_agree(
+            num in any::<i64>(), small in -1_000_i64..1_000, den in 1..i64::MAX, step in 1..100_i64, value in any::<i64>(),
+        ) {
+            for rounding in [Rounding::Nearest, Rounding::Floor, Rounding::TowardZero] {
+                for (num, den) in [(num, den), (num, step), (small, step), (small, den), (num, 1), (1, step)] {
+                    for value in [value, value >> 32, value >> 48, value >> 60] {
+                        let ratio = ratio(num, den);
+                        if let Some((short, inexact)) = ratio.short_quotient(value, rounding) {
+                            prop_assert_eq!((i128::from(short), inexact), ratio.quotient(value, rounding));
+                        } else {
+                            let product = i128::from(value) * i128::from(ratio.num());
+                            prop_assert!(product.unsigned_abs() + u128::from(ratio.den().unsigned_abs()) >= 1 << 63);
+                        }
+                    }
+                }
+            }
+        }
+
         #[test]
         fn short_and_long_division_agree(num in any::<i64>(), small in -1_000_i64..1_000, den in 1..i64::MAX, step in 1..100_i64) {
             for rounding in [Rounding::Nearest, Rounding::Floor, Rounding::TowardZero] {

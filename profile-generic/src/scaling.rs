@@ -58,6 +58,7 @@ impl AxisScaling {
 /// `value` folded into `0..modulus`.
 ///
 /// `modulus` must be above zero; a value is returned as it is otherwise.
+#[inline]
 pub const fn fold(value: i64, modulus: i64) -> i64 {
     if modulus > 0 { value.rem_euclid(modulus) } else { value }
 }
@@ -88,22 +89,26 @@ impl WrapTracker {
     /// Takes the counter and returns the unrolled count. The first value is taken as it is.
     ///
     /// The unrolled count wraps at 64 bits, which a machine does not reach.
+    #[inline]
     pub fn update(&mut self, raw: i64) -> i64 {
         let Some(last) = self.last.replace(raw) else {
             self.total = raw;
             return raw;
         };
-        let difference = i128::from(raw) - i128::from(last);
-        // Values that a drive sends lie within one modulus: no division for them.
-        let step = match difference {
-            0.. if difference < self.modulus => difference,
-            ..0 if difference >= -self.modulus => difference + self.modulus,
-            _ => difference.rem_euclid(self.modulus),
+        let step = match (i64::try_from(self.modulus), raw.checked_sub(last)) {
+            (Ok(modulus), Some(difference)) => short_step(difference, modulus),
+            _ => self.long_step(i128::from(raw) - i128::from(last)),
         };
+        self.total = self.total.wrapping_add(step);
+        self.total
+    }
+
+    /// The shorter way round for a difference of any counters.
+    fn long_step(&self, difference: i128) -> i64 {
+        let step = difference.rem_euclid(self.modulus);
         let step = if step >= self.modulus - step { step - self.modulus } else { step };
         // Half of at most 2^64, so it fits 64 bits.
-        self.total = self.total.wrapping_add(i64::try_from(step).unwrap_or(0));
-        self.total
+        i64::try_from(step).unwrap_or(0)
     }
 
     /// The unrolled count.
@@ -128,6 +133,20 @@ impl WrapTracker {
     pub fn restart(&mut self) {
         self.last = None;
     }
+}
+
+/// The shorter way round, for counters and a modulus of 64 bits: those that a drive sends.
+#[inline]
+const fn short_step(difference: i64, modulus: i64) -> i64 {
+    // Values that a drive sends lie within one modulus: no division for them.
+    let step = if difference >= 0 && difference < modulus {
+        difference
+    } else if difference < 0 && difference >= -modulus {
+        difference + modulus
+    } else {
+        difference.rem_euclid(modulus)
+    };
+    if step >= modulus - step { step - modulus } else { step }
 }
 
 #[cfg(test)]
@@ -211,6 +230,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn short_and_long_steps_agree(difference in any::<i64>(), modulus in 2..i64::MAX, shift in 0..62_u32) {
+            let modulus = (modulus >> shift).max(2);
+            let tracker = WrapTracker::new(modulus).unwrap();
+            for difference in [difference, difference >> shift, modulus, -modulus, modulus - 1, 1 - modulus, modulus / 2] {
+                prop_assert_eq!(short_step(difference, modulus), tracker.long_step(i128::from(difference)));
+            }
+        }
+
         #[test]
         fn any_modulus_unrolls(
             modulus in 3..i64::MAX, start in 0..i64::MAX,

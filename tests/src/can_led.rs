@@ -187,8 +187,8 @@ fn statuses(text: &mut String, program: &DriveProgram) {
     let len = usize::from(program.telegram.feedback_bytes);
     telegram[..3].copy_from_slice(&[0x37, 0x12, 1]);
     let (mut feedback, mut report) = (AxisFeedback::default(), ConversionReport::default());
-    let mut trackers = program.feedback.trackers();
-    program.decode(&telegram[..len], false, &mut feedback, &mut trackers, &mut report);
+    let mut hearing = program.hearing();
+    program.decode(&telegram[..len], false, &mut feedback, &mut hearing, &mut report);
     for signal in [Signal::PositionActual, Signal::VelocityActual, Signal::TorqueActual] {
         line(text, format_args!("    {signal} {:?}", feedback.get(signal)));
     }

@@ -39,13 +39,7 @@ impl Place {
     /// The raw value of bytes that hold nothing else.
     #[must_use]
     pub fn decode(&self, bytes: &[u8]) -> Option<i64> {
-        if bytes.len() != self.width.bytes() {
-            return None;
-        }
-        let negative = self.width.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
-        let mut wide = [if negative { 0xFF } else { 0 }; 8];
-        wide.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(i64::from_le_bytes(wide))
+        self.width.integer(bytes)
     }
 
     /// The raw value in the drive's telegram.

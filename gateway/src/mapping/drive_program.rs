@@ -146,6 +146,40 @@ pub(super) struct StepRow {
     pub control: BitPattern,
 }
 
+/// What is kept of a drive's telegrams from one to the next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hearing {
+    /// Unrolls the values that wrap.
+    trackers: Trackers,
+    /// What the drive showed last, and what that says: it seldom shows anything new.
+    last: Option<(Shown, Said)>,
+}
+
+impl Hearing {
+    /// Forgets where all counters were: the next values are taken as they are.
+    pub fn restart(&mut self) {
+        self.trackers.restart();
+    }
+}
+
+/// All that state, mode and status bits of a drive follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shown {
+    status: u32,
+    /// The words beside the status, those that the telegram is long enough for.
+    words: [Option<u32>; STATUS_WORDS_MAX],
+    /// It carries out a procedure.
+    led: bool,
+}
+
+/// What a drive says by what it shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Said {
+    report: Report,
+    mode: ModeSelection,
+    bits: StatusBits,
+}
+
 /// A status bit in a word of the telegram.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StatusRow {
@@ -375,7 +409,8 @@ impl DriveProgram {
         report: &mut ConversionReport,
     ) -> u32 {
         let order = order.into();
-        let control = self.control(order, command.selection(), control, status);
+        let told = self.told(order, command.selection());
+        let control = self.control_in(told, order, control, status);
         let [low, high, mode, _] = control.to_le_bytes();
         if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
             bytes.copy_from_slice(&[low, high]);
@@ -383,7 +418,7 @@ impl DriveProgram {
         if let Some(octet) = self.mode_octets.and_then(|[at, _]| telegram.get_mut(usize::from(at))) {
             *octet = mode;
         }
-        let hidden = self.hidden(self.told(order, command.selection()), status);
+        let hidden = self.hidden(told, status);
         if hidden.is_empty() {
             self.command.encode(command, telegram, report);
         } else {
@@ -404,10 +439,10 @@ impl DriveProgram {
         let target = |entry: &ModeEntry| {
             entry.carried.contains(CommandSet::TARGET_POSITION) && entry.status.matches(status)
         };
-        match (self.shares_target, told.is_some_and(target)) {
-            (false, _) => CommandSet::empty(),
-            (true, true) => CommandSet::POSITION,
-            (true, false) => CommandSet::TARGET_POSITION,
+        match self.shares_target {
+            false => CommandSet::empty(),
+            true if told.is_some_and(target) => CommandSet::POSITION,
+            true => CommandSet::TARGET_POSITION,
         }
     }
 
@@ -427,13 +462,18 @@ impl DriveProgram {
         status: u32,
     ) -> u32 {
         let order = order.into();
+        self.control_in(self.told(order, selection), order, control, status)
+    }
+
+    /// The same in the mode that the drive is told.
+    fn control_in(&self, told: Option<&ModeEntry>, order: Order, control: u32, status: u32) -> u32 {
         let Order { action, asks, .. } = order;
         let step = self.steps.iter().find(|step| step.action == action && step.when.matches(status));
         let control = match step {
             Some(step) => step.control.apply(control),
             None => self.actions.apply(action, control).unwrap_or(control),
         };
-        let Some(entry) = self.told(order, selection) else { return control };
+        let Some(entry) = told else { return control };
         let control = entry.control.apply(control);
         if entry.bits.mask == 0 {
             return control;
@@ -467,18 +507,39 @@ impl DriveProgram {
         telegram: &[u8],
         led: bool,
         feedback: &mut AxisFeedback,
-        trackers: &mut Trackers,
+        hearing: &mut Hearing,
         report: &mut ConversionReport,
     ) -> Option<u32> {
         let status = self.status(telegram)?;
-        feedback.report = if led { self.led_report(status) } else { self.report(status) };
-        let ModeSelection { mode, interpolation } = self.mode(status).unwrap_or_default();
-        (feedback.mode, feedback.interpolation) = (mode, interpolation);
-        let words = self.status_words(telegram);
-        let known = feedback.status.difference(self.known_status);
-        feedback.status = known.union(self.status_bits(status, &words));
-        self.feedback.decode(telegram, feedback, trackers, report);
+        let shown = Shown { status, words: self.words(telegram), led };
+        let said = match hearing.last {
+            Some((last, said)) if last == shown => said,
+            _ => {
+                let said = self.said(shown);
+                hearing.last = Some((shown, said));
+                said
+            }
+        };
+        feedback.report = said.report;
+        (feedback.mode, feedback.interpolation) = (said.mode.mode, said.mode.interpolation);
+        feedback.status = feedback.status.difference(self.known_status).union(said.bits);
+        self.feedback.decode(telegram, feedback, &mut hearing.trackers, report);
         Some(status)
+    }
+
+    /// What [`DriveProgram::decode`] keeps of a drive that was not heard yet.
+    #[must_use]
+    pub fn hearing(&self) -> Hearing {
+        Hearing { trackers: self.feedback.trackers(), last: None }
+    }
+
+    fn said(&self, shown: Shown) -> Said {
+        let Shown { status, words, led } = shown;
+        Said {
+            report: if led { self.led_report(status) } else { self.report(status) },
+            mode: self.mode(status).unwrap_or_default(),
+            bits: self.status_bits(status, &self.named(words)),
+        }
     }
 
     /// The status in a telegram: the status word, and the operating mode above it where it has an octet of its own.
@@ -554,8 +615,20 @@ impl DriveProgram {
 
     /// The words with status bits that the drive's telegram has beside the status word.
     pub fn status_words(&self, telegram: &[u8]) -> ArrayVec<(Item, u32), STATUS_WORDS_MAX> {
-        let word = |place: &Place| Some((place.item, place.read_word(telegram)?));
-        self.status_words.iter().filter_map(word).collect()
+        self.named(self.words(telegram))
+    }
+
+    fn words(&self, telegram: &[u8]) -> [Option<u32>; STATUS_WORDS_MAX] {
+        let mut words = [None; STATUS_WORDS_MAX];
+        for (word, place) in words.iter_mut().zip(&self.status_words) {
+            *word = place.read_word(telegram);
+        }
+        words
+    }
+
+    /// The words that are there, each with what it is.
+    fn named(&self, words: [Option<u32>; STATUS_WORDS_MAX]) -> ArrayVec<(Item, u32), STATUS_WORDS_MAX> {
+        self.status_words.iter().zip(words).filter_map(|(place, word)| Some((place.item, word?))).collect()
     }
 
     /// The status bits in a status, and in the words beside it.

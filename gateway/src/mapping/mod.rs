@@ -78,7 +78,8 @@ pub use dictionary::{
 };
 pub use drive_facts::{Difference, DriveFacts};
 pub use drive_program::{
-    DriveProgram, FaultRow, MAX_MODES, ModeProcedure, Order, ParameterEntry, Procedure, ProcedureBy, Telegram,
+    DriveProgram, FaultRow, Hearing, MAX_MODES, ModeProcedure, Order, ParameterEntry, Procedure, ProcedureBy,
+    Telegram,
 };
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};

@@ -30,7 +30,6 @@ use std::sync::Arc;
 use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
-use profile_generic::program::Trackers;
 use profile_generic::quantity::{
     Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
 };
@@ -39,7 +38,7 @@ use profile_generic::state::{Action, BasicDrive, Report};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
 
-use crate::mapping::CipTrackers;
+use crate::mapping::{CipTrackers, Hearing};
 
 use devicenet::Listener;
 pub use frame::{FrameError, Recognised, recognise};
@@ -63,7 +62,7 @@ struct AxisState {
     control: u32,
     status: u32,
     north: CipTrackers,
-    south: Trackers,
+    south: Hearing,
     command: AxisCommand,
     feedback: AxisFeedback,
     /// Attributes of the cyclic write data, in their order.
@@ -123,7 +122,7 @@ impl Translator {
             // Before it was heard it counts as operating.
             status: axis.south.status_of(Report::Operating).unwrap_or(0),
             north: axis.north.trackers(),
-            south: axis.south.feedback.trackers(),
+            south: axis.south.hearing(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             writes: Vec::new(),

@@ -45,7 +45,13 @@ impl Conversion {
     }
 
     /// Converts an integer.
+    #[inline]
     pub const fn convert(&self, value: i64) -> Outcome {
+        if let Some((quotient, inexact)) = self.ratio.short_quotient(value, self.rounding)
+            && let Some(value) = quotient.checked_add(self.offset)
+        {
+            return self.limit(Outcome { value, saturated: false, inexact });
+        }
         self.finish(self.ratio.quotient(value, self.rounding))
     }
 
@@ -82,13 +88,17 @@ impl Conversion {
     const fn finish(&self, (quotient, inexact): (i128, bool)) -> Outcome {
         // At most 2^126 plus 2^63.
         let sum = quotient + self.offset as i128;
-        let Outcome { value, saturated, inexact } = ratio::clamp((sum, inexact));
-        if value < self.min {
-            Outcome { value: self.min, saturated: true, inexact }
-        } else if value > self.max {
-            Outcome { value: self.max, saturated: true, inexact }
+        self.limit(ratio::clamp((sum, inexact)))
+    }
+
+    #[inline]
+    const fn limit(&self, outcome: Outcome) -> Outcome {
+        if outcome.value < self.min {
+            Outcome { value: self.min, saturated: true, ..outcome }
+        } else if outcome.value > self.max {
+            Outcome { value: self.max, saturated: true, ..outcome }
         } else {
-            Outcome { value, saturated, inexact }
+            outcome
         }
     }
 

@@ -38,6 +38,7 @@ named_enum! {
 
 impl Width {
     /// The length in bytes.
+    #[inline]
     pub const fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -63,6 +64,7 @@ impl Width {
     }
 
     /// The lowest and highest integer that it holds; all of 64 bits for floating point.
+    #[inline]
     pub const fn range(self) -> (i64, i64) {
         match self {
             Self::U8 => (0, u8::MAX as i64),
@@ -79,13 +81,34 @@ impl Width {
     /// The integer in these bytes, with its sign where the width has one; the bits of a floating point number, or of an
     /// unsigned one of 64 bits, as they are. `None` for another number of bytes.
     pub fn integer(self, bytes: &[u8]) -> Option<i64> {
-        if bytes.len() != self.bytes() {
-            return None;
+        if bytes.len() == self.bytes() { self.load(bytes) } else { None }
+    }
+
+    /// The same where the bytes begin. Each length is one that the compiler knows: a load.
+    #[inline]
+    fn load(self, bytes: &[u8]) -> Option<i64> {
+        Some(match self {
+            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I32 | Self::F32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U64 | Self::I64 | Self::F64 => i64::from_le_bytes(*bytes.first_chunk()?),
+        })
+    }
+
+    /// Puts the low bytes of an integer where the bytes begin. `None` when they are too few.
+    #[inline]
+    fn store(self, value: i64, bytes: &mut [u8]) -> Option<()> {
+        let all @ [a, b, c, d, ..] = value.to_le_bytes();
+        match self.bytes() {
+            1 => *bytes.first_chunk_mut()? = [a],
+            2 => *bytes.first_chunk_mut()? = [a, b],
+            4 => *bytes.first_chunk_mut()? = [a, b, c, d],
+            _ => *bytes.first_chunk_mut()? = all,
         }
-        let negative = self.range().0 < 0 && bytes.last().is_some_and(|byte| byte & 0x80 != 0);
-        let mut all = [if negative { 0xFF } else { 0 }; 8];
-        all.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(i64::from_le_bytes(all))
+        Some(())
     }
 }
 
@@ -151,6 +174,7 @@ impl ConversionReport {
         self.saturated == 0 && self.not_finite == 0 && self.missing == 0 && self.out_of_bounds == 0
     }
 
+    #[inline]
     fn note(&mut self, signal: Signal, saturated: bool, inexact: bool) {
         self.inexact = self.inexact.saturating_add(u32::from(inexact));
         if saturated {
@@ -242,14 +266,15 @@ impl<I: SignalImage> Program<I> {
     /// Writes the signals of the image into the telegram. What cannot be written is counted and left alone.
     pub fn encode(&self, image: &I, telegram: &mut [u8], report: &mut ConversionReport) {
         for field in self.fields() {
-            let begin = usize::from(field.offset);
-            let Some(bytes) = telegram.get_mut(begin..begin + field.width.bytes()) else {
-                report.out_of_bounds = report.out_of_bounds.saturating_add(1);
-                continue;
+            let place = telegram.get_mut(usize::from(field.offset)..).unwrap_or_default();
+            let written = match image.get(field.signal) {
+                Some(value) => field.write(value, place, report),
+                None => (place.len() >= field.width.bytes()).then(|| {
+                    report.missing = report.missing.saturating_add(1);
+                }),
             };
-            match image.get(field.signal) {
-                Some(value) => field.write(value, bytes, report),
-                None => report.missing = report.missing.saturating_add(1),
+            if written.is_none() {
+                report.out_of_bounds = report.out_of_bounds.saturating_add(1);
             }
         }
     }
@@ -263,12 +288,12 @@ impl<I: SignalImage> Program<I> {
         report: &mut ConversionReport,
     ) {
         for (field, tracker) in self.fields().zip(&mut trackers.fields) {
-            let begin = usize::from(field.offset);
-            let Some(bytes) = telegram.get(begin..begin + field.width.bytes()) else {
+            let place = telegram.get(usize::from(field.offset)..).unwrap_or_default();
+            let Some(raw) = field.width.load(place) else {
                 report.out_of_bounds = report.out_of_bounds.saturating_add(1);
                 continue;
             };
-            let Some(outcome) = field.read(bytes, tracker.as_mut()) else {
+            let Some(outcome) = field.read(raw, tracker.as_mut()) else {
                 report.not_finite = report.not_finite.saturating_add(1);
                 continue;
             };
@@ -285,64 +310,63 @@ fn modulo_fits(modulo: i64, width: Width) -> bool {
 }
 
 impl Field {
-    fn write(&self, value: i64, bytes: &mut [u8], report: &mut ConversionReport) {
-        match self.width {
-            Width::F32 => {
-                let (FloatOutcome { value, inexact }, saturated) = self.conversion.convert_to_f32(value);
-                bytes.copy_from_slice(&value.to_le_bytes());
-                report.note(self.signal, saturated, inexact);
-            }
-            Width::F64 => {
-                let (FloatOutcome { value, inexact }, saturated) = self.conversion.convert_to_f64(value);
-                bytes.copy_from_slice(&value.to_le_bytes());
-                report.note(self.signal, saturated, inexact);
-            }
-            _ => {
-                let outcome = self.conversion.convert(value);
-                let (min, max) = self.width.range();
-                let value = match self.modulo {
-                    Some(modulo) => {
-                        let folded = fold(outcome.value, modulo);
-                        if folded > max { folded - modulo } else { folded }
-                    }
-                    None => outcome.value,
-                };
-                let held = value.clamp(min, max);
-                bytes.copy_from_slice(&held.to_le_bytes()[..bytes.len()]);
-                report.note(self.signal, outcome.saturated || held != value, outcome.inexact);
-            }
+    /// Writes a value where the bytes begin. `None` when they are too few.
+    #[inline]
+    fn write(&self, value: i64, bytes: &mut [u8], report: &mut ConversionReport) -> Option<()> {
+        if self.width.is_float() {
+            return self.write_float(value, bytes, report);
         }
+        let outcome = self.conversion.convert(value);
+        let (min, max) = self.width.range();
+        let value = match self.modulo {
+            Some(modulo) => {
+                let folded = fold(outcome.value, modulo);
+                if folded > max { folded - modulo } else { folded }
+            }
+            None => outcome.value,
+        };
+        let held = value.clamp(min, max);
+        self.width.store(held, bytes)?;
+        report.note(self.signal, outcome.saturated || held != value, outcome.inexact);
+        Some(())
     }
 
-    /// `None` when the value is a floating point number that is not finite. `bytes` has the length of the
-    /// width.
-    fn read(&self, bytes: &[u8], tracker: Option<&mut WrapTracker>) -> Option<Outcome> {
-        let mut raw = [0; 8];
-        raw[..bytes.len()].copy_from_slice(bytes);
-        let bits = u64::from_le_bytes(raw);
-        let value = match self.width {
-            Width::F32 => {
-                let [a, b, c, d, ..] = raw;
-                return self.conversion.convert_f64(f64::from(f32::from_le_bytes([a, b, c, d])));
-            }
-            Width::F64 => return self.conversion.convert_f64(f64::from_bits(bits)),
-            Width::I8 | Width::I16 | Width::I32 | Width::I64 => {
-                // Shifted to the top and back to extend the sign.
-                let unused = u64::BITS - self.width.bits();
-                (bits << unused).cast_signed() >> unused
-            }
-            Width::U8 | Width::U16 | Width::U32 | Width::U64 => match i64::try_from(bits) {
-                Ok(value) => value,
-                Err(_) => {
-                    let outcome = self.conversion.convert(i64::MAX);
-                    return Some(Outcome { saturated: true, ..outcome });
-                }
-            },
+    fn write_float(&self, value: i64, bytes: &mut [u8], report: &mut ConversionReport) -> Option<()> {
+        let (saturated, inexact) = if self.width == Width::F32 {
+            let (FloatOutcome { value, inexact }, saturated) = self.conversion.convert_to_f32(value);
+            *bytes.first_chunk_mut()? = value.to_le_bytes();
+            (saturated, inexact)
+        } else {
+            let (FloatOutcome { value, inexact }, saturated) = self.conversion.convert_to_f64(value);
+            *bytes.first_chunk_mut()? = value.to_le_bytes();
+            (saturated, inexact)
         };
+        report.note(self.signal, saturated, inexact);
+        Some(())
+    }
+
+    /// What a raw value of the width says; `None` when it is a floating point number that is not finite.
+    #[inline]
+    fn read(&self, raw: i64, tracker: Option<&mut WrapTracker>) -> Option<Outcome> {
+        if self.width.is_float() {
+            return self.read_float(raw);
+        }
+        if self.width == Width::U64 && raw < 0 {
+            let outcome = self.conversion.convert(i64::MAX);
+            return Some(Outcome { saturated: true, ..outcome });
+        }
         Some(self.conversion.convert(match tracker {
-            Some(tracker) => tracker.update(value),
-            None => value,
+            Some(tracker) => tracker.update(raw),
+            None => raw,
         }))
+    }
+
+    fn read_float(&self, raw: i64) -> Option<Outcome> {
+        let [a, b, c, d, ..] = raw.to_le_bytes();
+        self.conversion.convert_f64(match self.width {
+            Width::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::from_bits(raw.cast_unsigned()),
+        })
     }
 }
 

@@ -1,5 +1,7 @@
 //! Bit patterns: status words to reports, actions to control words.
 
+use arrayvec::ArrayVec;
+
 use crate::state::{Action, Report};
 
 /// Some bits of a word with the values they have, or shall have.
@@ -18,11 +20,13 @@ impl BitPattern {
     }
 
     /// Whether the word has these bits.
+    #[inline]
     pub const fn matches(self, word: u32) -> bool {
         (word ^ self.value) & self.mask == 0
     }
 
     /// The word with these bits put in and all others as they were.
+    #[inline]
     pub const fn apply(self, word: u32) -> u32 {
         (word & !self.mask) | (self.value & self.mask)
     }
@@ -32,31 +36,25 @@ impl BitPattern {
 pub const MAX_STATE_ROWS: usize = 16;
 
 /// Turns a status word into a [`Report`]: the first row that matches wins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StateTable<const N: usize = MAX_STATE_ROWS> {
-    rows: [Option<(BitPattern, Report)>; N],
+    rows: ArrayVec<(BitPattern, Report), N>,
 }
 
 impl<const N: usize> StateTable<N> {
     /// A table without rows: it knows no status word.
     pub const fn new() -> Self {
-        Self { rows: [None; N] }
+        Self { rows: ArrayVec::new_const() }
     }
 
     /// Adds a row after the others. Returns `false` when the table is full.
     pub fn push(&mut self, pattern: BitPattern, report: Report) -> bool {
-        match self.rows.iter_mut().find(|row| row.is_none()) {
-            Some(row) => {
-                *row = Some((pattern, report));
-                true
-            }
-            None => false,
-        }
+        self.rows.try_push((pattern, report)).is_ok()
     }
 
     /// The rows in order.
     pub fn rows(&self) -> impl Iterator<Item = (BitPattern, Report)> + '_ {
-        self.rows.iter().map_while(|row| *row)
+        self.rows.iter().copied()
     }
 
     /// What the status word says, or `None` when no row matches.

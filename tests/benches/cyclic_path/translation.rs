@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
+use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Hearing, Mapping};
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
@@ -14,7 +14,7 @@ use profile_generic::interpolation::{
     FineInterpolator, InterpolatorConfig, Quality, SetPoints, TargetUpdate,
 };
 use profile_generic::mode::OperatingMode;
-use profile_generic::program::{ConversionReport, Trackers};
+use profile_generic::program::ConversionReport;
 use profile_generic::state::Action;
 use profile_generic::time::{DurationNs, SystemTime};
 
@@ -38,7 +38,7 @@ pub struct Axis {
     north: CipProgram,
     trackers: CipTrackers,
     south: DriveProgram,
-    south_trackers: Trackers,
+    hearing: Hearing,
     interpolator: FineInterpolator,
     period: DurationNs,
     command: AxisCommand,
@@ -79,7 +79,7 @@ impl Axis {
         let mut axis = Self {
             trackers: north.trackers(),
             north,
-            south_trackers: south.feedback.trackers(),
+            hearing: south.hearing(),
             south,
             interpolator,
             period,
@@ -152,8 +152,7 @@ impl Axis {
     /// what the state asks for to bytes.
     pub fn step(&mut self, telegram: &[u8]) {
         let mut report = ConversionReport::default();
-        let told =
-            self.south.decode(telegram, false, &mut self.feedback, &mut self.south_trackers, &mut report);
+        let told = self.south.decode(telegram, false, &mut self.feedback, &mut self.hearing, &mut report);
         assert!(told.is_some());
         self.encode();
     }
@@ -161,8 +160,7 @@ impl Axis {
     /// Bytes of the drive become the generic feedback, and that the values of an answer.
     pub fn feedback(&mut self, telegram: &[u8]) -> CyclicValues {
         let mut report = ConversionReport::default();
-        let word =
-            self.south.decode(telegram, false, &mut self.feedback, &mut self.south_trackers, &mut report);
+        let word = self.south.decode(telegram, false, &mut self.feedback, &mut self.hearing, &mut report);
         assert!(word.is_some());
         let mut values = CyclicValues::default();
         self.north.encode(&self.feedback, WANTED, &mut values);
@@ -181,6 +179,14 @@ fn values(number: u16) -> CommandValues {
     }
 }
 
+/// The TPDOs of a drive that operates in csp.
+#[must_use]
+pub fn csp_telegram() -> [u8; TELEGRAM_MAX] {
+    let mut telegram = [0; TELEGRAM_MAX];
+    telegram[..3].copy_from_slice(&CSP_OPERATING.to_le_bytes()[..3]);
+    telegram
+}
+
 /// Benches of this module.
 pub fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("translation");
@@ -197,8 +203,7 @@ pub fn bench(criterion: &mut Criterion) {
     group.bench_function("generic_to_rpdo_bytes", |bencher| bencher.iter(|| axis.encode()));
     group.bench_function("update_and_its_two_cycles_on_can", |bencher| bencher.iter(|| axis.update()));
     assert_eq!(axis.saturated, 0, "nothing was clamped");
-    let mut telegram = [0; TELEGRAM_MAX];
-    telegram[..3].copy_from_slice(&CSP_OPERATING.to_le_bytes()[..3]);
+    let telegram = csp_telegram();
     group
         .bench_function("tpdos_in_and_rpdos_out", |bencher| bencher.iter(|| axis.step(black_box(&telegram))));
     group.bench_function("tpdo_bytes_to_values", |bencher| {

@@ -17,6 +17,9 @@ mod explicit;
 #[expect(dead_code, reason = "shared with the benchmark of times")]
 #[path = "../cyclic_path/motion.rs"]
 mod motion;
+#[expect(dead_code, reason = "shared with the benchmark of times")]
+#[path = "../cyclic_path/translation.rs"]
+mod translation;
 
 use std::hint::black_box;
 
@@ -40,6 +43,8 @@ const CASES: &[&str] = &[
     "ten_axis_attributes",
     "identity_through_the_adapter",
     "engine_cycle_two_axes",
+    "rpdos_out",
+    "tpdos_in_and_rpdos_out",
 ];
 
 #[inline(never)]
@@ -80,6 +85,16 @@ fn counted_identity(session: &mut explicit::Session) -> usize {
 #[inline(never)]
 fn counted_engine(cycle: &mut dyn FnMut()) {
     cycle();
+}
+
+#[inline(never)]
+fn counted_rpdos(axis: &mut translation::Axis) {
+    axis.encode();
+}
+
+#[inline(never)]
+fn counted_step(axis: &mut translation::Axis, telegram: &[u8]) {
+    axis.step(telegram);
 }
 
 fn repeat<T>(count: u32, mut case: impl FnMut() -> T) {
@@ -123,6 +138,15 @@ fn run(case: &str, count: u32) {
         "engine_cycle_two_axes" => {
             let mut rig: Rig = engine::shuttle();
             repeat(count, || rig.cycle_in(|cycle| counted_engine(cycle)));
+        }
+        "rpdos_out" => {
+            let mut axis = translation::Axis::on_can();
+            repeat(count, || counted_rpdos(&mut axis));
+        }
+        "tpdos_in_and_rpdos_out" => {
+            let mut axis = translation::Axis::on_can();
+            let telegram = translation::csp_telegram();
+            repeat(count, || counted_step(&mut axis, black_box(&telegram)));
         }
         codec_case => {
             let (name, axes) = codec_case.rsplit_once('_').expect("see --list");

@@ -23,7 +23,7 @@ impl AxisChannel {
         sampled: SystemTime,
         received: Option<Received<'_>>,
     ) {
-        let Some((program, trackers)) = self.south.as_mut() else {
+        let Some((program, hearing)) = self.south.as_mut() else {
             self.tick(now, system);
             return;
         };
@@ -42,7 +42,7 @@ impl AxisChannel {
         let mut conversions = ConversionReport::default();
         let led = self.procedure.leads();
         let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
-        let status = program.decode(received.data, led, &mut self.feedback, trackers, &mut conversions);
+        let status = program.decode(received.data, led, &mut self.feedback, hearing, &mut conversions);
         let Some(status) = status else { return };
         let tells_velocity = program.tells(Signal::VelocityActual);
         self.status = status;
@@ -114,10 +114,10 @@ impl AxisChannel {
         unit.want(self.south().and_then(|program| program.procedure(self.command.selection())), &around);
         self.procedure = unit;
         if unit.has_shifted()
-            && let Some((_, trackers)) = &mut self.south
+            && let Some((_, hearing)) = &mut self.south
         {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
-            trackers.restart();
+            hearing.restart();
         }
         if let Some(selection) = unit.selection() {
             (self.feedback.mode, self.feedback.interpolation) = (selection.mode, selection.interpolation);

@@ -29,7 +29,7 @@ pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
 
 use self::hookup::TestRun;
-use crate::mapping::{CipProgram, CipTrackers, DriveProgram};
+use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing};
 use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -37,7 +37,6 @@ use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
 use profile_generic::mode::ModeSelection;
-use profile_generic::program::Trackers;
 use profile_generic::quantity::{Position, Velocity};
 use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
@@ -134,7 +133,7 @@ pub struct AxisChannel {
     /// Counts the programs that were taken.
     scaling_id: u32,
     trackers: CipTrackers,
-    south: Option<(DriveProgram, Trackers)>,
+    south: Option<(DriveProgram, Hearing)>,
     limits: Limits,
     command_loss: Reaction,
     /// It may be switched on.
@@ -337,9 +336,9 @@ impl AxisChannel {
 
     /// The drive is commissioned and will be spoken to by this program.
     pub fn set_south(&mut self, program: DriveProgram) {
-        let trackers = program.feedback.trackers();
+        let hearing = program.hearing();
         self.procedure.restart(program.procedures());
-        self.south = Some((program, trackers));
+        self.south = Some((program, hearing));
         self.captures.restart();
         self.action = Action::TorqueOff;
         (self.control, self.status, self.reset_cycles) = (0, 0, 0);
@@ -425,10 +424,10 @@ impl AxisChannel {
         generation: u8,
         result: Result<Progress, AccessFailure>,
     ) {
-        let Some((program, trackers)) = &mut self.south else { return };
+        let Some((program, hearing)) = &mut self.south else { return };
         if self.procedure.answer(program.procedures(), access, generation, result, now) {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
-            trackers.restart();
+            hearing.restart();
         }
     }
 
