@@ -383,6 +383,7 @@ impl AxisCommand {
     }
 
     /// The value of a command signal, or `None` when it is absent or belongs to the feedback.
+    #[inline]
     pub fn get(&self, signal: Signal) -> Option<i64> {
         let (bit, value) = match signal {
             Signal::PositionCommand => (CommandSet::POSITION, self.position.0),
@@ -405,6 +406,7 @@ impl AxisCommand {
 
     /// Sets a command signal and marks it present. Returns `false`, and changes nothing, when the signal
     /// belongs to the feedback or the value does not fit (digital outputs are 32 bits).
+    #[inline]
     pub fn set(&mut self, signal: Signal, value: i64) -> bool {
         let bit = match signal {
             Signal::PositionCommand => {
@@ -472,10 +474,12 @@ impl SignalImage for AxisCommand {
         signal.is_command()
     }
 
+    #[inline]
     fn get(&self, signal: Signal) -> Option<i64> {
         AxisCommand::get(self, signal)
     }
 
+    #[inline]
     fn set(&mut self, signal: Signal, value: i64) -> bool {
         AxisCommand::set(self, signal, value)
     }
@@ -533,6 +537,7 @@ impl AxisFeedback {
     }
 
     /// The value of a feedback signal, or `None` when it is absent or belongs to the command.
+    #[inline]
     pub fn get(&self, signal: Signal) -> Option<i64> {
         let (bit, value) = match signal {
             Signal::PositionActual => (FeedbackSet::POSITION, self.position.0),
@@ -551,6 +556,7 @@ impl AxisFeedback {
 
     /// Sets a feedback signal and marks it present. Returns `false`, and changes nothing, when the signal
     /// belongs to the command or the value does not fit (digital inputs are 32 bits).
+    #[inline]
     pub fn set(&mut self, signal: Signal, value: i64) -> bool {
         let bit = match signal {
             Signal::PositionActual => {
@@ -602,10 +608,12 @@ impl SignalImage for AxisFeedback {
         !signal.is_command()
     }
 
+    #[inline]
     fn get(&self, signal: Signal) -> Option<i64> {
         AxisFeedback::get(self, signal)
     }
 
+    #[inline]
     fn set(&mut self, signal: Signal, value: i64) -> bool {
         AxisFeedback::set(self, signal, value)
     }

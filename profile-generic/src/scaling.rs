@@ -104,6 +104,8 @@ impl WrapTracker {
     }
 
     /// The shorter way round for a difference of any counters.
+    #[cold]
+    #[inline(never)]
     fn long_step(&self, difference: i128) -> i64 {
         let step = difference.rem_euclid(self.modulus);
         let step = if step >= self.modulus - step { step - self.modulus } else { step };

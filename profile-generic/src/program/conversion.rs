@@ -52,6 +52,13 @@ impl Conversion {
         {
             return self.limit(Outcome { value, saturated: false, inexact });
         }
+        self.convert_long(value)
+    }
+
+    /// The same in 128 bits; apart, so that the ordinary way stays short where it is used.
+    #[cold]
+    #[inline(never)]
+    const fn convert_long(&self, value: i64) -> Outcome {
         self.finish(self.ratio.quotient(value, self.rounding))
     }
 

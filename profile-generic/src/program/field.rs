@@ -331,6 +331,7 @@ impl Field {
         Some(())
     }
 
+    #[inline(never)]
     fn write_float(&self, value: i64, bytes: &mut [u8], report: &mut ConversionReport) -> Option<()> {
         let (saturated, inexact) = if self.width == Width::F32 {
             let (FloatOutcome { value, inexact }, saturated) = self.conversion.convert_to_f32(value);
@@ -361,6 +362,7 @@ impl Field {
         }))
     }
 
+    #[inline(never)]
     fn read_float(&self, raw: i64) -> Option<Outcome> {
         let [a, b, c, d, ..] = raw.to_le_bytes();
         self.conversion.convert_f64(match self.width {

@@ -187,6 +187,14 @@ pub fn csp_telegram() -> [u8; TELEGRAM_MAX] {
     telegram
 }
 
+/// The same of a drive that shows something else in every cycle: that it is at its target, and that it is not.
+#[must_use]
+pub fn changing_telegrams() -> [[u8; TELEGRAM_MAX]; 2] {
+    let mut telegrams = [csp_telegram(); 2];
+    telegrams[1][1] |= 0x04;
+    telegrams
+}
+
 /// Benches of this module.
 pub fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("translation");
@@ -206,6 +214,13 @@ pub fn bench(criterion: &mut Criterion) {
     let telegram = csp_telegram();
     group
         .bench_function("tpdos_in_and_rpdos_out", |bencher| bencher.iter(|| axis.step(black_box(&telegram))));
+    let mut telegrams = changing_telegrams();
+    group.bench_function("new_state_in_and_rpdos_out", |bencher| {
+        bencher.iter(|| {
+            axis.step(black_box(&telegrams[0]));
+            telegrams.swap(0, 1);
+        });
+    });
     group.bench_function("tpdo_bytes_to_values", |bencher| {
         bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
     });

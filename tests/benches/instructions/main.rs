@@ -45,6 +45,7 @@ const CASES: &[&str] = &[
     "engine_cycle_two_axes",
     "rpdos_out",
     "tpdos_in_and_rpdos_out",
+    "new_state_in_and_rpdos_out",
 ];
 
 #[inline(never)]
@@ -147,6 +148,14 @@ fn run(case: &str, count: u32) {
             let mut axis = translation::Axis::on_can();
             let telegram = translation::csp_telegram();
             repeat(count, || counted_step(&mut axis, black_box(&telegram)));
+        }
+        "new_state_in_and_rpdos_out" => {
+            let mut axis = translation::Axis::on_can();
+            let mut telegrams = translation::changing_telegrams();
+            repeat(count, || {
+                counted_step(&mut axis, black_box(&telegrams[0]));
+                telegrams.swap(0, 1);
+            });
         }
         codec_case => {
             let (name, axes) = codec_case.rsplit_once('_').expect("see --list");

@@ -17,6 +17,8 @@ use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 
+use super::beside::{Beside, connect};
+
 const BOX: &str = include_str!("can.toml");
 
 const TURNTABLE: AxisSet = AxisSet::one(1);
@@ -46,6 +48,8 @@ fn position(rig: &Rig, device: usize) -> i64 {
     axis(rig, device).actual().position.get()
 }
 
+const BUS: Beside = Beside { velocity, position, turns: turntable_turns, slides: slide_moves };
+
 fn turn() -> Step {
     Step::RunAt { axis: 1, velocity: SPEED, acceleration: 20.0, jerk: 400.0 }
 }
@@ -57,13 +61,6 @@ fn settings() -> Settings {
 /// The slide goes far enough for what follows: `seconds`, and then turning the turntable again for a while.
 fn far(seconds: f64) -> Step {
     Step::MoveAbsolute { axis: 2, position: 24.0 * (seconds + 2.0), limits: SLIDE }
-}
-
-/// Connects a controller with the turntable in velocity control.
-fn connect(rig: &mut Rig, program: Vec<Step>) {
-    let mut config = rig.controller_config();
-    config.axes[0].control_mode = ControlMode::VELOCITY;
-    rig.connect_with(config, program);
 }
 
 /// Both axes in motion; the turntable is reset and turned again after so many seconds.
@@ -82,7 +79,11 @@ fn in_motion(seconds: f64) -> Rig {
 }
 
 fn moving(rig: &Rig) -> bool {
-    velocity(rig, 0) > 199 * NANO / 100 && slide_moves(rig)
+    turntable_turns(rig) && slide_moves(rig)
+}
+
+fn turntable_turns(rig: &Rig) -> bool {
+    velocity(rig, 0) > 199 * NANO / 100
 }
 
 /// The slide is at its speed, to a hundredth.
@@ -93,46 +94,6 @@ fn slide_moves(rig: &Rig) -> bool {
 /// Type and code of the faults of an axis that the controller got.
 fn codes(rig: &Rig, place: usize) -> Vec<(FaultType, u8)> {
     rig.report().axes[place].faults.kept().iter().map(|fault| (fault.fault_type, fault.code)).collect()
-}
-
-/// Goes on until `done` while the slide goes on.
-#[track_caller]
-fn go(rig: &mut Rig, limit: i64, what: &str, mut done: impl FnMut(&Rig) -> bool) {
-    rig.run_until(millis(limit), what, |rig| {
-        assert!(slide_moves(rig), "the slide runs at {}\n{}", velocity(rig, 1), rig.told());
-        done(rig)
-    });
-}
-
-#[track_caller]
-fn go_for(rig: &mut Rig, span: i64) {
-    let end = rig.now() + millis(span);
-    go(rig, span + 1_000, "the end of the time", |rig| rig.now() >= end);
-}
-
-/// The turntable comes to rest within so many milliseconds and stays where it is.
-#[track_caller]
-fn stops_within(rig: &mut Rig, limit: i64) {
-    go(rig, limit, "rest", |rig| velocity(rig, 0).abs() < NANO / 100);
-    go_for(rig, 50);
-    let stands = position(rig, 0);
-    go_for(rig, 300);
-    let moved = position(rig, 0) - stands;
-    assert!(moved.abs() < NANO / 1_000, "it moved by {moved} afterwards\n{}", rig.told());
-}
-
-/// The turntable turns again, to the end of the program; nothing was wrong with the slide, nor with anybody on the bus.
-#[track_caller]
-fn runs_again(rig: &mut Rig) {
-    go(rig, 30_000, "the turntable turns again", |rig| {
-        rig.engine.axes()[0].fault().is_none() && velocity(rig, 0) > 199 * NANO / 100
-    });
-    go_for(rig, 200);
-    let report = rig.run(millis(30_000));
-    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
-    assert_eq!((report.axes[1].faults.total, report.axes[1].alarms.total), (0, 0), "{}", rig.told());
-    assert_eq!(rig.engine.axes()[1].counters().faults, 0);
-    assert!(rig.torque_free());
 }
 
 /// What was told once.
@@ -168,11 +129,11 @@ fn a_lost_heartbeat_stops_its_axis() {
     let mut rig = in_motion(3.0);
     rig.can[0].tamper = Some(Box::new(|_, frame| frame.id() != HEARTBEAT));
     // Three heartbeats of 100 ms may be missing.
-    stops_within(&mut rig, 500);
+    BUS.stops_within(&mut rig, 500);
     told(&rig, "CAN bus 1: the heartbeat of node 1 is gone");
     silent(&rig);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
     rig.can[0].bus.bus_mut().judge();
 }
 
@@ -181,12 +142,12 @@ fn a_drive_whose_plug_is_pulled_stops_by_itself() {
     let mut rig = in_motion(3.0);
     let now = rig.now();
     rig.can[0].bus.connect(now, 0, false);
-    stops_within(&mut rig, 500);
+    BUS.stops_within(&mut rig, 500);
     silent(&rig);
-    go(&mut rig, 1_000, "the loss", |rig| rig.told().contains("the heartbeat of node 1 is gone"));
+    BUS.go(&mut rig, 1_000, "the loss", |rig| rig.told().contains("the heartbeat of node 1 is gone"));
     let now = rig.now();
     rig.can[0].bus.connect(now, 0, true);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -194,10 +155,10 @@ fn a_drive_that_reboots_stops_its_axis() {
     let mut rig = in_motion(3.0);
     let now = rig.now();
     rig.can[0].bus.nodes_mut().next().expect("a drive").power_cycle(now);
-    stops_within(&mut rig, 500);
+    BUS.stops_within(&mut rig, 500);
     told(&rig, "CAN bus 1: node 1 has restarted while it was in operation");
     silent(&rig);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
     rig.can[0].bus.bus_mut().judge();
 }
 
@@ -208,14 +169,14 @@ fn a_storm_of_emergency_messages_stops_nobody() {
     rig.can[0].bus.bus_mut().share(EMCY);
     for _ in 0..500 {
         send(&mut rig, other, EMCY, &[0x00, 0x10, 0x01, 0, 0, 0, 0, 0]);
-        go_for(&mut rig, 1);
+        BUS.go_for(&mut rig, 1);
         assert!(moving(&rig), "{}", rig.told());
     }
     told(&rig, "CAN bus 1: node 1 sends more emergency messages than are told one by one");
     let all = rig.notices.iter().filter(|notice| notice.to_string().contains("EMCY ")).count();
     assert_eq!(all, 16, "in a second: {}", rig.told());
     assert_eq!(codes(&rig, 0), []);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
     rig.can[0].bus.bus_mut().judge();
 }
 
@@ -253,6 +214,28 @@ fn a_box_that_is_bus_off_stops_every_axis_and_leads_them_again_when_it_is_back()
 }
 
 #[test]
+fn a_bus_that_is_lost_again_and_again_is_left_alone_for_longer_and_longer() {
+    let mut rig = Rig::ready(settings());
+    let own = rig.can[0].bus.own_station();
+    let count = |rig: &Rig, text| rig.told().lines().filter(|line| *line == text).count();
+    for (round, pause) in (1..).zip([0, 500, 1_000, 2_000, 4_000]) {
+        let now = rig.now();
+        rig.can[0].bus.bus_mut().take_off(now, own);
+        rig.run_for(millis(20));
+        let begin = rig.now();
+        rig.can[0].bus.bus_mut().restart(begin, own);
+        rig.run_until(millis(pause + 100), "back", |rig| {
+            count(rig, "CAN bus 1: the controller is back on the bus") == round
+        });
+        let waited = rig.now() - begin;
+        assert!((pause..pause + 10).contains(&(waited.0 / 1_000_000)), "{waited} in place of {pause} ms");
+        assert_eq!(count(&rig, "CAN bus 1: the controller is off the bus"), round);
+    }
+    rig.run_for(millis(2_000));
+    assert!(rig.engine.axes().iter().all(|axis| axis.south().is_some()), "both are in operation again");
+}
+
+#[test]
 fn a_second_device_with_the_same_node_id_stops_the_axis_until_it_is_gone() {
     let mut rig = in_motion(14.0);
     rig.can[0].bus.add(drive(NodeId::new(1).ok(), 1).expect("a drive"));
@@ -267,19 +250,19 @@ fn a_second_device_with_the_same_node_id_stops_the_axis_until_it_is_gone() {
     assert!(slowest > SLIDE_SPEED * 9 / 10, "{slowest}");
     told(&rig, "CAN bus 1: node 1 has restarted while it was in operation");
     silent(&rig);
-    go_for(&mut rig, 600);
+    BUS.go_for(&mut rig, 600);
     let left_out = |line: &str| {
         line.starts_with("axis 1: commissioning of node 1 failed: ")
             && line.ends_with(": no answer within 500 ms; it is left out")
     };
     assert_eq!(rig.told().lines().filter(|line| left_out(line)).count(), 1, "{}", rig.told());
-    stops_within(&mut rig, 10);
+    BUS.stops_within(&mut rig, 10);
     let now = rig.now();
     let bus = &mut rig.can[0].bus;
     bus.connect(now, 2, false);
     bus.connect(now, 0, true);
     bus.nodes_mut().next().expect("a drive").power_cycle(now);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -288,11 +271,11 @@ fn every_tpdo_twice_stops_its_axis() {
     let (own, device) = (rig.can[0].bus.own_station(), rig.can[0].bus.station(0));
     let twice = Disturbance::all(Effect::Double).from(device).to(own).id(TPDO);
     rig.can[0].bus.bus_mut().disturb(twice);
-    stops_within(&mut rig, 300);
+    BUS.stops_within(&mut rig, 300);
     told(&rig, "CAN bus 1: two devices seem to have node-id 1: two of each TPDO");
     silent(&rig);
     rig.can[0].bus.bus_mut().calm();
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -304,22 +287,22 @@ fn as_many_lost_tpdos_as_are_permitted_stop_nobody() {
         left -= i32::from(lost);
         !lost
     }));
-    go_for(&mut rig, 200);
+    BUS.go_for(&mut rig, 200);
     assert!(moving(&rig), "{}", rig.told());
     assert_eq!(rig.engine.axes()[0].counters().lost_telegrams, 3);
     assert_eq!((codes(&rig, 0), codes(&rig, 1)), (vec![], vec![]));
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
 fn a_tpdo_that_stays_away_stops_its_axis() {
     let mut rig = in_motion(2.0);
     rig.can[0].tamper = Some(Box::new(|_, frame| frame.id() != TPDO));
-    stops_within(&mut rig, 300);
+    BUS.stops_within(&mut rig, 300);
     told(&rig, "CAN bus 1: TPDO 1 of node 1 is missing more often than permitted");
     silent(&rig);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
     told(&rig, "CAN bus 1: TPDO 1 of node 1 comes again");
     rig.can[0].bus.bus_mut().judge();
 }
@@ -333,11 +316,11 @@ fn a_tpdo_of_another_length_is_not_taken_and_stops_its_axis() {
         }
         true
     }));
-    stops_within(&mut rig, 300);
+    BUS.stops_within(&mut rig, 300);
     told(&rig, "CAN bus 1: TPDO 1 of node 1: expected 7 bytes, got 3; it is not taken");
     silent(&rig);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -356,13 +339,13 @@ fn frames_that_nobody_has_asked_for_change_nothing() {
     ];
     for (id, data) in &strange {
         send(&mut rig, other, *id, data);
-        go_for(&mut rig, 50);
+        BUS.go_for(&mut rig, 50);
         assert!(moving(&rig), "{id}: {}", rig.told());
     }
     told(&rig, "CAN bus 1: node 37 is there and not in the list");
     assert_eq!(rig.status().counters.refused_frames - refused, strange.len() as u64);
     assert_eq!((codes(&rig, 0), codes(&rig, 1)), (vec![], vec![]));
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -373,14 +356,14 @@ fn somebody_else_who_commands_a_drive_stops_its_axis_and_is_told() {
     // Disable voltage, for as long as it takes.
     for _ in 0..20 {
         send(&mut rig, other, Id::Standard(0x201), &[0; 7]);
-        go_for(&mut rig, 2);
+        BUS.go_for(&mut rig, 2);
     }
-    stops_within(&mut rig, 1_000);
+    BUS.stops_within(&mut rig, 1_000);
     told(&rig, "CAN bus 1: somebody else sends 201, which only the master may send");
     // Whoever takes away its operation takes away its power, as far as the drive tells.
     assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 37)], "{}", rig.told());
     assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::POWER_LOSS));
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 /// A box whose turntable does not come up; the slide runs, and the turntable after so many seconds.
@@ -418,20 +401,20 @@ fn a_drive_that_refuses_its_mapping_is_left_out_and_tried_again() {
         "CAN bus 1: node 1 does not come up: J: configuration download failed: map write 1600:01: refused with 06040041: \
          object cannot be mapped to a PDO",
     );
-    go_for(&mut rig, 1_000);
+    BUS.go_for(&mut rig, 1_000);
     assert_eq!(position(&rig, 0), 0);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
 fn a_drive_that_answers_no_sdo_is_left_out_and_tried_again() {
     let mut rig = without_turntable(24.0, |frame| frame.id() != SDO_ANSWER);
-    go_for(&mut rig, 11_000);
+    BUS.go_for(&mut rig, 11_000);
     told(&rig, "CAN bus 1: node 1 does not come up: B: no answer to device type");
     assert_eq!(position(&rig, 0), 0);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -460,11 +443,11 @@ fn a_drive_that_does_not_come_into_operation_is_a_fault_and_is_not_led() {
     ];
     connect(&mut rig, program);
     rig.run_until(millis(10_000), "the slide in motion", slide_moves);
-    go_for(&mut rig, 10_500);
+    BUS.go_for(&mut rig, 10_500);
     assert_eq!(codes(&rig, 0), [(FaultType::AXIS_MFG, 12)], "{}", rig.told());
     assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::START_TIME_OUT));
     told(&rig, "axis 1: Axis Fault - Mfg 12 (start_time_out) in Starting, fault action 0x23");
     assert!(velocity(&rig, 0).abs() < NANO / 100);
     rig.can[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }

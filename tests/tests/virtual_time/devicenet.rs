@@ -10,11 +10,14 @@ use axisbridge_tests::rig::motion::{NANO, both, millis};
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{AxisSet, Limits, Step};
 use profile_cip::devicenet::wire::{DuplicateMac, Identifier, MacId};
-use profile_cip::wire::motion::codes::{ControlMode, FaultType};
+use profile_cip::wire::motion::codes::FaultType;
 use profile_generic::can::Frame;
 use profile_generic::can::bus::Station;
+use profile_generic::cast::f64_from_i64;
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
+
+use super::beside::{Beside, connect};
 
 /// Two CIP Motion drives at 10 ms and 500 kbit/s.
 const BOX: &str = include_str!("devicenet.toml");
@@ -49,22 +52,20 @@ fn velocity(rig: &Rig, place: usize) -> i64 {
     drive(rig, place).actual().velocity.get()
 }
 
-/// Where the servo of a drive is, in turns of its motor.
-fn turns(rig: &Rig, place: usize) -> f64 {
-    #[allow(clippy::cast_precision_loss)]
-    let turns = drive(rig, place).actual().position.get() as f64 / 1e9;
-    turns
+/// Where the servo of a drive is, in nanoturns of its motor.
+fn position(rig: &Rig, place: usize) -> i64 {
+    drive(rig, place).actual().position.get()
 }
+
+/// The same in turns.
+fn turns(rig: &Rig, place: usize) -> f64 {
+    f64_from_i64(position(rig, place)) / 1e9
+}
+
+const BUS: Beside = Beside { velocity, position, turns: turntable_turns, slides: slide_moves };
 
 fn turn(velocity: f64) -> Step {
     Step::RunAt { axis: 1, velocity, acceleration: 20.0, jerk: 400.0 }
-}
-
-/// Connects a controller with the turntable in velocity control.
-fn connect(rig: &mut Rig, program: Vec<Step>) {
-    let mut config = rig.controller_config();
-    config.axes[0].control_mode = ControlMode::VELOCITY;
-    rig.connect_with(config, program);
 }
 
 /// Both axes in motion; the turntable is reset and turned again after so many seconds.
@@ -94,46 +95,6 @@ fn turntable_turns(rig: &Rig) -> bool {
 fn slide_moves(rig: &Rig) -> bool {
     let seen = rig.engine.axes()[1].feedback().velocity.get();
     (velocity(rig, 1) - SLIDE_SPEED).abs() < SLIDE_SPEED / 3 && (seen - 24 * NANO).abs() < 24 * NANO / 10
-}
-
-/// Goes on until `done` while the slide goes on.
-#[track_caller]
-fn go(rig: &mut Rig, limit: i64, what: &str, mut done: impl FnMut(&Rig) -> bool) {
-    rig.run_until(millis(limit), what, |rig| {
-        assert!(slide_moves(rig), "the slide runs at {}\n{}", velocity(rig, 1), rig.told());
-        done(rig)
-    });
-}
-
-#[track_caller]
-fn go_for(rig: &mut Rig, span: i64) {
-    let end = rig.now() + millis(span);
-    go(rig, span + 1_000, "the end of the time", |rig| rig.now() >= end);
-}
-
-/// The turntable comes to rest within so many milliseconds and stays where it is.
-#[track_caller]
-fn stops_within(rig: &mut Rig, limit: i64) {
-    go(rig, limit, "rest", |rig| velocity(rig, 0).abs() < NANO / 100);
-    go_for(rig, 50);
-    let stands = turns(rig, 0);
-    go_for(rig, 300);
-    let moved = turns(rig, 0) - stands;
-    assert!(moved.abs() < 0.001, "it moved by {moved} afterwards\n{}", rig.told());
-}
-
-/// The turntable turns again, to the end of the program; nothing was wrong with the slide, nor with anybody on the bus.
-#[track_caller]
-fn runs_again(rig: &mut Rig) {
-    go(rig, 30_000, "the turntable turns again", |rig| {
-        rig.engine.axes()[0].fault().is_none() && turntable_turns(rig)
-    });
-    go_for(rig, 200);
-    let report = rig.run(millis(30_000));
-    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
-    assert_eq!((report.axes[1].faults.total, report.axes[1].alarms.total), (0, 0), "{}", rig.told());
-    assert_eq!(rig.engine.axes()[1].counters().faults, 0);
-    assert!(rig.torque_free());
 }
 
 #[track_caller]
@@ -207,16 +168,16 @@ fn a_drive_whose_plug_is_pulled_stops_by_itself_and_comes_back_while_the_other_g
     let mut rig = in_motion(BOX, 8.0);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, false);
-    stops_within(&mut rig, 800);
+    BUS.stops_within(&mut rig, 800);
     silent(&rig);
     assert_eq!(count(&rig, "DeviceNet 1: slave 5: poll connection: 4 answers in a row are missing"), 1);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, true);
-    go(&mut rig, 7_000, "the drive taken anew", |rig| {
+    BUS.go(&mut rig, 7_000, "the drive taken anew", |rig| {
         count(rig, "DeviceNet 1: slave 5: exchanging") == 2 && rig.engine.axes()[0].south().is_some()
     });
     assert!(velocity(&rig, 0).abs() < NANO / 100, "nobody has asked it to move");
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
     rig.devicenet[0].bus.bus_mut().judge();
 }
 
@@ -230,7 +191,7 @@ fn a_fault_of_the_drive_is_told_with_its_cause_and_reset() {
         .expect("a drive")
         .servo_mut()
         .raise_fault(FaultCause::OVER_CURRENT);
-    stops_within(&mut rig, 1_000);
+    BUS.stops_within(&mut rig, 1_000);
     assert_eq!(codes(&rig), [(FaultType::AXIS, 10)], "Inverter Overcurrent\n{}", rig.told());
     rig.devicenet[0]
         .bus
@@ -239,7 +200,7 @@ fn a_fault_of_the_drive_is_told_with_its_cause_and_reset() {
         .expect("a drive")
         .servo_mut()
         .clear_fault(FaultCause::OVER_CURRENT);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -252,12 +213,12 @@ fn one_message_with_its_fragments_out_of_order_stops_nobody() {
         }
         true
     }));
-    go_for(&mut rig, 200);
+    BUS.go_for(&mut rig, 200);
     assert!(turntable_turns(&rig), "{}", rig.told());
     assert!(rig.status().counters.refused_frames > refused, "they were not taken");
     let lost = rig.engine.axes()[0].counters().lost_telegrams;
     assert!((1..=2).contains(&lost), "{lost}");
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -267,10 +228,10 @@ fn fragments_that_stay_out_of_order_stop_their_axis() {
         shuffle(frame);
         true
     }));
-    stops_within(&mut rig, 1_500);
+    BUS.stops_within(&mut rig, 1_500);
     silent(&rig);
     rig.devicenet[0].tamper = None;
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -293,9 +254,9 @@ fn a_node_that_asks_for_the_mac_id_of_the_box_is_told_and_changes_nothing() {
     let mut rig = in_motion(BOX, 1.0);
     let other = intruder(&mut rig);
     claim(&mut rig, other, 1, false);
-    go_for(&mut rig, 300);
+    BUS.go_for(&mut rig, 300);
     assert!(turntable_turns(&rig), "{}", rig.told());
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -341,11 +302,11 @@ fn a_velocity_drive_that_is_lost_stops_and_comes_back() {
     let mut rig = in_motion(&velocity_drive(21), 9.0);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, false);
-    stops_within(&mut rig, 6_000);
+    BUS.stops_within(&mut rig, 6_000);
     silent(&rig);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, true);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -356,11 +317,11 @@ fn a_box_that_is_bus_off_stops_both_axes_and_leads_them_again_when_it_is_back() 
     // The drives miss four polls, and stop by themselves.
     let still = |rig: &Rig| (0..2).all(|place| velocity(rig, place).abs() < NANO / 100);
     rig.run_until(millis(1_500), "rest", still);
-    let stands = [turns(&rig, 0), turns(&rig, 1)];
+    let stands = [position(&rig, 0), position(&rig, 1)];
     rig.run(millis(60_000));
     for (axis, stands) in stands.into_iter().enumerate() {
         assert_eq!(codes_of(&rig, axis), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
-        assert!((turns(&rig, axis) - stands).abs() < 0.001);
+        assert!((position(&rig, axis) - stands).abs() < NANO / 1_000);
     }
     let now = rig.now();
     rig.devicenet[0].bus.bus_mut().restart(now, own);
@@ -403,14 +364,14 @@ fn a_fault_of_a_node_stops_its_axis_until_it_is_reset() {
         with_node_fault(frame);
         true
     }));
-    stops_within(&mut rig, 1_000);
+    BUS.stops_within(&mut rig, 1_000);
     // The axis of the drive knows of no fault, and half a second is waited for a cause.
-    go_for(&mut rig, 500);
+    BUS.go_for(&mut rig, 500);
     assert_eq!(codes(&rig), [(FaultType::AXIS_MFG, 1)], "{}", rig.told());
     rig.devicenet[0].tamper = None;
-    go_for(&mut rig, 300);
+    BUS.go_for(&mut rig, 300);
     assert!(rig.engine.axes()[0].fault().is_some(), "a fault stays until somebody resets it");
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -420,11 +381,11 @@ fn a_velocity_drive_with_the_basic_assembly_turns_forward_and_comes_back() {
     assert!((seen - 2 * NANO).abs() < NANO / 20, "the drive says {seen}, in whole rpm");
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, false);
-    stops_within(&mut rig, 6_000);
+    BUS.stops_within(&mut rig, 6_000);
     silent(&rig);
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, true);
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }
 
 #[test]
@@ -460,9 +421,9 @@ fn a_node_that_asks_for_the_mac_id_of_a_drive_is_told_and_changes_nothing() {
     let mut rig = in_motion(BOX, 2.0);
     let other = intruder(&mut rig);
     claim(&mut rig, other, 5, false);
-    go_for(&mut rig, 500);
+    BUS.go_for(&mut rig, 500);
     assert!(turntable_turns(&rig), "{}", rig.told());
     let named = "DeviceNet 1: slave 5: another node wants its MAC ID: vendor 0x0777, serial 0x12345678";
     assert_eq!(count(&rig, named), 1, "{}", rig.told());
-    runs_again(&mut rig);
+    BUS.runs_again(&mut rig);
 }

@@ -1,6 +1,7 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
 mod attributes;
+mod beside;
 mod can;
 mod can_captures;
 mod can_device;

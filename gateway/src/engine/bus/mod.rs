@@ -1,6 +1,7 @@
 //! The buses behind the engine: what they have in common.
 
 mod backoff;
+mod bus_return;
 pub mod can;
 pub mod devicenet;
 mod outlet;

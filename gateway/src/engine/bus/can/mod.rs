@@ -26,6 +26,7 @@ use self::commissioner::{AxisSetup, CommissionerEnd, Done, Job, Run, WINDOW};
 use self::layout::{BYTES_MAX, PDOS_MAX, Spread};
 use self::lss::{Assigner, Assignment};
 use super::backoff::Backoff;
+use super::bus_return::BusReturn;
 use super::outlet::Outlet;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
@@ -111,6 +112,7 @@ pub struct CanBus {
     commissioner: CommissionerEnd,
     cycles_seen: u64,
     outlet: Outlet,
+    back: BusReturn,
     /// It was up since the bus was on last.
     up: bool,
     stopped: bool,
@@ -154,6 +156,7 @@ impl CanBus {
             commissioner,
             cycles_seen: 0,
             outlet: Outlet::new(cycle_time),
+            back: BusReturn::NEVER_LOST,
             up: false,
             stopped: false,
         })
@@ -438,16 +441,23 @@ impl Bus for CanBus {
         let SouthPort::Can(port) = port else { return };
         for _ in 0..FRAMES_PER_CALL {
             match port.receive(now) {
+                Some(CanInput::Frame(_)) if !self.back.is_used() => {}
                 // A refused frame is counted by the master and changes nothing.
                 Some(CanInput::Frame(frame)) => {
                     if !self.assigner.handle(now, &frame) {
                         let _ = self.master.handle_frame(now, &frame);
                     }
                 }
-                Some(CanInput::BusOff) => self.master.bus_off(now),
-                Some(CanInput::BusOn) => self.master.bus_on(now),
+                Some(CanInput::BusOff) => {
+                    self.back.lose(now);
+                    self.master.bus_off(now);
+                }
+                Some(CanInput::BusOn) => self.back.come_back(now),
                 None => break,
             }
+        }
+        if self.back.take(now) {
+            self.master.bus_on(now);
         }
     }
 

@@ -22,6 +22,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use self::end::{End, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::backoff::Backoff;
+use super::bus_return::BusReturn;
 use super::outlet::Outlet;
 use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
@@ -100,6 +101,7 @@ pub struct DevicenetBus {
     /// It is on, or tries to be.
     started: bool,
     backoff: Backoff,
+    back: BusReturn,
     up: bool,
     stopped: bool,
 }
@@ -131,6 +133,7 @@ impl DevicenetBus {
             made_at: MonotonicTime::ZERO,
             started: false,
             backoff: Backoff::NONE,
+            back: BusReturn::NEVER_LOST,
             up: false,
             stopped: false,
         })
@@ -306,18 +309,22 @@ impl Bus for DevicenetBus {
         let SouthPort::Can(port) = port else { return };
         for _ in 0..FRAMES_PER_CALL {
             match port.receive(now) {
+                Some(CanInput::Frame(_)) if !self.back.is_used() => {}
                 // A refused frame is counted by the master and changes nothing.
                 Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
                 Some(CanInput::BusOff) => {
+                    self.back.lose(now);
                     self.outlet.clear();
                     self.master.handle_bus_off(now);
                     self.drives.iter_mut().for_each(|drive| drive.tried = true);
                 }
-                // Whether the MAC ID is still free has to be asked anew.
-                Some(CanInput::BusOn) if !self.stopped => self.master.start(now),
-                Some(CanInput::BusOn) => {}
+                Some(CanInput::BusOn) => self.back.come_back(now),
                 None => break,
             }
+        }
+        if self.back.take(now) && !self.stopped {
+            // Whether the MAC ID is still free has to be asked anew.
+            self.master.start(now);
         }
     }
 
@@ -349,7 +356,7 @@ impl Bus for DevicenetBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
         notice: &mut dyn FnMut(Notice),
     ) {
-        if !self.stopped && (!self.started || self.backoff.take(now)) {
+        if !self.stopped && self.back.is_used() && (!self.started || self.backoff.take(now)) {
             self.started = true;
             self.master.start(now);
         }
