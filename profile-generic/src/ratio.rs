@@ -123,7 +123,7 @@ impl Ratio {
     }
 
     /// `value` times this ratio, and whether it was rounded, where the product fits 64 bits: the way of nearly every value of a
-    /// cycle, without a division and without operations of 128 bits. `None` for others.
+    /// cycle, without a division. `None` for others, and where rounding would lead beyond what [`Reciprocal`] divides.
     #[inline]
     pub(crate) const fn short_quotient(self, value: i64, rounding: Rounding) -> Option<(i64, bool)> {
         let Some(product) = value.checked_mul(self.num) else { return None };
@@ -568,7 +568,7 @@ mod tests {
             }
         }
 
-        /// What fits 64 bits takes another way, to the same place.
+        /// What is divided by a reciprocal comes to the same place.
         #[test]
         fn short_and_long_quotients_agree(
             num in any::<i64>(), small in -1_000_i64..1_000, den in 1..i64::MAX, step in 1..100_i64, value in any::<i64>(),
@@ -588,6 +588,7 @@ mod tests {
             }
         }
 
+        /// What fits 64 bits takes another way, to the same place.
         #[test]
         fn short_and_long_division_agree(num in any::<i64>(), small in -1_000_i64..1_000, den in 1..i64::MAX, step in 1..100_i64) {
             for rounding in [Rounding::Nearest, Rounding::Floor, Rounding::TowardZero] {

@@ -345,6 +345,34 @@ fn a_box_that_is_bus_off_stops_both_axes_and_leads_them_again_when_it_is_back() 
     assert!(rig.torque_free());
 }
 
+#[test]
+fn a_bus_that_is_lost_again_and_again_is_left_alone_for_longer_and_longer() {
+    let mut rig = Rig::ready(settings());
+    let own = rig.devicenet[0].bus.own_station();
+    let count = |rig: &Rig, text| rig.told().lines().filter(|line| line.ends_with(text)).count();
+    // What the box does at once when it may: it asks twice whether its MAC ID is free.
+    let mut asking = None;
+    for (round, pause) in (1..).zip([0, 500, 1_000, 2_000]) {
+        for _ in 0..if pause == 0 { 1 } else { 2 } {
+            // Off once more while the pause lasts begins that pause anew, and is nothing new.
+            let now = rig.now();
+            rig.devicenet[0].bus.bus_mut().take_off(now, own);
+            rig.run_for(millis(20));
+            let now = rig.now();
+            rig.devicenet[0].bus.bus_mut().restart(now, own);
+            rig.run_for(millis(40));
+        }
+        assert_eq!(count(&rig, ": bus off"), round, "{}", rig.told());
+        let begin = rig.now();
+        rig.run_until(millis(10_000), "on line again", |rig| count(rig, ": on line") == round + 1);
+        let waited = (rig.now() - begin).0 / 1_000_000;
+        let asking = *asking.get_or_insert(waited);
+        assert!((waited - asking - pause).abs() <= 20, "{waited} ms, of which {asking} to ask, not {pause}");
+    }
+    rig.run_for(millis(5_000));
+    assert!(rig.engine.axes().iter().all(|axis| axis.south().is_some()), "both are in operation again");
+}
+
 /// The axis of the drive with MAC ID 5 is as it was, and its node has a fault.
 fn with_node_fault(frame: &mut Frame) {
     const FAULT: u8 = 1 << 3;

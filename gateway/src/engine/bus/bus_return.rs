@@ -2,7 +2,8 @@
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-/// A bus that was used for so long is sound: when it is lost, its return is waited for, and nothing else.
+/// A bus that was used for so long is sound, and so is one that is lost for the first time: its return is waited for, and
+/// nothing else.
 const SOUND: DurationNs = DurationNs::from_secs(10);
 
 /// The pause after a return that did not last; it doubles with every further one.
@@ -35,8 +36,9 @@ impl BusReturn {
     /// A bus that was never lost.
     pub const NEVER_LOST: Self = Self { place: Place::First, pause: DurationNs::ZERO };
 
-    /// The controller is off the bus.
-    pub fn lose(&mut self, now: MonotonicTime) {
+    /// The controller is off the bus; whether the bus was used until now.
+    pub fn lose(&mut self, now: MonotonicTime) -> bool {
+        let was_used = self.is_used();
         match self.place {
             Place::Used(since) if now < since + SOUND => {
                 self.pause = (self.pause * 2).clamp(PAUSE, PAUSE_MAX)
@@ -45,6 +47,7 @@ impl BusReturn {
             Place::Off | Place::From(_) => {}
         }
         self.place = Place::Off;
+        was_used
     }
 
     /// The controller is on the bus again.
@@ -75,7 +78,7 @@ mod tests {
 
     /// After how long the bus is used whose controller is back at once, and comes back as often while that is waited for.
     fn pause(back: &mut BusReturn, now: &mut MonotonicTime) -> DurationNs {
-        back.lose(*now);
+        assert!(back.lose(*now), "it was used");
         assert!(!back.is_used() && !back.take(MonotonicTime::MAX), "the controller is off");
         back.come_back(*now);
         let begin = *now;
@@ -102,10 +105,10 @@ mod tests {
     fn a_controller_that_goes_while_its_return_is_waited_for_begins_to_wait_anew() {
         let (mut back, mut now) = (BusReturn::NEVER_LOST, MonotonicTime(1));
         pause(&mut back, &mut now);
-        back.lose(now);
+        assert!(back.lose(now));
         back.come_back(now);
         let later = now + DurationNs::from_millis(400);
-        back.lose(later);
+        assert!(!back.lose(later), "it was told already");
         assert!(!back.take(MonotonicTime::MAX));
         back.come_back(later);
         assert!(!back.take(now + DurationNs::from_millis(500)));

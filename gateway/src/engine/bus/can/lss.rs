@@ -105,6 +105,10 @@ struct Place {
     told: Option<LssNotice>,
 }
 
+fn idle() -> Master {
+    Master::new(MasterConfig { timeout: TIMEOUT, ..MasterConfig::default() })
+}
+
 /// Gives node-ids, one device at a time.
 #[derive(Debug)]
 pub struct Assigner {
@@ -121,8 +125,14 @@ impl Assigner {
             next: MonotonicTime::ZERO,
             told: None,
         };
-        let config = MasterConfig { timeout: TIMEOUT, ..MasterConfig::default() };
-        Self { master: Master::new(config), places: assignments.iter().map(place).collect(), at: None }
+        Self { master: idle(), places: assignments.iter().map(place).collect(), at: None }
+    }
+
+    /// The bus is lost: a try that was under way is forgotten. The next one begins with all devices waiting.
+    pub fn abort(&mut self) {
+        if self.at.take().is_some() {
+            self.master = idle();
+        }
     }
 
     /// Goes on, and begins with the next device that is `wanted`; what people should know.

@@ -240,6 +240,13 @@ impl CanBus {
         }
     }
 
+    /// Brings all devices up again once the bus may be used again.
+    fn use_again(&mut self, now: MonotonicTime) {
+        if self.back.take(now) {
+            self.master.bus_on(now);
+        }
+    }
+
     /// A device waits for its application.
     fn begin(&mut self, now: MonotonicTime, node: NodeId) {
         let Some(place) = self.devices.iter().position(|device| device.node == node) else {
@@ -449,16 +456,19 @@ impl Bus for CanBus {
                     }
                 }
                 Some(CanInput::BusOff) => {
-                    self.back.lose(now);
-                    self.master.bus_off(now);
+                    if self.back.lose(now) {
+                        self.assigner.abort();
+                        self.master.bus_off(now);
+                    }
                 }
-                Some(CanInput::BusOn) => self.back.come_back(now),
+                Some(CanInput::BusOn) => {
+                    self.back.come_back(now);
+                    self.use_again(now);
+                }
                 None => break,
             }
         }
-        if self.back.take(now) {
-            self.master.bus_on(now);
-        }
+        self.use_again(now);
     }
 
     fn take_cycle(&mut self) -> bool {

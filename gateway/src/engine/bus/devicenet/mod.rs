@@ -159,6 +159,13 @@ impl DevicenetBus {
         }
     }
 
+    /// Begins anew once the bus may be used again: whether the MAC ID is still free has to be asked.
+    fn use_again(&mut self, now: MonotonicTime) {
+        if self.back.take(now) && !self.stopped {
+            self.master.start(now);
+        }
+    }
+
     fn event(&mut self, now: MonotonicTime, event: &Event) {
         match event {
             Event::Online => self.backoff = Backoff::NONE,
@@ -313,19 +320,20 @@ impl Bus for DevicenetBus {
                 // A refused frame is counted by the master and changes nothing.
                 Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
                 Some(CanInput::BusOff) => {
-                    self.back.lose(now);
-                    self.outlet.clear();
-                    self.master.handle_bus_off(now);
-                    self.drives.iter_mut().for_each(|drive| drive.tried = true);
+                    if self.back.lose(now) {
+                        self.outlet.clear();
+                        self.master.handle_bus_off(now);
+                        self.drives.iter_mut().for_each(|drive| drive.tried = true);
+                    }
                 }
-                Some(CanInput::BusOn) => self.back.come_back(now),
+                Some(CanInput::BusOn) => {
+                    self.back.come_back(now);
+                    self.use_again(now);
+                }
                 None => break,
             }
         }
-        if self.back.take(now) && !self.stopped {
-            // Whether the MAC ID is still free has to be asked anew.
-            self.master.start(now);
-        }
+        self.use_again(now);
     }
 
     fn take_cycle(&mut self) -> bool {
