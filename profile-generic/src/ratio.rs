@@ -318,7 +318,7 @@ const fn narrow(value: i128) -> Option<i64> {
 
 /// The rounded quotient, and whether it was rounded. `den` is above zero.
 const fn divide(num: i128, den: i128, rounding: Rounding) -> (i128, bool) {
-    // Nearly every value of a cycle takes this way: one division of the processor instead of two of the library.
+    // Nearly every double of a cycle takes this way: one division of the processor instead of two of the library.
     let (quotient, rest) = match (narrow(num), narrow(den)) {
         (Some(num), Some(1)) => (num as i128, 0),
         (Some(num), Some(den)) => ((num / den) as i128, (num % den) as i128),
@@ -505,10 +505,8 @@ mod tests {
     #[test]
     fn reciprocals_divide_at_the_ends_of_their_range() {
         let powers = (1..63).flat_map(|power| [(1 << power) - 1, 1 << power, (1 << power) + 1]);
-        for den in powers.chain([3, 7, 10, 641, 1_000_000_000, 6_700_417, Reciprocal::LIMIT - 1]) {
-            if den < 2 {
-                continue;
-            }
+        let others = [3, 7, 10, 641, 1_000_000_000, 6_700_417, Reciprocal::LIMIT - 1];
+        for den in powers.chain(others).filter(|den| *den > 1) {
             let reciprocal = Reciprocal::new(den);
             let last = (Reciprocal::LIMIT - 1) / den;
             for multiple in [0, 1, 2, last / 2, last - 1, last] {

@@ -37,11 +37,7 @@ impl CanProtocol {
     /// How a bus of a recording is described: `can0, DeviceNet`.
     #[must_use]
     pub fn describe(self, link: &CanLink) -> String {
-        let name = match link {
-            CanLink::InProcess => "simulated",
-            CanLink::Interface { name, .. } => name,
-        };
-        format!("{name}, {}", self.name())
+        format!("{}, {}", link.interface().unwrap_or("simulated"), self.name())
     }
 
     /// What a description made by [`Self::describe`] says.
@@ -74,10 +70,7 @@ impl CanBuses {
     /// The buses of a configuration.
     #[must_use]
     pub fn of(config: &Config) -> Self {
-        let name = |link: &CanLink| match link {
-            CanLink::InProcess => None,
-            CanLink::Interface { name, .. } => Some(name.clone()),
-        };
+        let name = |link: &CanLink| link.interface().map(str::to_owned);
         let canopen = config.can.iter().map(|bus| (name(&bus.link), CanProtocol::Canopen));
         let devicenet = config.devicenet.iter().map(|network| (name(&network.link), CanProtocol::Devicenet));
         Self { configured: canopen.chain(devicenet).collect(), rest: None }

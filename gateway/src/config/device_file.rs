@@ -260,10 +260,7 @@ fn counts(diagnostic: &Diagnostic) -> bool {
 
 /// A file as it is shown: with the lines that its reader counts.
 fn shown(bytes: &[u8]) -> String {
-    let bytes = bytes.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(bytes);
-    let text = core::str::from_utf8(bytes)
-        .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect(), str::to_owned);
-    text.replace("\r\n", "\n").replace('\r', "\n")
+    eds::plain(bytes).replace("\r\n", "\n").replace('\r', "\n")
 }
 
 fn problem(source: &Source, code: Code, diagnostic: &Diagnostic) -> Problem {

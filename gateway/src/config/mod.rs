@@ -584,6 +584,17 @@ pub enum CanLink {
     },
 }
 
+impl CanLink {
+    /// The interface of the host; `None` inside this process.
+    #[must_use]
+    pub fn interface(&self) -> Option<&str> {
+        match self {
+            Self::InProcess => None,
+            Self::Interface { name, .. } => Some(name),
+        }
+    }
+}
+
 /// A CANopen drive, or one axis of a device with several.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CanDrive {

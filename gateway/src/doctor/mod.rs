@@ -159,9 +159,9 @@ fn cycles(config: Option<&Config>) -> Vec<Cycle> {
     });
     // Neither declares a jitter: a SYNC or poll half a cycle late is one that the box itself counts as late.
     let on_can = |kind: &str, link: &CanLink, time: DurationNs, losses| Cycle {
-        what: match link {
-            CanLink::Interface { name, .. } => format!("{kind} on {name}"),
-            CanLink::InProcess => format!("{kind} in the process"),
+        what: match link.interface() {
+            Some(name) => format!("{kind} on {name}"),
+            None => format!("{kind} in the process"),
         },
         time,
         tolerance: DurationNs(time.as_nanos() / 2),

@@ -4,7 +4,7 @@ use profile_cia402::master::config::Direction;
 use profile_cip::target::drive_link::Trims;
 use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
 use profile_generic::image::{AxisCommand, Signal};
-use profile_generic::program::{ConversionReport, Field};
+use profile_generic::program::{ConversionReport, Field, Width};
 use profile_generic::quantity::Position;
 use profile_generic::state::{Action, DriveState};
 
@@ -202,10 +202,8 @@ impl Translator {
     /// A value of it.
     pub(super) fn command_value(&self, number: usize, field: &Field, item: Item, bytes: &[u8]) -> Node {
         let axis = &self.stage.axes[number];
-        let back = field.conversion.inverse().zip(integer(field, bytes));
-        let value = back.map_or_else(String::new, |(conversion, raw)| {
-            shown(axis, field.signal, conversion.convert(raw).value)
-        });
+        let value =
+            generic_of(field, bytes).map_or_else(String::new, |value| shown(axis, field.signal, value));
         let text = format!("{}: {} = {} {value}", self.named(item), raw(axis, field, bytes), field.signal);
         Node::new(text).by(axis.signal_row(&self.stage.mapping, field.signal))
     }
@@ -285,9 +283,9 @@ fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
 
 /// The bytes of a field, the number in them, and where they stand in which frame.
 pub(super) fn raw(axis: &StageAxis, field: &Field, telegram: &[u8]) -> String {
-    let start = usize::from(field.offset);
-    let bytes = telegram.get(start..start + field.width.bytes()).unwrap_or_default();
-    let number = integer(field, telegram).map_or_else(String::new, |number| format!("{number} "));
+    let (start, bytes) = (usize::from(field.offset), bytes_of(field, telegram));
+    let number = field.width.integer(bytes).filter(|_| !field.width.is_float());
+    let number = number.map_or_else(String::new, |number| format!("{number} "));
     let way = if field.signal.is_command() { Direction::Receive } else { Direction::Transmit };
     let place = match axis.can().map(|drive| drive.place(way, start)) {
         None => start.to_string(),
@@ -297,9 +295,17 @@ pub(super) fn raw(axis: &StageAxis, field: &Field, telegram: &[u8]) -> String {
     format!("{number}({} at {place})", hex(bytes))
 }
 
-/// The number in a field; `None` for one that is not there, or no integer.
-fn integer(field: &Field, telegram: &[u8]) -> Option<i64> {
+/// The bytes of a field; none of one that is not there.
+pub(super) fn bytes_of<'t>(field: &Field, telegram: &'t [u8]) -> &'t [u8] {
     let start = usize::from(field.offset);
-    let bytes = telegram.get(start..start + field.width.bytes()).filter(|_| !field.width.is_float())?;
-    field.width.integer(bytes)
+    telegram.get(start..start + field.width.bytes()).unwrap_or_default()
+}
+
+/// The generic value of a field of commands.
+pub(super) fn generic_of(field: &Field, telegram: &[u8]) -> Option<i64> {
+    let (back, bytes) = (field.conversion.inverse()?, bytes_of(field, telegram));
+    if field.width == Width::F32 {
+        return Some(back.convert_f64(f32::from_le_bytes(*bytes.first_chunk()?).into())?.value);
+    }
+    Some(back.convert(field.width.integer(bytes)?).value)
 }

@@ -10,6 +10,7 @@ use profile_cip::wire::motion::codes::{AxisControl, AxisStateCode, ControlMode};
 use profile_generic::can::{Frame, Id};
 use profile_generic::program::{Field, Width};
 
+use super::command::{bytes_of, generic_of};
 use super::stage::{DevicenetDrive, StageAxis};
 use super::tree::hex;
 use super::{Node, Translator, flags, shown};
@@ -220,18 +221,4 @@ pub(super) fn raw(drive: &DevicenetDrive, field: &Field, row: &[u8]) -> String {
         Some(at) => format!("{number} ({} at {at})", hex(bytes)),
         None => number,
     }
-}
-
-fn bytes_of<'r>(field: &Field, row: &'r [u8]) -> &'r [u8] {
-    let start = usize::from(field.offset);
-    row.get(start..start + field.width.bytes()).unwrap_or_default()
-}
-
-/// The generic value of a field of commands.
-fn generic_of(field: &Field, row: &Row) -> Option<i64> {
-    let (back, bytes) = (field.conversion.inverse()?, bytes_of(field, row));
-    if field.width == Width::F32 {
-        return Some(back.convert_f64(f32::from_le_bytes(*bytes.first_chunk()?).into())?.value);
-    }
-    Some(back.convert(field.width.integer(bytes)?).value)
 }

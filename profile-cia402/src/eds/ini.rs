@@ -110,7 +110,7 @@ pub(super) fn text<'b>(bytes: &'b [u8], diagnostics: &mut Diagnostics) -> Result
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         return Err(Refused::Utf16);
     }
-    let bytes = bytes.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(bytes);
+    let bytes = unmarked(bytes);
     match core::str::from_utf8(bytes) {
         Ok(text) => Ok(Cow::Borrowed(text)),
         Err(error) => {
@@ -119,9 +119,23 @@ pub(super) fn text<'b>(bytes: &'b [u8], diagnostics: &mut Diagnostics) -> Result
             let byte = bytes.get(error.valid_up_to()).copied().unwrap_or_default();
             let place = Place { line, column, ..Place::default() };
             diagnostics.push(Kind::Latin1, place, "UTF-8", format!("byte {byte:#04X}, read as Latin-1"));
-            Ok(Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()))
+            Ok(latin1(bytes))
         }
     }
+}
+
+/// The text of any file as [`read`](super::read) sees it, without what it says about that.
+pub fn plain(bytes: &[u8]) -> Cow<'_, str> {
+    let bytes = unmarked(bytes);
+    core::str::from_utf8(bytes).map_or_else(|_| latin1(bytes), Cow::Borrowed)
+}
+
+fn unmarked(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(bytes)
+}
+
+fn latin1(bytes: &[u8]) -> Cow<'static, str> {
+    Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect())
 }
 
 /// Line and column behind these bytes; every byte of a character but the first is none of its own.

@@ -30,7 +30,7 @@ pub use description::{
     SubObject,
 };
 pub use diagnostic::{DIAGNOSTICS_MAX, Diagnostic, Diagnostics, Kind, Severity};
-pub use ini::{BYTES_MAX, ENTRIES_MAX, LINE_MAX, Refused, SECTIONS_MAX};
+pub use ini::{BYTES_MAX, ENTRIES_MAX, LINE_MAX, Refused, SECTIONS_MAX, plain};
 pub use reader::{Reading, read};
 pub use value::{Setting, Value};
 pub use writer::Form;

@@ -7,7 +7,7 @@ use profile_cia402::wire::NodeId;
 use profile_generic::mode::{ModeSelection, OperatingMode};
 
 use super::{BuildError, kind, parameters};
-use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
+use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
 use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, pdos};
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdo, FoundPdos, SpareIds};
@@ -134,10 +134,7 @@ pub(super) fn bus(
     let Network { master, devices, assignments } = network(config, place, mapping)?;
     let (commissioner, end) = Commissioner::new(mapping.clone(), master.clone(), devices.iter().cloned());
     let number = u8::try_from(place).unwrap_or(u8::MAX);
-    let name = match &config.can[place].link {
-        CanLink::InProcess => "in-process",
-        CanLink::Interface { name, .. } => name,
-    };
+    let name = config.can[place].link.interface().unwrap_or("in-process");
     let bus = CanBus::new(number, master, &devices, &assignments, end)
         .map_err(|error| BuildError::Can { bus: name.to_owned(), error })?;
     Ok((bus, commissioner))

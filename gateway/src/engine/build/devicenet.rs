@@ -7,7 +7,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::scaling::{NANO, UnitKind};
 
 use super::{BuildError, kind, parameters};
-use crate::config::{Axis, AxisFunction, CanLink, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
+use crate::config::{Axis, AxisFunction, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
 use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
 use crate::engine::bus::devicenet::setup::{SetupStep, motion_steps, speed_steps};
 use crate::engine::bus::devicenet::{DevicenetBus, DrivePlan};
@@ -66,10 +66,7 @@ pub(super) fn bus(config: &Config, place: usize, mapping: &Mapping) -> Result<De
             drives.push(made.map_err(|error| BuildError::DevicenetDrive { name: axis.name.clone(), error })?);
         }
     }
-    let name = match &network.link {
-        CanLink::InProcess => "in-process",
-        CanLink::Interface { name, .. } => name,
-    };
+    let name = network.link.interface().unwrap_or("in-process");
     let number = u8::try_from(place).unwrap_or(u8::MAX);
     DevicenetBus::new(number, master(config, place), drives)
         .map_err(|error| BuildError::Devicenet { network: name.to_owned(), error })

@@ -225,7 +225,7 @@ impl AxisPdos {
         })
     }
 
-    /// Whether a PDO of a device may belong to the axis.
+    /// Numbers of the PDOs of a device that may belong to the axis.
     #[must_use]
     pub fn numbers(&self) -> core::ops::Range<u16> {
         self.first..self.first + LOOKED_AT
