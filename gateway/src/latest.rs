@@ -15,15 +15,16 @@ const SPINS: u32 = 64;
 /// A value that can be laid out in 64-bit words.
 pub trait Words: Copy {
     /// The words, an array of `u64`.
-    type Array: AsRef<[u64]> + AsMut<[u64]>;
+    type Array: AsRef<[u64]> + AsMut<[u64]> + std::fmt::Debug;
 
     /// An array to be filled.
     const EMPTY: Self::Array;
 
-    /// Writes every word.
-    fn to_words(&self, words: &mut Self::Array);
+    /// Writes the words that count, and returns how many they are, from the first one on. The others are left alone: what
+    /// stands there does not count, whatever it is.
+    fn to_words(&self, words: &mut Self::Array) -> usize;
 
-    /// The value of words that [`Words::to_words`] wrote.
+    /// The value of words that [`Words::to_words`] wrote, among others that do not count.
     fn from_words(words: &Self::Array) -> Self;
 }
 
@@ -36,9 +37,10 @@ struct Cell {
 
 /// The writing end.
 #[derive(Debug)]
-pub struct Publisher<T> {
+pub struct Publisher<T: Words> {
     cell: Arc<Cell>,
-    value: std::marker::PhantomData<fn(T)>,
+    /// Where a value is laid out; kept, because clearing it takes longer than filling what counts.
+    words: Box<T::Array>,
 }
 
 /// A reading end.
@@ -57,25 +59,26 @@ impl<T> Clone for Reader<T> {
 /// A cell that holds `initial`.
 #[must_use]
 pub fn latest<T: Words>(initial: T) -> (Publisher<T>, Reader<T>) {
-    let mut words = T::EMPTY;
+    let mut words = Box::new(T::EMPTY);
     initial.to_words(&mut words);
-    let words = words.as_ref().iter().map(|word| AtomicU64::new(*word)).collect();
-    let cell = Arc::new(Cell { sequence: AtomicU64::new(0), words });
-    let publisher = Publisher { cell: Arc::clone(&cell), value: std::marker::PhantomData };
+    let places = (*words).as_ref().iter().map(|word| AtomicU64::new(*word)).collect();
+    let cell = Arc::new(Cell { sequence: AtomicU64::new(0), words: places });
+    let publisher = Publisher { cell: Arc::clone(&cell), words };
     (publisher, Reader { cell, value: std::marker::PhantomData })
 }
 
 impl<T: Words> Publisher<T> {
     /// Replaces the value. Takes `&mut self`: there is one writer.
     pub fn publish(&mut self, value: &T) {
-        let mut words = T::EMPTY;
-        value.to_words(&mut words);
+        let count = value.to_words(&mut self.words);
+        let words = (*self.words).as_ref();
+        let words = words.get(..count).unwrap_or(words);
         let cell = &*self.cell;
         let sequence = cell.sequence.load(Ordering::Relaxed);
         cell.sequence.store(sequence.wrapping_add(1), Ordering::Relaxed);
         // No word below may be seen before the odd number above.
         fence(Ordering::Release);
-        for (place, word) in cell.words.iter().zip(words.as_ref()) {
+        for (place, word) in cell.words.iter().zip(words) {
             place.store(*word, Ordering::Relaxed);
         }
         // Whoever sees the even number sees all words.
@@ -129,14 +132,48 @@ mod tests {
         type Array = [u64; LEN];
         const EMPTY: Self::Array = [0; LEN];
 
-        fn to_words(&self, words: &mut Self::Array) {
+        fn to_words(&self, words: &mut Self::Array) -> usize {
             words.fill(self.0);
+            LEN
         }
 
         fn from_words(words: &Self::Array) -> Self {
             assert!(words.iter().all(|word| *word == words[0]), "torn: {words:?}");
             Self(words[0])
         }
+    }
+
+    /// As many words as their number says, each the number.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Few(usize);
+
+    impl Words for Few {
+        type Array = [u64; LEN];
+        const EMPTY: Self::Array = [0; LEN];
+
+        fn to_words(&self, words: &mut Self::Array) -> usize {
+            words[..self.0].fill(self.0 as u64);
+            self.0
+        }
+
+        fn from_words(words: &Self::Array) -> Self {
+            let count = usize::try_from(words[0]).unwrap();
+            assert!(words[..count].iter().all(|word| *word == words[0]), "{words:?}");
+            Self(count)
+        }
+    }
+
+    #[test]
+    fn only_the_words_that_count_are_published() {
+        let (mut publisher, reader) = latest(Few(3));
+        assert_eq!(reader.read(), Few(3));
+        for count in [LEN, 1, 7, LEN] {
+            publisher.publish(&Few(count));
+            assert_eq!(reader.read(), Few(count));
+        }
+        publisher.publish(&Few(2));
+        let words: Vec<_> = publisher.cell.words.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+        assert_eq!(words[..4], [2, 2, LEN as u64, LEN as u64], "the rest was left alone");
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub mod engine;
 pub mod finding;
 pub mod host;
 pub mod latest;
+pub mod log_limit;
 pub mod mapping;
 pub mod modbus;
 pub mod north;

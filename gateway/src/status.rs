@@ -352,7 +352,7 @@ impl Words for BoxStatus {
     type Array = [u64; WORDS];
     const EMPTY: Self::Array = [0; WORDS];
 
-    fn to_words(&self, words: &mut Self::Array) {
+    fn to_words(&self, words: &mut Self::Array) -> usize {
         let counters = &self.counters;
         let head = [self.state.0, self.phase, self.connections, self.axis_count, 0, 0, 0, 0];
         let of_box = [
@@ -368,9 +368,11 @@ impl Words for BoxStatus {
         ];
         let (front, rest) = words.split_at_mut(BOX_WORDS);
         front.copy_from_slice(&of_box);
-        for (place, axis) in rest.chunks_exact_mut(AXIS_WORDS).zip(&self.axes) {
-            place.copy_from_slice(&axis.to_words());
+        let axes = self.configured_axes();
+        for (place, axis) in rest.as_chunks_mut::<AXIS_WORDS>().0.iter_mut().zip(axes) {
+            *place = axis.to_words();
         }
+        BOX_WORDS + axes.len() * AXIS_WORDS
     }
 
     fn from_words(words: &Self::Array) -> Self {
@@ -378,7 +380,8 @@ impl Words for BoxStatus {
         let [state, phase, connections, axis_count, ..] = front[0].to_be_bytes();
         let (cycle_time_ns, lateness_max_ns) = split(front[1]);
         let mut axes = [AxisStatus::NONE; AXES_MAX];
-        for (axis, place) in axes.iter_mut().zip(rest.as_chunks::<AXIS_WORDS>().0) {
+        let configured = rest.as_chunks::<AXIS_WORDS>().0.iter().take(usize::from(axis_count));
+        for (axis, place) in axes.iter_mut().zip(configured) {
             *axis = AxisStatus::from_words(place);
         }
         Self {
@@ -484,6 +487,26 @@ pub(crate) mod tests {
         publisher.publish(&distinct());
         assert_eq!(reader.read(), distinct());
         assert_eq!(distinct().configured_axes().len(), 2);
+    }
+
+    #[test]
+    fn the_axes_of_a_full_box_cross_the_cell_and_those_that_are_not_configured_do_not() {
+        let (mut publisher, reader) = latest(BoxStatus::STARTING);
+        let mut status = distinct();
+        let model = status.axes[1];
+        for (place, axis) in (0..).zip(&mut status.axes) {
+            *axis = AxisStatus { instance: place % 16 + 1, device: place / 16, ..model };
+            axis.position.0 = -i64::from(place);
+        }
+        status.axis_count = 64;
+        publisher.publish(&status);
+        assert_eq!(reader.read(), status);
+        // Fewer than before: the others are no axes any more.
+        status.axis_count = 17;
+        publisher.publish(&status);
+        let seen = reader.read();
+        assert_eq!(seen.configured_axes(), &status.axes[..17]);
+        assert_eq!(seen.axes[17..], [AxisStatus::NONE; AXES_MAX - 17]);
     }
 
     #[test]

@@ -51,6 +51,7 @@ fn network(drives: u8) -> MasterConfig {
         nodes: (1..=drives).map(drive).collect(),
         sync: Some(SyncConfig { period_ns: PERIOD_MS * 1_000_000, window_ns: 0, counter_overflow: 0 }),
         heartbeat: Some(MasterHeartbeat { node: id(127), producer_ms: 100, timeout_ms: 300 }),
+        listens: false,
         ..MasterConfig::default()
     }
 }

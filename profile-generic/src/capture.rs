@@ -2,7 +2,7 @@
 
 use crate::code::named_enum;
 use crate::quantity::Position;
-use crate::time::SystemTime;
+use crate::time::MonotonicTime;
 
 named_enum! {
     /// What triggers a capture.
@@ -55,9 +55,21 @@ impl CaptureKind {
     }
 
     /// Its number, from 0 to [`CaptureKind::COUNT`] less 1.
-    pub fn index(self) -> usize {
-        let source = CaptureSource::ALL.iter().position(|known| *known == self.source).unwrap_or(0);
-        2 * source + usize::from(self.edge == CaptureEdge::Negative)
+    pub const fn index(self) -> usize {
+        let source = match self.source {
+            CaptureSource::Registration1 => 0,
+            CaptureSource::Registration2 => 1,
+            CaptureSource::Marker => 2,
+            CaptureSource::HomeSwitch => 3,
+            CaptureSource::HomeSwitchMarkerPositive => 4,
+            CaptureSource::HomeSwitchMarkerNegative => 5,
+            CaptureSource::WatchPosition => 6,
+        };
+        let edge = match self.edge {
+            CaptureEdge::Positive => 0,
+            CaptureEdge::Negative => 1,
+        };
+        2 * source + edge
     }
 
     /// Every kind, by its number.
@@ -84,6 +96,12 @@ impl CaptureSet {
     /// Whether the kind is among them.
     pub fn contains(self, kind: CaptureKind) -> bool {
         self.0 & 1 << kind.index() != 0
+    }
+
+    /// Those that are in both sets.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Adds or removes a kind.
@@ -179,8 +197,8 @@ pub struct CaptureResult {
     pub status: CaptureStatus,
     /// The position at the trigger.
     pub position: Position,
-    /// The system time of the trigger.
-    pub at: SystemTime,
+    /// When it was triggered, on the local clock.
+    pub at: MonotonicTime,
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::inhibit::Inhibits;
 use crate::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use crate::quantity::{Acceleration, Current, Position, Quantity, Temperature, Torque, Velocity, Voltage};
 use crate::state::{DriveState, Report, Request};
-use crate::time::SystemTime;
+use crate::time::MonotonicTime;
 use bitflags::bitflags;
 
 named_enum! {
@@ -349,7 +349,7 @@ pub struct AxisCommand {
     /// Which of the values above are valid.
     pub present: CommandSet,
     /// When the set-points shall be reached; as soon as possible when `None`.
-    pub target_time: Option<SystemTime>,
+    pub target_time: Option<MonotonicTime>,
     /// A request to the state machine, if there is one.
     pub request: Option<Request>,
     /// Changes with every fresh command; the same number twice means the command is old.
@@ -527,7 +527,7 @@ pub struct AxisFeedback {
     /// Cycles since the last new data; 0 when fresh.
     pub age_cycles: u32,
     /// When the actual values were taken.
-    pub at: SystemTime,
+    pub at: MonotonicTime,
 }
 
 impl AxisFeedback {

@@ -1,7 +1,7 @@
 //! Fine interpolation: from the controller's updates to the cycle of the drive.
 //!
-//! Each update carries set-points and the system time at which they shall be reached. Between two targets a
-//! polynomial is followed whose coefficients are those of CIP Motion (Volume 9, 5-2.6.5.2): third order for
+//! Each update carries set-points and the instant at which they shall be reached, on the local clock: a step of the system
+//! time moves nothing here (5-2.6.5.2). Between two targets a polynomial is followed whose coefficients are those of CIP Motion (Volume 9, 5-2.6.5.2): third order for
 //! the position, second for the velocity, first for acceleration and torque. The same polynomial goes on
 //! beyond its target when an update is late, for a stated number of periods and no longer: then the axis is
 //! held, and the interpolator says so until it is started again.
@@ -12,10 +12,13 @@
 use crate::code::named_enum;
 use crate::image::{AxisCommand, CommandSet};
 use crate::quantity::{Acceleration, Position, Torque, Velocity};
-use crate::time::{DurationNs, SystemTime};
+use crate::time::{DurationNs, MonotonicTime};
 use arrayvec::ArrayVec;
 
+mod arrival;
 mod polynomial;
+
+pub use arrival::ArrivalClock;
 
 use polynomial::{Channel, Polynomial};
 
@@ -51,7 +54,7 @@ impl TargetUpdate {
     }
 
     /// The target of an update with this stamp.
-    pub fn target(self, stamp: SystemTime, period: DurationNs) -> SystemTime {
+    pub fn target(self, stamp: MonotonicTime, period: DurationNs) -> MonotonicTime {
         stamp + period * i64::from(self.periods())
     }
 }
@@ -65,8 +68,9 @@ pub const MAX_EXTRAPOLATION: u32 = 4;
 /// The most periods between the targets of two updates that are taken as a gap and not as a wrong time stamp.
 pub const MAX_GAP: i64 = 16;
 
-/// Segments that may wait for their time: updates can come early by two periods at most.
-const MAX_SEGMENTS: usize = 4;
+/// Segments that may wait for their time. A controller whose clock is ahead is served up to the update delay high limit, at most
+/// ten periods; its updates are for two periods later, and one segment is in use.
+const MAX_SEGMENTS: usize = 16;
 
 /// Set-points at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -175,17 +179,23 @@ pub enum UpdateError {
     #[error("expected a target after {last}, got {target}")]
     NotNewer {
         /// The last target taken.
-        last: SystemTime,
+        last: MonotonicTime,
         /// The target of this update.
-        target: SystemTime,
+        target: MonotonicTime,
     },
     /// Its target is too far from that of the update before: more than [`MAX_GAP`] periods.
     #[error("target {target} is too far after {last}")]
     Gap {
         /// The last target taken.
-        last: SystemTime,
+        last: MonotonicTime,
         /// The target of this update.
-        target: SystemTime,
+        target: MonotonicTime,
+    },
+    /// Its target is further in the future than updates are kept for.
+    #[error("target {target} is too far ahead: {MAX_SEGMENTS} updates wait for their time already")]
+    Ahead {
+        /// The target of this update.
+        target: MonotonicTime,
     },
     /// A set-point is further from the one before than any machine moves in a period.
     #[error("a set-point jumps further than any axis can move")]
@@ -209,7 +219,7 @@ pub struct InterpolatorConfig {
 /// The polynomials between two targets.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
-    start: SystemTime,
+    start: MonotonicTime,
     /// Above zero.
     length: DurationNs,
     /// How long the curves count from the start on.
@@ -226,7 +236,7 @@ pub struct FineInterpolator {
     config: InterpolatorConfig,
     /// In the order of their starts; the first is the one in use.
     segments: ArrayVec<Segment, MAX_SEGMENTS>,
-    last_target: Option<SystemTime>,
+    last_target: Option<MonotonicTime>,
     position: Channel<3>,
     velocity: Channel<2>,
     acceleration: Channel<1>,
@@ -235,7 +245,7 @@ pub struct FineInterpolator {
     held: SetPoints,
     lost: bool,
     /// The motion that the next update goes on from, and when it was so.
-    carried: Option<(SystemTime, Motion)>,
+    carried: Option<(MonotonicTime, Motion)>,
 }
 
 impl FineInterpolator {
@@ -283,23 +293,21 @@ impl FineInterpolator {
     ///
     /// What no curve tells of the motion is taken from `actual`. Before the first update and after a loss there is no
     /// motion to go on with: then only the way changes.
-    pub fn change(&mut self, now: SystemTime, target_update: TargetUpdate, actual: &Motion) {
+    pub fn change(&mut self, now: MonotonicTime, target_update: TargetUpdate, actual: &Motion) {
         self.config.target_update = target_update;
-        while self.segments.get(1).is_some_and(|next| next.start <= now) {
-            self.segments.remove(0);
-        }
+        self.pass(now);
         let Some(segment) = self.segments.first() else { return };
         let motion = segment.motion_at(now, actual);
         self.carry(now, motion);
     }
 
     /// Begins in a motion that is under way: until the first update it goes on as it is.
-    pub fn start_moving(&mut self, now: SystemTime, motion: &Motion) {
+    pub fn start_moving(&mut self, now: MonotonicTime, motion: &Motion) {
         self.start(Some(motion.position));
         self.carry(now, *motion);
     }
 
-    fn carry(&mut self, now: SystemTime, motion: Motion) {
+    fn carry(&mut self, now: MonotonicTime, motion: Motion) {
         const SECOND: i128 = 1_000_000_000;
         let length = self.config.period;
         let per_length = |per_second: i64| saturate(i128::from(per_second) * i128::from(length.0) / SECOND);
@@ -326,9 +334,14 @@ impl FineInterpolator {
     ///
     /// # Errors
     /// See [`UpdateError`]; the update is then left out of account.
-    pub fn update(&mut self, target: SystemTime, set_points: &SetPoints) -> Result<(), UpdateError> {
+    pub fn update(&mut self, target: MonotonicTime, set_points: &SetPoints) -> Result<(), UpdateError> {
         if self.lost {
             return Err(UpdateError::Lost);
+        }
+        let immediate = self.config.target_update == TargetUpdate::Immediate;
+        if !immediate && self.segments.is_full() {
+            // The one in use has not ended: none of those that wait may take its place.
+            return Err(UpdateError::Ahead { target });
         }
         // The channels are worked on as copies, so that a refused update leaves no trace.
         let mut channels = (self.position, self.velocity, self.acceleration, self.torque);
@@ -353,7 +366,6 @@ impl FineInterpolator {
                 channels.3.fill(segment.torque.map(|curve| segment.value(&curve, at)));
             }
         }
-        let immediate = self.config.target_update == TargetUpdate::Immediate;
         let segment = Segment {
             start: target - length,
             length,
@@ -366,8 +378,6 @@ impl FineInterpolator {
         (self.position, self.velocity, self.acceleration, self.torque) = channels;
         if immediate {
             self.segments.clear();
-        } else if self.segments.is_full() {
-            self.segments.remove(0);
         }
         self.segments.push(segment);
         self.last_target = Some(target);
@@ -375,11 +385,16 @@ impl FineInterpolator {
         Ok(())
     }
 
-    /// The fine set-points for the instant `now`.
-    pub fn at(&mut self, now: SystemTime) -> FineCommand {
+    /// Lets the time pass up to `now` for updates that nobody follows: those whose time is over make room.
+    pub fn pass(&mut self, now: MonotonicTime) {
         while self.segments.get(1).is_some_and(|next| next.start <= now) {
             self.segments.remove(0);
         }
+    }
+
+    /// The fine set-points for the instant `now`.
+    pub fn at(&mut self, now: MonotonicTime) -> FineCommand {
+        self.pass(now);
         let (Some(segment), Some(last_target)) = (self.segments.first(), self.last_target) else {
             let quality = if self.lost { Quality::Lost } else { Quality::Waiting };
             return FineCommand { set_points: self.held, quality };
@@ -403,18 +418,8 @@ impl FineInterpolator {
         self.lost
     }
 
-    /// Moves everything by a step of the system time, so that targets and the present time keep one
-    /// reference.
-    pub fn shift(&mut self, step: DurationNs) {
-        for segment in &mut self.segments {
-            segment.start = segment.start + step;
-        }
-        self.last_target = self.last_target.map(|target| target + step);
-        self.carried = self.carried.map(|(since, motion)| (since + step, motion));
-    }
-
     /// The periods from the last target to this one, and the length of one of them.
-    fn spacing(&self, target: SystemTime) -> Result<(i64, DurationNs), UpdateError> {
+    fn spacing(&self, target: MonotonicTime) -> Result<(i64, DurationNs), UpdateError> {
         let period = self.config.period;
         let Some(last) = self.last_target else { return Ok((1, period)) };
         let spacing = target.since(last);
@@ -429,21 +434,21 @@ impl FineInterpolator {
     }
 
     /// Periods, begun ones included, by which the next update is overdue.
-    fn overdue(&self, last_target: SystemTime, now: SystemTime) -> u32 {
+    fn overdue(&self, last_target: MonotonicTime, now: MonotonicTime) -> u32 {
         let beyond = now.since(last_target).0.max(0);
         let periods = beyond / self.config.period.0 + i64::from(beyond % self.config.period.0 != 0);
         u32::try_from(periods).unwrap_or(u32::MAX).saturating_sub(self.config.target_update.usual_overrun())
     }
 
     /// `at`, or the last instant that a segment may be followed to.
-    fn limit_time(&self, segment: &Segment, at: SystemTime) -> SystemTime {
+    fn limit_time(&self, segment: &Segment, at: MonotonicTime) -> MonotonicTime {
         let beyond = self.config.target_update.usual_overrun() + self.config.extrapolate_periods;
         at.min(segment.start + segment.length + self.config.period * i64::from(beyond))
     }
 }
 
 impl Segment {
-    fn at(&self, now: SystemTime) -> SetPoints {
+    fn at(&self, now: MonotonicTime) -> SetPoints {
         let beyond = now.since(self.start) > self.follow;
         let motion = self.position.map(|curve| self.motion(&curve, now));
         let velocity = match (self.velocity, motion) {
@@ -462,7 +467,7 @@ impl Segment {
     }
 
     /// The motion at `now`; what no curve tells is taken from `actual`.
-    fn motion_at(&self, now: SystemTime, actual: &Motion) -> Motion {
+    fn motion_at(&self, now: MonotonicTime, actual: &Motion) -> Motion {
         let points = self.at(now);
         let on_curve = self.on_curve(now);
         let acceleration = match (points.acceleration, self.position, self.velocity) {
@@ -480,7 +485,7 @@ impl Segment {
     }
 
     /// The position at `now` and nothing that would move the axis on from there.
-    fn at_rest(&self, now: SystemTime) -> SetPoints {
+    fn at_rest(&self, now: MonotonicTime) -> SetPoints {
         let moving = self.at(now);
         SetPoints {
             position: moving.position,
@@ -492,18 +497,18 @@ impl Segment {
 
     /// How far along its curve the segment is at `at`. A curve is followed to its end and through the overrun that the
     /// target update brings with it, no further: beyond, a polynomial of third order soon leads anywhere.
-    fn on_curve(&self, at: SystemTime) -> DurationNs {
+    fn on_curve(&self, at: MonotonicTime) -> DurationNs {
         at.since(self.start).min(self.follow)
     }
 
     /// A value that stays what it was where the curve ends.
-    fn value(&self, curve: &Polynomial, at: SystemTime) -> i64 {
+    fn value(&self, curve: &Polynomial, at: MonotonicTime) -> i64 {
         curve.value(self.on_curve(at), self.length)
     }
 
     /// Position and velocity. Where the curve ends the position goes on with the velocity it had; if it was slowing down
     /// it goes on slowing down, until it stands. It never gets faster on its own.
-    fn motion(&self, curve: &Polynomial, at: SystemTime) -> (i64, i64) {
+    fn motion(&self, curve: &Polynomial, at: MonotonicTime) -> (i64, i64) {
         const SECOND: i128 = 1_000_000_000;
         let on_curve = self.on_curve(at);
         let position = curve.value(on_curve, self.length);

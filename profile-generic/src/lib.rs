@@ -69,3 +69,4 @@ pub mod sequence;
 pub mod servo;
 pub mod state;
 pub mod time;
+pub mod time_base;

@@ -15,7 +15,7 @@ use crate::quantity::{
 };
 use crate::scaling::UnitKind;
 use crate::state::Report;
-use crate::time::{DurationNs, SystemTime};
+use crate::time::{DurationNs, MonotonicTime};
 
 mod captures;
 mod control;
@@ -251,7 +251,7 @@ pub struct ServoActual {
     /// The latched fault.
     pub fault: Option<FaultCause>,
     /// The simulated instant.
-    pub at: SystemTime,
+    pub at: MonotonicTime,
 }
 
 #[cfg(test)]

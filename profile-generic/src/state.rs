@@ -50,7 +50,8 @@
 //! idle            InhibitRaised, InhibitCleared                        standby        None
 //! Starting        Timeout                      [start_time_out]        FaultReaction  Disable
 //! Stopping        Timeout                      [stop_time_out]         FaultReaction  TorqueOff
-//! FaultReaction   Timeout                                              Faulted        TorqueOff
+//! FaultReaction   Timeout                      drive is heard          Faulted        TorqueOff
+//! FaultReaction   Timeout                      drive is silent         Faulted        None (ends a hold by Disable)
 //! ```
 //!
 //! What the drive reports. F is Faulted with the action TorqueOff, R is FaultReaction with the action

@@ -16,6 +16,10 @@ const AXIS_COUNT: usize = 3;
 const AXES_ADDRESS: usize = 5;
 const BLOCK_LENGTH: usize = 6;
 
+/// First register of the counters, each of four registers, and their count: late_cycles, lost_updates, lost_telegrams,
+/// refused_frames.
+const COUNTERS: (u16, u16) = (20, 16);
+
 /// The map these numbers are of.
 const VERSION: u16 = 1;
 
@@ -41,6 +45,38 @@ pub struct AxisSeen {
     pub cip_axis_state: u16,
     /// Generic fault cause at the second look, 0 for none.
     pub fault_cause: u16,
+}
+
+/// Counters of the box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counters {
+    /// Cycles that began more than half a cycle late.
+    pub late_cycles: u64,
+    /// Updates of the controller that did not come, or came too late.
+    pub lost_updates: u64,
+    /// Bus cycles without the data of a drive.
+    pub lost_telegrams: u64,
+    /// Frames and datagrams that the cycle had to refuse.
+    pub refused_frames: u64,
+}
+
+/// Reads the counters of the box at `address`, with a connection of its own.
+///
+/// # Errors
+/// As [`watch`].
+pub async fn counters(address: SocketAddr) -> io::Result<Counters> {
+    let mut client = tcp::connect(address).await?;
+    let registers = read(&mut client, COUNTERS.0, COUNTERS.1).await?;
+    let mut numbers = registers
+        .chunks_exact(4)
+        .map(|words| words.iter().fold(0_u64, |value, word| value << 16 | u64::from(*word)));
+    let mut next = || numbers.next().ok_or_else(|| io::Error::other("expected four counters"));
+    Ok(Counters {
+        late_cycles: next()?,
+        lost_updates: next()?,
+        lost_telegrams: next()?,
+        refused_frames: next()?,
+    })
 }
 
 #[derive(Debug, Clone, Copy)]

@@ -26,13 +26,14 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let (mut good, findings) = read(&arguments.config)?;
     log_to_stderr(good.config.log_level);
     tell(&findings);
-    let asked =
-        Asked { stop: super::signal::stop_on_signals()?, reload: super::signal::reload_on_hang_up()? };
+    let [stop, hurry] = super::signal::stop_and_hurry_on_signals()?;
+    let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
     loop {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
         match run_once(&good, arguments, &settings, &asked)? {
-            After::End => return Ok(ExitCode::SUCCESS),
+            After::End { rested: true } => return Ok(ExitCode::SUCCESS),
+            After::End { rested: false } => return Ok(ExitCode::FAILURE),
             After::Again(next) => good = next.map_or(good, |next| *next),
         }
     }
@@ -47,13 +48,18 @@ struct Good {
 /// What the box is asked for from outside.
 struct Asked {
     stop: Arc<AtomicBool>,
+    /// To end without waiting for axes.
+    hurry: Arc<AtomicBool>,
     reload: Arc<AtomicBool>,
 }
 
 /// What comes after a run of the box.
 enum After {
     /// Nothing.
-    End,
+    End {
+        /// Every axis stands.
+        rested: bool,
+    },
     /// Another run, with other files where some were read.
     Again(Option<Box<Good>>),
 }
@@ -108,12 +114,14 @@ fn run_once(
         }
     }
     let stops = asked.stop.load(Ordering::Relaxed);
-    info!("axisbridge ends: axes stop, the bus goes down");
-    if let Some(dropped) = running.stop()?.filter(|dropped| *dropped > 0) {
+    info!("axisbridge ends: axes stop, then the bus goes down; a second signal waits for no axis");
+    let stopped = running.stop(&|| asked.hurry.load(Ordering::Relaxed))?;
+    if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
         warn!(dropped, "frames are missing in the recording");
     }
+    stopped.unrested.iter().for_each(|axis| error!("{axis}"));
     if stops {
-        return Ok(After::End);
+        return Ok(After::End { rested: stopped.unrested.is_empty() });
     }
     let why =
         if reloads { "its files were read again" } else { "a controller has reset the Identity object" };

@@ -10,6 +10,7 @@ use super::{CliError, print, signal};
 use crate::runner::port::CanSocketPort;
 use crate::scan::can::{self, Scanner};
 use crate::sys::can_socket::{self, CanSocket, OpenError};
+use crate::sys::interface_lock::InterfaceLock;
 use crate::sys::{can_interface, clock};
 
 /// Longest sleep: answers come at any time.
@@ -33,7 +34,7 @@ pub fn is_can(interface: &str) -> Result<bool, CliError> {
 /// # Errors
 /// The interface cannot be opened, the output cannot be written.
 pub fn run(interface: &str, json: bool) -> Result<ExitCode, CliError> {
-    let mut port = CanSocketPort::open(interface)?;
+    let mut port = CanSocketPort::open(interface, InterfaceLock::take(interface)?)?;
     // A virtual interface has no rate.
     let rate = can_interface::state(interface).ok().and_then(|state| state.nominal);
     let stop = signal::stop_on_signals()?;

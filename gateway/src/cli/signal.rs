@@ -7,8 +7,19 @@ use super::CliError;
 
 /// A flag that the first SIGINT or SIGTERM sets; a second one ends the process at once.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CliError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
+    let [stop] = flags_on_signals()?;
+    Ok(stop)
+}
+
+/// A flag that the first SIGINT or SIGTERM sets, and one that the second sets; a third ends the process at once.
+pub fn stop_and_hurry_on_signals() -> Result<[Arc<AtomicBool>; 2], CliError> {
+    flags_on_signals()
+}
+
+/// Flags that one SIGINT or SIGTERM after the other sets; the next one ends the process.
+fn flags_on_signals<const N: usize>() -> Result<[Arc<AtomicBool>; N], CliError> {
+    let flags: [Arc<AtomicBool>; N] = std::array::from_fn(|_| Arc::default());
+    let own = flags.clone();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     std::thread::Builder::new().name("axisbridge-signals".to_owned()).spawn(move || {
         runtime.block_on(async {
@@ -23,13 +34,14 @@ pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CliError> {
                     _ = interrupt.recv() => {}
                     _ = terminate.recv() => {}
                 }
-                if flag.swap(true, Ordering::Relaxed) {
-                    std::process::exit(1);
+                match own.iter().find(|flag| !flag.load(Ordering::Relaxed)) {
+                    Some(flag) => flag.store(true, Ordering::Relaxed),
+                    None => std::process::exit(1),
                 }
             }
         });
     })?;
-    Ok(stop)
+    Ok(flags)
 }
 
 /// A flag that each SIGHUP sets; whoever obeys clears it.

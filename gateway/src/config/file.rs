@@ -25,7 +25,7 @@ pub struct File {
     pub mappings: Option<MappingsTable>,
     /// The CIP Motion devices seen by controllers, at least one.
     pub device: Vec<Spanned<DeviceTable>>,
-    /// The axes, at least one, at most 16.
+    /// The axes, at least one, at most 64.
     pub axis: Vec<Spanned<AxisTable>>,
     /// The buses behind.
     pub south: Spanned<SouthTable>,
@@ -255,6 +255,9 @@ pub struct RealtimeTable {
     pub priority: Option<Spanned<i64>>,
     /// Processor to stay on, from 0. Default: any.
     pub cpu: Option<Spanned<i64>>,
+    /// How long before its instant the work for a cycle begins, `"0 us"` to `"1 ms"`: at the instant only what is ready goes out. What
+    /// drives send later than that belongs to the next cycle; at most a tenth of the cycle counts. Default: `"100 us"`.
+    pub lead: Option<Spanned<String>>,
     /// Keep the memory of the process resident. Default: true.
     pub lock_memory: Option<bool>,
     /// Keep the host's processors from sleeping while the box runs: the most even cycle, at full consumption. Default:

@@ -39,8 +39,9 @@ use crate::finding::{Findings, Source, deserialize, read_file, tree};
 use crate::mapping::{CaptureMode, Rated};
 use crate::sys::realtime;
 
-/// Axes of one box: what its status block, its recorder and its cycle have room for.
-pub const AXES_MAX: usize = 16;
+/// Axes of one box: what its status block, its register map and its cycle have room for. A device has at most 16 of
+/// them (IEC 61800-7-302 clause 7.2).
+pub const AXES_MAX: usize = 64;
 
 /// Devices of one box: each axis could have one of its own.
 pub const DEVICES_MAX: usize = AXES_MAX;
@@ -71,6 +72,8 @@ pub struct Config {
     pub axes: Vec<Axis>,
     /// What to ask of the kernel for the cycle thread.
     pub realtime: realtime::Request,
+    /// How long before its instant the work for a cycle begins.
+    pub lead: DurationNs,
     /// The SERCOS III bus behind.
     pub sercos: Option<Sercos>,
     /// The CAN buses behind.

@@ -340,23 +340,102 @@ fn every_fault_of_a_file_is_reported_in_its_order() {
     );
 }
 
-#[test]
-fn too_many_axes_and_devices_are_refused() {
-    let mut text = GOOD.to_owned();
-    let mut list = "\"x\", \"y\"".to_owned();
-    for number in 3..=17 {
-        list += &format!(", \"n{number}\"");
-        text += &format!("[[south.sercos.drive]]\nname = \"d{number}\"\naddress = {number}\n");
+/// A box with so many axes: 16 in a device, their drives on the SERCOS line, on two CAN buses and on DeviceNet in turn.
+fn crowd(axes: usize) -> String {
+    let mut text = "[box]\nname = \"crowd\"\n".to_owned();
+    let numbers: Vec<usize> = (1..=axes).collect();
+    for (device, axes) in (1..).zip(numbers.chunks(16)) {
+        let list: Vec<_> = axes.iter().map(|axis| format!("\"a{axis}\"")).collect();
         text += &format!(
-            "[[axis]]\nname = \"n{number}\"\ninstance = {number}\ndrive = \"d{number}\"\nunit = \"revolution\"\n"
+            "[[device]]\nname = \"front-{device}\"\nlisten = \"192.0.2.{device}\"\naxes = [{}]\n\
+             identity = {{ vendor_id = 1, product_code = 2, serial_number = {device} }}\n",
+            list.join(", ")
         );
     }
-    let text = text.replace("axes = [\"x\", \"y\"]", &format!("axes = [{list}]"));
+    for axis in &numbers {
+        text += &format!(
+            "[[axis]]\nname = \"a{axis}\"\ninstance = {}\ndrive = \"d{axis}\"\nunit = \"revolution\"\n",
+            (axis - 1) % 16 + 1
+        );
+    }
+    let mut bus = |place: usize, head: &str, line: &dyn Fn(usize) -> String| {
+        let drives: String =
+            numbers.iter().filter(|axis| **axis % 4 == place).map(|axis| line(*axis)).collect();
+        if !drives.is_empty() {
+            text += &format!("[{head}\ninterface = \"in-process\"\n{drives}");
+        }
+    };
+    bus(0, "south.sercos]\ncycle_time = \"2 ms\"", &|axis| {
+        format!("[[south.sercos.drive]]\nname = \"d{axis}\"\naddress = {axis}\n")
+    });
+    for number in [1, 2] {
+        bus(number, "[south.can]]\ncycle_time = \"8 ms\"", &|axis| {
+            format!("[[south.can.drive]]\nname = \"d{axis}\"\nnode = {axis}\n")
+        });
+    }
+    bus(3, "[south.devicenet]]\ncycle_time = \"40 ms\"", &|axis| {
+        format!("[[south.devicenet.drive]]\nname = \"d{axis}\"\nmac_id = {axis}\nresolution = 1_048_576\n")
+    });
+    text
+}
+
+#[test]
+fn a_box_may_have_64_axes_in_several_devices_on_mixed_buses() {
+    let config = Config::parse(&crowd(64), "box.toml").unwrap_or_else(|error| panic!("{error}"));
+    let of = |device| config.axes_of(device).count();
+    assert_eq!((0..config.devices.len()).map(of).collect::<Vec<_>>(), [16; 4]);
+    assert_eq!(config.sercos.as_ref().map(|bus| bus.drives.len()), Some(16));
+    assert_eq!(config.can.iter().map(|bus| bus.drives.len()).collect::<Vec<_>>(), [16, 16]);
+    assert_eq!(config.devicenet.iter().map(|bus| bus.drives.len()).collect::<Vec<_>>(), [16]);
+}
+
+#[test]
+fn the_65th_axis_is_refused_at_its_line() {
+    let text = crowd(65);
+    let error = Config::parse(&text, "box.toml").unwrap_err();
+    let line = text.lines().position(|line| line == "name = \"a65\"").unwrap();
+    let found: Vec<_> = error
+        .list()
+        .iter()
+        .map(|found| (found.line, found.title.as_str(), found.expected.as_str()))
+        .collect();
+    // The place is that of its table.
+    assert_eq!(found, [(line, "too many axes: 65", "expected at most 64")]);
+}
+
+#[test]
+fn the_17th_axis_of_a_device_is_refused() {
+    let text = crowd(17).replace("\"a16\"]", "\"a16\", \"a17\"]");
+    let text = text.replace("instance = 1\ndrive = \"d17\"", "instance = 17\ndrive = \"d17\"");
+    let start = text.find("[[device]]\nname = \"front-2\"").unwrap();
+    let end = text.find("[[axis]]").unwrap();
+    let text = format!("{}{}", &text[..start], &text[end..]);
     let error = Config::parse(&text, "box.toml").unwrap_err();
     let titles: Vec<_> = error.list().iter().map(|found| found.title.as_str()).collect();
-    assert_eq!(titles, ["the device `front` has 17 axes", "too many axes: 17"]);
+    assert_eq!(titles, ["the device `front-1` has 17 axes"]);
     let expected = &error.list()[0].expected;
     assert_eq!(expected, "expected 1 to 16 axes of a node on EtherNet/IP (IEC 61800-7-302 clause 7.2)");
+}
+
+#[test]
+fn the_65th_device_is_refused_at_its_line() {
+    let one = |number: usize| {
+        format!(
+            "[[device]]\nname = \"f{number}\"\nlisten = \"192.0.2.{number}\"\naxes = [\"x{number}\"]\n\
+             identity = {{ vendor_id = 1, product_code = 2, serial_number = {number} }}\n"
+        )
+    };
+    let devices: String = (1..=65).map(one).collect();
+    let text = format!("{devices}{}", crowd(1));
+    let text = text.replace("[box]\nname = \"crowd\"\n", "");
+    let text = format!("[box]\nname = \"crowd\"\n{text}");
+    let error = Config::parse(&text, "box.toml").unwrap_err();
+    let line = text.lines().position(|line| line == "name = \"f65\"").unwrap();
+    let too_many = error.list().iter().find(|found| found.title.starts_with("too many")).unwrap();
+    assert_eq!(
+        (too_many.line, too_many.title.as_str(), too_many.expected.as_str()),
+        (line, "too many devices: 66", "expected at most 64")
+    );
 }
 
 #[test]

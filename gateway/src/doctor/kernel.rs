@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Check;
-use crate::sys::clock::{self, SystemClock};
+use crate::sys::clock::{self, HostTime};
 use crate::sys::realtime::{Outcome, Request};
 
 /// Area of the checks of kernel and processors, which come first.
@@ -32,7 +32,7 @@ pub(super) fn checks(root: &Path, request: Request) -> Vec<Check> {
     checks.extend(host.governor(&online));
     checks.extend(host.sleep(request.stay_awake, &online));
     checks.push(discipline(clock::is_disciplined()));
-    checks.push(Check::good(CLOCK, "time scale", SystemClock::detect().scale().to_string()));
+    checks.push(Check::good(CLOCK, "time scale", HostTime.scale().to_string()));
     checks
 }
 

@@ -6,12 +6,12 @@ use arrayvec::ArrayVec;
 use profile_cip::target::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::target::axis_object::PositionView;
 use profile_cip::target::axis_state::AxisState;
-use profile_cip::target::drive_link::DriveAction;
+use profile_cip::target::drive_link::{Command, DriveAction};
 use profile_cip::target::fault_log::FaultLog;
 use profile_cip::target::motion_device::{DeviceConfig, DeviceError, MotionDevice, SequenceSettings};
 use profile_cip::target::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
-use profile_cip::wire::motion::codes::{EventChecking, NodeAlarm, NodeFault};
+use profile_cip::wire::motion::codes::{ControlMode, EventChecking, NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::capture::{CaptureKind, CaptureResult};
 use profile_generic::fault::Reaction;
@@ -21,8 +21,10 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Acceleration, Velocity};
 use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time_base::TimeBase;
 
 use super::access::{Access, AccessFailure, Refusal};
+use super::admission::Admission;
 use super::axis::{AxisChannel, StopSettings};
 use super::bus::{Answer, Buses, Purpose};
 use super::notice::Notice;
@@ -36,8 +38,12 @@ const ACCESSES_PER_CYCLE: usize = 8;
 /// Explicit requests handed to the device in one cycle.
 const REQUESTS_PER_CYCLE: usize = 4;
 
-/// Datagrams taken in one cycle: at most this many are believed to be no storm.
-const DATAGRAMS_PER_CYCLE: usize = 16;
+/// Updates of the owner taken in one call: what a controller sends after a pause, and no storm.
+const UPDATES_PER_CYCLE: usize = 16;
+
+/// Datagrams refused in one call beside those. They are cheap, and the owner's update stands behind them in the socket: with
+/// this many, 128 000 a second cannot hold it up in a cycle of 2 ms. Few come so far, see [`super::admission`].
+const REFUSED_PER_CYCLE: usize = 256;
 
 /// Writes to the drive that may be under way for one axis.
 const WRITES_MAX: usize = 8;
@@ -79,9 +85,37 @@ struct Member {
     action: DriveAction,
     /// What a stop falls back to where the controller has set nothing.
     stops: StopDefaults,
+    /// How the axis is to start and stop, as long as nothing changes that it was made of.
+    stopping: Option<(MadeOf, Stopping)>,
     /// Attributes of the sequences that are being written to the drive: ticket, attribute and bytes. What the drive has
     /// taken is kept here as well, because the box goes by it.
     writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
+}
+
+/// What the settings of starts and stops are made of: attributes of the axis, its programs, and the control mode of the
+/// last update. [`StopDefaults`] never change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct MadeOf {
+    attributes: Option<u64>,
+    programs: u64,
+    control_mode: Option<ControlMode>,
+}
+
+impl MadeOf {
+    fn now(device: &MotionDevice, place: usize, axis: &AxisChannel) -> Self {
+        Self {
+            attributes: device.attribute_changes(place),
+            programs: axis.programs(),
+            control_mode: device.control_mode(place),
+        }
+    }
+}
+
+/// How an axis is to start and stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stopping {
+    settings: StopSettings,
+    sequence: SequenceSettings,
 }
 
 /// What a stop falls back to where the controller has set nothing.
@@ -96,7 +130,7 @@ pub struct StopDefaults {
 /// What the I/O connection has counted beside the motion device.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct DatagramCounters {
-    /// Datagrams of nobody's connection, or malformed before the connection data.
+    /// Datagrams of nobody's connection, or malformed before the connection data, as far as the kernel let them through.
     pub refused: u64,
     /// Datagrams that could not be sent.
     pub send_failures: u64,
@@ -109,7 +143,8 @@ pub struct DeviceChannel {
     link: DeviceEnd,
     members: Vec<Member>,
     encapsulation_sequence: u32,
-    counters: DatagramCounters,
+    admission: Admission,
+    send_failures: u64,
     /// The connection for which the scaling attributes were preset.
     preset: Option<u32>,
     /// Fault and alarm of the node that were told last.
@@ -168,6 +203,7 @@ impl DeviceChannel {
                     drive_scaling: true,
                     action: DriveAction::None,
                     stops: *stops,
+                    stopping: None,
                     writes: ArrayVec::new(),
                 })
             })
@@ -178,7 +214,8 @@ impl DeviceChannel {
             link,
             members,
             encapsulation_sequence: 0,
-            counters: DatagramCounters::default(),
+            admission: Admission::default(),
+            send_failures: 0,
             preset: None,
             node: (NodeFault::NONE, NodeAlarm::NONE),
         })
@@ -204,7 +241,7 @@ impl DeviceChannel {
     /// Counters beside those of the motion device.
     #[must_use]
     pub fn counters(&self) -> DatagramCounters {
-        self.counters
+        DatagramCounters { refused: self.admission.refused(), send_failures: self.send_failures }
     }
 
     /// The engine's number of each axis with its state, in the order of the instances.
@@ -226,51 +263,73 @@ impl DeviceChannel {
     }
 
     /// Takes requests of the explicit side and what came on the I/O connection.
-    pub fn receive(&mut self, now: MonotonicTime, system: SystemTime, port: &mut dyn NorthPort) {
+    pub fn receive(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
+        let system = time.system_at(now);
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(request) = self.link.request() else { break };
             self.device.request(now, Some(system), request);
         }
         let mut buffer = [0; FRAME_MAX];
-        for _ in 0..DATAGRAMS_PER_CYCLE {
-            let Some((length, from)) = port.receive(&mut buffer) else { break };
-            if !self.datagram(now, system, &buffer[..length], from) {
-                self.counters.refused += 1;
-            }
+        let (mut updates, mut refused) = (0, 0);
+        while updates < UPDATES_PER_CYCLE && refused < REFUSED_PER_CYCLE {
+            let Some(datagram) = port.receive(&mut buffer) else { break };
+            // What has come since the call began came now; the other way round it would answer before it was asked.
+            let arrival = datagram.arrived_at.map_or(now, |at| at.min(now));
+            let taken = self.datagram((now, arrival), system, &buffer[..datagram.len], datagram.from);
+            *(if taken { &mut updates } else { &mut refused }) += 1;
         }
     }
 
-    fn datagram(&mut self, now: MonotonicTime, system: SystemTime, bytes: &[u8], from: SocketAddrV4) -> bool {
-        let Some(connection) = self.device.connection() else { return false };
-        let Ok(datagram) = Class1Datagram::parse(bytes) else { return false };
-        if datagram.connection_id != connection.o_to_t_id || *from.ip() != connection.originator {
+    /// Hands a datagram of the owner to the device; whether that has taken it.
+    fn datagram(
+        &mut self,
+        (now, arrival): (MonotonicTime, MonotonicTime),
+        system: SystemTime,
+        bytes: &[u8],
+        from: SocketAddrV4,
+    ) -> bool {
+        let connection = self.device.connection();
+        if let Err(why) = self.admission.check(connection, bytes, from) {
+            self.admission.refuse(now, from, why);
             return false;
         }
-        self.device.handle_io(now, Some(system), &bytes[CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN..]);
-        true
+        let id = connection.map_or(0, |connection| connection.o_to_t_id);
+        let data = &bytes[CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN..];
+        let taken = self.device.handle_io_arrived(now, arrival, Some(system), data);
+        if taken && self.admission.learn(id, from) {
+            self.link.tell_owner_port(id, from.port());
+        }
+        taken
     }
 
     /// Tells the device of its drives, lets time pass, and hands each axis what it has to do.
     pub fn exchange(
         &mut self,
         now: MonotonicTime,
-        system: SystemTime,
+        time: &TimeBase,
         mapping: &Mapping,
         axes: &mut [AxisChannel],
         notice: &mut dyn FnMut(Notice),
     ) {
+        let system = time.system_at(now);
         self.preset_scaling(mapping, axes);
-        for (place, member) in self.members.iter().enumerate() {
-            let mut image = axes[member.axis].drive_image();
-            image.events = member.checkable(image.events);
-            self.device.set_drive(place, image);
-            let settings = member.stop_settings(mapping, &self.device, place, &axes[member.axis]);
-            let abort = axes[member.axis].north().fault_action(settings.1);
-            self.device
-                .set_sequence(place, SequenceSettings { flying_start: settings.0.flying_start, abort });
-            axes[member.axis].set_stop_settings(settings.0);
+        for (place, member) in self.members.iter_mut().enumerate() {
+            self.device.update_drive(place, |image| {
+                axes[member.axis].fill_drive_image(image);
+                image.events = member.checkable(image.events);
+                image.captured_at = system_stamp(time, axes[member.axis].feedback().at);
+            });
+            let axis = &mut axes[member.axis];
+            let Stopping { settings, sequence } = member.stopping(mapping, &self.device, place, axis);
+            self.device.set_sequence(place, sequence);
+            // The attributes are those of the next connection while the axis still stops after the last one.
+            let winds_down =
+                self.device.axis_state(place) == Some(AxisState::Initializing) && axis.may_have_torque();
+            if !winds_down {
+                axis.set_stop_settings(settings);
+            }
         }
-        self.events(axes);
+        self.events(time, axes);
         for member in &mut self.members {
             let fault = axes[member.axis].node_fault();
             if let Some((code, at)) = fault
@@ -325,10 +384,17 @@ impl DeviceChannel {
                 inhibits.set(Inhibits::CONFIGURATION_INCOMPLETE, !member.scaled);
                 inhibits.set(Inhibits::LIMIT_SWITCHES_NOT_TOLD, axis.misses_limit_switches());
                 axis.set_inhibits(now, system, inhibits);
-                axis.from_controller(now, system, &image);
+                let target = match &image.command {
+                    Command::Follow(points) => points.target_time.map(SystemTime),
+                    Command::Withheld(_) => None,
+                };
+                axis.from_controller(now, system, &image, target.map(|at| time.monotonic_at(at)));
             }
         }
         self.tell(axes, notice);
+        if let Some(strangers) = self.admission.notice(now, self.number) {
+            notice(strangers);
+        }
     }
 
     /// Tells what came into the logs, and how the node is.
@@ -355,7 +421,7 @@ impl DeviceChannel {
     }
 
     /// Hands on what the drives have captured, and tells them what to capture.
-    fn events(&mut self, axes: &mut [AxisChannel]) {
+    fn events(&mut self, time: &TimeBase, axes: &mut [AxisChannel]) {
         for (place, member) in self.members.iter().enumerate() {
             let axis = &mut axes[member.axis];
             while let Some(CaptureResult { source, edge, status, position, at, .. }) = axis.poll_capture() {
@@ -363,7 +429,7 @@ impl DeviceChannel {
                 let event = events.event(CaptureKind::new(source, edge));
                 if let (Some(event), Some(status)) = (event, events.status(status)) {
                     let position = axis.north().counts(position.get()).value;
-                    self.device.notify_event(place, event, status, position, at.0);
+                    self.device.notify_event(place, event, status, position, system_stamp(time, at));
                 }
             }
             let armed = self.device.armed_events(place).map_or(EventChecking::empty(), |(armed, _)| armed);
@@ -390,7 +456,6 @@ impl DeviceChannel {
                 let _ = self.device.put_attribute(place, id, &bytes[..width(entry.data_type)]);
             }
             let axis = &mut axes[member.axis];
-            axis.connection_opened();
             // Counts from the end of the configuration on; refused while the axis still stops, and then taken again.
             let _ = member.use_scaling(mapping, axis, member.configured);
             member.scaled = false;
@@ -539,7 +604,8 @@ impl DeviceChannel {
     }
 
     /// Sends what is due on the I/O connection, and answers the explicit side.
-    pub fn transmit(&mut self, now: MonotonicTime, system: SystemTime, port: &mut dyn NorthPort) {
+    pub fn transmit(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
+        let system = time.system_at(now);
         let mut buffer = [0; FRAME_MAX];
         let data = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
         if let Some(length) = self.device.poll_transmit(now, Some(system), &mut buffer[data..])
@@ -556,7 +622,7 @@ impl DeviceChannel {
                 &mut buffer,
             );
             if header.is_err() || !port.send(&buffer[..data + length], to) {
-                self.counters.send_failures += 1;
+                self.send_failures += 1;
             }
         }
         while let Some(reply) = self.device.poll_reply() {
@@ -571,6 +637,38 @@ impl Member {
     /// where the device does the scaling (Table 5-2.36).
     fn checkable(&self, events: EventChecking) -> EventChecking {
         if self.drive_scaling { events | events.windows() } else { events - EventChecking::EXTENDED }
+    }
+
+    /// How the axis is to start and stop now. It is worked out again when something has changed that it is made of.
+    fn stopping(
+        &mut self,
+        mapping: &Mapping,
+        device: &MotionDevice,
+        place: usize,
+        axis: &AxisChannel,
+    ) -> Stopping {
+        let now = MadeOf::now(device, place, axis);
+        if let Some((made_of, stopping)) = self.stopping
+            && made_of == now
+        {
+            debug_assert_eq!(stopping, self.work_out_stopping(mapping, device, place, axis), "it is stale");
+            return stopping;
+        }
+        let stopping = self.work_out_stopping(mapping, device, place, axis);
+        self.stopping = Some((now, stopping));
+        stopping
+    }
+
+    fn work_out_stopping(
+        &self,
+        mapping: &Mapping,
+        device: &MotionDevice,
+        place: usize,
+        axis: &AxisChannel,
+    ) -> Stopping {
+        let (settings, abort) = self.stop_settings(mapping, device, place, axis);
+        let abort = axis.north().fault_action(abort);
+        Stopping { settings, sequence: SequenceSettings { flying_start: settings.flying_start, abort } }
     }
 
     /// How the axis is to start and stop by the attributes that the controller has set, and the reaction to an Abort.
@@ -673,6 +771,11 @@ impl Member {
         self.scaling = scaling;
         Ok(())
     }
+}
+
+/// An instant of the local clock as a stamp in system time, ns; 0 for one that is not known.
+fn system_stamp(time: &TimeBase, at: MonotonicTime) -> u64 {
+    if at == MonotonicTime::ZERO { 0 } else { time.system_at(at).0 }
 }
 
 /// The attributes that describe a scaling, with their values.

@@ -1,9 +1,14 @@
 //! The engine of the box: everything that happens in a cycle, without sockets, clocks and threads.
 //!
 //! ```text
-//! receive south -> axes take feedback -> receive north -> devices and axes exchange -> axes fill the telegrams
-//!               -> send south -> send north -> publish
+//! lead before the instant   receive south -> axes take feedback -> receive north -> devices and axes exchange
+//!                           -> axes fill the telegrams -> the bus builds its frames
+//! at the instant            send south -> send north -> publish
 //! ```
+//!
+//! Each bus has a grid of instants at which its cycles begin. Set-points are computed for the instant of the grid at which drives
+//! take them, whenever the engine is called; a cycle that is left out leaves the grid where it is. Everything that moves an axis works
+//! on the local clock, the monotonic one; system time is made from it at the north side ([`TimeBase`]).
 //!
 //! The cycle thread of the box calls [`Engine::cycle`] with real ports and clocks, the whole-system tests with queues and
 //! virtual time. After start it neither allocates, locks, logs nor waits: what people should know leaves as a
@@ -12,6 +17,7 @@
 //! [`bus::sercos::commissioner`].
 
 pub mod access;
+pub mod admission;
 pub mod axis;
 pub mod build;
 pub mod bus;
@@ -21,12 +27,17 @@ pub mod port;
 
 use std::cell::RefCell;
 
+use profile_cip::target::motion_device::SyncState;
+use profile_cip::target::visualization::display::{self, Line};
+use profile_cip::target::visualization::{self, Indication};
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time_base::{TimeBase, TimeSample};
 
 use self::axis::AxisChannel;
+use self::axis::rest::Unrested;
 use self::bus::sercos::SercosBus;
-use self::bus::{Bus, Buses, Purpose};
+use self::bus::{Bus, Buses, Cycle, Purpose};
 use self::device::DeviceChannel;
 use self::notice::Notice;
 use self::port::{NorthPort, SouthPort};
@@ -44,8 +55,14 @@ const IDLE_INTERVAL: DurationNs = DurationNs::from_millis(1);
 const IDLE_INTERVAL_MAX: DurationNs = DurationNs::from_millis(4);
 const IDLE_CALLS_PER_CYCLE: i64 = 4;
 
+/// Beyond the limits of the axes, before the buses of a box that ends go down whatever the axes do: telegrams take their time.
+const END_MARGIN: DurationNs = DurationNs::from_secs(1);
+
 /// Rather than call so shortly before a cycle of a bus, the engine sleeps until that.
 const QUIET_BEFORE_CYCLE: DurationNs = DurationNs::from_micros(250);
+
+/// The work for a cycle begins at most by this part of it before its instant: the answers of the drives have to be back by then.
+const LEAD_DIVISOR: i64 = 10;
 
 /// The engine.
 #[derive(Debug)]
@@ -60,11 +77,33 @@ pub struct Engine {
     publisher: Publisher<BoxStatus>,
     status: BoxStatus,
     cycle_time: DurationNs,
+    /// How long before its instant the work for a cycle begins.
+    lead: DurationNs,
+    time: TimeBase,
+    /// The time base has taken a sample.
+    timed: bool,
+    sync: SyncState,
     started: Option<MonotonicTime>,
     due: Option<MonotonicTime>,
-    /// When each bus began its last cycle.
-    sent_at: [Option<SystemTime>; BUSES_MAX],
+    /// The cycle of each bus that is built and waits for its instant.
+    prepared: [Option<MonotonicTime>; BUSES_MAX],
+    /// By how much calls were late since the last cycle of each bus was built.
+    late: [DurationNs; BUSES_MAX],
+    /// When each bus began its last cycle: its instant on the grid.
+    sent_at: [Option<MonotonicTime>; BUSES_MAX],
     stopping: bool,
+    ending: Ending,
+}
+
+/// The end of a box: which axes are waited for, and how long.
+#[derive(Debug)]
+struct Ending {
+    deadline: MonotonicTime,
+    /// The axes that were on the move, or could be.
+    awaited: Vec<bool>,
+    /// Nobody is waited for any longer.
+    over: bool,
+    unrested: Vec<Unrested>,
 }
 
 /// The parts of an engine; [`build`] makes them from a configuration.
@@ -82,13 +121,15 @@ pub struct Parts {
     pub notices: rtrb::Producer<Notice>,
     /// The status of the box goes there.
     pub publisher: Publisher<BoxStatus>,
+    /// How long before its instant the work for a cycle begins; at most a tenth of the cycle counts.
+    pub lead: DurationNs,
 }
 
 impl Engine {
     /// An engine of these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { mapping, buses, devices, axes, notices, publisher } = parts;
+        let Parts { mapping, buses, devices, axes, notices, publisher, lead } = parts;
         let mut status = BoxStatus::STARTING;
         let cycle_time = buses.iter().map(Bus::cycle_time).min().unwrap_or(IDLE_INTERVAL);
         status.cycle_time_ns = u32::try_from(cycle_time.as_nanos()).unwrap_or(u32::MAX);
@@ -104,6 +145,12 @@ impl Engine {
             }
         }
         let told = axes.iter().map(|axis| (axis.state(), false)).collect();
+        let ending = Ending {
+            deadline: MonotonicTime::MAX,
+            awaited: vec![false; axes.len()],
+            over: false,
+            unrested: Vec::with_capacity(axes.len()),
+        };
         Self {
             mapping,
             buses,
@@ -114,10 +161,21 @@ impl Engine {
             publisher,
             status,
             cycle_time,
+            lead,
+            time: TimeBase::new(TimeSample {
+                at: MonotonicTime::ZERO,
+                system: SystemTime::ZERO,
+                rate_ppb: 0,
+            }),
+            timed: false,
+            sync: SyncState::default(),
             started: None,
             due: None,
+            prepared: [None; BUSES_MAX],
+            late: [DurationNs::ZERO; BUSES_MAX],
             sent_at: [None; BUSES_MAX],
             stopping: false,
+            ending,
         }
     }
 
@@ -156,85 +214,131 @@ impl Engine {
         &self.status
     }
 
-    /// Whether system time can be trusted by the devices, and which clock it comes from.
-    pub fn set_sync(&mut self, sync: profile_cip::target::motion_device::SyncState) {
+    /// Whether system time can be trusted by the devices, and which clock it comes from. The offset is that of the time base.
+    pub fn set_sync(&mut self, sync: SyncState) {
+        self.sync = SyncState { offset: self.time.offset().as_nanos(), ..sync };
         for channel in &mut self.devices {
-            channel.device_mut().set_sync(sync);
+            channel.device_mut().set_sync(self.sync);
         }
     }
 
-    /// Ends operation: the axes stop as on a lost command, then the buses go down. [`Self::is_stopped`] tells when.
-    pub fn stop(&mut self, now: MonotonicTime, system: SystemTime) {
+    /// Takes a sample of system time, before each [`Self::cycle`]. A step is reported to the devices, which compensate the stamps of
+    /// their controllers (clause 2-2); no axis follows it.
+    pub fn feed_time(&mut self, sample: &TimeSample) {
+        let step = if std::mem::replace(&mut self.timed, true) {
+            self.time.feed(sample)
+        } else {
+            self.time = TimeBase::new(*sample);
+            None
+        };
+        if self.time.offset().as_nanos() != self.sync.offset {
+            self.set_sync(self.sync);
+        }
+        if let Some(step) = step {
+            tell(&mut self.notices, Notice::TimeStep { step });
+        }
+    }
+
+    /// System time over the local clock.
+    #[must_use]
+    pub fn time(&self) -> &TimeBase {
+        &self.time
+    }
+
+    /// Ends operation: the axes stop as on a lost command, and when they stand, or have had all the time that their own limits
+    /// give them, the buses go down. [`Self::is_stopped`] says when.
+    pub fn stop(&mut self, now: MonotonicTime) {
         self.stopping = true;
-        for axis in &mut self.axes {
+        let system = self.time.system_at(now);
+        let mut limit = DurationNs::ZERO;
+        for (axis, awaited) in self.axes.iter_mut().zip(&mut self.ending.awaited) {
+            *awaited = axis.is_stopping();
             axis.end(now, system);
+            if *awaited {
+                limit = limit.max(axis.stop_limit());
+            }
         }
+        self.ending.deadline = now + limit + END_MARGIN;
     }
 
-    /// Whether every axis is without torque and every bus is down after [`Self::stop`].
+    /// Ends the wait for axes that [`Self::stop`] has begun to stop: the buses go down now.
+    pub fn hurry(&mut self, now: MonotonicTime) {
+        self.ending.deadline = self.ending.deadline.min(now);
+    }
+
+    /// Whether no axis is waited for any longer and every bus is down after [`Self::stop`].
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.stopping && self.buses.iter().all(Bus::is_stopped)
+        self.ending.over && self.buses.iter().all(Bus::is_stopped)
+    }
+
+    /// The axes that did not come to rest, or were not seen to, before the buses went down.
+    #[must_use]
+    pub fn unrested(&self) -> &[Unrested] {
+        &self.ending.unrested
+    }
+
+    /// Whether the buses may go down; notes once which axes do not stand.
+    fn may_go_down(&mut self, now: MonotonicTime) -> bool {
+        let Ending { deadline, awaited, over, unrested } = &mut self.ending;
+        let awaited = || self.axes.iter().enumerate().zip(&*awaited).filter(|(_, awaited)| **awaited);
+        if !*over && (now >= *deadline || awaited().all(|((_, axis), _)| axis.has_stopped())) {
+            *over = true;
+            unrested.extend(awaited().filter_map(|((number, axis), _)| axis.unrested(number)));
+        }
+        *over
     }
 
     /// One call of the cycle. `north` has a port for each device, `south` one for each bus. Returns when the next one is due.
     ///
-    /// A bus whose cycle is about to begin has its axes do a step: they take what their drives sent in the cycle that ends,
-    /// and give what they are to do in the next one. Calls in between serve the north side and what is beside the cycle.
+    /// A bus is called for twice in a cycle. A little before its instant its axes do a step: they take what their drives sent in the
+    /// cycle that ends, and give what they are to do in the next one, for the instant of the grid at which drives take it. At the
+    /// instant itself what was built goes out before anything else is done. Calls in between serve the north side and what is
+    /// beside the cycle.
     pub fn cycle(
         &mut self,
         now: MonotonicTime,
-        system: SystemTime,
         north: &mut [&mut dyn NorthPort],
         south: &mut [SouthPort<'_>],
     ) -> MonotonicTime {
         let started = *self.started.get_or_insert(now);
-        self.count_lateness(now);
-        let mut due = [false; BUSES_MAX];
-        let mut stepped = [false; BUSES_MAX];
+        let late = self.count_lateness(now);
+        self.late.iter_mut().for_each(|known| *known = (*known).max(late));
+        self.send_prepared(now, south);
+        let mut due = [None; BUSES_MAX];
         for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
             bus.receive(now, port);
-            due[place] = bus.is_due(now);
-            stepped[place] = due[place] && bus.take_cycle();
+            let lead = lead_of(bus.cycle_time(), self.lead);
+            due[place] = match bus.next_cycle() {
+                // Before there is a grid every call is a step.
+                None => Some(now),
+                Some(at) if self.prepared[place] == Some(at) || now + lead < at => None,
+                Some(at) => Some(at),
+            };
         }
-        for (number, axis) in self.axes.iter_mut().enumerate() {
-            let place = self.buses.of(number);
-            if stepped[place] {
-                // The drives capture their values when the telegrams pass them.
-                let sampled = self.sent_at[place].unwrap_or(system);
-                axis.from_drive(now, system, sampled, self.buses.get(place).feedback(number));
-            }
-        }
-        self.run_buses(now, system);
+        self.take_feedback(now, &due);
+        self.run_buses(now);
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
-            channel.receive(now, system, &mut **port);
+            channel.receive(now, &self.time, &mut **port);
         }
         {
-            let Self { devices, mapping, axes, buses, notices, .. } = self;
+            let Self { devices, mapping, axes, buses, notices, time, .. } = self;
             for channel in devices {
-                channel.exchange(now, system, mapping, axes, &mut |notice| tell(notices, notice));
+                channel.exchange(now, time, mapping, axes, &mut |notice| tell(notices, notice));
                 channel.attributes(mapping, axes, buses);
             }
         }
-        for (number, axis) in self.axes.iter_mut().enumerate() {
-            let place = self.buses.of(number);
-            if due[place] {
-                let bus = self.buses.get_mut(place);
-                let acts_at = system + bus.cycle_time();
-                bus.command(number, &mut |telegram| axis.to_drive(now, system, acts_at, telegram));
-            }
-        }
+        self.fill_telegrams(now, &due);
         for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
-            let sent = bus.send(now, port);
-            self.status.counters.send_failures += sent.failures;
-            if sent.cycle {
-                self.sent_at[place] = Some(system);
+            if self.prepared[place].is_none_or(|at| now >= at) {
+                let at = self.prepared[place].take().unwrap_or(now);
+                self.status.counters.send_failures += send(bus, port, (now, at), &mut self.sent_at[place]);
             }
         }
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
-            channel.transmit(now, system, &mut **port);
+            channel.transmit(now, &self.time, &mut **port);
         }
-        if self.stopping && !self.axes.iter().any(AxisChannel::may_have_torque) {
+        if self.stopping && self.may_go_down(now) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
         self.tell_changes();
@@ -244,9 +348,73 @@ impl Engine {
         due
     }
 
+    /// Sends what was built ahead and whose instant has come. What could only go out much too late does not.
+    fn send_prepared(&mut self, now: MonotonicTime, south: &mut [SouthPort<'_>]) {
+        for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
+            let before = bus.next_cycle();
+            bus.skip_late(now);
+            let Some(at) = self.prepared[place] else { continue };
+            if before != bus.next_cycle() {
+                // It was left out; the axes do their step for another cycle.
+                self.prepared[place] = None;
+            } else if now >= at {
+                self.status.counters.send_failures += send(bus, port, (now, at), &mut self.sent_at[place]);
+                self.prepared[place] = None;
+            }
+        }
+    }
+
+    /// The axes of the buses that are due take what their drives sent.
+    fn take_feedback(&mut self, now: MonotonicTime, due: &[Option<MonotonicTime>; BUSES_MAX]) {
+        let mut stepped = [false; BUSES_MAX];
+        for (place, bus) in self.buses.iter_mut().enumerate() {
+            stepped[place] = due[place].is_some() && bus.take_cycle();
+        }
+        let system = self.time.system_at(now);
+        for (number, axis) in self.axes.iter_mut().enumerate() {
+            let place = self.buses.of(number);
+            if stepped[place] {
+                // The drives capture their values when the telegrams pass them.
+                let sampled = self.sent_at[place].unwrap_or(now);
+                axis.from_drive(now, system, sampled, self.buses.get(place).feedback(number));
+            }
+        }
+    }
+
+    /// The axes of the buses that are due give what their drives are to do, and the buses build their frames.
+    fn fill_telegrams(&mut self, now: MonotonicTime, due: &[Option<MonotonicTime>; BUSES_MAX]) {
+        let system = self.time.system_at(now);
+        for (number, axis) in self.axes.iter_mut().enumerate() {
+            let place = self.buses.of(number);
+            if let Some(at) = due[place] {
+                let bus = self.buses.get_mut(place);
+                let span = bus.cycle_time();
+                let ahead = span + lead_of(span, self.lead);
+                let cycle = Cycle { acts_at: at + span, span, ahead, late: self.late[place] };
+                bus.command(number, &mut |telegram| axis.to_drive(now, system, &cycle, telegram));
+            }
+        }
+        for (place, bus) in self.buses.iter_mut().enumerate() {
+            if let Some(at) = due[place].filter(|_| bus.next_cycle().is_some()) {
+                bus.prepare();
+                self.prepared[place] = Some(at);
+                self.late[place] = DurationNs::ZERO;
+            }
+        }
+    }
+
     /// When the next call is due.
     fn next_due(&self, now: MonotonicTime) -> MonotonicTime {
-        let wake = self.buses.iter().filter_map(Bus::wake_at).min();
+        let of = |(place, bus): (usize, &dyn Bus)| match self.prepared[place] {
+            Some(at) => Some(at),
+            None => {
+                let begin = bus.next_cycle().map(|at| at - lead_of(bus.cycle_time(), self.lead));
+                // A cycle that could not begin, as its frames have no room, waits for what the bus says.
+                let begin = begin.filter(|at| *at > now);
+                bus.wake_at().into_iter().chain(begin).min()
+            }
+        };
+        let wake = self.buses.iter().enumerate().filter_map(of).min();
         let patience = self.buses.iter().map(Bus::patience).min().unwrap_or(IDLE_INTERVAL);
         let part = DurationNs(self.cycle_time.as_nanos() / IDLE_CALLS_PER_CYCLE);
         let interval = part.max(IDLE_INTERVAL).min(IDLE_INTERVAL_MAX);
@@ -257,17 +425,20 @@ impl Engine {
         }
     }
 
-    fn count_lateness(&mut self, now: MonotonicTime) {
-        let Some(due) = self.due else { return };
+    /// Counts a late call; by how much it is late.
+    fn count_lateness(&mut self, now: MonotonicTime) -> DurationNs {
+        let Some(due) = self.due else { return DurationNs::ZERO };
         let late = now.since(due).as_nanos().max(0);
         self.status.lateness_max_ns =
             self.status.lateness_max_ns.max(u32::try_from(late).unwrap_or(u32::MAX));
         if late > self.cycle_time.as_nanos() / 2 {
             self.status.counters.late_cycles += 1;
         }
+        DurationNs(late)
     }
 
-    fn run_buses(&mut self, now: MonotonicTime, system: SystemTime) {
+    fn run_buses(&mut self, now: MonotonicTime) {
+        let system = self.time.system_at(now);
         let Self { mapping, buses, devices, axes, notices, .. } = self;
         let idle = devices.iter().all(|channel| channel.device().connection().is_none());
         // What an answer leads to is told beside what the bus tells, never while it does.
@@ -332,7 +503,8 @@ impl Engine {
                 told.0 = state;
             }
             if let Some(fault) = axis.fault().filter(|_| !told.1) {
-                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss: axis.loss() });
+                let (loss, trip) = (axis.loss(), axis.tripped());
+                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip });
             }
             told.1 = axis.fault().is_some();
         }
@@ -357,15 +529,17 @@ impl Engine {
             status.counters.lost_updates += lost;
             status.counters.refused_frames += channel.counters().refused;
             let (module, network) = (device.module_state(), channel.network_status());
+            let node = device.node_condition();
             for (place, (axis, state)) in channel.axis_states().enumerate() {
+                let shown = device.axis_condition(place);
                 if let (Some(entry), Some(axis)) = (status.axes.get_mut(axis), self.axes.get(axis)) {
                     entry.indicators = Indicators {
                         module,
                         network,
-                        axis: device.axis_indication(place),
-                        line: device.display_line(place),
+                        axis: shown.as_ref().map_or(Indication::OFF, visualization::axis_status),
+                        line: shown.as_ref().map_or(Line::default(), |axis| display::line(&node, axis)),
                         several: entry.indicators.several,
-                        minor_fault: device.axis_condition(place).is_some_and(|axis| axis.minor_fault),
+                        minor_fault: shown.is_some_and(|axis| axis.minor_fault),
                     };
                     fill(entry, axis);
                     entry.cip_axis_state = state.code().0;
@@ -420,6 +594,25 @@ fn unsigned(data: &[u8]) -> Option<u32> {
     let mut bytes = [0; 4];
     bytes[..data.len()].copy_from_slice(data);
     Some(u32::from_le_bytes(bytes))
+}
+
+/// How long before its instant the work for a cycle begins: what comes in later belongs to the cycle after.
+fn lead_of(cycle: DurationNs, lead: DurationNs) -> DurationNs {
+    lead.min(DurationNs(cycle.as_nanos() / LEAD_DIVISOR))
+}
+
+/// Sends what is due on a bus at the second of two instants; the frames that could not be sent.
+fn send(
+    bus: &mut dyn Bus,
+    port: &mut SouthPort<'_>,
+    (now, at): (MonotonicTime, MonotonicTime),
+    sent_at: &mut Option<MonotonicTime>,
+) -> u64 {
+    let sent = bus.send(now, port);
+    if sent.cycle {
+        *sent_at = Some(at);
+    }
+    sent.failures
 }
 
 fn tell(notices: &mut rtrb::Producer<Notice>, notice: Notice) {

@@ -1,6 +1,7 @@
 //! What the cycle thread has to tell people. The supervisor logs it; the cycle itself never does.
 
 use std::fmt;
+use std::net::SocketAddrV4;
 
 use profile_cia402::master::event::Event as CanEvent;
 use profile_cia402::wire::NodeId;
@@ -11,10 +12,12 @@ use profile_cip::target::fault_log::{LogEntry, LogKind};
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
 use profile_sercos::master::event::Event;
 use profile_sercos::master::topology::Topology;
 
-use super::axis::{Loss, OwnWords};
+use super::admission::Refused;
+use super::axis::{Loss, OwnWords, Trip};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::setup::SetupFailure;
@@ -163,6 +166,13 @@ pub enum Notice {
         fault: Fault,
         /// Why the command was lost, when that is the fault.
         loss: Option<Loss>,
+        /// The limit that a set-point has exceeded, when that is the fault.
+        trip: Option<Trip>,
+    },
+    /// The source of system time has stepped.
+    TimeStep {
+        /// By how much.
+        step: DurationNs,
     },
     /// What a drive says in its own words of a fault or warning that it has.
     DriveSays {
@@ -188,6 +198,17 @@ pub enum Notice {
         fault: NodeFault,
         /// The alarm.
         alarm: NodeAlarm,
+    },
+    /// Datagrams reached the UDP port of a device that are not of its motion connection. At most once a minute.
+    Strangers {
+        /// The device, from 0.
+        device: u8,
+        /// How many since the last time.
+        count: u64,
+        /// Sender of the last one.
+        from: SocketAddrV4,
+        /// Why that was refused.
+        why: Refused,
     },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
@@ -252,6 +273,8 @@ impl Notice {
             | Self::Lss { .. }
             | Self::Devicenet { .. }
             | Self::Retry
+            | Self::TimeStep { .. }
+            | Self::Strangers { .. }
             | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
@@ -318,11 +341,19 @@ impl fmt::Display for Notice {
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
-            Self::Fault { fault, loss: None, .. } => write!(f, "{fault}"),
+            Self::Fault { fault, trip: Some(trip), .. } => write!(f, "{fault}: {trip}"),
+            Self::Fault { fault, .. } => write!(f, "{fault}"),
+            Self::TimeStep { step } => {
+                write!(f, "system time stepped by {step}; it is reported to controllers, and no axis follows it")
+            }
             Self::DriveSays { said, .. } => own_words(f, said),
             Self::Logged { entry, cause, .. } => logged(f, entry, *cause),
             Self::Node { device, fault, alarm } => {
                 write!(f, "device {device}: {fault} ({}), {alarm} ({})", fault.0, alarm.0)
+            }
+            Self::Strangers { device, count, from, why } => {
+                let s = if *count == 1 { "" } else { "s" };
+                write!(f, "device {device}: refused {count} datagram{s}, the last one from {from}: {why}")
             }
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }

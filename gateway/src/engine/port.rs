@@ -11,10 +11,22 @@ use profile_sercos::master::event::Port;
 /// Longest frame or datagram that is taken; longer ones are none of ours.
 pub const FRAME_MAX: usize = 1518;
 
+/// A datagram that came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Datagram {
+    /// Its octets in the buffer.
+    pub len: usize,
+    /// Its sender.
+    pub from: SocketAddrV4,
+    /// When it arrived at the host, where that is known better than by when it is taken.
+    pub arrived_at: Option<MonotonicTime>,
+}
+
 /// The class 1 UDP port of one CIP Motion device.
 pub trait NorthPort {
-    /// The next datagram that came: its length in `buffer` and its sender. Truncated ones are left out.
-    fn receive(&mut self, buffer: &mut [u8]) -> Option<(usize, SocketAddrV4)>;
+    /// The next datagram that came. One that is longer than the buffer has length 0: it counts as one that came, so that whoever
+    /// bounds the datagrams of a cycle has bounded these as well.
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram>;
 
     /// Sends a datagram now or not at all; `false` when it could not be sent.
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool;

@@ -73,6 +73,9 @@ impl EventProgram {
 
     /// The events among those that the drive captures whose captures are in the set.
     pub fn captured(&self, captures: CaptureSet) -> EventChecking {
+        if captures.is_empty() {
+            return EventChecking::empty();
+        }
         self.bits(|trigger| matches!(trigger, EventTrigger::Capture(kind) if captures.contains(kind)))
     }
 
@@ -83,6 +86,9 @@ impl EventProgram {
 
     /// The captures that events need.
     pub fn captures(&self, events: EventChecking) -> CaptureSet {
+        if events.is_empty() {
+            return CaptureSet::EMPTY;
+        }
         let wanted = self.rules.iter().filter(|rule| events.bits() & rule.checking != 0);
         wanted
             .filter_map(|rule| match rule.trigger {

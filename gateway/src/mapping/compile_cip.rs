@@ -9,7 +9,7 @@ use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::Conversion;
-use profile_generic::ratio::{Outcome, Ratio};
+use profile_generic::ratio::{Outcome, Ratio, Rounding};
 use profile_generic::scaling::{WrapTracker, fold};
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{DriveState, Request};
@@ -285,6 +285,8 @@ pub struct CipProgram {
     unwind: Option<i64>,
     tracker: WrapTracker,
     position_counts: Ratio,
+    /// A position count in nanounits.
+    count: i64,
     modes: [Option<OperatingMode>; NIBBLE],
     requests: ArrayVec<CipRequest, MAX_REQUESTS>,
     states: [CipState; DriveState::ALL.len()],
@@ -323,6 +325,7 @@ impl CipProgram {
                 None => WrapTracker::of_bits(DINT_BITS)?,
             },
             position_counts,
+            count: scaling.nanounits_per_count().convert(1, Rounding::Nearest).value.saturating_abs().max(1),
             modes: tables.modes,
             requests: tables.requests.iter().copied().collect(),
             states: tables.states,
@@ -501,6 +504,11 @@ impl CipProgram {
     /// Counts of the controller in a generic position.
     pub fn counts(&self, nanounits: i64) -> Outcome {
         Conversion::new(self.position_counts).convert(nanounits)
+    }
+
+    /// A position count of the controller in nanounits, at least 1.
+    pub fn count(&self) -> i64 {
+        self.count
     }
 
     /// The operating mode of a Control Mode; `None` when the device does not know the mode.

@@ -1,13 +1,11 @@
 //! Between the compiled tables and the CIP Motion device: its images.
 
-use profile_cip::target::drive_link::{
-    DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
-};
+use profile_cip::target::drive_link::{DriveAction, DriveCondition, DriveImage, ExceptionAction};
 use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::Reaction;
 use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
-use profile_generic::image::{AxisFeedback, StatusBits};
+use profile_generic::image::{AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::state::Request;
 
 use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue, CyclicValues};
@@ -67,7 +65,11 @@ impl CipProgram {
         image: &mut DriveImage,
     ) -> CipReport {
         let mut report = CipReport::default();
-        image.position = self.actual_counts(bit::POSITION, feedback, &mut report);
+        // Of a drive that is gone, the last position that it has reported.
+        let reported = AxisFeedback { present: feedback.present | FeedbackSet::POSITION, ..*feedback };
+        image.position = self.actual_counts(bit::POSITION, &reported, &mut report);
+        let moves = feedback.present.contains(FeedbackSet::VELOCITY);
+        image.position_rate = if moves { self.counts(feedback.velocity.get()).value } else { 0 };
         image.unwind = self.unwind();
         image.velocity = self.actual_real(bit::VELOCITY, feedback, &mut report);
         image.acceleration = self.actual_real(bit::ACCELERATION, feedback, &mut report);
@@ -83,18 +85,12 @@ impl CipProgram {
             false => AxisIoStatus::empty(),
         };
         (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
-        image.conditions = self.conditions(faults);
-        image.captured_at = feedback.at.0;
+        image.conditions.clear();
+        for condition in faults.iter().filter_map(|active| self.condition(active)) {
+            image.conditions.push(condition);
+        }
         image.torque = self.events().torque(feedback);
         report
-    }
-
-    fn conditions(&self, faults: &FaultSet) -> DriveConditions {
-        let mut conditions = DriveConditions::default();
-        for condition in faults.iter().filter_map(|active| self.condition(active)) {
-            conditions.push(condition);
-        }
-        conditions
     }
 
     /// A fault as a condition of the axis; `None` for one of the communications node.

@@ -30,7 +30,7 @@ use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, DriveState, Report, Request};
-use profile_generic::time::SystemTime;
+use profile_generic::time::{MonotonicTime, SystemTime};
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 use proptest::prelude::*;

@@ -17,10 +17,10 @@ pub const BLOCK_LEN: u16 = 64;
 /// Address of the first axis block.
 pub const AXES_ADDRESS: u16 = BLOCK_LEN;
 
-/// Registers of the map: the block of the box and those of 16 axes, configured or not.
+/// Registers of the map: the block of the box and those of all axes that a box can have, configured or not.
 pub const MAP_LEN: u16 = AXES_ADDRESS + BLOCK_LEN * AXES;
 
-const AXES: u16 = 16;
+const AXES: u16 = 64;
 const _: () = assert!(AXES as usize == AXES_MAX);
 
 /// The most registers one request can ask for (Modbus application protocol 1.1b3, 6.3 and 6.4).
@@ -261,13 +261,19 @@ pub fn registers(status: &BoxStatus, address: u16, count: u16) -> Result<Vec<u16
     if address >= MAP_LEN || count > MAP_LEN - address {
         return Err(Refusal::Address);
     }
-    let mut image = [0; MAP_LEN as usize];
-    let (of_box, of_axes) = image.split_at_mut(usize::from(BLOCK_LEN));
-    fill(of_box, BOX, status);
-    for (block, axis) in of_axes.chunks_exact_mut(usize::from(BLOCK_LEN)).zip(status.configured_axes()) {
-        fill(block, AXIS, axis);
+    // Only the blocks that are asked for are laid out: a request touches three of them at most.
+    let (first, last) = (address / BLOCK_LEN, (address + count - 1) / BLOCK_LEN);
+    let mut image = vec![0; usize::from((last - first + 1) * BLOCK_LEN)];
+    for (number, block) in (first..).zip(image.chunks_exact_mut(usize::from(BLOCK_LEN))) {
+        let axis = number.checked_sub(1).map(|axis| status.configured_axes().get(usize::from(axis)));
+        match axis {
+            None => fill(block, BOX, status),
+            Some(Some(axis)) => fill(block, AXIS, axis),
+            Some(None) => {}
+        }
     }
-    Ok(image[usize::from(address)..usize::from(address + count)].to_vec())
+    let start = usize::from(address - first * BLOCK_LEN);
+    Ok(image[start..start + usize::from(count)].to_vec())
 }
 
 fn fill<S>(block: &mut [u16], entries: &[Entry<S>], source: &S) {
@@ -347,7 +353,7 @@ mod tests {
     fn values_lie_one_after_the_other_within_their_block() {
         assert_layout(BOX);
         assert_layout(AXIS);
-        assert_eq!(MAP_LEN, 1088);
+        assert_eq!(MAP_LEN, 4160);
     }
 
     #[test]
@@ -405,11 +411,30 @@ mod tests {
     }
 
     #[test]
+    fn the_blocks_of_64_axes_lie_one_after_the_other() {
+        let mut status = distinct();
+        status.axis_count = 64;
+        for (place, axis) in (0..).zip(&mut status.axes) {
+            *axis = AxisStatus { instance: place % 16 + 1, device: place / 16, ..AxisStatus::NONE };
+            axis.position_counts = 1000 + i32::from(place);
+        }
+        for place in 0..64_u16 {
+            let block = AXES_ADDRESS + BLOCK_LEN * place;
+            assert_eq!(registers(&status, block, 2).unwrap(), [place % 16 + 1, place / 16], "axis {place}");
+            assert_eq!(registers(&status, block + 16, 2).unwrap(), [0, 1000 + place], "axis {place}");
+        }
+        // The last register of one block and the first of the next, and all of two blocks but their ends.
+        assert_eq!(registers(&status, 64 + 64 * 17 - 1, 2).unwrap(), [0, 2]);
+        let two = registers(&status, 64 + 64 * 62 + 1, 125).unwrap();
+        assert_eq!((two[0], two[16], two[63], two[64], two[80]), (3, 1062, 16, 3, 1063));
+    }
+
+    #[test]
     fn registers_outside_the_map_are_refused() {
         let status = distinct();
-        assert_eq!(registers(&status, 1087, 1).unwrap(), [0]);
-        assert_eq!(registers(&status, 1087, 2), Err(Refusal::Address));
-        assert_eq!(registers(&status, 1088, 1), Err(Refusal::Address));
+        assert_eq!(registers(&status, 4159, 1).unwrap(), [0]);
+        assert_eq!(registers(&status, 4159, 2), Err(Refusal::Address));
+        assert_eq!(registers(&status, 4160, 1), Err(Refusal::Address));
         assert_eq!(registers(&status, 65_535, 125), Err(Refusal::Address));
         assert_eq!(registers(&status, 0, 0), Err(Refusal::Count));
         assert_eq!(registers(&status, 0, 126), Err(Refusal::Count));

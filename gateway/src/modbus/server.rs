@@ -223,7 +223,7 @@ mod tests {
         assert_eq!(both, Err(ExceptionCode::IllegalFunction));
         assert_eq!(client.read_coils(0, 1).await.unwrap(), Err(ExceptionCode::IllegalFunction));
         assert_eq!(
-            client.read_input_registers(1087, 2).await.unwrap(),
+            client.read_input_registers(4159, 2).await.unwrap(),
             Err(ExceptionCode::IllegalDataAddress)
         );
         assert_eq!(client.read_input_registers(0, 126).await.unwrap(), Err(ExceptionCode::IllegalDataValue));

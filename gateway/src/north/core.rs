@@ -11,6 +11,7 @@ use super::link::AdapterEnd;
 use super::statistics::Statistics;
 use crate::capture::recorder::Tap;
 use crate::sys::clock::realtime_now;
+use crate::sys::gate::Admitted;
 
 /// Longest answer to a datagram.
 const ANSWER_LEN_MAX: usize = 256;
@@ -27,6 +28,7 @@ const POLL_IDLE: DurationNs = DurationNs::from_millis(20);
 
 pub(super) type OnEvent = Box<dyn FnMut(&Event) + Send>;
 pub(super) type OnOpen = Box<dyn FnMut(&OpenParameters) + Send>;
+pub(super) type OnAdmit = Box<dyn FnMut(Option<Admitted>) + Send>;
 
 /// The adapter and all that it is connected to but the sockets.
 pub(super) struct Core {
@@ -35,6 +37,9 @@ pub(super) struct Core {
     pub tap: Option<Tap>,
     pub on_event: Option<OnEvent>,
     pub on_open: Option<OnOpen>,
+    pub on_admit: Option<OnAdmit>,
+    /// Whose datagrams are let through now.
+    admitted: Option<Admitted>,
     /// Where answers to datagrams come from.
     address: SocketAddrV4,
     /// A request for which the queue to the motion device had no room.
@@ -61,6 +66,8 @@ impl Core {
             tap,
             on_event: None,
             on_open: None,
+            on_admit: None,
+            admitted: None,
             address,
             held: None,
             owed: 0,
@@ -80,6 +87,7 @@ impl Core {
         if self.adapter.wake_at().is_some_and(|at| at <= now) {
             self.adapter.handle_timeout(now);
         }
+        self.admit();
         self.send_requests(now);
         self.link.tell_connections(self.adapter.explicit_connections());
         while let Some(event) = self.adapter.poll_event() {
@@ -92,6 +100,22 @@ impl Core {
     /// When [`Core::step`] has something to do at the latest.
     pub fn wake_at(&self) -> MonotonicTime {
         self.adapter.wake_at().map_or(self.poll_at, |at| at.min(self.poll_at))
+    }
+
+    /// Has the I/O socket let through what belongs to the motion connection, from before the motion device is asked to take
+    /// it until it has ended.
+    fn admit(&mut self) {
+        let admitted = self.adapter.motion_connection().map(|open| Admitted {
+            address: open.originator,
+            port: self.link.owner_port(open.o_to_t_id),
+            connection_id: open.o_to_t_id,
+        });
+        if admitted != self.admitted {
+            self.admitted = admitted;
+            if let Some(on_admit) = &mut self.on_admit {
+                on_admit(admitted);
+            }
+        }
     }
 
     /// Hands the adapter's requests to the motion device, as far as there is room.

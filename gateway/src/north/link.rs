@@ -1,7 +1,7 @@
-//! The way between the adapter (supervisor) and the motion device (cycle thread): two bounded queues, and a number.
+//! The way between the adapter (supervisor) and the motion device (cycle thread): two bounded queues, and a number each way.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use profile_cip::target::motion_link::{MotionReply, MotionRequest};
 use rtrb::{Consumer, Producer, PushError, RingBuffer};
@@ -15,9 +15,22 @@ pub fn motion_link() -> (AdapterEnd, DeviceEnd) {
     let (request_in, request_out) = RingBuffer::new(QUEUE_LEN);
     let (reply_in, reply_out) = RingBuffer::new(QUEUE_LEN);
     let connections = Arc::new(AtomicUsize::new(0));
-    let adapter =
-        AdapterEnd { requests: request_in, replies: reply_out, connections: Arc::clone(&connections) };
-    (adapter, DeviceEnd { requests: request_out, replies: reply_in, connections })
+    let owner_port = Arc::new(AtomicU64::new(0));
+    let adapter = AdapterEnd {
+        requests: request_in,
+        replies: reply_out,
+        connections: Arc::clone(&connections),
+        owner_port: Arc::clone(&owner_port),
+    };
+    (adapter, DeviceEnd { requests: request_out, replies: reply_in, connections, owner_port })
+}
+
+/// Marks a port as known, in one number with a connection ID (upper 32 bits) and the port (lower 16).
+const KNOWN: u64 = 1 << 16;
+
+/// Connection ID and port in one number.
+fn with_port(connection_id: u32, port: u16) -> u64 {
+    u64::from(connection_id) << 32 | KNOWN | u64::from(port)
 }
 
 /// The end beside the adapter.
@@ -26,6 +39,7 @@ pub struct AdapterEnd {
     requests: Producer<MotionRequest>,
     replies: Consumer<MotionReply>,
     connections: Arc<AtomicUsize>,
+    owner_port: Arc<AtomicU64>,
 }
 
 impl AdapterEnd {
@@ -43,6 +57,15 @@ impl AdapterEnd {
         self.connections.store(count, Ordering::Relaxed);
     }
 
+    /// Source port of the updates of this connection, once the motion device has taken one.
+    #[must_use]
+    pub fn owner_port(&self, connection_id: u32) -> Option<u16> {
+        let known = self.owner_port.load(Ordering::Relaxed);
+        let [low, high, ..] = known.to_le_bytes();
+        let port = u16::from_le_bytes([low, high]);
+        (known == with_port(connection_id, port)).then_some(port)
+    }
+
     /// The next reply of the motion device.
     pub fn reply(&mut self) -> Option<MotionReply> {
         self.replies.pop().ok()
@@ -55,6 +78,7 @@ pub struct DeviceEnd {
     requests: Consumer<MotionRequest>,
     replies: Producer<MotionReply>,
     connections: Arc<AtomicUsize>,
+    owner_port: Arc<AtomicU64>,
 }
 
 impl DeviceEnd {
@@ -62,6 +86,11 @@ impl DeviceEnd {
     #[must_use]
     pub fn explicit_connections(&self) -> usize {
         self.connections.load(Ordering::Relaxed)
+    }
+
+    /// Tells from which source port the updates of this connection come.
+    pub fn tell_owner_port(&self, connection_id: u32, port: u16) {
+        self.owner_port.store(with_port(connection_id, port), Ordering::Relaxed);
     }
 
     /// The next request of the adapter.
@@ -99,6 +128,11 @@ mod tests {
         }
         adapter.tell_connections(3);
         assert_eq!(device.explicit_connections(), 3);
+        assert_eq!(adapter.owner_port(0), None);
+        device.tell_owner_port(0x7A00_0001, 0);
+        assert_eq!((adapter.owner_port(0x7A00_0001), adapter.owner_port(0x7A00_0002)), (Some(0), None));
+        device.tell_owner_port(0x7A00_0002, 2222);
+        assert_eq!((adapter.owner_port(0x7A00_0001), adapter.owner_port(0x7A00_0002)), (None, Some(2222)));
         assert_eq!(adapter.request(close(32)), Err(close(32)));
         let reply = MotionReply::Closed { token: Token(32) };
         assert_eq!(device.reply(reply.clone()), Err(reply));

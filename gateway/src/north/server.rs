@@ -24,6 +24,7 @@ use super::statistics::Statistics;
 use super::stream::{Ending, Stream};
 use crate::capture::recorder::Tap;
 use crate::sys::clock::{monotonic_now, realtime_now};
+use crate::sys::gate::Admitted;
 
 /// UDP and TCP port of explicit messages.
 const PORT_EXPLICIT: u16 = profile_cip::wire::encapsulation::EXPLICIT_PORT;
@@ -127,6 +128,14 @@ impl ExplicitServer {
     #[must_use]
     pub fn on_open(mut self, on_open: impl FnMut(&OpenParameters) + Send + 'static) -> Self {
         self.core.on_open = Some(Box::new(on_open));
+        self
+    }
+
+    /// Calls `on_admit` with whose datagrams the I/O socket is to let through whenever that changes: before the motion device
+    /// is asked to take a connection, once the source port of its updates is known, and with `None` when it has ended.
+    #[must_use]
+    pub fn on_admit(mut self, on_admit: impl FnMut(Option<Admitted>) + Send + 'static) -> Self {
+        self.core.on_admit = Some(Box::new(on_admit));
         self
     }
 

@@ -1,5 +1,6 @@
 //! The server on loopback addresses, as clients and the cycle thread see it.
 
+mod admission;
 mod client;
 mod marking;
 mod other_targets;

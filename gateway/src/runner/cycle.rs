@@ -1,16 +1,41 @@
 //! The cycle thread: sleeps until the engine's next cycle is due, and runs it.
 
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::port::{OpenPort, UdpPort};
 use crate::engine::Engine;
+use crate::engine::axis::STOP_TIME_OUT;
+use crate::engine::axis::rest::Unrested;
 use crate::engine::port::{NorthPort, SouthPort};
-use crate::sys::clock::{self, SystemClock};
+use crate::sys::clock::{self, HostTime};
 use crate::sys::realtime;
+
+/// What the thread is asked for: to go on, to stop the axes and end, to end without waiting for them.
+const RUN: u8 = 0;
+const STOP: u8 = 1;
+const HURRY: u8 = 2;
+
+/// How long the buses may take to go down.
+const DOWN_TIME_OUT: Duration = Duration::from_secs(5);
+
+/// How long the thread may take to its end: longer than the engine waits for any axis.
+fn end_limit() -> Duration {
+    let stop = u64::try_from(STOP_TIME_OUT.as_nanos()).unwrap_or_default();
+    2 * Duration::from_nanos(stop) + 2 * DOWN_TIME_OUT
+}
+
+/// How the thread has ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Ended {
+    /// The buses are down; these axes did not come to rest before, or were not seen to.
+    Down(Vec<Unrested>),
+    /// It has not ended, or ended by a panic: nothing is known.
+    Unknown,
+}
 
 /// What the thread gets.
 pub struct Setup {
@@ -27,8 +52,8 @@ pub struct Setup {
 /// The running thread.
 #[derive(Debug)]
 pub struct CycleThread {
-    thread: JoinHandle<()>,
-    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Vec<Unrested>>,
+    asked: Arc<AtomicU8>,
     realtime: Arc<OnceLock<String>>,
 }
 
@@ -38,15 +63,15 @@ impl CycleThread {
     /// # Errors
     /// The system gives no thread.
     pub fn start(setup: Setup) -> io::Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
+        let asked = Arc::new(AtomicU8::new(RUN));
         let realtime = Arc::new(OnceLock::new());
-        let (asked, told) = (Arc::clone(&stop), Arc::clone(&realtime));
+        let (wish, told) = (Arc::clone(&asked), Arc::clone(&realtime));
         let thread = std::thread::Builder::new().name("axisbridge-cycle".to_owned()).spawn(move || {
             let report = realtime::apply(&setup.realtime);
             let _ = told.set(report.refused().map(ToString::to_string).collect::<Vec<_>>().join("; "));
-            run(setup, &asked);
+            run(setup, &wish)
         })?;
-        Ok(Self { thread, stop, realtime })
+        Ok(Self { thread, asked, realtime })
     }
 
     /// What was refused of the asked-for real-time properties.
@@ -59,38 +84,48 @@ impl CycleThread {
         self.thread.is_finished()
     }
 
-    /// Asks it to stop the axes and to end, and waits for at most `limit`.
-    pub fn stop(self, limit: Duration) {
-        self.stop.store(true, Ordering::Relaxed);
-        let end = Instant::now() + limit;
+    /// Asks it to stop the axes and to end, and waits until they stand or have had the time for it, or `hurry` says that there is
+    /// none.
+    pub fn stop(self, hurry: &dyn Fn() -> bool) -> Ended {
+        self.asked.store(STOP, Ordering::Relaxed);
+        let mut end = Instant::now() + end_limit();
         while !self.thread.is_finished() && Instant::now() < end {
+            if hurry() && self.asked.swap(HURRY, Ordering::Relaxed) != HURRY {
+                end = Instant::now() + DOWN_TIME_OUT;
+            }
             std::thread::sleep(Duration::from_millis(2));
         }
-        if self.thread.is_finished() {
-            // A panic has been printed where it happened.
-            let _ = self.thread.join();
+        if !self.thread.is_finished() {
+            return Ended::Unknown;
         }
+        // A panic has been printed where it happened.
+        self.thread.join().map_or(Ended::Unknown, Ended::Down)
     }
 }
 
-fn run(setup: Setup, stop: &AtomicBool) {
+fn run(setup: Setup, asked: &AtomicU8) -> Vec<Unrested> {
     let Setup { mut engine, mut north, mut south, .. } = setup;
-    let clock = SystemClock::detect();
+    engine.feed_time(&HostTime.first_sample());
     let mut ports: Vec<&mut dyn NorthPort> =
         north.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
     let mut buses: Vec<SouthPort<'_>> = south.iter_mut().map(OpenPort::port).collect();
-    let mut stopping = false;
+    let mut obeyed = RUN;
     loop {
-        if stop.load(Ordering::Relaxed) && !stopping {
-            stopping = true;
-            engine.stop(clock::monotonic_now(), clock.now());
+        let asked = asked.load(Ordering::Relaxed);
+        if asked != RUN && obeyed == RUN {
+            engine.stop(clock::monotonic_now());
         }
-        let due = engine.cycle(clock::monotonic_now(), clock.now(), &mut ports, &mut buses);
-        if engine.is_stopped() {
-            return;
+        if asked == HURRY && obeyed != HURRY {
+            engine.hurry(clock::monotonic_now());
         }
-        if clock::sleep_until(due).is_err() {
-            return;
+        obeyed = asked;
+        let due = engine.cycle(clock::monotonic_now(), &mut ports, &mut buses);
+        // Behind the work of the cycle: a sample that is a cycle old is as good.
+        if let Some(sample) = HostTime.sample() {
+            engine.feed_time(&sample);
+        }
+        if engine.is_stopped() || clock::sleep_until(due).is_err() {
+            return engine.unrested().to_vec();
         }
     }
 }

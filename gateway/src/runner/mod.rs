@@ -9,7 +9,9 @@ mod can_watch;
 mod cycle;
 mod indicators;
 pub mod port;
+mod strangers;
 
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io;
 use std::net::{SocketAddr, SocketAddrV4};
 use std::path::Path;
@@ -25,15 +27,18 @@ use profile_cip::target::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
+use profile_generic::time_base::TimeSample;
 use tracing::{info, warn};
 
 use self::can_watch::CanWatch;
-use self::cycle::{CycleThread, Setup};
+use self::cycle::{CycleThread, Ended, Setup};
 use self::indicators::{Change, Shown};
-use self::port::{CanSocketPort, OpenPort, PacketPort, UdpPort};
+use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
+use self::strangers::DropWatch;
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{CanLink, Config, Link};
+use crate::config::{AxisKind, CanLink, Config, Link};
+use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
@@ -49,8 +54,8 @@ use crate::simulate::setup::HOST_CLOCK;
 use crate::status::BoxStatus;
 use crate::sys::can_interface::{self, ConfigureError};
 use crate::sys::can_socket;
-use crate::sys::clock::{SystemClock, TimeScale, monotonic_now};
-use crate::sys::packet_socket::OpenError;
+use crate::sys::clock::{HostTime, TimeScale};
+use crate::sys::interface_lock::{InterfaceLock, LockError};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 
 /// How often the commissioning of drives that come later goes on.
@@ -65,18 +70,18 @@ const CAN_RESTART_MS: u32 = 100;
 /// Frames that the transmit queue of a CAN interface holds: the RPDOs of a cycle, and more. Linux gives ten.
 const CAN_QUEUE: u32 = 128;
 
-/// How long a box that is asked to end waits for its axes to stop.
-const STOP_TIME_OUT: Duration = Duration::from_secs(5);
-
 /// Why the box cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     /// The configuration makes no box.
     #[error("{0}")]
     Build(#[from] BuildError),
-    /// The SERCOS interface cannot be opened.
+    /// The SERCOS interface cannot be opened, or has a master.
     #[error("{0}")]
-    Interface(#[from] OpenError),
+    Interface(#[from] PortError),
+    /// A CAN interface has a master.
+    #[error("{0}")]
+    Lock(#[from] LockError),
     /// A CAN interface cannot be opened.
     #[error("{0}")]
     Can(#[from] can_socket::OpenError),
@@ -133,6 +138,17 @@ pub struct RunningBox {
     recorder: Option<Recorder>,
     stop_notices: Arc<AtomicBool>,
     restart: Arc<AtomicBool>,
+    /// Name and kind of each axis.
+    axes: Vec<(String, AxisKind)>,
+}
+
+/// How a box has ended.
+#[derive(Debug)]
+pub struct Stopped {
+    /// How many records the recording lost; `None` without one.
+    pub dropped: Option<u64>,
+    /// Each axis that is not known to stand, with its speed and state.
+    pub unrested: Vec<String>,
 }
 
 /// Starts a box with these tables; `capture` records both sides, and `settings` has what controllers set.
@@ -187,9 +203,10 @@ pub fn start(
         }
         settings.apply(&device.name, adapter);
         let address = SocketAddrV4::new(device.listen, PORT_IO);
-        let socket = IoSocket::bind(address, adapter.qos.urgent)?;
+        // Nothing comes in before there is a connection.
+        let (socket, gate) = IoSocket::bind_closed(address, adapter.qos.urgent)?;
         let system = |source| BindError::System { address, step: "dup", source };
-        markers.push(socket.marker().map_err(system)?);
+        markers.push((socket.marker().map_err(system)?, Arc::new(gate)));
         north.push(UdpPort::new(socket, tap()));
     }
 
@@ -203,15 +220,18 @@ pub fn start(
     let mut servers = Vec::with_capacity(adapters.len());
     let restart = Arc::new(AtomicBool::new(false));
     let parts = adapters.into_iter().zip(ports).zip(markers);
-    for (number, (device, (((adapter_config, end), port), marker))) in
+    for (number, (device, (((adapter_config, end), port), (marker, gate)))) in
         config.devices.iter().zip(parts).enumerate()
     {
-        let adapter = Adapter::new(adapter_config)
+        let mut adapter = Adapter::new(adapter_config)
             .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
+        adapter.hide_connection_ids(secret());
         let (source, asked) = (status.clone(), Arc::clone(&restart));
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
+        let mut drops = DropWatch::new(Arc::clone(&gate), SocketAddrV4::new(device.listen, PORT_IO));
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
             .attend(move |adapter| {
+                drops.look();
                 let of_axes = health(&source.read(), number);
                 let minor_recoverable = of_axes.minor_recoverable || kept.is_unsaved();
                 adapter.set_health(Health { minor_recoverable, ..of_axes });
@@ -224,6 +244,12 @@ pub fn start(
                 // Data are sent unmarked rather than not at all.
                 if let Err(error) = marker.mark(open.t_to_o_dscp) {
                     warn!(dscp = open.t_to_o_dscp, %error, "the data of the connection are not marked");
+                }
+            })
+            .on_admit(move |admitted| {
+                // The cycle refuses what the kernel lets through, at its own cost.
+                if let Err(error) = gate.set(admitted) {
+                    warn!(%error, "the datagrams of others are not dropped by the kernel");
                 }
             })
             .on_event(move |event| {
@@ -262,7 +288,8 @@ pub fn start(
     let cycle = CycleThread::start(setup)
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
-    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart })
+    let axes = config.axes.iter().map(|axis| (axis.name.clone(), axis.kind)).collect();
+    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart, axes })
 }
 
 /// The port of a bus on CAN.
@@ -274,6 +301,8 @@ fn can_port(
     in_process: impl FnOnce(Option<(Tap, u8)>) -> Box<dyn CanPort + Send>,
 ) -> Result<Box<dyn CanPort + Send>, StartError> {
     let CanLink::Interface { name, set_bit_rate } = link else { return Ok(in_process(tap)) };
+    // Before anything is set: that would disturb the master that there is.
+    let lock = InterfaceLock::take(name)?;
     if *set_bit_rate {
         let settings = can_interface::Settings {
             bit_rate: Some(bit_rate),
@@ -283,7 +312,7 @@ fn can_port(
         };
         can_interface::configure(name, &settings)?;
     }
-    let port = CanSocketPort::open(name)?.recorded(tap);
+    let port = CanSocketPort::open(name, lock)?.recorded(tap);
     watches.push(CanWatch::new(name.clone(), *set_bit_rate, port.back()));
     Ok(Box::new(port))
 }
@@ -306,9 +335,8 @@ fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
 /// The clock of the devices: that of the host, which runs no PTP of its own. Clocks that the host's daemons discipline tick
 /// at one rate, so their distance stands between two looks unless somebody sets the clock.
 fn time_sync(sync: SyncState) -> TimeSyncState {
-    let clock = SystemClock::detect();
-    let (system, monotonic) = (clock.now(), monotonic_now());
-    let utc_offset = match clock.scale() {
+    let TimeSample { at: monotonic, system, .. } = HostTime.first_sample();
+    let utc_offset = match HostTime.scale() {
         TimeScale::Tai { offset_s } => u16::try_from(offset_s).ok(),
         TimeScale::Utc => None,
     };
@@ -364,6 +392,11 @@ fn incarnation() -> u16 {
     let seconds = WallClock::now().duration_since(WallClock::UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let [low, high, ..] = seconds.to_le_bytes();
     u16::from_le_bytes([low, high]).max(1)
+}
+
+/// A number that nobody can guess: the standard library seeds its hash tables from the system's random numbers.
+fn secret() -> u64 {
+    RandomState::new().build_hasher().finish()
 }
 
 /// Logs what the cycle thread has to tell, until it has ended.
@@ -447,13 +480,16 @@ impl RunningBox {
         self.cycle.is_dead()
     }
 
-    /// Stops the axes, takes the bus down, ends every server, and finishes the recording. Returns how many records the
-    /// recording lost, or `None` without one.
+    /// Stops the axes, waits until they stand or have had the time that their own limits give them, takes the buses down, ends
+    /// every server, and finishes the recording. `hurry` says when the axes are waited for no longer.
     ///
     /// # Errors
     /// The recording cannot be finished.
-    pub fn stop(self) -> io::Result<Option<u64>> {
-        self.cycle.stop(STOP_TIME_OUT);
+    pub fn stop(self, hurry: &dyn Fn() -> bool) -> io::Result<Stopped> {
+        let unrested = match self.cycle.stop(hurry) {
+            Ended::Down(unrested) => unrested.iter().map(|axis| describe(axis, &self.axes)).collect(),
+            Ended::Unknown => vec!["the cycle thread has not ended: no axis is known to stand".to_owned()],
+        };
         self.stop_notices.store(true, Ordering::Relaxed);
         let servers = self.servers;
         self.runtime.block_on(async {
@@ -464,6 +500,54 @@ impl RunningBox {
         });
         self.runtime.shutdown_timeout(Duration::from_secs(1));
         let summary = self.recorder.map(Recorder::finish).transpose()?;
-        Ok(summary.map(|summary| summary.dropped))
+        Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
+    }
+}
+
+/// An axis that is not known to stand, in words.
+fn describe(unrested: &Unrested, axes: &[(String, AxisKind)]) -> String {
+    let Unrested { axis, state, velocity } = unrested;
+    let (name, kind) =
+        axes.get(usize::from(*axis)).map_or(("", AxisKind::Rotary), |(name, kind)| (name, *kind));
+    let unit = match kind {
+        AxisKind::Rotary => "rev/s",
+        AxisKind::Linear => "mm/s",
+    };
+    match velocity {
+        Some(velocity) => {
+            let thousandths = velocity.get() / 1_000_000;
+            let (whole, rest) = (thousandths.unsigned_abs() / 1_000, thousandths.unsigned_abs() % 1_000);
+            let sign = if thousandths < 0 { "-" } else { "" };
+            format!("axis {name} did not come to rest: {sign}{whole}.{rest:03} {unit}, drive state {state}")
+        }
+        None => {
+            format!("axis {name} was not seen to come to rest: its speed is not known, drive state {state}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use profile_generic::quantity::Velocity;
+
+    #[test]
+    fn an_axis_that_does_not_stand_is_said_with_speed_and_state() {
+        let axes = [("table".to_owned(), AxisKind::Rotary), ("slide".to_owned(), AxisKind::Linear)];
+        let said = |axis, state, velocity: Option<i64>| {
+            describe(&Unrested { axis, state, velocity: velocity.map(Velocity) }, &axes)
+        };
+        assert_eq!(
+            said(0, DriveState::FaultReaction, Some(1_998_500_000)),
+            "axis table did not come to rest: 1.998 rev/s, drive state fault_reaction"
+        );
+        assert_eq!(
+            said(1, DriveState::Ready, Some(-20_000_000)),
+            "axis slide did not come to rest: -0.020 mm/s, drive state ready"
+        );
+        assert_eq!(
+            said(1, DriveState::Faulted, None),
+            "axis slide was not seen to come to rest: its speed is not known, drive state faulted"
+        );
     }
 }

@@ -11,10 +11,11 @@ use profile_sercos::master::event::Port;
 
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
-use crate::engine::port::{CanInput, CanPort, CanSent, EthernetPort, NorthPort, SouthPort};
+use crate::engine::port::{CanInput, CanPort, CanSent, Datagram, EthernetPort, NorthPort, SouthPort};
 use crate::sys::can_error::BusEvent;
 use crate::sys::can_socket::{self, CanSocket, Content, Options};
 use crate::sys::clock;
+use crate::sys::interface_lock::{InterfaceLock, LockError};
 use crate::sys::link::LinkError;
 use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, OpenError, PacketSocket};
 use crate::sys::udp::IoSocket;
@@ -53,20 +54,19 @@ impl UdpPort {
 }
 
 impl NorthPort for UdpPort {
-    fn receive(&mut self, buffer: &mut [u8]) -> Option<(usize, SocketAddrV4)> {
-        loop {
-            // An error of one datagram, such as an unreachable peer's, says nothing of the next.
-            let datagram = self.socket.recv(buffer).ok().flatten()?;
-            if datagram.truncated {
-                continue;
-            }
-            if let Some(tap) = self.tap.as_mut() {
-                let at = datagram.at.unwrap_or_else(clock::realtime_now);
-                let payload = &buffer[..datagram.len];
-                tap.datagram(at, datagram.from, self.socket.local_address(), datagram.dscp << 2, payload);
-            }
-            return Some((datagram.len, datagram.from));
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram> {
+        // An error of one datagram, such as an unreachable peer's, says nothing of the next.
+        let datagram = self.socket.recv(buffer).ok().flatten()?;
+        if datagram.truncated {
+            return Some(Datagram { len: 0, from: datagram.from, arrived_at: None });
         }
+        if let Some(tap) = self.tap.as_mut() {
+            let at = datagram.at.unwrap_or_else(clock::realtime_now);
+            let payload = &buffer[..datagram.len];
+            tap.datagram(at, datagram.from, self.socket.local_address(), datagram.dscp << 2, payload);
+        }
+        let arrived_at = datagram.at.and_then(clock::monotonic_of);
+        Some(Datagram { len: datagram.len, from: datagram.from, arrived_at })
     }
 
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
@@ -85,20 +85,33 @@ pub struct PacketPort {
     /// Which one is asked first: the other one than last time.
     first: usize,
     tap: Option<Tap>,
+    /// Nobody else on this host is the master there.
+    _locks: ArrayVec<InterfaceLock, 2>,
+}
+
+/// Why a master cannot have its interfaces.
+#[derive(Debug, thiserror::Error)]
+pub enum PortError {
+    /// One of them cannot be opened.
+    #[error("{0}")]
+    Open(#[from] OpenError),
+    /// One of them has a master.
+    #[error("{0}")]
+    Lock(#[from] LockError),
 }
 
 impl PacketPort {
-    /// Opens the interfaces.
+    /// Opens the interfaces, for the one master on this host that may use them.
     ///
     /// # Errors
-    /// One of them cannot be opened.
-    pub fn open(name: &str, ring: Option<&str>) -> Result<Self, OpenError> {
-        let mut sockets = ArrayVec::new();
-        sockets.push(PacketSocket::open(name, ETHER_TYPE_SERCOS)?);
-        if let Some(ring) = ring {
-            sockets.push(PacketSocket::open(ring, ETHER_TYPE_SERCOS)?);
+    /// One of them cannot be opened, or has a master already.
+    pub fn open(name: &str, ring: Option<&str>) -> Result<Self, PortError> {
+        let (mut sockets, mut locks) = (ArrayVec::new(), ArrayVec::new());
+        for name in std::iter::once(name).chain(ring) {
+            sockets.push(PacketSocket::open(name, ETHER_TYPE_SERCOS)?);
+            locks.push(InterfaceLock::take(name)?);
         }
-        Ok(Self { sockets, first: 0, tap: None })
+        Ok(Self { sockets, first: 0, tap: None, _locks: locks })
     }
 
     /// The same, with a recording of what goes to and fro.
@@ -185,16 +198,18 @@ pub struct CanSocketPort {
     back: Arc<BackOnBus>,
     /// The recording, and the number of the bus in it.
     tap: Option<(Tap, u8)>,
+    /// Nobody else on this host is the master there.
+    _lock: InterfaceLock,
 }
 
 impl CanSocketPort {
-    /// Opens an interface.
+    /// Opens an interface, for the one master on this host that may use it.
     ///
     /// # Errors
     /// It cannot be opened.
-    pub fn open(name: &str) -> Result<Self, can_socket::OpenError> {
+    pub fn open(name: &str, lock: InterfaceLock) -> Result<Self, can_socket::OpenError> {
         let socket = CanSocket::open(name, &Options::default())?;
-        Ok(Self { socket, off: false, back: Arc::default(), tap: None })
+        Ok(Self { socket, off: false, back: Arc::default(), tap: None, _lock: lock })
     }
 
     /// Where whoever watches the interface says that it is back on the bus.

@@ -230,7 +230,8 @@ impl Scanner {
                 self.crowded = true;
                 self.end();
             }
-            Event::NoSlaves
+            Event::OtherMaster(_)
+            | Event::NoSlaves
             | Event::ScanUnstable
             | Event::TooManySlaves { .. }
             | Event::SwitchFailed { .. }

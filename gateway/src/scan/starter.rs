@@ -1,6 +1,8 @@
-//! A configuration to begin with: one device in front, one axis for each drive that was found.
+//! A configuration to begin with: one axis for each drive that was found, and in front a device for every 16 of them.
 
 use std::fmt::Write as _;
+
+use profile_cip::target::config::AXES_MAX as DEVICE_AXES_MAX;
 
 use super::questions as ask;
 use super::report::title;
@@ -41,7 +43,7 @@ pub fn starter(bus: &Bus, link: &Link) -> Option<String> {
         }
     };
     for (number, slave) in drives.iter().enumerate() {
-        axis(&mut out, number + 1, slave);
+        axis(&mut out, instance(number), slave);
     }
     let _ = write!(
         out,
@@ -66,17 +68,34 @@ address = {}
     Some(out)
 }
 
-/// The box and the device in front, with axes of these names.
+/// The instance number of an axis in its device, from the place of the axis in the box.
+pub(super) const fn instance(place: usize) -> usize {
+    place % DEVICE_AXES_MAX + 1
+}
+
+/// The box and the devices in front, with axes of these names.
 pub(super) fn head(out: &mut String, names: &[String], update_period: &str) {
     let _ = write!(
         out,
         "\
 [box]
 name = \"axisbridge\"
+"
+    );
+    for (number, axes) in (1..).zip(names.chunks(DEVICE_AXES_MAX)) {
+        device(out, number, axes, update_period);
+    }
+}
 
+/// A device in front, from 1 on.
+fn device(out: &mut String, number: usize, axes: &[String], update_period: &str) {
+    let name = if number == 1 { "front".to_owned() } else { format!("front-{number}") };
+    let _ = write!(
+        out,
+        "
 [[device]]
-name = \"front\"
-listen = \"127.0.0.2\" # CHANGE: an address of this host, on the controller's network
+name = \"{name}\"
+listen = \"127.0.0.{}\" # CHANGE: an address of this host, on the controller's network
 axes = [{}]
 power_structure_class_id = 0
 update_period = {{ {update_period} }}
@@ -85,10 +104,11 @@ update_period = {{ {update_period} }}
 vendor_id = 1 # CHANGE: the number ODVA gave you
 product_code = 1
 revision = \"1.1\"
-serial_number = 1 # CHANGE: every box has its own
+serial_number = {number} # CHANGE: every box has its own
 product_name = \"Axisbridge\"
 ",
-        names.join(", ")
+        number + 1,
+        axes.join(", ")
     );
 }
 

@@ -95,6 +95,24 @@ fn the_starter_is_a_configuration_of_the_drives_that_were_found() {
     );
 }
 
+/// The axes of each device and the instance of its last axis.
+fn devices(config: &Config) -> Vec<(usize, u8)> {
+    let last = |device| config.axes_of(device).map(|(_, axis)| axis.instance).max().unwrap_or(0);
+    (0..config.devices.len()).map(|device| (config.axes_of(device).count(), last(device))).collect()
+}
+
+#[test]
+fn more_drives_than_a_device_has_axes_get_further_devices_up_to_what_a_box_has() {
+    for (drives, expected) in
+        [(16, vec![(16, 16)]), (17, vec![(16, 16), (1, 1)]), (64, vec![(16, 16); 4]), (65, vec![(16, 16); 4])]
+    {
+        let bus = scan((1..=drives).map(|address| (address, UnitKind::Rotary)));
+        let text = starter(&bus, &wire()).unwrap();
+        let config = Config::parse(&text, "starter.toml").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(devices(&config), expected, "{drives} drives");
+    }
+}
+
 #[test]
 fn the_same_address_twice_is_told_and_gets_no_axis() {
     let bus = scan([(7, UnitKind::Rotary), (5, UnitKind::Rotary), (7, UnitKind::Rotary)]);
@@ -152,4 +170,41 @@ fn a_scan_that_is_given_up_takes_the_line_down() {
     }
     let bus = scanner.finish();
     assert_eq!((bus.slaves.len(), bus.findings), (1, vec!["interrupted".to_owned()]));
+}
+
+/// A wire on which another master sends.
+struct Occupied {
+    sent: usize,
+    turn: bool,
+}
+
+impl EthernetPort for Occupied {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        use profile_sercos::wire::header::{Channel, Header, Kind, Phase, PhaseField, TelegramType};
+        self.turn = !self.turn;
+        let telegram = TelegramType::new(Channel::Primary, Kind::Mdt, 0);
+        let header = Header { source: [2; 6], telegram, phase: PhaseField::new(false, 0, Phase::CP4) };
+        header.emit(&mut buffer[..60]).unwrap();
+        self.turn.then_some((Port::One, 60))
+    }
+
+    fn send(&mut self, _now: MonotonicTime, _port: Port, _frame: &[u8]) -> bool {
+        self.sent += 1;
+        true
+    }
+}
+
+#[test]
+fn a_wire_that_another_master_uses_is_left_alone() {
+    let mut south = Occupied { sent: 0, turn: false };
+    let mut scanner = Scanner::new(config()).unwrap();
+    let mut now = MonotonicTime::ZERO;
+    while !scanner.step(now, &mut south) {
+        assert!(now < MonotonicTime(1_000_000_000), "the scan does not end");
+        now = now + profile_generic::time::DurationNs::from_millis(2);
+    }
+    let bus = scanner.finish();
+    assert_eq!((south.sent, bus.slaves.len()), (0, 0));
+    let text = "another master sends on this wire: CP4 from 02:02:02:02:02:02, a cycle of about 2000 us, heard on port 1";
+    assert_eq!(bus.findings, [text]);
 }

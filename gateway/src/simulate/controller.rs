@@ -4,14 +4,16 @@
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::Duration;
 
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
 };
 use profile_generic::time::DurationNs;
+use profile_generic::time_base::TimeBase;
 
-use crate::sys::clock::{self, SystemClock};
+use crate::sys::clock::{self, HostTime};
 use crate::sys::realtime;
 use crate::sys::udp::{self, BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
@@ -87,42 +89,59 @@ pub fn run(
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
     let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
-    let clock = SystemClock::detect();
+    let mut time = TimeBase::new(HostTime.first_sample());
     let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
     let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
     // Gone when either side has closed it.
     let mut stream = Some(stream);
+    // Another one is being opened, while the motion connection goes on.
+    let mut opening: Option<Receiver<io::Result<TcpStream>>> = None;
     let mut stopping = false;
     controller.tcp_connected(clock::monotonic_now());
     while !controller.is_closed() {
+        if let Some(sample) = HostTime.sample() {
+            // A step of the host's clock is told to the device with the controller's time offset.
+            time.feed(&sample);
+        }
         if stop.load(Ordering::Relaxed) && !stopping {
             stopping = true;
             controller.interrupt(clock::monotonic_now());
         }
+        if let Some(opened) = opening.as_ref().and_then(outcome) {
+            opening = None;
+            match opened {
+                Ok(opened) => {
+                    stream = Some(opened);
+                    controller.tcp_connected(clock::monotonic_now());
+                }
+                // The axes are led by the motion connection, which is still there.
+                Err(_) if controller.is_connected() => controller.tcp_closed(clock::monotonic_now()),
+                Err(source) => return Err(RunError::Connect { target, source }),
+            }
+        }
         while let Some(open) = &mut stream {
             match open.read(&mut buffer[..STREAM_CHUNK]) {
-                Ok(0) => {
-                    stream = None;
-                    controller.tcp_closed(clock::monotonic_now());
+                Ok(length) if length > 0 => {
+                    controller.handle_stream(clock::monotonic_now(), &buffer[..length]);
                 }
-                Ok(length) => controller.handle_stream(clock::monotonic_now(), &buffer[..length]),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                // A device that throws the stream away is as good as one that closes it.
-                Err(error) if error.kind() == io::ErrorKind::ConnectionReset => {
+                // However a stream breaks, it is as good as closed by the device.
+                Ok(_) | Err(_) => {
                     stream = None;
                     controller.tcp_closed(clock::monotonic_now());
                 }
-                Err(source) => return Err(RunError::Socket { what: "TCP stream to the device", source }),
             }
         }
         while let Some(datagram) = io.recv(&mut buffer).map_err(udp_error)? {
             // A longer datagram than any of ours, or one from elsewhere, is none of the device's.
             if !datagram.truncated && *datagram.from.ip() == endpoints.target {
                 let bytes = &buffer[..datagram.len];
-                controller.handle_datagram(clock::monotonic_now(), clock.now(), bytes);
+                let now = clock::monotonic_now();
+                controller.handle_datagram(now, time.system_at(now), bytes);
             }
         }
-        controller.handle_time(clock::monotonic_now(), clock.now());
+        let now = clock::monotonic_now();
+        controller.handle_time(now, time.system_at(now));
         while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
             match io.send_to(&buffer[..length], destination(&controller, endpoints.target)) {
                 // A full queue loses this update; the device counts it.
@@ -133,16 +152,17 @@ pub fn run(
         while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
             outgoing.extend_from_slice(&buffer[..length]);
         }
-        flush(stream.as_mut(), &mut outgoing)?;
+        if flush(stream.as_mut(), &mut outgoing).is_err() {
+            stream = None;
+            outgoing.clear();
+            controller.tcp_closed(clock::monotonic_now());
+        }
         match controller.poll_stream_action() {
             Some(StreamAction::Close) => stream = None,
             Some(StreamAction::Reopen) => {
                 drop(stream.take());
                 outgoing.clear();
-                let opened =
-                    connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
-                stream = Some(opened);
-                controller.tcp_connected(clock::monotonic_now());
+                opening = Some(connect_aside(target, endpoints.bind));
             }
             None => {}
         }
@@ -167,6 +187,25 @@ fn destination(controller: &Controller, target: Ipv4Addr) -> SocketAddrV4 {
     if named.ip().is_unspecified() { SocketAddrV4::new(target, named.port()) } else { named }
 }
 
+/// Connects beside the run: a device that does not answer must not hold up its updates.
+fn connect_aside(target: SocketAddrV4, bind: Ipv4Addr) -> Receiver<io::Result<TcpStream>> {
+    let (sender, receiver) = mpsc::sync_channel(1);
+    std::thread::spawn(move || {
+        // The run may have ended meanwhile.
+        let _ = sender.send(connect(target, bind));
+    });
+    receiver
+}
+
+/// What became of [`connect_aside`], once it has ended.
+fn outcome(opening: &Receiver<io::Result<TcpStream>>) -> Option<io::Result<TcpStream>> {
+    match opening.try_recv() {
+        Ok(result) => Some(result),
+        Err(TryRecvError::Empty) => None,
+        Err(TryRecvError::Disconnected) => Some(Err(io::ErrorKind::ConnectionAborted.into())),
+    }
+}
+
 fn connect(target: SocketAddrV4, bind: Ipv4Addr) -> io::Result<TcpStream> {
     let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None)?;
     socket.bind(&SocketAddr::from((bind, 0)).into())?;
@@ -177,7 +216,7 @@ fn connect(target: SocketAddrV4, bind: Ipv4Addr) -> io::Result<TcpStream> {
 }
 
 /// Writes what the stream takes now; the rest waits.
-fn flush(stream: Option<&mut TcpStream>, outgoing: &mut Vec<u8>) -> Result<(), RunError> {
+fn flush(stream: Option<&mut TcpStream>, outgoing: &mut Vec<u8>) -> io::Result<()> {
     let Some(stream) = stream else {
         outgoing.clear();
         return Ok(());
@@ -188,7 +227,7 @@ fn flush(stream: Option<&mut TcpStream>, outgoing: &mut Vec<u8>) -> Result<(), R
                 outgoing.drain(..written);
             }
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-            Err(source) => return Err(RunError::Socket { what: "TCP stream to the device", source }),
+            Err(error) => return Err(error),
         }
     }
     Ok(())

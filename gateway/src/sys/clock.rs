@@ -3,25 +3,30 @@
 //! | clock | from | used for |
 //! |---|---|---|
 //! | [`monotonic_now`] | `CLOCK_MONOTONIC` | the cycle, time-outs; never steps |
-//! | [`SystemClock::now`] | `CLOCK_TAI`, else `CLOCK_REALTIME` | CIP Sync system time |
-//! | [`KernelTime`] | `CLOCK_REALTIME` | the kernel's receive time stamps |
+//! | [`HostTime::sample`] | `CLOCK_TAI` against `CLOCK_MONOTONIC` | the source of CIP Sync system time |
+//! | [`KernelTime`] | `CLOCK_REALTIME` | the kernel's receive time stamps, recordings |
+//!
+//! System time itself is a [`TimeBase`](profile_generic::time_base::TimeBase) over the monotonic clock: when somebody sets the host's
+//! clock, that is a step of its source and moves no axis. `CLOCK_TAI` knows no leap seconds, so that one is none either, where the
+//! kernel has been told the offset.
 //!
 //! CIP Sync counts the seconds of TAI. The kernel knows the offset from UTC to TAI only when a time daemon
 //! has told it (`ptp4l`, `phc2sys`, `chronyd` with `leapsectz`). Without one the offset is zero and
-//! `CLOCK_TAI` would be UTC under another name; [`SystemClock::detect`] says which of the two it found, so
-//! that the box can report it.
+//! `CLOCK_TAI` is UTC under another name; [`HostTime::scale`] says which of the two it is, so that the
+//! box can report it. An offset that appears later is a step of the source.
 #![allow(unsafe_code)]
 
 use std::fmt;
 use std::io;
 
 use profile_generic::time::{MonotonicTime, SystemTime};
+use profile_generic::time_base::TimeSample;
 
 const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 
 /// A time stamp of the kernel: nanoseconds of `CLOCK_REALTIME` (UTC) since 1970.
 ///
-/// [`SystemClock::from_kernel`] turns it into system time.
+/// [`monotonic_of`] turns a fresh one into monotonic time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct KernelTime(pub u64);
 
@@ -88,53 +93,64 @@ impl fmt::Display for TimeScale {
     }
 }
 
-/// The host's clock as CIP Sync system time.
-///
-/// The scale is looked up once: an offset that appears later would step the time by 37 s under a running
-/// axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SystemClock {
-    scale: TimeScale,
-}
+/// Readings of which the best is taken: between the two of the monotonic clock the thread may be interrupted.
+const READINGS: usize = 3;
 
-impl SystemClock {
-    /// Asks the kernel which scale it can give.
+/// A pair of readings further apart than this says nothing.
+const APART_MAX_NS: u64 = 20_000;
+
+/// The host's clock as a source of system time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct HostTime;
+
+impl HostTime {
+    /// System time with the monotonic time of the same instant, to some hundred nanoseconds; `None` when the thread was interrupted
+    /// at each try. Two to nine readings of clocks, no waiting.
     #[must_use]
-    pub fn detect() -> Self {
-        let scale = match tai_offset_s() {
+    pub fn sample(self) -> Option<TimeSample> {
+        let mut best: Option<(u64, TimeSample)> = None;
+        for _ in 0..READINGS {
+            let before = monotonic_now();
+            let system = SystemTime(read(libc::CLOCK_TAI));
+            let apart = monotonic_now().0.saturating_sub(before.0);
+            if best.is_none_or(|(best, _)| apart < best) {
+                let at = MonotonicTime(before.0 + apart / 2);
+                best = Some((apart, TimeSample { at, system, rate_ppb: 0 }));
+            }
+            if apart <= APART_MAX_NS / 10 {
+                break;
+            }
+        }
+        best.filter(|(apart, _)| *apart <= APART_MAX_NS).map(|(_, sample)| sample)
+    }
+
+    /// The first sample, whatever interrupts it: as good as there is one.
+    #[must_use]
+    pub fn first_sample(self) -> TimeSample {
+        self.sample().unwrap_or_else(|| TimeSample {
+            at: monotonic_now(),
+            system: SystemTime(read(libc::CLOCK_TAI)),
+            rate_ppb: 0,
+        })
+    }
+
+    /// The scale that it counts now.
+    #[must_use]
+    pub fn scale(self) -> TimeScale {
+        match tai_offset_s() {
             Some(offset_s) if offset_s != 0 => TimeScale::Tai { offset_s },
             _ => TimeScale::Utc,
-        };
-        Self { scale }
+        }
     }
+}
 
-    /// A clock on a given scale, whatever the kernel knows.
-    #[must_use]
-    pub const fn with_scale(scale: TimeScale) -> Self {
-        Self { scale }
-    }
-
-    /// The scale this clock counts.
-    #[must_use]
-    pub const fn scale(self) -> TimeScale {
-        self.scale
-    }
-
-    /// System time now.
-    #[must_use]
-    pub fn now(self) -> SystemTime {
-        self.from_kernel(realtime_now())
-    }
-
-    /// System time of a kernel time stamp.
-    #[must_use]
-    pub fn from_kernel(self, stamp: KernelTime) -> SystemTime {
-        let offset_s = match self.scale {
-            TimeScale::Tai { offset_s } => i64::from(offset_s),
-            TimeScale::Utc => 0,
-        };
-        SystemTime(stamp.0.saturating_add_signed(offset_s.saturating_mul(1_000_000_000)))
-    }
+/// The monotonic time of a stamp of the kernel that was taken just now: within the last second. `None` for any other, as the clock
+/// may have been set since.
+#[must_use]
+pub fn monotonic_of(stamp: KernelTime) -> Option<MonotonicTime> {
+    let (now, realtime) = (monotonic_now(), realtime_now());
+    let age = realtime.0.checked_sub(stamp.0).filter(|age| *age < NANOSECONDS_PER_SECOND)?;
+    now.0.checked_sub(age).map(MonotonicTime)
 }
 
 /// Whether somebody keeps the host's clock right: a daemon of PTP or NTP that has told the kernel so.
@@ -192,19 +208,34 @@ mod tests {
     }
 
     #[test]
-    fn kernel_time_becomes_system_time_by_the_offset() {
-        let stamp = KernelTime(1_800_000_000_000_000_001);
-        let tai = SystemClock::with_scale(TimeScale::Tai { offset_s: 37 });
-        assert_eq!(tai.from_kernel(stamp), SystemTime(1_800_000_037_000_000_001));
-        let utc = SystemClock::with_scale(TimeScale::Utc);
-        assert_eq!(utc.from_kernel(stamp), SystemTime(1_800_000_000_000_000_001));
+    fn a_sample_is_the_tai_clock_at_an_instant_of_the_monotonic_one() {
+        let before = monotonic_now();
+        let sample = HostTime.first_sample();
+        let after = monotonic_now();
+        assert!((before..=after).contains(&sample.at), "{before} {} {after}", sample.at);
+        let offset = |at: MonotonicTime, system: u64| system.wrapping_sub(at.0).cast_signed();
+        let again = HostTime.first_sample();
+        let apart = offset(sample.at, sample.system.0) - offset(again.at, again.system.0);
+        assert!(apart.abs() < 1_000_000, "{apart} ns between two samples");
     }
 
     #[test]
-    fn the_detected_scale_agrees_with_the_tai_clock() {
-        let clock = SystemClock::detect();
+    fn a_fresh_stamp_of_the_kernel_is_an_instant_of_the_monotonic_clock() {
+        let (before, stamp) = (monotonic_now(), realtime_now());
+        let at = monotonic_of(stamp).unwrap();
+        assert!(at.0.abs_diff(before.0) < 100_000_000, "{at} {before}");
+        assert_eq!(
+            monotonic_of(KernelTime(stamp.0 - 2_000_000_000)),
+            None,
+            "long ago: the clock may have been set"
+        );
+        assert_eq!(monotonic_of(KernelTime(stamp.0 + 2_000_000_000)), None, "not yet");
+    }
+
+    #[test]
+    fn the_scale_agrees_with_the_tai_clock() {
         let offset = i64::try_from(read(libc::CLOCK_TAI)).unwrap() - i64::try_from(realtime_now().0).unwrap();
-        let expected_s = match clock.scale() {
+        let expected_s = match HostTime.scale() {
             TimeScale::Tai { offset_s } => i64::from(offset_s),
             TimeScale::Utc => 0,
         };

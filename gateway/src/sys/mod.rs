@@ -12,6 +12,8 @@ mod can_netlink;
 pub mod can_socket;
 pub mod clock;
 pub mod ethtool;
+pub mod gate;
+pub mod interface_lock;
 pub mod interfaces;
 pub mod link;
 pub mod packet_socket;

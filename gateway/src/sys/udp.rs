@@ -17,6 +17,7 @@ use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 use thiserror::Error;
 
 use super::clock::KernelTime;
+use super::gate::Gate;
 use super::receive::{PlainAddress, enable_time_stamps, enable_type_of_service, receive, wait_for_input};
 
 /// UDP port of EtherNet/IP implicit messages.
@@ -110,6 +111,27 @@ impl IoSocket {
     /// # Errors
     /// [`BindError`], one kind for each thing a person can put right.
     pub fn bind(address: SocketAddrV4, dscp: u8) -> Result<Self, BindError> {
+        Self::open(address, dscp, |_| Ok(())).map(|(socket, ())| socket)
+    }
+
+    /// As [`IoSocket::bind`], with a [`Gate`] that is closed from the start.
+    ///
+    /// # Errors
+    /// As [`IoSocket::bind`].
+    pub fn bind_closed(address: SocketAddrV4, dscp: u8) -> Result<(Self, Gate), BindError> {
+        Self::open(address, dscp, |socket| {
+            let gate = Gate::new(socket.try_clone()?);
+            gate.set(None)?;
+            Ok(gate)
+        })
+    }
+
+    /// Opens a socket; `prepare` sees it before anything can come in.
+    fn open<T>(
+        address: SocketAddrV4,
+        dscp: u8,
+        prepare: impl FnOnce(&Socket) -> io::Result<T>,
+    ) -> Result<(Self, T), BindError> {
         let system =
             |step: &'static str| move |source: io::Error| BindError::System { address, step, source };
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP)).map_err(system("socket"))?;
@@ -120,6 +142,7 @@ impl IoSocket {
         // A smaller buffer than asked for is still a working one.
         let _ = socket.set_recv_buffer_size(RECEIVE_BUFFER_LEN);
         let time_stamps = enable_time_stamps(socket.as_fd());
+        let prepared = prepare(&socket).map_err(system("SO_ATTACH_FILTER"))?;
         socket.bind(&SockAddr::from(address)).map_err(|source| match source.kind() {
             io::ErrorKind::AddrNotAvailable => BindError::NoSuchAddress { address },
             io::ErrorKind::AddrInUse => BindError::InUse { address },
@@ -130,7 +153,7 @@ impl IoSocket {
             .map_err(system("getsockname"))?
             .as_socket_ipv4()
             .unwrap_or(SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0));
-        Ok(Self { socket, local, time_stamps, dscp: Arc::new(AtomicU8::new(dscp)) })
+        Ok((Self { socket, local, time_stamps, dscp: Arc::new(AtomicU8::new(dscp)) }, prepared))
     }
 
     /// What changes the marking of this socket, also from another thread.

@@ -9,7 +9,7 @@ mod values;
 
 use std::net::SocketAddrV4;
 
-use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime};
 use profile_sercos::wire::layout::Layout;
 
 pub use can::{CanDrive, CanMember, CanPart, CanPdo};
@@ -18,7 +18,7 @@ pub use values::ValuesError;
 
 use crate::config::Config;
 use crate::engine::build::{BuildError, Built, Host, build, scaling};
-use crate::engine::port::{NorthPort, SouthPort};
+use crate::engine::port::{Datagram, NorthPort, SouthPort};
 use crate::mapping::{AttributeTable, CipProgram, CipScaling, DriveFacts, DriveProgram, Mapping, SercosAxis};
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
@@ -164,7 +164,7 @@ pub enum StageError {
 struct Silent;
 
 impl NorthPort for Silent {
-    fn receive(&mut self, _: &mut [u8]) -> Option<(usize, SocketAddrV4)> {
+    fn receive(&mut self, _: &mut [u8]) -> Option<Datagram> {
         None
     }
 
@@ -195,7 +195,7 @@ impl Stage {
         let mut told = Vec::new();
         let ready = |engine: &crate::engine::Engine| engine.axes().iter().all(|axis| axis.south().is_some());
         while !ready(&engine) && now.since(START) < LIMIT {
-            now = engine.cycle(now, SystemTime(now.0), &mut ports, &mut south).max(now + DurationNs(1));
+            now = engine.cycle(now, &mut ports, &mut south).max(now + DurationNs(1));
             commissioners.poll();
             while let Ok(notice) = notices.pop() {
                 told.push(notice.to_string());

@@ -290,6 +290,9 @@ pub struct MasterConfig {
     pub sdo_frames_per_cycle: u8,
     /// EMCYs per device and second that are told one by one.
     pub emcy_per_second: u8,
+    /// Whether it listens for another master before its first frame ([`LISTEN`](super::foreign::LISTEN)). Without, on a bus that
+    /// nobody else can be on.
+    pub listens: bool,
 }
 
 impl Default for MasterConfig {
@@ -307,6 +310,7 @@ impl Default for MasterConfig {
             boot_time: DurationNs::from_millis(10_000),
             sdo_frames_per_cycle: 2,
             emcy_per_second: 16,
+            listens: true,
         }
     }
 }

@@ -23,6 +23,19 @@ impl Master {
         }
     }
 
+    /// Leaves out SYNCs that could only go out late, by more than half a period: devices would take the values of two periods
+    /// nearly at once. The grid stays where it is.
+    pub fn skip_late(&mut self, now: MonotonicTime) {
+        let Some(sync) = self.config.sync.filter(|_| self.running && !self.bus_off) else { return };
+        let period = i64::from(sync.period_ns).max(1);
+        let late = now.since(self.next_sync).as_nanos();
+        if late > period / 2 {
+            let missed = ((late + period / 2) / period).max(1);
+            self.next_sync = self.next_sync + DurationNs(period) * missed;
+            self.statistics.syncs_skipped += missed.unsigned_abs();
+        }
+    }
+
     /// Begins a SYNC period when its time has come.
     pub(super) fn cycle(&mut self, now: MonotonicTime) {
         let Some(sync) = self.config.sync.filter(|_| self.running && now >= self.next_sync) else { return };

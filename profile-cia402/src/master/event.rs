@@ -6,6 +6,7 @@ use profile_generic::can::{Frame, Id};
 
 use super::boot::BootStatus;
 use super::config::Direction;
+use super::foreign::OtherMaster;
 use super::report::ReportRow;
 use crate::sdo::request::SdoOutcome;
 use crate::wire::emcy::Emcy;
@@ -163,6 +164,11 @@ pub enum Event {
         /// Its identifier.
         id: Id,
     },
+    /// Another master is on the bus. Before the first frame this one waits until he is silent; in operation the application stops
+    /// what it leads and calls `give_way`.
+    OtherMaster(OtherMaster),
+    /// Nothing is sent any more, because of another master, until he has been silent for a while.
+    GaveWay,
     /// The bus is off: no device can be reached, and nothing is valid.
     BusOff,
     /// The bus is back. All devices are brought up again.
@@ -238,6 +244,10 @@ impl fmt::Display for Event {
             Self::UnknownNode { node } => write!(f, "node {node} is there and not in the list"),
             Self::SecondMaster { id, .. } => {
                 write!(f, "somebody else sends {id}, which only the master may send")
+            }
+            Self::OtherMaster(other) => write!(f, "{other}"),
+            Self::GaveWay => {
+                f.write_str("nothing is sent until the other master has been silent for a while")
             }
             Self::BusOff => f.write_str("the controller is off the bus"),
             Self::BusOn => f.write_str("the controller is back on the bus"),

@@ -24,6 +24,7 @@ pub mod config;
 mod cycle;
 mod ends;
 pub mod event;
+pub mod foreign;
 pub mod pdo_set;
 mod plan;
 mod program;
@@ -42,6 +43,7 @@ use self::boot::{BootEvent, BootState, BootStatus};
 use self::config::{ConfigError, Direction, MasterConfig};
 pub use self::ends::{Consumer, ConsumerState};
 use self::event::{DuplicateSign, Event, Output, Refusal, Statistics, Ticket};
+use self::foreign::{Bus, Foreign};
 pub use self::queue::Priority;
 use self::receive::Routes;
 use self::report::ReportRow;
@@ -133,6 +135,9 @@ pub struct Master {
     statistics: Statistics,
     unknown: [u64; 2],
     second_master: u8,
+    /// Whose the bus is, and what was heard of somebody else.
+    bus: Bus,
+    foreign: Foreign,
     transmit_told: bool,
 }
 
@@ -165,28 +170,31 @@ impl Master {
             statistics: Statistics::default(),
             unknown: [0; 2],
             second_master: 0,
+            bus: Bus::Ours,
+            foreign: Foreign::default(),
             transmit_told: false,
             config,
         })
     }
 
-    /// Starts: devices are reset, unless they may stay in operation, and brought up; SYNC begins. Nothing when it runs already.
+    /// Starts: once the bus has been silent for [`foreign::LISTEN`], devices are reset, unless they may stay in operation, and
+    /// brought up; SYNC begins. Nothing when it runs already.
     pub fn start(&mut self, now: MonotonicTime) {
         if core::mem::replace(&mut self.running, true) {
             return;
         }
         // Somebody has stopped the network to see to it.
         self.stations.iter_mut().for_each(|station| station.programmed = false);
-        self.begin(now);
-        if self.config.heartbeat.is_some() {
-            self.heartbeat = Some(NmtState::BOOT_UP);
-            self.next_heartbeat = now;
-        }
+        self.heartbeat = None;
+        self.listen(now);
     }
 
     /// Stops: all devices are told to stop, and nothing is sent any more.
     pub fn stop(&mut self, now: MonotonicTime) {
-        if !core::mem::replace(&mut self.running, false) {
+        let led = self.leads();
+        if !core::mem::replace(&mut self.running, false) || !led {
+            // Nothing was sent, or the devices are another master's.
+            self.bus = Bus::Ours;
             return;
         }
         for index in 0..self.stations.len() {
@@ -210,6 +218,9 @@ impl Master {
         if self.bus_off {
             return None;
         }
+        if let Some(until) = self.listens_until() {
+            return Some(until);
+        }
         let pending = self.nmt_all.is_some() || self.time.is_some() || self.sync_due || self.has_rpdo();
         if pending {
             return Some(MonotonicTime::ZERO);
@@ -226,12 +237,12 @@ impl Master {
     /// The next SYNC; `None` while there is none.
     #[must_use]
     pub fn next_sync(&self) -> Option<MonotonicTime> {
-        self.config.sync.filter(|_| self.running && !self.bus_off).map(|_| self.next_sync)
+        self.config.sync.filter(|_| self.leads() && !self.bus_off).map(|_| self.next_sync)
     }
 
     /// Does what is due, and gives the frames to send one by one.
     pub fn poll(&mut self, now: MonotonicTime) -> Option<Output> {
-        if self.bus_off {
+        if self.bus_off || !self.may_send(now) {
             return None;
         }
         self.cycle(now);
@@ -247,7 +258,11 @@ impl Master {
     /// # Errors
     /// [`Refusal`].
     pub fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) -> Result<(), Refusal> {
-        let taken = if self.running { self.receive(now, frame) } else { Err(Refusal::NotOurs) };
+        let taken = match self.bus {
+            _ if !self.running => Err(Refusal::NotOurs),
+            Bus::Ours => self.receive(now, frame),
+            Bus::Listening(_) | Bus::Occupied(_) => Err(self.overhear(now, frame)),
+        };
         match taken {
             Ok(()) => self.statistics.accepted += 1,
             Err(reason) => self.statistics.count(reason),
@@ -268,14 +283,14 @@ impl Master {
         (self.sync_due, self.complete) = (false, false);
     }
 
-    /// The controller is back on the bus: all devices are brought up again.
+    /// The controller is back on the bus: all devices are brought up again, if nobody else has the bus.
     pub fn bus_on(&mut self, now: MonotonicTime) {
         if !core::mem::replace(&mut self.bus_off, false) {
             return;
         }
         self.emit(Event::BusOn);
         if self.running {
-            self.begin(now);
+            self.listen(now);
         }
     }
 
@@ -351,7 +366,7 @@ impl Master {
     /// [`CallError`].
     pub fn retry(&mut self, now: MonotonicTime, node: NodeId) -> Result<(), CallError> {
         let (place, state) = self.call(node)?;
-        if !self.running || self.bus_off || !self.advance(now, place, BootEvent::Start) {
+        if !self.leads() || self.bus_off || !self.advance(now, place, BootEvent::Start) {
             return Err(CallError::State(state));
         }
         Ok(())
@@ -453,7 +468,7 @@ impl Master {
 
     /// Sends TIME once.
     pub fn send_time(&mut self, time: TimeOfDay) {
-        if self.running {
+        if self.leads() {
             self.time = Some(time);
         }
     }

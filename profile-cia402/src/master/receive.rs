@@ -98,13 +98,21 @@ impl Master {
             Some(Function::SdoResponse(node)) => self.take_answer(now, node, data),
             Some(Function::Emcy(node)) => self.take_emcy(now, node, data),
             Some(Function::Nmt) => Err(self.second_master(id, 1)),
-            Some(Function::Sync) if self.config.sync.is_some() => Err(self.second_master(id, 2)),
+            Some(Function::Sync) if self.config.sync.is_some() => {
+                self.foreign_sync(now, id);
+                Err(self.second_master(id, 2))
+            }
             Some(Function::Tpdo(_, node)) => {
                 self.listed(node)?;
                 Err(Refusal::NotOurs)
             }
             _ => Err(Refusal::NotOurs),
         }
+    }
+
+    /// Whether an identifier is that of an RPDO of a device in the list.
+    pub(super) fn is_rpdo(&self, id: Id) -> bool {
+        self.routes.get(id) == Route::Own
     }
 
     fn second_master(&mut self, id: Id, kind: u8) -> Refusal {

@@ -96,6 +96,15 @@ impl CyclicLists {
         true
     }
 
+    /// The value of an attribute in the write data.
+    pub fn written(&self, id: u16) -> Option<&[u8]> {
+        self.write
+            .attributes
+            .iter()
+            .find(|attribute| attribute.id == id)
+            .map(|attribute| &attribute.value[..])
+    }
+
     /// What the device said of the list in use: its status once it has used it, `None` before.
     pub fn status(&self, direction: CyclicDirection) -> Option<u8> {
         let (list, told) = match direction {

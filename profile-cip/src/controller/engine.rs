@@ -22,7 +22,11 @@ use super::session::{Answer, Output, Session};
 use super::time_offset::TimeOffset;
 use super::update::Traffic;
 use crate::wire::Error;
+use crate::wire::motion::codes::AxisControl;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+
+/// Shortest time between two attempts to get a lost session back.
+const REOPEN_INTERVAL: DurationNs = DurationNs::from_secs(1);
 
 /// Events kept for the caller; more are dropped, the report has them all.
 const EVENTS_MAX: usize = 1024;
@@ -69,6 +73,13 @@ pub struct Controller {
     pub(super) carried: Option<(u8, u8)>,
     /// In the fixed format: faults that the updates do not name.
     pub(super) faults: FaultReader,
+    /// Since when the session is lost while the motion connection goes on.
+    pub(super) session_lost: Option<MonotonicTime>,
+    /// When another stream is to be opened for it, and when the last one was.
+    reopen_at: Option<MonotonicTime>,
+    reopened_at: Option<MonotonicTime>,
+    /// How long the motions may take to their end.
+    pub(super) stop_patience: DurationNs,
     stream: Option<StreamAction>,
 }
 
@@ -108,6 +119,10 @@ impl Controller {
             answer: None,
             carried: None,
             faults: FaultReader::default(),
+            session_lost: None,
+            reopen_at: None,
+            reopened_at: None,
+            stop_patience: DurationNs::ZERO,
             stream: None,
             config,
         })
@@ -137,6 +152,13 @@ impl Controller {
         self.link.destination()
     }
 
+    /// The value of an attribute in the cyclic write data of an axis instance, in wire order; `None` if it is not among
+    /// them.
+    #[must_use]
+    pub fn cyclic_write(&self, instance: u8, attribute: u16) -> Option<&[u8]> {
+        self.axes.get(usize::from(instance).checked_sub(1)?)?.lists.written(attribute)
+    }
+
     /// The figures of the run so far.
     #[must_use]
     pub fn report(&self) -> Report {
@@ -148,7 +170,19 @@ impl Controller {
     #[must_use]
     pub fn wake_at(&self) -> Option<MonotonicTime> {
         let tick = self.next_tick.filter(|_| self.link.is_open());
-        [tick, self.session.wake_at(), self.link.wake_at()].into_iter().flatten().min()
+        let keep_alive = self.session.keep_alive_at().filter(|_| self.keeps_session());
+        let wakes = [tick, self.session.wake_at(), self.link.wake_at(), keep_alive, self.reopen_at];
+        wakes.into_iter().flatten().min()
+    }
+
+    /// Whether the motion connection is open: it does not need the TCP stream to go on.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.link.is_open()
+    }
+
+    fn keeps_session(&self) -> bool {
+        self.link.is_open() && !self.abuse.vanished && !self.abuse.stream_dropped
     }
 
     /// What to do with the TCP stream, once. To be asked for after every input, as the events are.
@@ -181,13 +215,21 @@ impl Controller {
             self.phase = Phase::Explicit;
             self.connections += 1;
             self.session.start(now);
+        } else {
+            self.session.resume(now);
         }
     }
 
-    /// The TCP stream is gone.
+    /// The TCP stream is gone, or could not be opened again. While the motion connection is open the run goes on, and
+    /// [`StreamAction::Reopen`] asks for another stream.
     pub fn tcp_closed(&mut self, now: MonotonicTime) {
         if self.abuse.vanished || self.abuse.stream_dropped || self.phase == Phase::Idle {
             return;
+        }
+        if self.link.is_open() {
+            self.session.lose();
+            self.lose_session(now);
+            return self.drain_session(now);
         }
         if !matches!(self.phase, Phase::Closing | Phase::Closed | Phase::Reconnecting) {
             self.record_failure(Failure::StreamClosed);
@@ -195,6 +237,15 @@ impl Controller {
         self.link.close();
         self.session.stream_closed();
         self.drain_session(now);
+    }
+
+    /// Has another stream opened, at once or after a while.
+    fn lose_session(&mut self, now: MonotonicTime) {
+        if self.session_lost.is_none() {
+            self.session_lost = Some(now);
+            self.event(Event::SessionLost);
+        }
+        self.reopen_at = Some(self.reopened_at.map_or(now, |last| now.max(last + REOPEN_INTERVAL)));
     }
 
     /// Ends the run early: stops the axes, disables them, and closes the connection.
@@ -231,6 +282,13 @@ impl Controller {
     pub fn handle_time(&mut self, now: MonotonicTime, system_time: SystemTime) {
         self.session.handle_time(now);
         self.link.handle_time(now);
+        if self.keeps_session() {
+            self.session.keep_alive(now);
+        }
+        if self.reopen_at.take_if(|at| *at <= now).is_some() {
+            self.reopened_at = Some(now);
+            self.stream = Some(StreamAction::Reopen);
+        }
         self.drain_session(now);
         if let Some(due) = self.next_tick
             && self.link.is_open()
@@ -257,7 +315,11 @@ impl Controller {
                     self.report.identity = Some(identity.clone());
                     self.event(Event::Identified(identity));
                 }
-                Output::Registered(handle) => self.event(Event::SessionRegistered { handle }),
+                Output::Registered(handle) => {
+                    self.session_lost = None;
+                    self.event(Event::SessionRegistered { handle });
+                }
+                Output::Lost => self.lose_session(now),
                 Output::Malformed(error) => self.malformed(error),
                 Output::Failed(failure) => self.fail(now, failure),
                 Output::Opened(opened) => {
@@ -308,11 +370,17 @@ impl Controller {
                 self.faults.restart();
                 self.node_fault_reset = false;
                 self.disabling = false;
-                // A motion that cannot be stopped smoothly is stopped by the Disable that follows.
+                let mut longest = DurationNs::ZERO;
                 for axis in &mut self.axes {
                     axis.handshake.cancel();
-                    let _ = axis.stop(None);
+                    match axis.stop(None) {
+                        Ok(length) => longest = longest.max(length),
+                        // What cannot be stopped smoothly is stopped by the device.
+                        Err(_) => axis.handshake.request(AxisControl::DISABLE),
+                    }
                 }
+                let time_outs = &self.config.time_outs;
+                self.stop_patience = time_outs.axis_control.max(longest + time_outs.motion_margin);
                 self.phase = Phase::Stopping { since: now };
             }
             Phase::Idle => {
@@ -329,6 +397,7 @@ impl Controller {
             return;
         }
         self.phase = Phase::Closing;
+        self.reopen_at = None;
         self.link.close();
         if self.abuse.vanished || self.abuse.stream_dropped {
             self.session.stream_closed();
@@ -343,7 +412,8 @@ impl Controller {
     pub(super) fn reconnect(&mut self, now: MonotonicTime) {
         self.event(Event::Reconnecting);
         self.services.clear();
-        if self.lost.is_some() || self.abuse.vanished || self.abuse.stream_dropped {
+        let unreachable = self.session.is_lost() || self.abuse.vanished || self.abuse.stream_dropped;
+        if self.lost.is_some() || unreachable {
             self.restart();
         } else {
             self.phase = Phase::Reconnecting;
@@ -373,6 +443,7 @@ impl Controller {
         self.carried = None;
         self.faults = FaultReader::default();
         self.next_tick = None;
+        (self.session_lost, self.reopen_at, self.reopened_at) = (None, None, None);
         self.phase = Phase::Idle;
         self.stream = Some(StreamAction::Reopen);
     }

@@ -178,6 +178,8 @@ pub enum Event {
     Misbehaving(Misbehaviour),
     /// The connection is lost, as is to be expected of a controller that misbehaves.
     ConnectionLost,
+    /// The TCP stream was lost while the motion connection goes on; another one is opened, with a new session.
+    SessionLost,
     /// Session and connection are opened anew.
     Reconnecting,
     /// A step of the program began.
@@ -291,6 +293,9 @@ impl fmt::Display for Event {
             Self::Scaled { axis, counts } => write!(f, "axis {axis}: {counts} counts in a unit"),
             Self::Misbehaving(kind) => write!(f, "misbehaving: {kind}"),
             Self::ConnectionLost => f.write_str("connection lost"),
+            Self::SessionLost => {
+                f.write_str("TCP stream lost; the motion connection goes on, opening another stream")
+            }
             Self::Reconnecting => f.write_str("reconnecting"),
             Self::StepStarted { step } => write!(f, "step {step} started"),
             Self::StepFinished { step } => write!(f, "step {step} finished"),

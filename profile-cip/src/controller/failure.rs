@@ -31,6 +31,8 @@ pub enum Exchange {
     ForwardClose,
     /// A request of the program with this service code.
     Message(u8),
+    /// Get_Attribute_Single of the Identity object, so that an idle session stays open.
+    KeepAlive,
 }
 
 impl fmt::Display for Exchange {
@@ -46,6 +48,7 @@ impl fmt::Display for Exchange {
             Self::LargeForwardOpen => "Large_Forward_Open",
             Self::ForwardClose => "Forward_Close",
             Self::Message(_) => "message",
+            Self::KeepAlive => "Get_Attribute_Single of the Identity object",
         })
     }
 }

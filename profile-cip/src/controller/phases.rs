@@ -307,7 +307,7 @@ impl Controller {
     fn stop_axes(&mut self, now: MonotonicTime, since: MonotonicTime) {
         let waited = now - since;
         let patience = self.config.time_outs.axis_control;
-        if !self.disabling && (waited > patience || !self.axes.iter().any(Axis::is_moving)) {
+        if !self.disabling && (waited > self.stop_patience || !self.axes.iter().any(Axis::is_moving)) {
             self.disabling = true;
             for axis in self.axes.iter_mut().filter(|axis| is_enabled(axis.state())) {
                 axis.handshake.request(AxisControl::DISABLE);
@@ -316,7 +316,11 @@ impl Controller {
         let enabled = self.axes.iter().any(|axis| is_enabled(axis.state()));
         // Which fault it was belongs into the report.
         let reading = self.faults.is_busy() && self.reads_faults();
-        if self.disabling && (!(enabled || reading) || waited > patience * 2) {
+        // Without a session nobody can be asked to close the connection; it may come back.
+        let unreachable =
+            self.session_lost.is_some_and(|since| now - since <= self.config.time_outs.explicit);
+        if self.disabling && (!(enabled || reading || unreachable) || waited > self.stop_patience + patience)
+        {
             self.close(now);
         }
     }

@@ -7,12 +7,18 @@
 //! | Asked(RegisterSession) | RegisterSession | Identity |
 //! | Asked(ReadIdentity) | Get_Attributes_All | Forward_Open |
 //! | Asked(ForwardOpen) | Forward_Open, or the large one above 511 bytes | Open |
-//! | Open | | `close`, or `message` |
+//! | Open | | `close`, `message`, or `keep_alive` |
 //! | Asked(Message) | any request of the program | Open |
+//! | Asked(KeepAlive) | Get_Attribute_Single of the Vendor ID | Open, or Lost |
+//! | Lost | | `resume`: RegisterSession, then Open |
 //! | Asked(ForwardClose) | Forward_Close | Closed |
 //! | Closed | UnRegisterSession | |
 //!
 //! A reply counts only with the sender context of the request under way.
+//!
+//! A device closes an idle stream, after 120 s where nobody has said otherwise (TCP/IP Interface object, attribute 13). The
+//! motion connection does not end with it, but nobody could close that in order any more: so an idle session is kept open by
+//! a harmless request, and one that is lost is registered anew on another stream.
 
 use core::net::{Ipv4Addr, SocketAddrV4};
 use std::collections::VecDeque;
@@ -40,6 +46,10 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Longest packet that the device may send: far more than any answer to what is asked here.
 const PACKET_MAX: usize = 4096;
+/// Time without a request after which an idle session is kept alive.
+const KEEP_ALIVE: DurationNs = DurationNs::from_secs(30);
+/// Vendor ID, an attribute of the Identity object that every device lets read.
+const VENDOR_ID: u16 = 1;
 /// Class code of the Motion Device Axis Object.
 pub(super) const MOTION_DEVICE_AXIS: u16 = 0x42;
 const IDENTITY: u16 = 1;
@@ -59,6 +69,8 @@ pub(super) enum Output {
     Registered(u32),
     Opened(Opened),
     Closed,
+    /// The session does not answer any more; the motion connection is not concerned.
+    Lost,
     Malformed(Error),
     Failed(Failure),
     /// The answer to a message.
@@ -95,8 +107,13 @@ pub(super) struct Opened {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Idle,
-    Asked { exchange: Exchange, since: MonotonicTime },
+    Asked {
+        exchange: Exchange,
+        since: MonotonicTime,
+    },
     Open,
+    /// The stream or the session is gone, the motion connection is not.
+    Lost,
     Closed,
 }
 
@@ -106,6 +123,10 @@ pub(super) struct Session {
     state: State,
     handle: u32,
     context: u64,
+    /// When the last request was made.
+    asked_at: MonotonicTime,
+    /// The session is being registered anew beside the open connection.
+    resuming: bool,
     received: Vec<u8>,
     sent: Vec<u8>,
     outputs: VecDeque<Output>,
@@ -129,6 +150,8 @@ impl Session {
             state: State::Idle,
             handle: 0,
             context: 0,
+            asked_at: MonotonicTime::ZERO,
+            resuming: false,
             received: Vec::with_capacity(PACKET_MAX),
             sent: Vec::with_capacity(1024),
             outputs: VecDeque::with_capacity(8),
@@ -165,7 +188,7 @@ impl Session {
     /// Closes the connection as far as it was opened, and the session.
     pub fn close(&mut self, now: MonotonicTime) {
         match self.state {
-            State::Open | State::Asked { exchange: Exchange::Message(_), .. } => {
+            State::Open | State::Asked { exchange: Exchange::Message(_) | Exchange::KeepAlive, .. } => {
                 let close = ForwardClose {
                     priority_tick: TIME_TICK,
                     timeout_ticks: TIME_OUT_TICKS,
@@ -176,7 +199,7 @@ impl Session {
                 let length = close.emit(&mut data);
                 self.ask_object(now, Exchange::ForwardClose, CONNECTION_MANAGER, length.map(|_| data), None);
             }
-            State::Idle | State::Asked { .. } => self.unregister(),
+            State::Idle | State::Asked { .. } | State::Lost => self.unregister(),
             State::Closed => {}
         }
     }
@@ -197,6 +220,46 @@ impl Session {
             }
         }
         true
+    }
+
+    /// Whether there is no session for the open connection: it is lost, or not registered again yet.
+    pub fn is_lost(&self) -> bool {
+        self.resuming || self.state == State::Lost
+    }
+
+    /// The stream is gone, the motion connection is not. A message under way is answered by that.
+    pub fn lose(&mut self) {
+        if matches!(self.state, State::Asked { exchange: Exchange::Message(_), .. }) {
+            self.outputs.push_back(Output::Answered(self.asker, Err(Failure::StreamClosed)));
+        }
+        self.sent.clear();
+        self.received.clear();
+        (self.handle, self.resuming, self.state) = (0, false, State::Lost);
+    }
+
+    /// Another stream is there for a session that was lost.
+    pub fn resume(&mut self, now: MonotonicTime) {
+        if self.state == State::Lost {
+            self.resuming = true;
+            self.register(now);
+        }
+    }
+
+    /// When an idle session is to be kept alive.
+    pub fn keep_alive_at(&self) -> Option<MonotonicTime> {
+        (self.state == State::Open).then(|| self.asked_at + KEEP_ALIVE)
+    }
+
+    /// Makes a harmless request if none was made for long.
+    pub fn keep_alive(&mut self, now: MonotonicTime) {
+        if self.keep_alive_at().is_none_or(|at| now < at) {
+            return;
+        }
+        let exchange = Exchange::KeepAlive;
+        match unconnected(service_of(exchange), IDENTITY, 1, Some(VENDOR_ID), &[], None) {
+            Ok(block) => self.ask(now, exchange, Command::SEND_RR_DATA, &block),
+            Err(error) => self.fail(Failure::AnswerMalformed { exchange, error }),
+        }
     }
 
     /// Closes the session of a connection that is no more.
@@ -250,7 +313,7 @@ impl Session {
 
     /// Takes bytes of the stream.
     pub fn handle_stream(&mut self, now: MonotonicTime, bytes: &[u8]) {
-        if self.state == State::Closed {
+        if matches!(self.state, State::Closed | State::Lost) {
             return;
         }
         self.received.extend_from_slice(bytes);
@@ -333,6 +396,10 @@ impl Session {
         RegisterSession::parse(packet.data)?;
         self.handle = packet.session_handle;
         self.outputs.push_back(Output::Registered(self.handle));
+        if self.resuming {
+            (self.resuming, self.state) = (false, State::Open);
+            return Ok(());
+        }
         self.ask_object(now, Exchange::ReadIdentity, IDENTITY, Ok(Vec::new()), None);
         Ok(())
     }
@@ -355,6 +422,11 @@ impl Session {
                 data: reply.data.to_vec(),
             };
             self.outputs.push_back(Output::Answered(self.asker, Ok(answer)));
+            return Ok(());
+        }
+        if exchange == Exchange::KeepAlive {
+            // Whatever the device thinks of the attribute, it has answered.
+            self.state = State::Open;
             return Ok(());
         }
         if reply.status != GeneralStatus::SUCCESS {
@@ -473,6 +545,7 @@ impl Session {
 
     fn ask(&mut self, now: MonotonicTime, exchange: Exchange, command: Command, data: &[u8]) {
         self.context += 1;
+        self.asked_at = now;
         self.state = State::Asked { exchange, since: now };
         self.send(command, data);
     }
@@ -494,8 +567,14 @@ impl Session {
         }
     }
 
-    /// A failed Forward_Close leaves nothing more to be done than to end the session.
+    /// A failed Forward_Close leaves nothing more to be done than to end the session. A session that fails beside an open
+    /// connection is lost, and does not take the connection with it.
     fn fail(&mut self, failure: Failure) {
+        if self.resuming || matches!(self.state, State::Asked { exchange: Exchange::KeepAlive, .. }) {
+            self.lose();
+            self.outputs.push_back(Output::Lost);
+            return;
+        }
         if matches!(self.state, State::Asked { exchange: Exchange::Message(_), .. }) {
             self.state = State::Open;
             self.outputs.push_back(Output::Answered(self.asker, Err(failure)));
@@ -524,6 +603,7 @@ const fn service_of(exchange: Exchange) -> Service {
         Exchange::LargeForwardOpen => Service::LARGE_FORWARD_OPEN,
         Exchange::ForwardClose => Service::FORWARD_CLOSE,
         Exchange::Message(service) => Service(service),
+        Exchange::KeepAlive => Service::GET_ATTRIBUTE_SINGLE,
         _ => Service::GET_ATTRIBUTES_ALL,
     }
 }

@@ -76,6 +76,12 @@ impl Adapter {
         })
     }
 
+    /// Draws connection IDs with a secret from now on, instead of counting up: a client that has a connection of its own
+    /// cannot guess the ID of another's. The caller takes it from the system's random numbers, anew at each start.
+    pub fn hide_connection_ids(&mut self, secret: u64) {
+        self.node.connections.set_secret(secret);
+    }
+
     /// What has been counted so far.
     pub fn counters(&self) -> &Counters {
         &self.node.counters

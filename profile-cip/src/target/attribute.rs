@@ -500,7 +500,27 @@ pub struct Entry {
 #[derive(Debug, Clone)]
 pub struct AttributeTable {
     entries: Vec<Entry>,
+    /// Place of each ID below [`INDEXED`] among the entries, [`NOWHERE`] where there is no such attribute.
+    index: Box<[u16]>,
     octets: usize,
+}
+
+/// IDs below this are found without a search: those of the standard, which the cycle asks for.
+const INDEXED: usize = 4096;
+
+/// Place of an ID that no entry has.
+const NOWHERE: u16 = u16::MAX;
+
+fn index(entries: &[Entry]) -> Box<[u16]> {
+    let mut index = Vec::new();
+    for (place, entry) in (0..).zip(entries) {
+        let id = usize::from(entry.definition.id);
+        if id < INDEXED {
+            index.resize(id, NOWHERE);
+            index.push(place);
+        }
+    }
+    index.into_boxed_slice()
 }
 
 fn encode_default(
@@ -626,13 +646,20 @@ impl AttributeTable {
             entries.push(Entry { definition, offset: octets, default, element_defaults });
             octets += size;
         }
-        Ok(Self { entries, octets })
+        let index = index(&entries);
+        Ok(Self { entries, index, octets })
     }
 
     /// The attribute with this ID.
     #[must_use]
     pub fn find(&self, id: u16) -> Option<&Entry> {
-        self.entries.binary_search_by_key(&id, |e| e.definition.id).ok().map(|at| &self.entries[at])
+        match self.index.get(usize::from(id)) {
+            Some(place) => self.entries.get(usize::from(*place)),
+            None => {
+                let at = self.entries.binary_search_by_key(&id, |e| e.definition.id).ok()?;
+                self.entries.get(at)
+            }
+        }
     }
 
     /// All attributes in the order of their IDs.
@@ -726,19 +753,22 @@ impl Entry {
 #[derive(Debug, Clone)]
 pub struct AttributeStore {
     octets: Box<[u8]>,
+    /// Counts how often a value has become another one.
+    changes: u64,
 }
 
 impl AttributeStore {
     /// Values at their defaults.
     #[must_use]
     pub fn new(table: &AttributeTable) -> Self {
-        let mut store = Self { octets: vec![0; table.octets].into_boxed_slice() };
+        let mut store = Self { octets: vec![0; table.octets].into_boxed_slice(), changes: 0 };
         store.reset(table);
         store
     }
 
     /// Puts every value back to its default.
     pub fn reset(&mut self, table: &AttributeTable) {
+        self.changes += 1;
         for entry in &table.entries {
             let size = usize::from(entry.definition.data_type.size());
             let place = entry.offset..entry.offset + entry.definition.size();
@@ -780,8 +810,18 @@ impl AttributeStore {
         if place.len() != value.len() {
             return Err(GeneralStatus::NOT_ENOUGH_DATA);
         }
-        place.copy_from_slice(value);
+        if *place != *value {
+            place.copy_from_slice(value);
+            self.changes += 1;
+        }
         Ok(())
+    }
+
+    /// A number that is another one after a value has changed: what was made of the values before may be kept as long as it
+    /// is the same.
+    #[must_use]
+    pub fn changes(&self) -> u64 {
+        self.changes
     }
 
     /// A single unsigned value up to 64 bits; `None` if there is no such attribute.
@@ -842,6 +882,44 @@ mod tests {
         assert_eq!(store.get(array, Part { start: 61, count: 3 }), Ok(&[3, 1, 2][..]));
         store.reset(&table);
         assert_eq!(store.get(array, Part { start: 61, count: 3 }), Ok(&[3, 3, 3][..]));
+    }
+
+    #[test]
+    fn every_id_leads_to_its_attribute_and_no_other() {
+        let number =
+            |id| AttributeDefinition::new(Scope::Instance, id, DataType::Dint, Access::Set, "a number");
+        for ids in [&[][..], &[1], &[4095, 4096], &[5, 4094, 65_535], &[65_534]] {
+            let definitions: Vec<_> = ids.iter().map(|id| number(*id)).collect();
+            let table = AttributeTable::new(Scope::Instance, &definitions).expect("a table");
+            let known: Vec<u16> = table.iter().map(|definition| definition.id).collect();
+            assert!(ids.iter().all(|id| known.contains(id)));
+            for id in 0..=u16::MAX {
+                let found = table.find(id).map(|entry| entry.definition.id);
+                assert_eq!(found, known.contains(&id).then_some(id));
+            }
+        }
+    }
+
+    #[test]
+    fn changes_are_counted_when_a_value_becomes_another_one() {
+        let table = table();
+        let mut store = AttributeStore::new(&table);
+        let entry = table.find(100).expect("it is there");
+        let mut last = store.changes();
+        let mut changed =
+            |store: &AttributeStore| std::mem::replace(&mut last, store.changes()) != store.changes();
+        store.put(entry, entry.whole(), &[0xF9, 0xFF]).expect("two octets");
+        assert!(!changed(&store), "it was -7 before");
+        store.put(entry, entry.whole(), &[0xF8, 0xFF]).expect("two octets");
+        assert!(changed(&store));
+        assert!(store.put(entry, entry.whole(), &[0]).is_err());
+        assert!(!changed(&store));
+        store.publish(&table, 100, 3);
+        assert!(changed(&store));
+        store.publish(&table, 100, 3);
+        assert!(!changed(&store));
+        store.reset(&table);
+        assert!(changed(&store));
     }
 
     #[test]

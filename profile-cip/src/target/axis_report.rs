@@ -10,6 +10,10 @@ use super::io_connection::missed_updates;
 use crate::wire::motion::codes::{ActualDataSet, AxisStatus, ControlMode, StatusDataSet};
 use crate::wire::motion::{ActualBlock, ActualValues, StatusValues};
 
+/// Captures further apart than this are not of one update: longer than a drive is silent on the slowest bus (a cycle of 65 ms)
+/// before it counts as lost.
+const CORRECTION_MAX_NS: u64 = 1_000_000_000;
+
 impl Axis {
     /// What the drive has to do at `now`. `period_ns` and `limit` judge the age of the set-points.
     pub fn command(
@@ -20,7 +24,10 @@ impl Axis {
         limit: u32,
     ) -> AxisCommandImage {
         let command = match self.held {
-            _ if !context.connected => Command::Withheld(Withheld::NotConnected),
+            _ if !context.connected && self.state == AxisState::Initializing => {
+                Command::Withheld(Withheld::NotConnected)
+            }
+            _ if !context.connected => Command::Withheld(Withheld::ConnectionLost),
             _ if context.node_fault => Command::Withheld(Withheld::NodeFault),
             _ if !context.remote => Command::Withheld(Withheld::LocalControl),
             _ if self.state != AxisState::Running || self.config.kind != ControlKind::Active => {
@@ -80,8 +87,9 @@ impl Axis {
         status & allowed(self.config.kind, self.state, powered)
     }
 
-    /// The cyclic actual block of D-to-C update `update_id`.
-    pub fn actual_block(&mut self, update_id: u8, context: &Context) -> ActualBlock {
+    /// The cyclic actual block of D-to-C update `update_id`, whose time stamp is `stamp`, system time in ns; `None` for an
+    /// update without one.
+    pub fn actual_block(&mut self, update_id: u8, stamp: Option<u64>, context: &Context) -> ActualBlock {
         let (axis_response, response_status) = self.handshake.response();
         let lint = self.config.lint_position && self.block.feedback_mode.position_is_lint();
         ActualBlock {
@@ -90,28 +98,53 @@ impl Axis {
             axis_response,
             response_status,
             axis_state: self.state.code(),
-            actual: self.actual_values(lint),
+            actual: self.actual_values(lint, stamp),
             status: self.status_values(update_id, context),
         }
     }
 
     /// The actual values that the controller asks for and this axis has. A bit for which there is no value is clear in the
     /// answer, so that nobody takes a zero for a measurement: everything of a converter, what the drive does not tell, and
-    /// the Unwind Cycle Count where nothing is unwound.
-    fn actual_values(&self, lint: bool) -> ActualValues {
+    /// the Unwind Cycle Count where nothing is unwound. Of a drive that is not online only the position remains, the last
+    /// one that it has reported: state and faults of the axis say that it is not measured any more.
+    fn actual_values(&self, lint: bool, stamp: Option<u64>) -> ActualValues {
         let asked = self.block.actual_data_set;
         if self.config.kind == ControlKind::Converter {
             return ActualValues::default();
         }
-        let seen = self.seen_by_controller(self.drive.position);
+        let position = stamp.map_or(self.drive.position, |stamp| self.position_at(stamp));
+        let seen = self.seen_by_controller(position);
         let has = |bit| asked.contains(bit);
+        let measured = |bit| has(bit) && self.drive.online;
         ActualValues {
             position: has(ActualDataSet::POSITION).then(|| seen.value(lint)),
-            velocity: self.drive.velocity.filter(|_| has(ActualDataSet::VELOCITY)),
-            acceleration: self.drive.acceleration.filter(|_| has(ActualDataSet::ACCELERATION)),
+            velocity: self.drive.velocity.filter(|_| measured(ActualDataSet::VELOCITY)),
+            acceleration: self.drive.acceleration.filter(|_| measured(ActualDataSet::ACCELERATION)),
             unwind_count: seen.unwind_count().filter(|_| has(ActualDataSet::UNWIND_COUNT)),
             position_displacement: has(ActualDataSet::POSITION_DISPLACEMENT).then(|| self.displacement()),
         }
+    }
+
+    /// When the actual values were captured, system time in ns; `None` while the drive measures nothing or does not say
+    /// when.
+    pub fn captured_at(&self) -> Option<u64> {
+        Some(self.drive.captured_at).filter(|at| self.drive.online && *at != 0)
+    }
+
+    /// The actual position at the instant of a time stamp: where the drive was when it was captured, and on from there at
+    /// the velocity it had. An update has one time stamp for all of its instances, but drives of different buses, or one
+    /// whose last telegram is missing, were captured at different instants.
+    fn position_at(&self, stamp: u64) -> i64 {
+        const SECOND: i128 = 1_000_000_000;
+        let position = self.drive.position;
+        let Some(captured_at) = self.captured_at().filter(|at| at.abs_diff(stamp) <= CORRECTION_MAX_NS)
+        else {
+            return position;
+        };
+        let span = i128::from(stamp) - i128::from(captured_at);
+        let way = i128::from(self.drive.position_rate) * span;
+        let way = (way + way.signum() * SECOND / 2) / SECOND;
+        i64::try_from(way).map_or(position, |way| position.saturating_add(way))
     }
 
     fn status_values(&mut self, update_id: u8, context: &Context) -> StatusValues {

@@ -16,6 +16,11 @@
 //! | 28 | 4 | O->T requested packet interval in microseconds |
 //! | 32 | 4 | O->T actual packet interval in microseconds |
 //! | 36 | 20 | the same from offset 16 on for T->O |
+//!
+//! Whoever knows a connection ID can forge data of the connection. Therefore the four IDs are 0 in the reply to a client
+//! with another address than the connection's originator.
+
+use core::net::Ipv4Addr;
 
 use super::config::InterfaceConfig;
 use super::connection_manager::{CONNECTIONS_MAX, ConnectionManager, Explicit, Motion, Owner};
@@ -84,18 +89,28 @@ impl Statistics<'_> {
 }
 
 /// Get_Connection_Data: the connection with this number.
-pub(super) fn get(connections: &ConnectionManager, interface: &InterfaceConfig, data: &[u8]) -> Answer {
+pub(super) fn get(
+    connections: &ConnectionManager,
+    interface: &InterfaceConfig,
+    client: Ipv4Addr,
+    data: &[u8],
+) -> Answer {
     let mut r = Reader::new(data);
     let number = match r.u16("connection number").and_then(|number| r.finish("request").map(|()| number)) {
         Ok(number) => number,
         Err(error) => return Answer::status(data_status(error)),
     };
     let explicit = connections.explicit.iter().find(|one| one.number == number);
-    answer(interface, (number == 0).then_some(connections.motion), explicit)
+    answer(interface, client, (number == 0).then_some(connections.motion), explicit)
 }
 
 /// Search_Connection_Data: the connection of this triad.
-pub(super) fn search(connections: &ConnectionManager, interface: &InterfaceConfig, data: &[u8]) -> Answer {
+pub(super) fn search(
+    connections: &ConnectionManager,
+    interface: &InterfaceConfig,
+    client: Ipv4Addr,
+    data: &[u8],
+) -> Answer {
     let mut r = Reader::new(data);
     let triad = match ConnectionTriad::read(&mut r).and_then(|triad| r.finish("request").map(|()| triad)) {
         Ok(triad) => triad,
@@ -103,11 +118,16 @@ pub(super) fn search(connections: &ConnectionManager, interface: &InterfaceConfi
     };
     let of_motion = connections.motion.parameters().is_some_and(|open| open.triad == triad);
     let explicit = connections.explicit.iter().find(|one| one.triad == triad);
-    answer(interface, of_motion.then_some(connections.motion), explicit)
+    answer(interface, client, of_motion.then_some(connections.motion), explicit)
 }
 
-fn answer(interface: &InterfaceConfig, motion: Option<Motion>, explicit: Option<&Explicit>) -> Answer {
-    let data = match (motion, explicit) {
+fn answer(
+    interface: &InterfaceConfig,
+    client: Ipv4Addr,
+    motion: Option<Motion>,
+    explicit: Option<&Explicit>,
+) -> Answer {
+    let mut data = match (motion, explicit) {
         (Some(Motion::Opening(owner, _)), _) => motion_data(&owner, CONFIGURING, interface),
         (Some(Motion::Open(owner)), _) => motion_data(&owner, ESTABLISHED, interface),
         (Some(Motion::Closing(owner, _)), _) => motion_data(&owner, CLOSING, interface),
@@ -116,6 +136,9 @@ fn answer(interface: &InterfaceConfig, motion: Option<Motion>, explicit: Option<
             return Answer::status(GeneralStatus::PATH_DESTINATION_UNKNOWN);
         }
     };
+    if client != data.originator {
+        data.ids = (0, 0);
+    }
     let mut bytes = vec![0; CONNECTION_DATA_LEN];
     match data.write(&mut Writer::new(&mut bytes)) {
         Ok(()) => Answer::done(bytes),
@@ -126,6 +149,7 @@ fn answer(interface: &InterfaceConfig, motion: Option<Motion>, explicit: Option<
 struct ConnectionData {
     number: u16,
     state: u16,
+    originator: Ipv4Addr,
     ports: (u16, u16),
     triad: ConnectionTriad,
     ids: (u32, u32),
@@ -138,6 +162,7 @@ fn motion_data(owner: &Owner, state: u16, interface: &InterfaceConfig) -> Connec
     ConnectionData {
         number: 0,
         state,
+        originator: *owner.peer.ip(),
         ports: (owner.peer.port(), interface.io_port),
         triad: open.triad,
         ids: (open.o_to_t_id, open.t_to_o_id),
@@ -150,6 +175,7 @@ fn explicit_data(explicit: &Explicit, interface: &InterfaceConfig) -> Connection
     ConnectionData {
         number: explicit.number,
         state: ESTABLISHED,
+        originator: *explicit.peer.ip(),
         ports: (explicit.peer.port(), interface.explicit_port),
         triad: explicit.triad,
         ids: (explicit.o_to_t_id, explicit.t_to_o_id),

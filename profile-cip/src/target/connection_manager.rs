@@ -120,19 +120,26 @@ pub(super) struct ConnectionManager {
     pub motion_lost: bool,
     pub explicit: Vec<Explicit>,
     next_id: u32,
+    /// What connection IDs are drawn with; without it they count up.
+    secret: Option<u64>,
 }
 
 impl ConnectionManager {
     pub fn new(incarnation: u16) -> Self {
         let next_id = u32::from(incarnation) << 16 | 1;
         let explicit = Vec::with_capacity(EXPLICIT_CONNECTIONS_MAX);
-        Self { motion: Motion::Closed, motion_lost: false, explicit, next_id }
+        Self { motion: Motion::Closed, motion_lost: false, explicit, next_id, secret: None }
+    }
+
+    /// Draws connection IDs with a secret from now on: nobody gets that of another's connection out of its own.
+    pub fn set_secret(&mut self, secret: u64) {
+        self.secret = Some(secret);
     }
 
     /// A connection ID nobody uses.
     pub fn new_id(&mut self) -> u32 {
         loop {
-            let id = self.next_id;
+            let id = self.secret.map_or(self.next_id, |secret| drawn(self.next_id, secret));
             self.next_id = self.next_id.wrapping_add(1);
             let motion = self.motion.parameters().is_some_and(|open| open.o_to_t_id == id);
             if id != 0 && !motion && self.explicit.iter().all(|one| one.o_to_t_id != id) {
@@ -221,6 +228,23 @@ impl ConnectionManager {
     }
 }
 
+/// The number in the place of `number` in an order of all numbers that follows from the secret: two halves of 16 bits, mixed
+/// into each other (a Feistel network), which gives no number twice.
+fn drawn(number: u32, secret: u64) -> u32 {
+    let [a, b, c, d] = number.to_le_bytes();
+    let mut halves = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
+    for round in 0..6_u64 {
+        // SplitMix64.
+        let mut mixed =
+            secret.wrapping_add((round << 16 | u64::from(halves[1])).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        mixed = (mixed ^ mixed >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        let [low, high, ..] = (mixed ^ mixed >> 31).to_le_bytes();
+        halves = [halves[1], halves[0] ^ u16::from_le_bytes([low, high])];
+    }
+    u32::from(halves[0]) << 16 | u32::from(halves[1])
+}
+
 /// Interval times multiplier, in nanoseconds; the multiplier has been checked before.
 pub(super) fn timeout_ns(open: &ForwardOpen<'_>) -> DurationNs {
     DurationNs::from_micros(i64::from(open.o_to_t_rpi_us)) * i64::from(open.multiplier().unwrap_or(4))
@@ -261,4 +285,32 @@ fn check_explicit(open: &ForwardOpen<'_>) -> Result<(), Refusal> {
         return Err(Refusal::intervals(0, 10_000, open.t_to_o_rpi_us.max(10_000)));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn drawn_connection_ids_never_repeat_and_do_not_follow_from_each_other() {
+        let ids = |secret| {
+            let mut manager = ConnectionManager::new(0x7A00);
+            manager.set_secret(secret);
+            (0..20_000).map(|_| manager.new_id()).collect::<Vec<_>>()
+        };
+        let one = ids(1);
+        assert_eq!(one.iter().collect::<BTreeSet<_>>().len(), one.len());
+        assert_eq!(one, ids(1));
+        let other = ids(2);
+        assert!(one.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
+        // Of the steps from one to the next no one is frequent, and half of the bits change.
+        let steps: BTreeSet<_> = one.windows(2).map(|pair| pair[1].wrapping_sub(pair[0])).collect();
+        assert!(steps.len() > one.len() - 100, "{}", steps.len());
+        let changed: u32 = one.windows(2).map(|pair| (pair[0] ^ pair[1]).count_ones()).sum();
+        assert!((15 * 20_000..17 * 20_000).contains(&changed), "{changed}");
+        let whole: BTreeSet<_> = (0..=u16::MAX).map(|low| drawn(u32::from(low), 3)).collect();
+        assert_eq!(whole.len(), 0x1_0000);
+    }
 }

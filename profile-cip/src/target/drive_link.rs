@@ -20,6 +20,7 @@ use crate::wire::motion::test_service::HookupTestData;
 
 use super::axis_state::AxisState;
 pub use super::exception::{DriveCondition, DriveConditions, ExceptionAction};
+use profile_generic::time::MonotonicTime;
 
 /// What the drive has to do now, and to keep doing until it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,8 +45,10 @@ pub enum DriveAction {
 /// Why there is no set-point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Withheld {
-    /// No connection is open.
+    /// No connection is open: the controller has closed it, or has not opened one. The axis stops as for a Disable.
     NotConnected,
+    /// The connection was lost, and none was opened since.
+    ConnectionLost,
     /// The axis is not Running.
     NotRunning,
     /// No update came for longer than the update delay high limit.
@@ -96,6 +99,9 @@ pub struct SetPoints {
     pub time_stamp: Option<u64>,
     /// Command Target Time in this device's system time, ns; `None` in asynchronous operation.
     pub target_time: Option<u64>,
+    /// When the update would have arrived on an even network: the controller's update clock as its arrivals show it. Set-points
+    /// without a target time are placed by it.
+    pub paced_at: MonotonicTime,
     /// Subtract from a position command to get back to the reference system of power-up, position control units
     /// (Change Command Position Reference, clause 5-2.6.1.2).
     pub position_reference: i64,
@@ -174,8 +180,8 @@ pub struct AxisCommandImage {
     pub action: DriveAction,
     /// Changes whenever the action changes; to be returned in [`DriveImage::action_id`].
     pub action_id: u32,
-    /// Changes whenever the drive has to reset its faults; to be returned in [`DriveImage::reset_id`] once it has
-    /// tried, with success or not.
+    /// Changes whenever the drive has to reset its faults, for the controller or because a connection begins or ends; to
+    /// be returned in [`DriveImage::reset_id`] once it has tried, with success or not. A reset moves nothing.
     pub reset_id: u32,
     /// With [`DriveAction::Abort`]: how to stop. It may become more severe while the axis stops.
     pub abort: Option<AbortOrder>,
@@ -224,8 +230,12 @@ pub struct DriveImage {
     pub start_inhibits: u16,
     /// Start Inhibits - Mfg, attribute 677.
     pub start_inhibits_mfg: u16,
-    /// Actual position in the reference system of power-up, position control units, never unwound.
+    /// Actual position in the reference system of power-up, position control units, never unwound. While the drive is not
+    /// online, the last one it has reported.
     pub position: i64,
+    /// Actual velocity in position control units per second, by which `position` is taken from the instant of its capture to
+    /// that of the update. 0 when the drive does not report a velocity.
+    pub position_rate: i64,
     /// Cyclic Unwind Position in use, position control units: after so many counts a cyclic axis is where it was. `None`
     /// for an axis that is not cyclic, or whose controller unwinds it (Control Scaling).
     pub unwind: Option<u32>,
@@ -255,4 +265,93 @@ pub struct DriveImage {
     pub events: EventChecking,
     /// Events that the drive is looking for at this moment.
     pub events_checking: EventChecking,
+}
+
+impl DriveImage {
+    /// Makes it as by [`Default`], without a copy of all the conditions that there can be.
+    pub fn clear(&mut self) {
+        // Every field is named, so that none can be forgotten.
+        let Self {
+            online,
+            action_id,
+            reset_id,
+            bus_up,
+            start_complete,
+            stop_complete,
+            power_enabled,
+            tracking,
+            test,
+            conditions,
+            start_inhibits,
+            start_inhibits_mfg,
+            position,
+            position_rate,
+            unwind,
+            scaling_id,
+            velocity,
+            acceleration,
+            axis_status,
+            axis_status_mfg,
+            io_status,
+            io_status_mfg,
+            safety,
+            captured_at,
+            torque,
+            events,
+            events_checking,
+        } = self;
+        (*online, *bus_up, *start_complete, *stop_complete) = (false, false, false, false);
+        (*power_enabled, *tracking) = (false, false);
+        (*action_id, *reset_id, *scaling_id) = (0, 0, 0);
+        *test = None;
+        conditions.clear();
+        (*start_inhibits, *start_inhibits_mfg) = (0, 0);
+        (*position, *position_rate, *unwind) = (0, 0, None);
+        (*velocity, *acceleration, *torque) = (None, None, None);
+        (*axis_status, *axis_status_mfg) = (AxisStatus::empty(), 0);
+        (*io_status, *io_status_mfg) = (AxisIoStatus::empty(), 0);
+        *safety = None;
+        *captured_at = 0;
+        (*events, *events_checking) = (EventChecking::empty(), EventChecking::empty());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cleared_image_is_one_of_which_nothing_is_known() {
+        let mut image = DriveImage {
+            online: true,
+            action_id: 1,
+            reset_id: 2,
+            bus_up: true,
+            start_complete: true,
+            stop_complete: true,
+            power_enabled: true,
+            tracking: true,
+            test: Some(TestReport { id: 3, data: HookupTestData::default() }),
+            conditions: DriveConditions::of(&[DriveCondition { code: 4, ..DriveCondition::default() }]),
+            start_inhibits: 5,
+            start_inhibits_mfg: 6,
+            position: 7,
+            position_rate: 77,
+            unwind: Some(8),
+            scaling_id: 9,
+            velocity: Some(10.0),
+            acceleration: Some(11.0),
+            axis_status: AxisStatus::all(),
+            axis_status_mfg: 12,
+            io_status: AxisIoStatus::all(),
+            io_status_mfg: 13,
+            safety: Some(SafetyStatus::default()),
+            captured_at: 14,
+            torque: Some(15.0),
+            events: EventChecking::all(),
+            events_checking: EventChecking::all(),
+        };
+        image.clear();
+        assert_eq!(image, DriveImage::default());
+    }
 }

@@ -61,11 +61,20 @@ impl DriveCondition {
 }
 
 /// The conditions of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct DriveConditions {
     list: [DriveCondition; CONDITIONS_MAX],
     len: usize,
 }
+
+/// What lies behind the last condition does not count.
+impl PartialEq for DriveConditions {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
+    }
+}
+
+impl Eq for DriveConditions {}
 
 impl Default for DriveConditions {
     fn default() -> Self {
@@ -91,6 +100,11 @@ impl DriveConditions {
             all.push(*condition);
         }
         all
+    }
+
+    /// Takes all of them out.
+    pub fn clear(&mut self) {
+        self.len = 0;
     }
 
     /// Adds one. In a full list a condition that stops the axis takes the place of one that need not; `false` when there
@@ -120,6 +134,9 @@ pub struct ExceptionActions<'a> {
 }
 
 impl<'a> ExceptionActions<'a> {
+    /// Nothing is set: every exception stops the axis.
+    pub const NONE: ExceptionActions<'static> = ExceptionActions::new(&[], &[]);
+
     /// The arrays 672 and 673 of an axis.
     #[must_use]
     pub fn of(table: &AttributeTable, store: &'a AttributeStore) -> Self {
@@ -186,6 +203,17 @@ mod tests {
         let manufacturer =
             DriveCondition { fault_type: FaultType::AXIS_MFG, ..condition(54, ExceptionAction::IGNORE) };
         assert_eq!(actions.action(&manufacturer), ExceptionAction::MAJOR_FAULT, "no array, no mercy");
+    }
+
+    #[test]
+    fn a_list_that_was_cleared_is_like_one_that_never_had_any() {
+        let mut list = DriveConditions::of(&[condition(8, ExceptionAction::IGNORE); 3]);
+        assert_ne!(list, DriveConditions::default());
+        list.clear();
+        assert_eq!(list, DriveConditions::default());
+        assert!(list.push(condition(6, ExceptionAction::ALARM)));
+        assert_eq!(list, DriveConditions::of(&[condition(6, ExceptionAction::ALARM)]));
+        assert_eq!(list.as_slice(), [condition(6, ExceptionAction::ALARM)]);
     }
 
     #[test]

@@ -61,7 +61,7 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
     let application = connection_path::application(open.path, &node.config.identity)?;
     let null = |direction: ConnectionType| direction == ConnectionType::NULL;
     if null(open.o_to_t.connection_type) && null(open.t_to_o.connection_type) {
-        return null_open(node, open, &application);
+        return null_open(node, origin, open, &application);
     }
     if node.connections.has(open.triad) {
         return Err(Refusal::connection(ConnectionStatus::IN_USE_OR_DUPLICATE));
@@ -83,15 +83,23 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
 }
 
 /// A Forward_Open without connection type in either direction opens nothing. It asks whether the path, the
-/// key and the configuration fit this device; for a connection that lives it is answered with that
-/// connection's IDs.
-fn null_open(node: &Node, open: &ForwardOpen<'_>, application: &Application<'_>) -> Result<Opened, Refusal> {
+/// key and the configuration fit this device; for an open connection of the same address it is answered with that
+/// connection's IDs. Nobody else gets them: they are all that data of the connection are known by.
+fn null_open(
+    node: &Node,
+    origin: &Origin,
+    open: &ForwardOpen<'_>,
+    application: &Application<'_>,
+) -> Result<Opened, Refusal> {
     if let Application::Motion(path) = application {
         motion_open::check_path(path, &node.config.motion)?;
     }
-    let motion = node.connections.motion.parameters().filter(|one| one.triad == open.triad);
+    let client = *origin.peer.ip();
+    let motion = node.connections.motion.parameters();
+    let motion = motion.filter(|one| one.triad == open.triad && one.originator == client);
     let motion = motion.map(|one| (one.o_to_t_id, one.t_to_o_id));
-    let explicit = node.connections.explicit.iter().find(|one| one.triad == open.triad);
+    let mut explicit = node.connections.explicit.iter();
+    let explicit = explicit.find(|one| one.triad == open.triad && *one.peer.ip() == client);
     let explicit = explicit.map(|one| (one.o_to_t_id, one.t_to_o_id));
     let (o_to_t_id, t_to_o_id) = motion.or(explicit).unwrap_or((open.o_to_t_id, open.t_to_o_id));
     Ok(Opened::Now { o_to_t_id, t_to_o_id })

@@ -8,11 +8,15 @@
 //! Synchronous   D-to-C updates at the start of each update cycle, C-to-D updates or not
 //! ```
 
-use profile_generic::time::MonotonicTime;
+use profile_generic::interpolation::ArrivalClock;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::motion_link::OpenParameters;
 use crate::wire::motion::CommandHeader;
 use crate::wire::motion::codes::{NodeControl, TimeDataSet};
+
+/// Steps of the sequence count that are always believed.
+const STEPS_MIN: u64 = 8;
 
 /// What a packet is, by its sequence count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,6 +89,10 @@ pub(super) struct IoConnection {
     answer: Option<u8>,
     /// System time at which the last C-to-D update was received, ns.
     pub received_at: u64,
+    /// The controller's update clock, estimated from the arrivals of its updates.
+    arrivals: ArrivalClock,
+    /// The last time stamp that was trusted, on the local clock, with Update ID and arrival of its update.
+    stamped: Option<(u64, u8, MonotonicTime)>,
 }
 
 impl IoConnection {
@@ -106,6 +114,8 @@ impl IoConnection {
             sent_update_id: 0,
             answer: None,
             received_at: 0,
+            stamped: None,
+            arrivals: ArrivalClock::new(DurationNs(i64::try_from(period).unwrap_or(i64::MAX).max(1))),
         }
     }
 
@@ -116,12 +126,21 @@ impl IoConnection {
 
     // -- receiving ----------------------------------------------------------------------------------------------
 
+    /// What a packet with this sequence count is. A count that is further ahead than the time-out lets updates be lost, twice
+    /// over, is not the next one of this connection but an old one that comes again after the counter has gone round.
     pub fn packet(&self, sequence: u16) -> Packet {
         match self.sequence.map(|last| sequence.wrapping_sub(last)) {
-            None | Some(1..=0x7FFF) => Packet::New,
+            None => Packet::New,
             Some(0) => Packet::Refresh,
+            Some(step) if u64::from(step) <= self.steps_max() => Packet::New,
             Some(_) => Packet::Old,
         }
+    }
+
+    /// Steps of the sequence count from one packet to the next at most: twice the updates in the time-out.
+    fn steps_max(&self) -> u64 {
+        let updates = self.parameters.timeout_us / u64::from(self.parameters.rpi_us.max(1));
+        updates.saturating_mul(2).clamp(STEPS_MIN, 0x7FFF)
     }
 
     /// A packet of the owner has come, with its sequence count where the network has one.
@@ -155,6 +174,35 @@ impl IoConnection {
         } else {
             Age::OnTime
         }
+    }
+
+    /// An update has arrived, after so many lost ones: when it would have arrived without the jitter of the network.
+    pub fn arrive(&mut self, arrival: MonotonicTime, lost: u8) -> MonotonicTime {
+        self.arrivals.arrive(arrival, u32::from(lost) + 1)
+    }
+
+    /// Whether a time stamp, on the local clock in ns, follows from the one before: to half a period as many periods later as the
+    /// Update ID says. After a gap in the arrivals it may be as long later as the update has arrived later, to one and a half
+    /// periods: a controller that was held up leaves out cycles. One that does neither is of a clock that was set.
+    pub fn follows(&mut self, stamp: u64, id: u8, arrival: MonotonicTime) -> bool {
+        let period = self.period();
+        let plausible = self.stamped.is_none_or(|(last, before, arrived)| {
+            let advance = stamp.wrapping_sub(last).cast_signed();
+            let expected = u64::from(id.wrapping_sub(before)).saturating_mul(period);
+            let gap = arrival.0.saturating_sub(arrived.0);
+            let near = |expected: u64| advance.abs_diff(expected.cast_signed());
+            near(expected) <= period / 2
+                || gap > expected.saturating_add(period / 2) && near(gap) <= period + period / 2
+        });
+        if plausible {
+            self.stamped = Some((stamp, id, arrival));
+        }
+        plausible
+    }
+
+    /// Time stamps are not looked at any more: the next one begins anew.
+    pub fn forget_stamps(&mut self) {
+        self.stamped = None;
     }
 
     /// An update with data was accepted, to be applied or not.

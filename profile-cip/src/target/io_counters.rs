@@ -29,6 +29,8 @@ pub struct MotionCounters {
     pub untimed: u64,
     /// Updates whose time stamp lies too far ahead: not applied.
     pub ahead_of_time: u64,
+    /// Updates whose time stamp does not follow from the one before: not applied.
+    pub stamp_jumps: u64,
     /// Update IDs that were skipped.
     pub lost_updates: u64,
     /// Updates later than one update period.

@@ -33,6 +33,7 @@ mod motion_owner;
 mod node;
 pub(crate) mod object;
 pub mod object_list;
+mod ownership;
 pub mod qos;
 mod refusal;
 mod reset;

@@ -391,8 +391,14 @@ impl MotionDevice {
 
     /// Takes what the drive of an axis reports; to be followed by [`MotionDevice::poll`] in the same cycle.
     pub fn set_drive(&mut self, axis: usize, image: DriveImage) {
+        self.update_drive(axis, |drive| *drive = image);
+    }
+
+    /// As [`MotionDevice::set_drive`], without a copy: `fill` gets what the drive reported before and has to write all of
+    /// it anew ([`DriveImage::clear`] is where to begin). It is not called without such an axis.
+    pub fn update_drive(&mut self, axis: usize, fill: impl FnOnce(&mut DriveImage)) {
         if let Some(slot) = self.slots.get_mut(axis) {
-            slot.axis.set_drive(image);
+            slot.axis.update_drive(fill);
         }
     }
 
@@ -480,6 +486,13 @@ impl MotionDevice {
         let slot = self.slots.get(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
         let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         slot.store.get(entry, entry.whole())
+    }
+
+    /// A number that is another one after an attribute of an axis has changed, or `None` if there is no such axis. What was made
+    /// of [`MotionDevice::attribute`] may be kept as long as it is the same.
+    #[must_use]
+    pub fn attribute_changes(&self, axis: usize) -> Option<u64> {
+        self.slots.get(axis).map(|slot| slot.store.changes())
     }
 
     /// The next access to an attribute that lives in the drive.
@@ -648,7 +661,12 @@ impl MotionDevice {
     pub(super) fn step(&mut self, system_time: Option<SystemTime>) {
         let context = self.context(system_time);
         for slot in &mut self.slots {
-            let actions = ExceptionActions::of(&self.axis_table, &slot.store);
+            // They are looked up only where there is something that they say anything about.
+            let nothing = slot.axis.drive().conditions.as_slice().is_empty();
+            let actions = match nothing {
+                true => ExceptionActions::NONE,
+                false => ExceptionActions::of(&self.axis_table, &slot.store),
+            };
             slot.axis.step(&context, &actions);
         }
     }

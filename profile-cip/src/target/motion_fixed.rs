@@ -112,7 +112,7 @@ impl MotionDevice {
         let valid = node_status.contains(NodeStatus::DATA_VALID);
         let context = self.context(None);
         let axis = self.slots.first_mut().filter(|_| valid).map(|slot| &mut slot.axis);
-        let block = axis.map(|axis| axis.actual_block(update_id, &context)).unwrap_or_default();
+        let block = axis.map(|axis| axis.actual_block(update_id, None, &context)).unwrap_or_default();
         let actual = FixedActual { update_id, node_status, ..FixedActual::from(&block) };
         let mut writer = Writer::new(update);
         actual.emit(&mut writer).ok()?;

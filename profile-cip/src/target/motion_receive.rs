@@ -28,19 +28,15 @@ impl Checked<'_> {
         }
     }
 
-    fn has_instance_above(&self, axes: usize) -> bool {
+    /// Whether every instance is one of so many axes or the class, and whether every value is a number; in one pass, because
+    /// reading an instance is what takes the time.
+    fn is_known_and_finite(&self, axes: usize) -> (bool, bool) {
         match self {
-            Self::Variable(frame) => frame.instances().any(|i| usize::from(i.number) > axes),
-            Self::Fixed(_) => false,
-        }
-    }
-
-    fn is_finite(&self) -> bool {
-        match self {
-            Self::Variable(frame) => {
-                frame.instances().all(|i| i.cyclic.is_none_or(|block| block.values.is_finite()))
-            }
-            Self::Fixed(command) => command.values.is_finite(),
+            Self::Variable(frame) => frame.instances().fold((true, true), |(known, finite), instance| {
+                let number = instance.cyclic.is_none_or(|block| block.values.is_finite());
+                (known && usize::from(instance.number) <= axes, finite && number)
+            }),
+            Self::Fixed(command) => (true, command.values.is_finite()),
         }
     }
 }
@@ -59,36 +55,53 @@ impl MotionDevice {
     /// Takes the data of a C-to-D packet: the class-1 sequence count and the update.
     ///
     /// `system_time` is `None` if the device has no synchronized time. The packet must be of this connection; whose it
-    /// is stands in the datagram around it.
-    pub fn handle_io(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, packet: &[u8]) {
+    /// is stands in the datagram around it. Returns whether it was taken: its form was right, and it was not older than the
+    /// last one.
+    pub fn handle_io(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, packet: &[u8]) -> bool {
+        self.handle_io_arrived(now, now, system_time, packet)
+    }
+
+    /// The same for a packet that arrived at `arrival`, before it could be looked at. The controller's update clock is estimated from
+    /// the arrivals (asynchronous operation); everything else goes by `now`.
+    pub fn handle_io_arrived(
+        &mut self,
+        now: MonotonicTime,
+        arrival: MonotonicTime,
+        system_time: Option<SystemTime>,
+        packet: &[u8],
+    ) -> bool {
         let Some(connection) = &mut self.connection else {
             self.counters.unconnected += 1;
-            return;
+            return false;
         };
         if packet.len() > usize::from(connection.parameters.o_to_t_size) {
             self.counters.oversize += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
-            return;
+            return false;
         }
         let Some((sequence, update)) = packet.split_first_chunk::<SEQUENCE_LEN>() else {
             self.counters.malformed += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
-            return;
+            return false;
         };
         let sequence = u16::from_le_bytes(*sequence);
-        match connection.packet(sequence) {
-            Packet::Old => self.counters.out_of_order += 1,
+        let taken = match connection.packet(sequence) {
+            Packet::Old => {
+                self.counters.out_of_order += 1;
+                false
+            }
             Packet::Refresh => {
                 self.counters.refreshes += 1;
                 connection.heard(Some(sequence), now);
+                true
             }
-            Packet::New => {
-                if let Some(checked) = self.check(update) {
-                    self.handle_update(now, system_time, Some(sequence), &checked);
-                }
-            }
-        }
+            Packet::New => self.check(update).is_some_and(|checked| {
+                self.handle_update((now, arrival), system_time, Some(sequence), &checked);
+                true
+            }),
+        };
         self.step(system_time);
+        taken
     }
 
     /// Takes a C-to-D update of a network that puts no sequence count in front of it, as DeviceNet does not: the 16
@@ -102,7 +115,7 @@ impl MotionDevice {
             self.counters.oversize += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
         } else if let Some(checked) = self.check(update) {
-            self.handle_update(now, system_time, None, &checked);
+            self.handle_update((now, now), system_time, None, &checked);
         }
         self.step(system_time);
     }
@@ -124,21 +137,20 @@ impl MotionDevice {
                 return None;
             }
         };
-        if checked.has_instance_above(self.slots.len()) {
-            self.counters.unknown_instance += 1;
-        } else if !checked.is_finite() {
-            self.counters.not_finite += 1;
-        } else {
-            return Some(checked);
+        match checked.is_known_and_finite(self.slots.len()) {
+            (false, _) => self.counters.unknown_instance += 1,
+            (true, false) => self.counters.not_finite += 1,
+            (true, true) => return Some(checked),
         }
         self.node.raise(NodeFault::DATA_FORMAT);
         None
     }
 
-    /// Judges a checked update and distributes it. Without a sequence count the Update ID alone tells what is new.
+    /// Judges a checked update that has arrived at the second of two instants, and distributes it. Without a sequence count the
+    /// Update ID alone tells what is new.
     fn handle_update(
         &mut self,
-        now: MonotonicTime,
+        (now, arrival): (MonotonicTime, MonotonicTime),
         system_time: Option<SystemTime>,
         sequence: Option<u16>,
         checked: &Checked<'_>,
@@ -171,13 +183,14 @@ impl MotionDevice {
         connection.heard(sequence, now);
         connection.header = Some(header);
         connection.received_at = system_time.map_or(0, |t| t.0);
+        let paced_at = connection.arrive(arrival, lost);
         self.node_control(before, header.node_control);
         self.counters.lost_updates += u64::from(lost);
         self.diagnostics.0 = self.diagnostics.0.wrapping_add(lost);
         if u64::from(lost) > self.high_limit() {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
         }
-        let verdict = self.judge(now, system_time, &header);
+        let verdict = self.judge(now, (arrival, paced_at), system_time, &header);
         match checked {
             Checked::Variable(frame) => self.apply(now, system_time, frame, &verdict),
             Checked::Fixed(command) => self.apply_fixed(now, system_time, command, &verdict),
@@ -210,6 +223,7 @@ impl MotionDevice {
     fn judge(
         &mut self,
         now: MonotonicTime,
+        (arrival, paced_at): (MonotonicTime, MonotonicTime),
         system_time: Option<SystemTime>,
         header: &CommandHeader,
     ) -> Verdict {
@@ -232,7 +246,8 @@ impl MotionDevice {
         let synchronous =
             self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
         if !synchronous {
-            return Verdict::Fresh(UpdateTimes { time_stamp: None, period });
+            connection.forget_stamps();
+            return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
         let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
             self.counters.untimed += 1;
@@ -240,8 +255,10 @@ impl MotionDevice {
         };
         let time_stamp = self.compensation.compensate(received);
         let age = connection.age(time_stamp, system_time, low, high);
+        // A stamp of the future, or of more than two periods ago (clause 7-1.3).
+        let skewed = time_stamp.saturating_add(period).abs_diff(system_time) > period;
         if connection.mode == Mode::Asynchronous {
-            let skewed = time_stamp.saturating_add(period).abs_diff(system_time) > period;
+            connection.forget_stamps();
             self.node.skew(skewed, now);
             if !skewed && self.sync.synchronized {
                 let start = time_stamp.saturating_add(period.saturating_mul(2));
@@ -250,12 +267,22 @@ impl MotionDevice {
                 connection.synchronize(header.update_id, in_ns, now);
             }
             // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
-            return Verdict::Fresh(UpdateTimes { time_stamp: None, period });
+            return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
+        }
+        // On the local clock, so that a step of the device's own is none of the controller's.
+        let local = time_stamp.wrapping_sub(self.sync.offset.cast_unsigned());
+        if !connection.follows(local, header.update_id, arrival) {
+            // A clock was set and the offsets do not say so, or do not yet: the update counts as one that did not come.
+            self.counters.stamp_jumps += 1;
+            return Verdict::CommandsRefused;
         }
         let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
         let cycle = if time_stamp >= system_time { cycle } else { -cycle };
         let processing = i64::try_from(self.config.transmission_processing_ns).unwrap_or(0);
         match age {
+            // Served at its time, but one of the clocks is wrong: no update arrives before the start of its own period. What is
+            // below the step threshold says nothing: the update may have come while this call was under way.
+            Age::OnTime if cycle > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
             Age::OnTime => {}
             Age::Late | Age::Alarming => {
                 self.counters.late_updates += 1;
@@ -278,7 +305,7 @@ impl MotionDevice {
             }
         }
         connection.align(cycle.saturating_sub(processing), now);
-        Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period })
+        Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 
     /// Distributes a checked update to class and axes.

@@ -54,6 +54,9 @@ impl Part {
 /// Keeps back notifications that have no room beside everything else of the update; they stay until acknowledged anyway.
 fn fit_notifications(parts: &mut [Part], room: usize) {
     let of = |part: &Part| part.events.as_ref().map_or(0, |events| events.notifications.len());
+    if parts.iter().all(|part| of(part) == 0) {
+        return;
+    }
     let bare = |part: &Part| part.instance(None).buffer_len() - NOTIFICATION_LEN * of(part);
     let mut left = room.saturating_sub(parts.iter().map(bare).sum()) / NOTIFICATION_LEN;
     for part in parts {
@@ -145,9 +148,7 @@ impl MotionDevice {
         let asked = if valid { connection.time_data_set() } else { TimeDataSet::empty() };
         let supported = self.config.supports_sync;
         let time = system_time.filter(|_| supported).map_or(0, |t| t.0);
-        let first = self.echo.iter().find_map(|e| usize::from(e.number).checked_sub(1));
-        let captured = first.and_then(|axis| self.slots.get(axis)).map_or(0, |s| s.axis.drive().captured_at);
-        let stamp = if supported && captured != 0 { captured } else { time };
+        let stamp = self.time_stamp(system_time).unwrap_or(0);
         let stamped = asked.contains(TimeDataSet::TIME_STAMP);
         let offset = (stamped && supported).then(|| self.reported_offset.due(self.sync.offset, update_id));
         let diagnostics = asked.contains(TimeDataSet::UPDATE_DIAGNOSTICS);
@@ -171,7 +172,31 @@ impl MotionDevice {
         })
     }
 
-    fn parts(&mut self, update_id: u8, system_time: Option<SystemTime>) -> ArrayVec<Part, INSTANCES_MAX> {
+    /// Device Time Stamp, ns: when the actual data of the update was captured (clauses 2-1.3 and 6-2.7.2). `None` for a
+    /// device without system time.
+    ///
+    /// There is one for all instances. It is that of the newest capture among the drives that are heard, to whose instant the
+    /// positions of the others are taken ([`Axis::actual_block`](super::axis_object::Axis::actual_block)); the controller
+    /// goes on from there to its own cycle by the same means (Time-Stamp Correction), so nothing is corrected further than
+    /// it would be on a device of its own. A drive that is lost does not count, and where none is heard the update itself is
+    /// the event that is stamped.
+    fn time_stamp(&self, system_time: Option<SystemTime>) -> Option<u64> {
+        if !self.config.supports_sync {
+            return None;
+        }
+        let axes = self.echo.iter().filter_map(|echo| usize::from(echo.number).checked_sub(1));
+        let newest = axes.filter_map(|axis| self.slots.get(axis)?.axis.captured_at()).max();
+        newest.or(system_time.map(|time| time.0))
+    }
+
+    /// Fills in what each instance of the update has, in place: a list for all instances is too long to be handed around.
+    fn fill_parts(
+        &mut self,
+        update_id: u8,
+        system_time: Option<SystemTime>,
+        parts: &mut ArrayVec<Part, INSTANCES_MAX>,
+    ) {
+        let stamp = self.time_stamp(system_time);
         let context = self.context(system_time);
         for number in 1..=self.slots.len() {
             if self.echo.iter().any(|e| usize::from(e.number) == number && e.lists.is_some()) {
@@ -179,27 +204,25 @@ impl MotionDevice {
             }
         }
         let (echoes, slots, table) = (&self.echo, &mut self.slots, &self.axis_table);
-        echoes
-            .iter()
-            .map(|echo| {
-                let axis = usize::from(echo.number).checked_sub(1);
-                let Some(slot) = axis.and_then(|axis| slots.get_mut(axis)) else {
-                    return Part { number: echo.number, cyclic: None, read: None, events: None };
-                };
-                let read = echo.lists.map(|(write_id, read_id, write_status)| {
-                    let data = slot.read_lists.read(table, &slot.store, read_id);
-                    let read_status = data.as_ref().err().copied().unwrap_or(GeneralStatus::SUCCESS);
-                    let head = [write_id, write_status.0, read_id, read_status.0];
-                    ReadData { head, data: data.unwrap_or_default() }
-                });
-                Part {
-                    number: echo.number,
-                    cyclic: echo.cyclic.then(|| slot.axis.actual_block(update_id, &context)),
-                    read,
-                    events: slot.axis.events.block(),
-                }
-            })
-            .collect()
+        for echo in echoes {
+            let axis = usize::from(echo.number).checked_sub(1);
+            let Some(slot) = axis.and_then(|axis| slots.get_mut(axis)) else {
+                parts.push(Part { number: echo.number, cyclic: None, read: None, events: None });
+                continue;
+            };
+            let read = echo.lists.map(|(write_id, read_id, write_status)| {
+                let data = slot.read_lists.read(table, &slot.store, read_id);
+                let read_status = data.as_ref().err().copied().unwrap_or(GeneralStatus::SUCCESS);
+                let head = [write_id, write_status.0, read_id, read_status.0];
+                ReadData { head, data: data.unwrap_or_default() }
+            });
+            parts.push(Part {
+                number: echo.number,
+                cyclic: echo.cyclic.then(|| slot.axis.actual_block(update_id, stamp, &context)),
+                read,
+                events: slot.axis.events.block(),
+            });
+        }
     }
 
     /// Writes header and instances. Service responses take what room the rest leaves: one that does not fit now waits,
@@ -216,7 +239,8 @@ impl MotionDevice {
             header.emit(&mut writer).ok()?;
             return Some(writer.written());
         }
-        let mut parts = self.parts(update_id, system_time);
+        let mut parts = ArrayVec::new();
+        self.fill_parts(update_id, system_time, &mut parts);
         let room = update.len().saturating_sub(header.buffer_len());
         fit_notifications(&mut parts, room);
         let base: usize = parts.iter().map(|part| part.instance(None).buffer_len()).sum();

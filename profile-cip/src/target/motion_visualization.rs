@@ -1,6 +1,7 @@
 //! What the motion device has to show: from its connection and its axes to the conditions of
 //! [`super::visualization`].
 
+use super::axis_object::Axis;
 use super::axis_state::AxisState;
 use super::identity::ModuleState;
 use super::motion_device::{MotionDevice, Slot};
@@ -91,9 +92,19 @@ impl MotionDevice {
     }
 }
 
+/// While the axis is Initializing nothing is latched, but a drive that has switched itself off for a fault is no drive in
+/// standby.
+fn standing_fault(axis: &Axis) -> Option<(FaultType, u8)> {
+    let conditions = axis.drive().conditions.as_slice();
+    let initializing = axis.state() == AxisState::Initializing;
+    let standing = conditions.iter().find(|condition| initializing && condition.stops());
+    standing.map(|condition| (condition.fault_type, condition.code))
+}
+
 fn condition(slot: &Slot) -> AxisCondition {
     let axis = &slot.axis;
     let words = axis.fault_words();
+    let faults = if axis.faults.any() { &FAULTS[..] } else { &[] };
     let alarm = |types: [AlarmType; 2]| {
         types.into_iter().find_map(|one| lowest_bit(words.alarm(one)).map(|code| (one, code)))
     };
@@ -101,7 +112,10 @@ fn condition(slot: &Slot) -> AxisCondition {
         kind: axis.config.kind,
         state: axis.state(),
         bus_up: axis.drive().bus_up,
-        fault: FAULTS.into_iter().find_map(|one| lowest_bit(words.fault(one)).map(|code| (one, code))),
+        fault: faults
+            .iter()
+            .find_map(|one| lowest_bit(words.fault(*one)).map(|code| (*one, code)))
+            .or_else(|| standing_fault(axis)),
         unrecoverable: axis.faults.any_unrecoverable(),
         // Latched, and it has not taken the axis out of operation.
         minor_fault: axis.faults.any() && !axis.faults.any_major(),

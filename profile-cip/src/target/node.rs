@@ -183,6 +183,10 @@ impl Node {
             Ok(path) => path,
             Err(status) => return self.refuse(request.service, status),
         };
+        let client = *origin.peer.ip();
+        if self.is_foreign(client, path.class, request.service) {
+            return self.refuse(request.service, GeneralStatus::PRIVILEGE_VIOLATION);
+        }
         let answer = match (path.class, path.instance, request.service) {
             (CLASS_MOTION_DEVICE_AXIS, ..) => return self.hand_on(origin, &request, path),
             (CLASS_CONNECTION_MANAGER, 1, Service::FORWARD_OPEN | Service::LARGE_FORWARD_OPEN) => {
@@ -192,10 +196,10 @@ impl Node {
                 return forward_close::close(self, origin, &request);
             }
             (CLASS_CONNECTION_MANAGER, 1, Service::GET_CONNECTION_DATA) => {
-                connection_data::get(&self.connections, &self.config.interface, request.data)
+                connection_data::get(&self.connections, &self.config.interface, client, request.data)
             }
             (CLASS_CONNECTION_MANAGER, 1, Service::SEARCH_CONNECTION_DATA) => {
-                connection_data::search(&self.connections, &self.config.interface, request.data)
+                connection_data::search(&self.connections, &self.config.interface, client, request.data)
             }
             (CLASS_IDENTITY, 1, Service::RESET) => return self.reset(origin, request.data),
             (CLASS_ETHERNET_LINK, 1, GET_AND_CLEAR) => {

@@ -20,6 +20,9 @@ use core::fmt;
 /// Bytes in front of the connection data.
 pub const CLASS1_HEADER_LEN: usize = 20;
 
+/// Where the connection ID stands, 4 bytes, low byte first.
+pub const CONNECTION_ID_OFFSET: usize = 6;
+
 /// Bytes of the sequence count, which the connection size includes.
 pub const SEQUENCE_COUNT_LEN: usize = 2;
 

@@ -3,7 +3,7 @@ use crate::cast;
 use proptest::prelude::*;
 
 const PERIOD: DurationNs = DurationNs::from_millis(2);
-const EPOCH: SystemTime = SystemTime(1_700_000_000_000_000_000);
+const EPOCH: MonotonicTime = MonotonicTime(1_700_000_000_000);
 
 fn interpolator(target_update: TargetUpdate, extrapolate_periods: u32) -> FineInterpolator {
     let config = InterpolatorConfig { target_update, period: PERIOD, extrapolate_periods };
@@ -11,7 +11,7 @@ fn interpolator(target_update: TargetUpdate, extrapolate_periods: u32) -> FineIn
 }
 
 /// The instant `periods` and `part` thousandths after the epoch.
-fn time(periods: i64, part: i64) -> SystemTime {
+fn time(periods: i64, part: i64) -> MonotonicTime {
     EPOCH + PERIOD * periods + DurationNs(PERIOD.0 / 1000 * part)
 }
 
@@ -19,7 +19,7 @@ fn position(value: i64) -> SetPoints {
     SetPoints { position: Some(Position(value)), ..SetPoints::default() }
 }
 
-fn position_at(interpolator: &mut FineInterpolator, now: SystemTime) -> i64 {
+fn position_at(interpolator: &mut FineInterpolator, now: MonotonicTime) -> i64 {
     interpolator.at(now).set_points.position.unwrap().0
 }
 
@@ -232,20 +232,46 @@ fn stamps_that_cannot_be_right_are_refused_and_leave_no_trace() {
     }
     let target = time(3 + MAX_GAP + 1, 0);
     assert_eq!(interpolator.update(target, &position(9_999)), Err(UpdateError::Gap { last, target }));
-    let target = SystemTime::MAX;
+    let target = MonotonicTime::MAX;
     assert_eq!(interpolator.update(target, &position(9_999)), Err(UpdateError::Gap { last, target }));
     assert_eq!(interpolator.update(time(4, 0), &position(i64::MAX)), Err(UpdateError::Jump));
     interpolator.update(time(4, 0), &position(4_000)).unwrap();
     assert_eq!(position_at(&mut interpolator, time(3, 500)), 3_500);
 }
 
+/// A controller whose clock is ahead: its updates come long before their time, and each is served at its own (M4).
 #[test]
-fn a_step_of_the_system_time_moves_nothing() {
-    let step = DurationNs::from_secs(37);
-    let (mut plain, mut shifted) = (fed(&[60, 240, 600]), fed(&[60, 240, 600]));
-    shifted.shift(step);
-    for part in (0..3_000).step_by(111) {
-        assert_eq!(plain.at(time(0, part)), shifted.at(time(0, part) + step));
+fn updates_far_ahead_of_their_time_wait_for_it() {
+    for ahead in [0, 1, 2, 4, 10] {
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+        interpolator.start(Some(Position(0)));
+        for period in 1..60_i64 {
+            interpolator
+                .update(time(period + 2 + ahead, 0), &position((period + 2 + ahead) * 1_000))
+                .unwrap();
+            for part in [0, 250, 500, 750] {
+                let expected = period * 1_000 + part;
+                if period > 4 + ahead {
+                    assert_eq!(position_at(&mut interpolator, time(period, part)), expected, "{ahead}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_update_for_which_there_is_no_room_is_refused_and_the_curve_in_use_goes_on() {
+    let mut interpolator = fed(&[1_000, 2_000]);
+    assert_eq!(position_at(&mut interpolator, time(0, 500)), 500);
+    let mut refused = None;
+    for target in 3..40 {
+        if let Err(error) = interpolator.update(time(target, 0), &position(target * 1_000)) {
+            refused.get_or_insert((target, error));
+        }
+    }
+    assert_eq!(refused, Some((17, UpdateError::Ahead { target: time(17, 0) })));
+    for (periods, part) in [(0, 500), (1, 500), (9, 250), (16, 0)] {
+        assert_eq!(position_at(&mut interpolator, time(periods, part)), periods * 1_000 + part);
     }
 }
 
@@ -304,7 +330,7 @@ proptest! {
         let mut interpolator = interpolator(TargetUpdate::Extrapolate, MAX_EXTRAPOLATION);
         interpolator.start(Some(Position(0)));
         for (time, place, speed) in updates {
-            let time = SystemTime(time >> spread);
+            let time = MonotonicTime(time >> spread);
             let set_points = SetPoints {
                 position: Some(Position(place >> (spread / 2))),
                 velocity: Some(Velocity(speed >> (spread / 2))),
@@ -314,14 +340,13 @@ proptest! {
                 interpolator.start(None);
             }
             interpolator.at(time);
-            interpolator.shift(DurationNs(speed));
-            interpolator.at(SystemTime(time.0.wrapping_mul(3)));
+            interpolator.at(MonotonicTime(time.0.wrapping_mul(3)));
         }
     }
 }
 
 /// A trajectory with a bounded acceleration: position, velocity and acceleration `periods` thousandths after the epoch.
-fn swing(at: SystemTime) -> Motion {
+fn swing(at: MonotonicTime) -> Motion {
     // One swing in 0.4 s, 0.2 units to either side: at most 49.3 units per second squared.
     let angle = cast::f64_from_i64(at.since(EPOCH).0) / 1e9 * SWING;
     let nano = |value: f64| cast::i64_from_f64(value * 1e9);

@@ -5,7 +5,7 @@ use crate::capture::{
     CaptureEdge, CaptureKind, CaptureRequest, CaptureResult, CaptureSource, CaptureStatus, CaptureWindow,
 };
 use crate::quantity::Position;
-use crate::time::SystemTime;
+use crate::time::MonotonicTime;
 use arrayvec::ArrayVec;
 
 /// Results that wait to be taken; beyond that the oldest is lost.
@@ -75,7 +75,7 @@ impl Captures {
     }
 
     /// Arms or disarms. A capture that is disarmed gives a result that says so.
-    pub(super) fn request(&mut self, request: CaptureRequest, at: SystemTime) {
+    pub(super) fn request(&mut self, request: CaptureRequest, at: MonotonicTime) {
         let slot = CaptureKind::new(request.source, request.edge).index();
         let before = core::mem::replace(&mut self.armed[slot], request.arm.then_some(request));
         self.awaiting_marker[slot] = false;
@@ -95,7 +95,7 @@ impl Captures {
         source: CaptureSource,
         active: bool,
         position: Position,
-        at: SystemTime,
+        at: MonotonicTime,
     ) {
         let edge = if active { CaptureEdge::Positive } else { CaptureEdge::Negative };
         self.trigger(source, edge, position, at);
@@ -146,7 +146,7 @@ impl Captures {
         }
     }
 
-    fn pass_marker(&mut self, marker: CaptureEdge, place: Position, at: SystemTime) {
+    fn pass_marker(&mut self, marker: CaptureEdge, place: Position, at: MonotonicTime) {
         for (source, wanted) in AFTER_SWITCH {
             for edge in CaptureEdge::ALL {
                 let slot = CaptureKind::new(source, *edge).index();
@@ -157,7 +157,7 @@ impl Captures {
         }
     }
 
-    fn trigger(&mut self, source: CaptureSource, edge: CaptureEdge, position: Position, at: SystemTime) {
+    fn trigger(&mut self, source: CaptureSource, edge: CaptureEdge, position: Position, at: MonotonicTime) {
         let slot = CaptureKind::new(source, edge).index();
         let Some(request) = self.armed[slot] else { return };
         if request.window.is_some_and(|window| !window.contains(position)) {
@@ -169,7 +169,13 @@ impl Captures {
         self.give(&request, CaptureStatus::Captured, position, at);
     }
 
-    fn give(&mut self, request: &CaptureRequest, status: CaptureStatus, position: Position, at: SystemTime) {
+    fn give(
+        &mut self,
+        request: &CaptureRequest,
+        status: CaptureStatus,
+        position: Position,
+        at: MonotonicTime,
+    ) {
         if self.results.is_full() {
             self.results.remove(0);
         }

@@ -17,7 +17,7 @@ use crate::quantity::{Acceleration, Current, Position, Temperature, Torque, Velo
 use crate::ratio::{Ratio, Rounding};
 use crate::scaling::{AxisScaling, fold};
 use crate::state::Report;
-use crate::time::{DurationNs, SystemTime};
+use crate::time::{DurationNs, MonotonicTime};
 use arrayvec::ArrayVec;
 
 /// Velocity in parts of the limit from which the drive faults.
@@ -68,7 +68,7 @@ pub struct Servo {
     /// Faults whose condition is present.
     active: ArrayVec<FaultCause, MAX_ACTIVE_FAULTS>,
     latched: Option<(FaultCause, Reaction)>,
-    now: SystemTime,
+    now: MonotonicTime,
 }
 
 impl Servo {
@@ -95,7 +95,7 @@ impl Servo {
             set_point: None,
             active: ArrayVec::new(),
             latched: None,
-            now: SystemTime::ZERO,
+            now: MonotonicTime::ZERO,
         })
     }
 
@@ -125,7 +125,7 @@ impl Servo {
     }
 
     /// Sets the simulated instant; each step moves it on.
-    pub fn set_time(&mut self, now: SystemTime) {
+    pub fn set_time(&mut self, now: MonotonicTime) {
         self.now = now;
     }
 

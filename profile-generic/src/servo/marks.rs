@@ -3,7 +3,7 @@
 use super::ServoParameters;
 use crate::capture::CaptureEdge;
 use crate::quantity::Position;
-use crate::time::{DurationNs, SystemTime};
+use crate::time::{DurationNs, MonotonicTime};
 use arrayvec::ArrayVec;
 
 /// Places at which an input is active.
@@ -22,7 +22,7 @@ pub struct Marks {
 pub(super) struct Passage {
     /// Distance from the beginning of the stretch: finer than the time.
     pub way: u64,
-    pub at: SystemTime,
+    pub at: MonotonicTime,
     pub edge: CaptureEdge,
     pub place: Position,
 }
@@ -32,7 +32,7 @@ pub(super) struct Passage {
 pub(super) struct Stretch {
     pub from: Position,
     pub to: Position,
-    pub begin: SystemTime,
+    pub begin: MonotonicTime,
     pub length: DurationNs,
 }
 
@@ -48,7 +48,7 @@ impl Stretch {
     }
 
     /// When the stretch is at the place.
-    pub fn time_at(&self, place: i64) -> SystemTime {
+    pub fn time_at(&self, place: i64) -> MonotonicTime {
         let whole = i128::from(self.to.0) - i128::from(self.from.0);
         if whole == 0 {
             return self.begin;

@@ -418,7 +418,7 @@ fn every_order_of_home_switch_and_marker_and_every_edge_of_a_mark() {
 fn registration_inputs_capture_on_their_edge_within_their_window() {
     let mut servo =
         Servo::new(ServoParameters { start_position: Position(55), ..ServoParameters::default() }).unwrap();
-    servo.set_time(SystemTime(1_000));
+    servo.set_time(MonotonicTime(1_000));
     let outside = CaptureWindow { from: Position(60), to: Position(70) };
     servo.capture(CaptureRequest {
         window: Some(outside),
@@ -437,7 +437,7 @@ fn registration_inputs_capture_on_their_edge_within_their_window() {
     );
     servo.set_registration(2, false);
     let result = servo.poll_capture().unwrap();
-    assert_eq!((result.id, result.position, result.at), (2, Position(55), SystemTime(1_000 + 1_000_000)));
+    assert_eq!((result.id, result.position, result.at), (2, Position(55), MonotonicTime(1_000 + 1_000_000)));
     servo.set_registration(2, true);
     servo.set_registration(2, false);
     assert_eq!(servo.poll_capture(), None, "once only");

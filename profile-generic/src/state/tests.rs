@@ -408,9 +408,29 @@ fn a_silent_drive_ends_in_a_fault_after_the_time_limit() {
     assert_eq!(silent.fault, Some(FaultCause::SOUTH_SILENCE));
     assert_eq!(drive.report(Report::Silent).action, Action::None, "the controlled stop is not cut short");
     let late = drive.handle(Event::Timeout);
-    assert_eq!((late.next, late.action), (DriveState::Faulted, Action::TorqueOff));
+    assert_eq!((late.next, late.action), (DriveState::Faulted, Action::None), "nor by the end of the wait");
     let back = drive.report(Report::Operating);
     assert_eq!((back.next, back.fault), (DriveState::Faulted, Some(FaultCause::UNEXPECTED_TORQUE)));
+}
+
+#[test]
+fn a_silent_drive_keeps_no_hold_and_a_heard_one_loses_its_torque_at_the_time_limit() {
+    let mut drive = operating();
+    assert_eq!(drive.raise_fault(Reaction::HoldPosition).action, Action::Halt);
+    drive.report(Report::Silent);
+    let late = drive.handle(Event::Timeout);
+    assert_eq!((late.next, late.action), (DriveState::Faulted, Action::Disable));
+
+    let mut drive = operating();
+    drive.raise_fault(Reaction::CoastAndDisable);
+    drive.report(Report::Silent);
+    assert_eq!(drive.handle(Event::Timeout).action, Action::None, "torque off stands already");
+
+    let mut drive = operating();
+    drive.raise_fault(Reaction::DecelerateAndDisable);
+    drive.report(Report::Stopping);
+    let late = drive.handle(Event::Timeout);
+    assert_eq!((late.next, late.action), (DriveState::Faulted, Action::TorqueOff));
 }
 
 #[test]

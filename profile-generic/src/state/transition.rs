@@ -92,7 +92,7 @@ impl DriveState {
             Event::FaultCleared => self.after_reset(conditions),
             Event::TestComplete => self.end_test(conditions, Action::None),
             Event::CommandLost => self.fail(FaultCause::COMMAND_LOST),
-            Event::Timeout => self.on_timeout(),
+            Event::Timeout => self.on_timeout(conditions),
         }
     }
 
@@ -251,7 +251,7 @@ impl DriveState {
         }
     }
 
-    const fn on_timeout(self) -> Transition {
+    const fn on_timeout(self, conditions: &Conditions) -> Transition {
         match self {
             Self::Starting => {
                 Transition::to(Self::FaultReaction, Action::Disable).because(FaultCause::START_TIME_OUT)
@@ -259,6 +259,11 @@ impl DriveState {
             Self::Stopping => {
                 Transition::to(Self::FaultReaction, Action::TorqueOff).because(FaultCause::STOP_TIME_OUT)
             }
+            // Nobody hears the drive, and it may hear every word: a stop that it is about is not made a coasting.
+            Self::FaultReaction if !conditions.initialised => match conditions.reaction {
+                Reaction::HoldPosition => Transition::to(Self::Faulted, Action::Disable),
+                _ => Transition::to(Self::Faulted, Action::None),
+            },
             Self::FaultReaction => Transition::to(Self::Faulted, Action::TorqueOff),
             _ => self.stay(),
         }

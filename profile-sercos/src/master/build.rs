@@ -8,7 +8,7 @@ use super::Master;
 use super::event::SlaveId;
 use super::layout::CyclicLayout;
 use super::scan;
-use super::station::{End, Station};
+use super::station::{End, Presence, Station};
 use crate::wire::cp0::{self, AtRepr, MdtRepr, SequenceCounter};
 use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
@@ -110,9 +110,9 @@ impl Master {
         }
         for (index, station) in stations.iter().enumerate() {
             if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
-                fill_station(&mut mdts, slot, station, ring);
+                fill_station(&mut mdts, slot, station, ring, station.is_addressed(phase));
             }
-            if phase == Phase::CP4 && station.is_active() {
+            if phase == Phase::CP4 && station.presence != Presence::Joining && station.is_addressed(phase) {
                 fill_connections(&mut mdts, layout, index, station);
             }
         }
@@ -150,18 +150,16 @@ impl Master {
     }
 }
 
-/// Writes a slave's service channel and C-DEV into the MDT that has them. One that takes no part is told nothing but
+/// Writes a slave's service channel and C-DEV into the MDT that has them. One that is not addressed is told nothing but
 /// that its topology is to stay as it is.
-fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool) {
-    if station.is_served()
-        && let Some(bytes) = part(mdts, slot.svc.0, slot.svc.1..slot.svc.1 + SVC_LEN)
-    {
+fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool, addressed: bool) {
+    if addressed && let Some(bytes) = part(mdts, slot.svc.0, slot.svc.1..slot.svc.1 + SVC_LEN) {
         let _ = station.channel.outgoing().emit(bytes);
     }
     if let Some(bytes) = part(mdts, slot.device.0, slot.device.1..slot.device.1 + DEVICE_WORD_LEN) {
         let mut control = station.command;
-        control.set(DeviceControl::MASTER_VALID, station.is_served());
-        control.set(DeviceControl::RING_CLOSED, ring && station.is_served());
+        control.set(DeviceControl::MASTER_VALID, addressed);
+        control.set(DeviceControl::RING_CLOSED, ring && addressed);
         put_u16(bytes, 0, control.bits());
     }
 }

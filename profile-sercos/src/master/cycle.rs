@@ -21,6 +21,9 @@ use crate::wire::svc::{AtSvc, SVC_LEN, SvcStatus};
 /// Cycles with CPS set, at least; CP4 may have connections between slaves, which need one more.
 const LEAVE_CYCLES: u32 = 2;
 const LEAVE_CYCLES_CP3: u32 = 3;
+/// Cycles in a row in which a lost slave has to be valid before it takes part again: a bad contact lets one through now and
+/// then.
+const RETURN_CYCLES: u16 = 10;
 /// States which one cycle can pass at most; more would be a loop in the table.
 const STATES_PER_CYCLE: usize = 8;
 
@@ -31,7 +34,8 @@ impl Master {
             self.advance(now, PhaseEvent::Up);
             return;
         }
-        if self.state.phase().is_some() || self.state == State::Down {
+        let left_out = core::mem::take(&mut self.left_out);
+        if (self.state.phase().is_some() || self.state == State::Down) && !left_out {
             if !self.evaluated {
                 self.statistics.at_missing += u64::from(!self.is_complete());
                 self.evaluate(now);
@@ -48,6 +52,7 @@ impl Master {
             return;
         }
         self.build();
+        self.send_at = now;
         self.schedule(now);
     }
 
@@ -71,6 +76,7 @@ impl Master {
         let target = self.target.unwrap_or(Phase::CP0);
         match self.state {
             State::Nrt | State::Cp4 => None,
+            State::Listen | State::Occupied => self.decide_listen(now),
             State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3 => {
                 (now >= self.next_cycle).then_some(PhaseEvent::Elapsed)
             }
@@ -349,11 +355,14 @@ impl Master {
                         self.lose(index);
                     }
                 }
-                Presence::Lost if valid && !station.returned => {
-                    station.returned = true;
-                    self.emit(Event::SlaveReturned { slave: SlaveId::from_index(index) });
+                Presence::Lost if valid && self.state == State::Cp4 => {
+                    station.valid_cycles = station.valid_cycles.saturating_add(1);
+                    if station.valid_cycles >= RETURN_CYCLES {
+                        self.take_back(index);
+                    }
                 }
-                Presence::Lost | Presence::Excluded | Presence::Absent | Presence::Joining => {}
+                Presence::Lost => station.valid_cycles = 0,
+                Presence::Excluded | Presence::Absent | Presence::Joining => {}
             }
         }
         if !self.stations[..self.found].iter().any(Station::is_active) {
@@ -364,11 +373,26 @@ impl Master {
     pub(super) fn lose(&mut self, index: usize) {
         let station = &mut self.stations[index];
         station.presence = Presence::Lost;
+        station.valid_cycles = 0;
         self.admission.count_anew();
         station.channel.abort(SvcFailure::SlaveLost);
         let address = station.address;
         let slave = SlaveId::from_index(index);
         self.emit(Event::SlaveLost { slave, address, phase: self.layout_phase });
+    }
+
+    /// A lost slave is valid again. One that had gone to NRT could not be: it is as it was, and takes part again.
+    fn take_back(&mut self, index: usize) {
+        let station = &mut self.stations[index];
+        station.presence = Presence::Active;
+        station.misses = 0;
+        for end in &mut station.ends {
+            if let End::Consumer(end) = end {
+                end.reset();
+            }
+        }
+        self.admission.count_anew();
+        self.emit(Event::SlaveReturned { slave: SlaveId::from_index(index) });
     }
 
     fn all_lost(&mut self) {
@@ -411,6 +435,8 @@ impl Master {
                 self.frames.silence();
                 self.emit(Event::Stopped);
             }
+            State::Listen => self.enter_listen(now),
+            State::Occupied => self.enter_occupied(now, last),
             State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3 => {
                 self.frames.silence();
                 self.evaluated = true;

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::connection::ConsumerState;
+use super::foreign::OtherMaster;
 pub use super::hot_plug::HotPlugRefusal;
 use super::layout::LayoutError;
 use super::svc::request::{SvcFailure, SvcOutcome};
@@ -81,6 +82,11 @@ pub enum Event {
     Phase(Phase),
     /// No more SERCOS telegrams are sent.
     Stopped,
+    /// Another master sends on the wire. Before the first telegram, and below CP4, this one waits until he is silent; in CP4 the
+    /// application stops what it leads and calls `give_way`.
+    OtherMaster(OtherMaster),
+    /// No more SERCOS telegrams are sent, because of another master. They begin again when he is silent.
+    GaveWay,
     /// CP0: topology and address list are stable.
     Scanned {
         /// Slaves found.
@@ -211,7 +217,8 @@ pub enum Event {
         /// Its SERCOS address.
         address: u16,
     },
-    /// A slave is not valid any more. It takes no part until the next scan, or until it comes in by hot plug.
+    /// A slave is not valid any more. It takes no part until it is valid again in CP4, comes in by hot plug, or is found by
+    /// the next scan.
     SlaveLost {
         /// The slave.
         slave: SlaveId,
@@ -220,7 +227,7 @@ pub enum Event {
         /// The phase in which it went.
         phase: Phase,
     },
-    /// A lost slave is valid again; it takes no part until the next scan.
+    /// A lost slave is valid again in CP4 and takes part: it had never left.
     SlaveReturned {
         /// The slave.
         slave: SlaveId,
@@ -293,6 +300,10 @@ impl fmt::Display for Event {
         match self {
             Event::Phase(phase) => write!(f, "{phase}"),
             Event::Stopped => f.write_str("no SERCOS telegrams any more"),
+            Event::OtherMaster(other) => write!(f, "{other}"),
+            Event::GaveWay => {
+                f.write_str("no SERCOS telegrams any more until the other master has been silent for a while")
+            }
             Event::Scanned { slaves } => write!(f, "{slaves} slaves found"),
             Event::NoSlaves => f.write_str("no slave answers"),
             Event::ScanUnstable => f.write_str("topology or address list do not become stable"),
@@ -348,7 +359,7 @@ impl fmt::Display for Event {
                 write!(f, "{slave} with address {address} was lost in {phase}")
             }
             Event::SlaveReturned { slave } => {
-                write!(f, "{slave} is valid again and stays out until the next scan")
+                write!(f, "{slave} is valid again and takes part")
             }
             Event::PlaceKept { address } => {
                 write!(f, "a place is kept for the slave with address {address}: it can be plugged in later")

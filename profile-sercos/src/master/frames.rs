@@ -165,6 +165,12 @@ impl Frames {
         Some((port_of(frame.telegram.channel()), &frame.bytes[..frame.len]))
     }
 
+    /// The frames of this cycle are not sent: whatever comes is refused.
+    pub fn discard(&mut self) {
+        self.out = false;
+        self.next = self.used;
+    }
+
     pub fn has_transmit(&self) -> bool {
         self.next < self.used
     }

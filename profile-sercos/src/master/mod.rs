@@ -22,6 +22,7 @@ pub mod config;
 pub mod connection;
 mod cycle;
 pub mod event;
+pub mod foreign;
 mod frames;
 pub mod hot_plug;
 pub mod layout;
@@ -43,6 +44,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use self::config::{ConfigError, Connections, MasterConfig};
 use self::connection::Consumer;
 use self::event::{Event, Output, Port, Refusal, SlaveId, Statistics, Ticket};
+use self::foreign::{Foreign, OtherMaster};
 use self::frames::Frames;
 use self::hot_plug::Admission;
 use self::layout::CyclicLayout;
@@ -123,6 +125,8 @@ pub struct Master {
     redundancy: Redundancy,
     admission: Admission,
     measuring: Measuring,
+    foreign: Foreign,
+    heard: Option<OtherMaster>,
     /// Slaves in a stable scan that has not been taken over yet.
     scan_ready: Option<u16>,
     stations: Vec<Station>,
@@ -143,6 +147,10 @@ pub struct Master {
     left_before: bool,
     proceed: bool,
     next_cycle: MonotonicTime,
+    /// When the frames that are built go out.
+    send_at: MonotonicTime,
+    /// The frames of the last cycle were built and left out: nothing can have come back.
+    left_out: bool,
     system_time: Option<SystemTime>,
     /// The system time sent, latched for eight cycles, and its toggle.
     latched_time: Option<(SystemTime, bool)>,
@@ -152,7 +160,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// A master that sends nothing until a phase is set as the target.
+    /// A master that sends nothing until a phase is set as the target, and then listens first ([`foreign::LISTEN`]).
     pub fn new(config: MasterConfig) -> Result<Master, ConfigError> {
         config.check()?;
         let slaves = usize::from(config.slaves_max);
@@ -167,6 +175,8 @@ impl Master {
             redundancy: Redundancy::new(config.ports, slaves),
             admission: Admission::new(&config),
             measuring: Measuring::default(),
+            foreign: Foreign::default(),
+            heard: None,
             scan_ready: None,
             stations: (0..slaves).map(|_| Station::new(&config)).collect(),
             turning: Vec::with_capacity(slaves),
@@ -179,6 +189,8 @@ impl Master {
             left_before: false,
             proceed: false,
             next_cycle: MonotonicTime::ZERO,
+            send_at: MonotonicTime::ZERO,
+            left_out: false,
             system_time: None,
             latched_time: None,
             events: VecDeque::with_capacity(EVENTS_MAX),
@@ -235,19 +247,64 @@ impl Master {
     /// When to call [`Master::poll`] next; `None` when nothing will happen by itself.
     #[must_use]
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        if self.frames.has_transmit() || (self.state == State::Nrt && self.target.is_some()) {
+        if self.frames.has_transmit() {
+            return Some(self.send_at);
+        }
+        let begins = self.state == State::Nrt && self.target.is_some();
+        let ends = self.state.listens() && self.target.is_none();
+        if begins || ends {
             return Some(MonotonicTime::ZERO);
         }
         (self.state != State::Nrt).then_some(self.next_cycle)
     }
 
-    /// Starts the next cycle when its time has come, and gives its frames one by one.
+    /// The instant on the grid at which the next cycle begins that is not built yet; `None` outside of CP4, where values are
+    /// transmitted.
+    #[must_use]
+    pub fn next_cycle(&self) -> Option<MonotonicTime> {
+        (self.state == State::Cp4).then_some(self.next_cycle)
+    }
+
+    /// Builds the frames of the next cycle ahead of its instant; [`Master::poll`] gives them when that has come. To be called
+    /// when everything of the cycle before has come back and all values are committed. Outside of CP4 nothing is built ahead.
+    pub fn prepare(&mut self) {
+        if self.state == State::Cp4 && !self.frames.has_transmit() {
+            self.cycle(self.next_cycle);
+        }
+    }
+
+    /// Leaves out what could only go out late, by more than half a cycle, in CP4: frames that are built, and cycles that are not.
+    /// A late MST would be near the next one, and no slave takes it for this cycle's. The grid stays where it is.
+    pub fn skip_late(&mut self, now: MonotonicTime) {
+        if self.state != State::Cp4 {
+            return;
+        }
+        let cycle = self.cycle_time();
+        let late = |at: MonotonicTime| now.since(at).as_nanos() > cycle.as_nanos() / 2;
+        if self.frames.has_transmit() && late(self.send_at) {
+            self.frames.discard();
+            self.left_out = true;
+            self.statistics.skipped += 1;
+        }
+        if !self.frames.has_transmit() && late(self.next_cycle) {
+            let behind = now.since(self.next_cycle).as_nanos() + cycle.as_nanos() / 2;
+            let missed = (behind / cycle.as_nanos()).max(1);
+            self.next_cycle = self.next_cycle + cycle * missed;
+            self.statistics.skipped += missed.unsigned_abs();
+        }
+    }
+
+    /// Starts the next cycle when its time has come, and gives its frames one by one; those that were built ahead at their
+    /// instant.
     pub fn poll(&mut self, now: MonotonicTime) -> Option<Output<'_>> {
         if !self.frames.has_transmit() {
             let due = self.wake_at().is_some_and(|at| now >= at);
             if due {
                 self.cycle(now);
             }
+        }
+        if now < self.send_at {
+            return None;
         }
         self.frames.next_transmit().map(|(port, frame)| Output::Transmit { port, frame })
     }
@@ -264,6 +321,7 @@ impl Master {
                 Ok(())
             }
             Err(reason) => {
+                let reason = self.hear(now, port, frame, reason);
                 self.statistics.count_refusal(reason);
                 Err(reason)
             }

@@ -1,8 +1,10 @@
 //! The phases as the master goes through them.
 //!
 //! ```text
-//! Nrt --> Silence0 --> Settle --> Scan <--> Cp0
-//!                                            |
+//! Nrt --> Listen --> Settle --> Scan <--> Cp0
+//!           |          ^                   |
+//!           v          |                   |
+//!         Occupied ----+                   |
 //!   Leave0 --> Silence1 --> Identify --> OpenSvc --> Cp1
 //!                                                     |
 //!   Leave1 --> Silence2 --> Start2 --> Read2 --> Await2 --> Connect2 --> Write2 --> Measure2 --> Check2
@@ -13,10 +15,12 @@
 //!     +------------------------------------------------------------------------------------------+
 //!   Leave3 --> Start4 --> Cp4          Leave3 follows Check3 and has no silence behind it
 //!
-//!   every phase --> Down --> Silence0
+//!   every phase --> Down --> Silence0 --> Settle
+//!   every state with telegrams, and the silences --> Occupied, when another master sends on the wire
 //! ```
 //!
-//! `Leave` and `Down` send telegrams of the old phase with CPS set and the new phase in the header until the
+//! `Listen` sends nothing before it is known that nobody else does. `Occupied` sends nothing because somebody else does, until
+//! he has been silent for a while. `Leave` and `Down` send telegrams of the old phase with CPS set and the new phase in the header until the
 //! slaves have stopped inserting data. `Silence` sends nothing. `Await` is where the application works.
 
 use crate::wire::header::Phase;
@@ -26,6 +30,10 @@ use crate::wire::header::Phase;
 pub enum State {
     /// No SERCOS telegrams.
     Nrt,
+    /// Nothing was sent yet: listening for another master.
+    Listen,
+    /// Another master sends; waiting for him to be silent.
+    Occupied,
     /// Pause before CP0.
     Silence0,
     /// CP0, telegrams not evaluated yet.
@@ -99,12 +107,16 @@ pub enum PhaseEvent {
     Failed,
     /// The application is through.
     Proceed,
+    /// Another master sends on the wire.
+    Foreign,
 }
 
 impl State {
     /// All states.
-    pub const ALL: [State; 28] = [
+    pub const ALL: [State; 30] = [
         State::Nrt,
+        State::Listen,
+        State::Occupied,
         State::Silence0,
         State::Settle,
         State::Scan,
@@ -140,14 +152,18 @@ impl State {
         use PhaseEvent as E;
         use State as S;
         Some(match (self, event) {
-            (S::Nrt, E::Up | E::Restart) => S::Silence0,
-            (S::Silence0, E::Elapsed) => S::Settle,
+            (S::Nrt | S::Occupied, E::Foreign) => return None,
+            (_, E::Foreign) => S::Occupied,
+            (S::Nrt, E::Up | E::Restart) => S::Listen,
+            (S::Listen | S::Occupied | S::Silence0, E::Elapsed) => S::Settle,
             (S::Settle, E::Elapsed) => S::Scan,
             (S::Scan, E::Ready) => S::Cp0,
             (S::Cp0, E::Failed) => S::Scan,
             (S::Cp0, E::Up) => S::Leave0,
-            (S::Silence0 | S::Settle | S::Scan | S::Cp0, E::Stop) => S::Nrt,
-            (S::Silence0 | S::Settle | S::Scan | S::Cp0 | S::Down, E::Restart) => return None,
+            (S::Listen | S::Occupied | S::Silence0 | S::Settle | S::Scan | S::Cp0, E::Stop) => S::Nrt,
+            (S::Listen | S::Occupied | S::Silence0 | S::Settle | S::Scan | S::Cp0 | S::Down, E::Restart) => {
+                return None;
+            }
             (S::Leave0, E::Ready) => S::Silence1,
             (S::Silence1, E::Elapsed) => S::Identify,
             (S::Identify, E::Ready) => S::OpenSvc,
@@ -182,13 +198,14 @@ impl State {
         })
     }
 
-    /// The phase whose telegrams are on the wire; `None` in `Nrt`, in the silences and, as it depends on where it
-    /// came from, in `Down`.
+    /// The phase whose telegrams are on the wire; `None` in `Nrt`, while it listens, in the silences and, as it depends on
+    /// where it came from, in `Down`.
     #[must_use]
     pub const fn phase(self) -> Option<Phase> {
         use State as S;
         Some(match self {
-            S::Nrt | S::Silence0 | S::Silence1 | S::Silence2 | S::Silence3 | S::Down => return None,
+            S::Nrt | S::Listen | S::Occupied => return None,
+            S::Silence0 | S::Silence1 | S::Silence2 | S::Silence3 | S::Down => return None,
             S::Settle | S::Scan | S::Cp0 | S::Leave0 => Phase::CP0,
             S::Identify | S::OpenSvc | S::Cp1 | S::Leave1 => Phase::CP1,
             S::Start2
@@ -230,7 +247,14 @@ impl State {
     /// Whether nothing is sent until a time has come.
     #[must_use]
     pub const fn is_silent(self) -> bool {
-        matches!(self, State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3)
+        self.listens()
+            || matches!(self, State::Silence0 | State::Silence1 | State::Silence2 | State::Silence3)
+    }
+
+    /// Whether every telegram that is heard is another master's.
+    #[must_use]
+    pub const fn listens(self) -> bool {
+        matches!(self, State::Listen | State::Occupied)
     }
 
     /// Whether the service channels are served.
@@ -265,7 +289,7 @@ mod tests {
     #[test]
     fn whole_table() {
         use PhaseEvent::*;
-        let events = [Up, Restart, Stop, Elapsed, Ready, Failed, Proceed];
+        let events = [Up, Restart, Stop, Elapsed, Ready, Failed, Proceed, Foreign];
         let mut table = String::new();
         for state in State::ALL {
             for event in events {

@@ -10,6 +10,7 @@ use super::report::{REPORT_MAX, ReportRow};
 use super::svc::ServiceChannel;
 use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::DeviceStatus;
+use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 use crate::wire::svc::AtSvc;
@@ -113,7 +114,8 @@ pub(super) struct Station {
     pub presence: Presence,
     /// Routes on which the last cycle brought valid data, one bit each by [`super::topology::Route::index`].
     pub valid_routes: u8,
-    pub returned: bool,
+    /// Cycles in a row in which it was valid again since it was lost.
+    pub valid_cycles: u16,
     pub ends: ArrayVec<End, CONNECTIONS_MAX>,
     pub connections: Connections,
     pub address: u16,
@@ -159,7 +161,7 @@ impl Station {
             svc: None,
             told: DeviceStatus::empty(),
             misses: 0,
-            returned: false,
+            valid_cycles: 0,
             work: Work::Done,
             cursor: Cursor::default(),
             check_failed: false,
@@ -192,7 +194,7 @@ impl Station {
         self.svc = None;
         self.told = DeviceStatus::empty();
         self.misses = 0;
-        self.returned = false;
+        self.valid_cycles = 0;
         self.work = Work::Done;
         self.check_failed = false;
         self.checked = false;
@@ -208,6 +210,12 @@ impl Station {
     /// It takes part, or is on its way in: its service channel is served.
     pub fn is_served(&self) -> bool {
         matches!(self.presence, Presence::Active | Presence::Joining)
+    }
+
+    /// It is spoken to. One that was lost in CP4 may hear every word: it is told what the application wants of it, which is to
+    /// stop, until it is heard again or known to have left.
+    pub fn is_addressed(&self, phase: Phase) -> bool {
+        self.is_served() || phase == Phase::CP4 && self.presence == Presence::Lost
     }
 
     /// It is not there and can come in by hot plug.

@@ -1,15 +1,19 @@
-//! Whole cycles of the engine with two axes in motion, in virtual time.
+//! Whole cycles of the engine with axes in motion, in virtual time.
 
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::rig::motion::{SLIDE_END, TURNTABLE_END, both, moves};
-use axisbridge_tests::rig::{Rig, Settings};
-use criterion::Criterion;
+use axisbridge_tests::rig::many::{Crowd, Many, all};
+use axisbridge_tests::rig::motion::{SLIDE_END, TURNTABLE, TURNTABLE_END, both, moves};
+use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
+use criterion::{BenchmarkId, Criterion, Throughput};
 use profile_cip::controller::Step;
 use profile_generic::time::DurationNs;
 
 /// Moves there and back, of more than four seconds each: more cycles than a measurement takes.
 const MOVES: usize = 2_000;
+
+/// How many axes are measured, each a drive on one SERCOS line, in devices of up to 16.
+pub const AXES: [usize; 5] = [1, 2, 4, 16, 64];
 
 /// A rig whose axes go there and back.
 #[must_use]
@@ -22,14 +26,29 @@ pub fn shuttle() -> Rig {
     rig
 }
 
-/// So many cycles; gives the time that the engine took of them.
-fn engine_alone(rig: &mut Rig, count: u64) -> Duration {
-    let timed = |cycle: &mut dyn FnMut()| {
-        let start = Instant::now();
-        cycle();
-        start.elapsed()
-    };
-    (0..count).map(|_| rig.cycle_in(timed)).sum()
+/// A rig of so many turntables on a SERCOS line, all of which go there and back.
+#[must_use]
+pub fn crowd(axes: usize) -> Many {
+    let mut many = Many::ready(Crowd::line(axes));
+    many.connect(UPDATE_PERIOD_US, |_, axes| {
+        let go = |position: f64| {
+            let axis = |axis| Step::MoveAbsolute { axis, position, limits: TURNTABLE };
+            Step::Together((1..).take(axes).map(axis).collect())
+        };
+        let there_and_back = [go(TURNTABLE_END), go(0.0)].into_iter().cycle().take(MOVES);
+        std::iter::once(Step::Enable(all(axes))).chain(there_and_back).collect()
+    });
+    many.run_until(DurationNs::from_secs(30), "motion", |many| {
+        (0..many.axis_count()).all(|axis| many.velocity(axis) > 0)
+    });
+    many
+}
+
+/// Runs a call and gives the time that it took.
+fn timed(call: &mut dyn FnMut()) -> Duration {
+    let start = Instant::now();
+    call();
+    start.elapsed()
 }
 
 /// So many cycles; gives the time of engine, drives, network, explicit side and controller.
@@ -43,11 +62,16 @@ fn whole_chain(rig: &mut Rig, count: u64) -> Duration {
 
 /// Benches of this module.
 pub fn bench(criterion: &mut Criterion) {
+    two_axes(criterion);
+    by_axes(criterion);
+}
+
+fn two_axes(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("engine_cycle_two_axes");
     group.sample_size(20);
     let mut rig = shuttle();
     group.bench_function("engine", |bencher| {
-        bencher.iter_custom(|count| engine_alone(&mut rig, count));
+        bencher.iter_custom(|count| (0..count).map(|_| rig.cycle_in(timed)).sum());
     });
     group.bench_function("engine_drives_and_controller", |bencher| {
         bencher.iter_custom(|count| whole_chain(&mut rig, count));
@@ -55,4 +79,25 @@ pub fn bench(criterion: &mut Criterion) {
     group.finish();
     let report = rig.report();
     assert_eq!((report.failure, report.steps_finished < MOVES), (None, true), "the axes were in motion");
+}
+
+/// The engine alone, by the number of its axes: the simulated drives, the network and the controllers are not counted.
+fn by_axes(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("engine_cycle");
+    group.sample_size(20);
+    for axes in AXES {
+        let mut many = crowd(axes);
+        group.throughput(Throughput::Elements(u64::try_from(axes).unwrap_or(u64::MAX)));
+        group.bench_function(BenchmarkId::from_parameter(axes), |bencher| {
+            bencher.iter_custom(|count| (0..count).map(|_| many.cycle_in(timed)).sum());
+        });
+        for report in many.reports() {
+            assert_eq!(
+                (report.failure, report.steps_finished < MOVES),
+                (None, true),
+                "in motion all the time"
+            );
+        }
+    }
+    group.finish();
 }

@@ -16,7 +16,7 @@ use profile_generic::interpolation::{
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
 use profile_generic::state::Action;
-use profile_generic::time::{DurationNs, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Bytes set aside for the values of a connection.
 const TELEGRAM_MAX: usize = 64;
@@ -27,7 +27,7 @@ const AMPLITUDE: f64 = 1_000_000.0;
 /// Actual Data Set: position, velocity, acceleration.
 const WANTED: u8 = 0b111;
 /// When the first update counts; the instant does not matter.
-const START: SystemTime = SystemTime(1_000_000_000_000);
+const START: MonotonicTime = MonotonicTime(1_000_000_000_000);
 /// The status of a CiA 402 drive that operates and follows in csp: mode of operation, statusword.
 const CSP_OPERATING: u32 = 0x08_1037;
 /// Cycle of the bus; an update lasts two of them.
@@ -47,7 +47,7 @@ pub struct Axis {
     control: u32,
     status: u32,
     saturated: u32,
-    target: SystemTime,
+    target: MonotonicTime,
     swing: Vec<CommandValues>,
     next: usize,
 }

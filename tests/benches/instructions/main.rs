@@ -43,6 +43,11 @@ const CASES: &[&str] = &[
     "ten_axis_attributes",
     "identity_through_the_adapter",
     "engine_cycle_two_axes",
+    "engine_cycle_1",
+    "engine_cycle_2",
+    "engine_cycle_4",
+    "engine_cycle_16",
+    "engine_cycle_64",
     "rpdos_out",
     "tpdos_in_and_rpdos_out",
     "new_state_in_and_rpdos_out",
@@ -157,9 +162,16 @@ fn run(case: &str, count: u32) {
                 telegrams.swap(0, 1);
             });
         }
-        codec_case => {
-            let (name, axes) = codec_case.rsplit_once('_').expect("see --list");
-            codec(name, axes.parse().expect("see --list"), count);
+        by_axes => {
+            let (name, axes) = by_axes.rsplit_once('_').expect("see --list");
+            let axes = axes.parse().expect("see --list");
+            match name {
+                "engine_cycle" => {
+                    let mut many = engine::crowd(usize::from(axes));
+                    repeat(count, || many.cycle_in(|cycle| counted_engine(cycle)));
+                }
+                codec_case => codec(codec_case, axes, count),
+            }
         }
     }
 }

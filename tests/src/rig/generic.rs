@@ -305,6 +305,7 @@ impl<S: South> OneAxis<S> {
             axes: vec![axis],
             notices: producer,
             publisher,
+            lead: DurationNs::from_micros(100),
         });
         let mut rig = Self {
             engine,
@@ -334,7 +335,7 @@ impl<S: South> OneAxis<S> {
 
     /// Leads the axis by position set-points of this velocity, from where it is and as fast as it is.
     pub fn lead(&mut self, velocity: i64, selection: ModeSelection) {
-        let target = self.system() + UPDATE_PERIOD * 2;
+        let target = self.now + UPDATE_PERIOD * 2;
         let feedback = *self.feedback();
         let way = feedback.velocity.get() * target.since(feedback.at).as_nanos() / 1_000_000_000;
         self.want(|command| {
@@ -408,12 +409,12 @@ impl<S: South> OneAxis<S> {
             self.next_update = self.now + UPDATE_PERIOD;
             let way = velocity * UPDATE_PERIOD.as_nanos() / 1_000_000_000;
             self.command.position.0 += way;
-            self.command.target_time = Some(system + UPDATE_PERIOD * 2);
+            self.command.target_time = Some(self.now + UPDATE_PERIOD * 2);
             self.command.sequence += 1;
         }
         self.engine.axes_mut()[0].from_north(self.now, system, &self.command);
         self.command.request = None;
-        self.due = self.engine.cycle(self.now, system, &mut [], &mut [self.south.port()]);
+        self.due = self.engine.cycle(self.now, &mut [], &mut [self.south.port()]);
         self.south.exchange(self.now, self.cable);
         while let Ok(notice) = self.notice_queue.pop() {
             self.notices.push(notice);

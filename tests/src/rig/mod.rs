@@ -12,11 +12,16 @@
 //! test that fails
 //! prints the seed.
 
+pub mod clocks;
 pub mod explicit;
 pub mod generic;
+pub mod many;
 pub mod motion;
+pub mod motion_checker;
 pub mod network;
 pub mod ports;
+mod updates;
+pub mod wake_ups;
 
 use std::cell::Cell;
 use std::net::{Ipv4Addr, SocketAddrV4};
@@ -49,13 +54,17 @@ use profile_cip::wire::motion::Format;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time_base::TimeSample;
 use profile_sercos::police::court::{Court, Tried};
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
 
+use self::clocks::Clock;
+use self::motion_checker::MotionChecker;
 use self::network::{Knobs, Pipe};
 use self::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
+use self::wake_ups::WakeUps;
 
 /// The configuration of the box: a turntable (axis 1, revolutions) and a slide (axis 2, millimetres).
 pub const BOX: &str = include_str!("box.toml");
@@ -66,7 +75,7 @@ pub const FIXED_BOX: &str = include_str!("fixed.toml");
 /// Update period of the controller in microseconds: two cycles of the bus.
 pub const UPDATE_PERIOD_US: u32 = 4_000;
 
-/// Where the controller is; its datagrams come from [`IO_PORT`] there.
+/// Where the controller is; its datagrams come from [`Rig::command_port`] there.
 pub const CONTROLLER: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 1);
 
 /// TCP port of the controller.
@@ -153,6 +162,8 @@ pub struct Rig {
     pub devicenet: Vec<CanWire<DevicenetNode>>,
     /// The police over the line.
     pub court: Court,
+    /// The checker of every set-point.
+    pub motion_checker: MotionChecker,
     /// What was seen of each drive.
     pub watched: Vec<Watched>,
     /// The network between controller and box.
@@ -165,14 +176,30 @@ pub struct Rig {
     pub tamper_frame: Option<Tamper>,
     /// Whether there is a cable between the box and the line.
     pub cable: bool,
+    /// The clock of the controller.
+    pub controller_clock: Clock,
+    /// Whether the controller reports steps of its system time in its Controller Time Offset.
+    pub reports_steps: bool,
+    /// The clock of the gateway.
+    pub gateway_clock: Clock,
+    /// How late the engine runs.
+    pub wake_ups: WakeUps,
     /// Whether the stream of the controller still carries bytes.
     pub stream_works: bool,
+    /// UDP port that the controller's datagrams come from.
+    pub command_port: u16,
+    /// Whether the box accepts another stream of the controller.
+    pub accepts_streams: bool,
     mapping: Mapping,
     config: Config,
     seed: u64,
     now: MonotonicTime,
     clock: Rc<Cell<MonotonicTime>>,
     engine_due: MonotonicTime,
+    /// How late the wake-up for `engine_due` is.
+    lateness: DurationNs,
+    /// How late its last call was.
+    late: DurationNs,
     commissioners: Commissioners,
     link: AdapterEnd,
     notice_queue: rtrb::Consumer<Notice>,
@@ -214,18 +241,27 @@ impl Rig {
             can,
             devicenet: devicenet.collect(),
             court: Court::new(START),
+            motion_checker: MotionChecker::new(&config, settings.seed),
             knobs: settings.knobs,
             tamper_command: None,
             tamper_actual: None,
             tamper_frame: None,
             cable: true,
+            controller_clock: Clock::default(),
+            reports_steps: true,
+            gateway_clock: Clock::default(),
+            wake_ups: WakeUps::new(settings.seed),
             stream_works: true,
+            command_port: IO_PORT,
+            accepts_streams: true,
             mapping: mapping(),
             config,
             seed: settings.seed,
             now: START,
             clock: Rc::new(Cell::new(START)),
             engine_due: START,
+            lateness: DurationNs::ZERO,
+            late: DurationNs::ZERO,
             commissioners,
             link,
             notice_queue,
@@ -267,10 +303,26 @@ impl Rig {
         Rc::clone(&self.clock)
     }
 
-    /// System time, the same for controller and box.
+    /// System time of the gateway: the one place where it is made.
     #[must_use]
     pub fn system(&self) -> SystemTime {
-        SystemTime(self.now.0 + SYSTEM_OFFSET)
+        self.gateway_clock.system(self.now)
+    }
+
+    /// What the clock of the controller shows: its monotonic time and its system time.
+    #[must_use]
+    pub fn controller_time(&self) -> (MonotonicTime, SystemTime) {
+        (self.controller_clock.monotonic(self.now), self.controller_clock.system(self.now))
+    }
+
+    /// When the controller has something to do, in true time.
+    fn controller_due(&self) -> Option<MonotonicTime> {
+        Some(self.controller_clock.when(self.controller.as_ref()?.wake_at()?))
+    }
+
+    /// When the engine runs next: when it is due, later by what the wake-ups have, and not in a pause.
+    fn engine_wake(&self) -> MonotonicTime {
+        self.wake_ups.after_pause(self.engine_due + self.lateness)
     }
 
     /// Seconds since the box was switched on.
@@ -281,14 +333,16 @@ impl Rig {
 
     /// Goes on to the next thing that is due.
     pub fn step(&mut self) {
-        let controller = self.controller.as_ref().and_then(Controller::wake_at);
-        let due = [Some(self.engine_due), controller, self.actuals.wake_at()];
-        let next = due.into_iter().flatten().min().unwrap_or(self.engine_due);
+        let engine = self.engine_wake();
+        let due = [Some(engine), self.controller_due(), self.actuals.wake_at()];
+        let next = due.into_iter().flatten().min().unwrap_or(engine);
         self.now = next.clamp(self.now, self.now + STEP_MAX);
         self.clock.set(self.now);
         self.deliver();
-        if self.now >= self.engine_due {
+        if self.now >= engine {
             self.cycle();
+        } else if self.now > self.engine_due {
+            self.go_on_without_engine();
         }
         self.control();
         self.explicit();
@@ -361,7 +415,8 @@ impl Rig {
             Controller::new(config, program).expect("the controller's configuration is sound");
         let peer = SocketAddrV4::new(CONTROLLER, CONTROLLER_PORT);
         self.slot = Some(self.adapter.open(self.now, peer).expect("the box has room for a stream"));
-        controller.tcp_connected(self.now);
+        controller.tcp_connected(self.controller_clock.monotonic(self.now));
+        self.motion_checker.connected(self.now);
         self.controller = Some(controller);
         self.events.clear();
     }
@@ -400,6 +455,15 @@ impl Rig {
         }
     }
 
+    /// The box closes the controller's stream, as it does with an idle one.
+    pub fn close_stream(&mut self) {
+        self.drop_stream();
+        let now = self.now;
+        if let Some(controller) = self.controller.as_mut() {
+            controller.tcp_closed(now);
+        }
+    }
+
     /// The controller's events as text, one a line.
     #[must_use]
     pub fn log(&self) -> String {
@@ -419,7 +483,13 @@ impl Rig {
         self.north = NorthQueue::default();
         self.south = SouthQueue::default();
         // A box takes longer to start; the last telegrams of the old one are through by then.
-        self.engine_due = self.now + STEP_MAX;
+        self.set_due(self.now + STEP_MAX);
+    }
+
+    /// The engine is due then; how late it is found out now.
+    fn set_due(&mut self, due: MonotonicTime) {
+        self.engine_due = due;
+        self.lateness = self.wake_ups.lateness();
     }
 
     /// The SERCOS bus of the box.
@@ -469,7 +539,7 @@ impl Rig {
 
     /// Sends a datagram to the box, past the network's knobs.
     pub fn inject_datagram(&mut self, bytes: &[u8], from: SocketAddrV4) {
-        self.north.inbound.push_back((Bytes::of(bytes), from));
+        self.north.inbound.push_back((Bytes::of(bytes), from, self.now));
     }
 
     /// Puts a frame on the box's SERCOS port.
@@ -488,9 +558,8 @@ impl Rig {
     /// weigh the cycle alone. Before it comes everything that is due until then.
     pub fn cycle_in<T>(&mut self, around: impl FnOnce(&mut dyn FnMut()) -> T) -> T {
         loop {
-            let controller = self.controller.as_ref().and_then(Controller::wake_at);
-            let due = [controller, self.actuals.wake_at()].into_iter().flatten().min();
-            if due.is_none_or(|due| due >= self.engine_due) {
+            let due = [self.controller_due(), self.actuals.wake_at()].into_iter().flatten().min();
+            if due.is_none_or(|due| due >= self.engine_wake()) {
                 break;
             }
             self.now = due.unwrap_or(self.now).max(self.now);
@@ -498,13 +567,15 @@ impl Rig {
             self.control();
             self.explicit();
         }
-        self.now = self.engine_due.max(self.now);
+        self.now = self.engine_wake().max(self.now);
         self.deliver();
-        let (now, system) = (self.now, self.system());
-        let Self { engine, engine_due, north, south, can, devicenet, config, .. } = self;
+        self.before_cycle();
+        let (now, mut due) = (self.now, self.now);
+        let Self { engine, north, south, can, devicenet, config, .. } = self;
         let mut ports = ports_of(config, south, can, devicenet);
-        let result = around(&mut || *engine_due = engine.cycle(now, system, &mut [north], &mut ports));
+        let result = around(&mut || due = engine.cycle(now, &mut [north], &mut ports));
         drop(ports);
+        self.set_due(due);
         self.after_cycle();
         self.control();
         self.explicit();
@@ -557,12 +628,12 @@ impl Rig {
 
     /// What the network brings now.
     fn deliver(&mut self) {
-        let from = SocketAddrV4::new(CONTROLLER, IO_PORT);
+        let from = SocketAddrV4::new(CONTROLLER, self.command_port);
         while let Some(datagram) = self.commands.receive(self.now) {
-            self.north.inbound.push_back((datagram, from));
+            self.north.inbound.push_back((datagram, from, self.now));
         }
-        let (now, system) = (self.now, self.system());
-        while let Some(datagram) = self.actuals.receive(now) {
+        let (now, system) = self.controller_time();
+        while let Some(datagram) = self.actuals.receive(self.now) {
             if let Some(controller) = self.controller.as_mut() {
                 controller.handle_datagram(now, system, datagram.as_slice());
             }
@@ -570,10 +641,40 @@ impl Rig {
     }
 
     fn cycle(&mut self) {
-        let (now, system) = (self.now, self.system());
-        let Self { engine, engine_due, north, south, can, devicenet, config, .. } = self;
-        *engine_due = engine.cycle(now, system, &mut [north], &mut ports_of(config, south, can, devicenet));
+        self.before_cycle();
+        let now = self.now;
+        let Self { engine, north, south, can, devicenet, config, .. } = self;
+        let due = engine.cycle(now, &mut [north], &mut ports_of(config, south, can, devicenet));
+        self.set_due(due);
         self.after_cycle();
+    }
+
+    /// The engine is late: buses and drives go on.
+    fn go_on_without_engine(&mut self) {
+        self.line.handle_time(self.now);
+        self.can.iter_mut().for_each(|wire| wire.bus.advance(self.now));
+        self.devicenet.iter_mut().for_each(|wire| wire.bus.advance(self.now));
+        self.check_motion(|checker, rig| checker.observe(rig));
+    }
+
+    /// Shows the rig to the motion checker.
+    fn check_motion(&mut self, look: impl FnOnce(&mut MotionChecker, &Self)) {
+        let mut checker = std::mem::take(&mut self.motion_checker);
+        look(&mut checker, self);
+        self.motion_checker = checker;
+    }
+
+    /// What the engine finds at its ports when it is called now.
+    fn before_cycle(&mut self) {
+        self.late = self.now.since(self.engine_due);
+        let format = self.config.devices[0].connection_format;
+        let sample = TimeSample { at: self.now, system: self.system(), rate_ppb: 0 };
+        self.engine.feed_time(&sample);
+        for (datagram, ..) in &self.north.inbound {
+            if let Some(update) = updates::read(datagram.as_slice(), format, None) {
+                self.motion_checker.arrived(update.id);
+            }
+        }
     }
 
     /// The line answers, the network takes the device's datagrams, and the watchers look.
@@ -592,6 +693,11 @@ impl Rig {
         while let Ok(notice) = self.notice_queue.pop() {
             self.notices.push(notice);
         }
+        let late = self.late;
+        self.check_motion(|checker, rig| {
+            checker.called(rig, late);
+            checker.observe(rig);
+        });
         for (slave, watched) in self.line.slaves().iter().zip(&mut self.watched) {
             let [low, high, ..] = slave.store().number_of(Idn::DRIVE_CONTROL).to_le_bytes();
             let control = DriveControl::from_bits_retain(u16::from_le_bytes([low, high]));
@@ -605,35 +711,56 @@ impl Rig {
 
     /// The controller does what is due and its datagrams go on their way.
     fn control(&mut self) {
-        let (now, system) = (self.now, self.system());
+        let (now, system) = self.controller_time();
+        let hidden = if self.reports_steps { DurationNs::ZERO } else { self.controller_clock.stepped() };
         let Some(controller) = self.controller.as_mut() else { return };
         controller.handle_time(now, system);
+        let mut sent = Vec::new();
+        let format = self.config.devices[0].connection_format;
         let mut buffer = [0; DATAGRAM_MAX];
         while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
             let mut datagram = Bytes::of(&buffer[..length]);
+            sent.extend(updates::read(datagram.as_slice(), format, Some(&*controller)));
+            updates::hide_steps(datagram.as_mut_slice(), hidden);
             if self.tamper_command.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
-                self.commands.send(now, &self.knobs, datagram);
+                self.commands.send(self.now, &self.knobs, datagram);
             }
         }
         while let Some(event) = controller.poll_event() {
             self.events.push(event);
         }
-        if let Some(action) = controller.poll_stream_action() {
+        let action = controller.poll_stream_action();
+        for commanded in &sent {
+            self.check_motion(|checker, rig| checker.sent(rig, rig.now, commanded));
+        }
+        if let Some(action) = action {
             if let Some(slot) = self.slot.take() {
                 self.adapter.close(slot);
             }
-            self.stream_works = action == StreamAction::Reopen;
+            self.stream_works = action == StreamAction::Reopen && self.accepts_streams;
+            if let Some(controller) = self.controller.as_mut()
+                && action == StreamAction::Reopen
+                && !self.accepts_streams
+            {
+                controller.tcp_closed(now);
+            }
             if self.stream_works {
                 let peer = SocketAddrV4::new(CONTROLLER, CONTROLLER_PORT);
-                self.slot = Some(self.adapter.open(now, peer).expect("the box has room for a stream"));
-                controller.tcp_connected(now);
+                self.slot = Some(self.adapter.open(self.now, peer).expect("the box has room for a stream"));
+                if let Some(controller) = self.controller.as_mut() {
+                    controller.tcp_connected(now);
+                }
+                // A session that is registered anew leaves the motion connection, and its curve, as they are.
+                if self.engine.devices()[0].device().connection().is_none() {
+                    self.motion_checker.connected(self.now);
+                }
             }
         }
     }
 
     /// Moves everything that can move on the explicit side without time passing.
     fn explicit(&mut self) {
-        let now = self.now;
+        let (now, (controller_now, _)) = (self.now, self.controller_time());
         while let Some(reply) = self.link.reply() {
             self.adapter.complete(now, &reply);
         }
@@ -658,7 +785,7 @@ impl Rig {
                     }
                     moved = true;
                     if self.stream_works {
-                        controller.handle_stream(now, &buffer[..length]);
+                        controller.handle_stream(controller_now, &buffer[..length]);
                     }
                 }
             } else if let Some(controller) = self.controller.as_mut() {
@@ -672,8 +799,11 @@ impl Rig {
                 }
             }
             if !moved {
-                return;
+                break;
             }
+        }
+        if self.slot.is_some_and(|slot| self.adapter.is_done(slot)) {
+            self.close_stream();
         }
     }
 

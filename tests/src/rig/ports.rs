@@ -4,17 +4,20 @@
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
-use axisbridge::engine::port::{CanInput, CanPort, CanSent, EthernetPort, FRAME_MAX, NorthPort};
+use axisbridge::engine::port::{CanInput, CanPort, CanSent, Datagram, EthernetPort, FRAME_MAX, NorthPort};
 use axisbridge::simulate::can_bus::{CanNode, InProcessCan};
 use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::DriveNetwork;
-use profile_generic::can::Frame;
+use profile_generic::can::{Frame, Id};
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::police::court::Court;
 
 /// Frames or datagrams that a queue holds; more are lost.
 const QUEUE: usize = 64;
+
+/// Identifiers whose last frame is remembered: a box uses fewer.
+const SENT_MAX: usize = 256;
 
 /// Bytes of a frame or datagram.
 #[derive(Debug, Clone)]
@@ -52,8 +55,8 @@ impl Bytes {
 /// The UDP port of a device.
 #[derive(Debug)]
 pub struct NorthQueue {
-    /// What the device receives, with its sender.
-    pub inbound: VecDeque<(Bytes, SocketAddrV4)>,
+    /// What the device receives, with its sender and when it arrived.
+    pub inbound: VecDeque<(Bytes, SocketAddrV4, MonotonicTime)>,
     /// What the device has sent, with its destination.
     pub outbound: VecDeque<(Bytes, SocketAddrV4)>,
 }
@@ -65,11 +68,11 @@ impl Default for NorthQueue {
 }
 
 impl NorthPort for NorthQueue {
-    fn receive(&mut self, buffer: &mut [u8]) -> Option<(usize, SocketAddrV4)> {
-        let (datagram, from) = self.inbound.pop_front()?;
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram> {
+        let (datagram, from, arrived_at) = self.inbound.pop_front()?;
         let bytes = datagram.as_slice();
         buffer[..bytes.len()].copy_from_slice(bytes);
-        Some((bytes.len(), from))
+        Some(Datagram { len: bytes.len(), from, arrived_at: Some(arrived_at) })
     }
 
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
@@ -155,13 +158,21 @@ pub struct CanWire<N = DriveNode> {
     pub tamper: Option<TamperCan>,
     /// Runs what happens on the bus and in its drives; a test that weighs the box leaves it out.
     pub aside: fn(&mut dyn FnMut()),
+    /// When the box has sent a frame with an identifier last.
+    sent: Vec<(Id, MonotonicTime)>,
 }
 
 impl<N: CanNode> CanWire<N> {
     /// All there is, as it is.
     #[must_use]
     pub fn new(bus: InProcessCan<N>) -> Self {
-        Self { bus, tamper: None, aside: |run| run() }
+        Self { bus, tamper: None, aside: |run| run(), sent: Vec::with_capacity(SENT_MAX) }
+    }
+
+    /// When the box has sent a frame with this identifier last.
+    #[must_use]
+    pub fn sent_at(&self, id: Id) -> Option<MonotonicTime> {
+        self.sent.iter().find(|(known, _)| *known == id).map(|(_, at)| *at)
     }
 }
 
@@ -186,6 +197,11 @@ impl<N: CanNode> CanPort for CanWire<N> {
         let Self { bus, aside, .. } = self;
         let mut sent = CanSent::Failed;
         aside(&mut || sent = bus.send(now, frame));
+        match self.sent.iter().position(|(known, _)| *known == frame.id()) {
+            Some(place) => self.sent[place].1 = now,
+            None if self.sent.len() < SENT_MAX => self.sent.push((frame.id(), now)),
+            None => {}
+        }
         sent
     }
 }

@@ -4,4 +4,5 @@
 
 mod explicit;
 mod frames;
+mod strangers;
 mod updates;

@@ -17,14 +17,14 @@ use profile_cip::wire::motion::codes::NodeFault;
 /// Length of the data item in a class 1 datagram.
 const ITEM_LENGTH: usize = 16;
 /// Sequence count of the connection data.
-const SEQUENCE_COUNT: usize = 18;
+pub const SEQUENCE_COUNT: usize = 18;
 /// Format, revision, instance count and first instance behind the class 1 header.
 const FORMAT: usize = CLASS1_HEADER_LEN;
 const REVISION: usize = FORMAT + 1;
 const INSTANCE_COUNT: usize = FORMAT + 4;
 
 /// Where the instances of an update begin in its datagram.
-fn instances(datagram: &[u8]) -> Vec<usize> {
+pub fn instances(datagram: &[u8]) -> Vec<usize> {
     let data = Class1Datagram::parse(datagram).expect("the controller's own datagram").data;
     let frame = CommandFrame::parse(data).expect("the controller's own update");
     let mut at = datagram.len() - data.len() + frame.header().buffer_len();

@@ -433,14 +433,14 @@ fn the_basic_assembly_has_no_reverse_and_a_command_for_it_is_a_fault() {
         least = least.min(velocity(rig, 0));
         rig.engine.axes()[0].fault().is_some()
     });
+    let fault = rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::POSITION_COMMAND_LIMIT), "{}", rig.told());
     rig.run_until(millis(3_000), "rest", |rig| {
         least = least.min(velocity(rig, 0));
         velocity(rig, 0).abs() < NANO / 100
     });
     assert!(least > -NANO / 100, "it never ran in reverse: {least}");
     rig.run_for(millis(500));
-    let fault = rig.engine.axes()[0].fault().map(|fault| fault.cause);
-    assert_eq!(fault, Some(FaultCause::POSITION_COMMAND_LIMIT), "{}", rig.told());
     assert_eq!(codes(&rig), [(FaultType::AXIS_MFG, 6)], "{}", rig.told());
 }
 

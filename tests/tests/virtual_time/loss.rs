@@ -1,14 +1,21 @@
 //! Somebody is gone: the controller, its stream, the box, a drive.
 
+use std::cell::RefCell;
 use std::fmt::Write as _;
+use std::rc::Rc;
 
 use axisbridge::config::StoppingAction;
-use axisbridge_tests::rig::motion::{NANO, SLIDE_END, at_rest, both, in_motion, long_moves, millis, moves};
+use axisbridge_tests::rig::motion::{
+    NANO, SLIDE_END, arrival, at_rest, both, in_motion, long_moves, millis, moves,
+};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Failure, Step};
 use profile_cip::target::axis_state::AxisState;
+use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{AxisStateCode, FaultType, NodeFault};
+use profile_cip::wire::motion::{ActualFrame, ActualPosition};
 use profile_generic::fault::FaultCause;
+use profile_generic::scaling::UnitKind;
 use profile_generic::state::{DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -220,8 +227,8 @@ fn a_box_that_restarts_moves_nothing_until_it_is_asked_to() {
 fn a_box_that_ends_leaves_drives_without_torque_and_a_silent_bus() {
     for action in [StoppingAction::RampedDecelAndDisable, StoppingAction::CurrentDecelAndHold] {
         let mut rig = in_motion(stopping_by(action));
-        let (now, system) = (rig.now(), rig.system());
-        rig.engine.stop(now, system);
+        let now = rig.now();
+        rig.engine.stop(now);
         assert!(!rig.engine.is_stopped());
         let took = rig.run_until(millis(2_000), "the end", |rig| rig.engine.is_stopped());
         assert!(took < millis(200), "{action:?}: {took}");
@@ -240,12 +247,65 @@ fn a_single_lost_drive_is_taken_back_once_nobody_uses_the_others() {
     // The controller stops and disables the axis that it still has, and closes the connection.
     rig.run_until(millis(30_000), "the end of the connection", |rig| rig.status().connections == 0);
     assert_eq!(rig.status().phase, 4, "the bus stays up for the axis that is in use");
-    assert!(rig.engine.axes()[1].south().is_none(), "the drive does not come back by itself");
-    rig.run_until(millis(30_000), "the drive", |rig| {
-        rig.status().phase == 4 && rig.engine.axes()[1].south().is_some()
-    });
+    let heard = |rig: &Rig| rig.engine.axes()[1].feedback().report != Report::Silent;
+    assert!(!heard(&rig), "the drive does not come back by itself: it has left CP4");
+    rig.run_until(millis(30_000), "the drive", |rig| rig.status().phase == 4 && heard(rig));
     rig.run_for(millis(500));
     // Taking the bus down was the box's own wish: the axis that was well is well.
     assert_eq!(rig.engine.axes()[0].fault(), None);
     assert!(rig.torque_free());
+}
+
+/// Age of the time stamp in ns and the position in counts of both axes, in an update of the box that is sent now.
+fn stamped(bytes: &[u8], system: u64) -> Option<(u64, [i64; 2])> {
+    let frame = ActualFrame::parse(bytes.get(CLASS1_HEADER_LEN..)?).ok()?;
+    let stamp = frame.header().time_stamp?;
+    let counts = |position| match position {
+        ActualPosition::Dint(position) => i64::from(position),
+        ActualPosition::Lint(position) => position,
+    };
+    let mut positions = frame.instances().filter_map(|one| one.cyclic?.actual.position).map(counts);
+    Some((system - stamp, [positions.next()?, positions.next()?]))
+}
+
+#[test]
+fn one_lost_drive_leaves_the_time_stamp_of_the_other_fresh_and_its_own_position_held() {
+    for lost in 0..2 {
+        let other = 1 - lost;
+        // The last drive of the line is lost: that of either axis.
+        let mut settings = Settings::default();
+        if lost == 0 {
+            settings.drives = vec![(1, UnitKind::Linear), (2, UnitKind::Rotary)];
+            let swapped = BOX.replace("drive = \"drive-a\"", "drive = \"drive-?\"");
+            let swapped = swapped.replace("drive = \"drive-b\"", "drive = \"drive-a\"");
+            settings.configuration = swapped.replace("drive-?", "drive-b");
+        }
+        let mut rig = Rig::ready(settings);
+        rig.connect(vec![Step::Enable(both()), moves(1.0, 40.0), arrival(), Step::Dwell { seconds: 30.0 }]);
+        rig.run_until(millis(8_000), "both axes in place", |rig| rig.report().steps_finished == 3);
+        let (clock, offset) = (rig.clock(), rig.system().0 - rig.now().0);
+        let seen = Rc::new(RefCell::new(Vec::new()));
+        let log = Rc::clone(&seen);
+        rig.tamper_actual = Some(Box::new(move |datagram| {
+            log.borrow_mut().extend(stamped(datagram.as_slice(), clock.get().0 + offset));
+            true
+        }));
+        rig.run_for(millis(100));
+        let before = seen.borrow().last().expect("updates").1;
+        rig.line.cut(1);
+        rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[lost].fault().is_some());
+        seen.borrow_mut().clear();
+        rig.run_for(millis(2_000));
+        let seen = seen.borrow();
+        assert!(seen.len() > 300, "axis {lost} lost: {} updates", seen.len());
+        let oldest = seen.iter().map(|(age, _)| *age).max().expect("updates");
+        // Captured in the cycle of 2 ms before the update.
+        assert!(oldest <= 2_100_000, "axis {lost} lost: the time stamp is up to {oldest} ns old");
+        for (_, positions) in seen.iter() {
+            assert!((positions[lost] - before[lost]).abs() < 50, "held: {positions:?}, {before:?}");
+            assert!((positions[other] - before[other]).abs() < 50, "at rest: {positions:?}, {before:?}");
+        }
+        // It has been silent for longer than its stop is waited for.
+        assert_eq!(rig.report().axes[lost].state, Some(AxisStateCode::MAJOR_FAULTED));
+    }
 }

@@ -1,6 +1,7 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
 mod attributes;
+mod bench_controller;
 mod beside;
 mod can;
 mod can_captures;
@@ -9,6 +10,7 @@ mod can_faults;
 mod can_modes;
 mod devicenet;
 mod drive_profile;
+mod ending;
 mod events;
 mod faults;
 mod fixed;
@@ -16,15 +18,21 @@ mod hookup;
 mod hot_plug;
 mod indicators;
 mod inputs;
+mod limits;
 mod loss;
+mod many;
 mod modes;
+mod motion_checker;
 mod network;
 mod owner;
 mod planes;
 mod programs;
+mod reconnect;
 mod scaling;
 mod scripts;
 mod stalled;
 mod stopping;
 mod torque;
 mod trims;
+mod two_masters;
+mod ways_back;

@@ -296,7 +296,8 @@ fn without_its_north_side_a_homing_axis_stops() {
     rig.enable();
     rig.want(|command| command.select(BY_DRIVE));
     rig.run_until(500, "the speed", |rig| rig.speed() > NANO * 9 / 10);
-    let (now, system) = (rig.now(), rig.feedback().at);
+    let now = rig.now();
+    let system = rig.engine.time().system_at(now);
     rig.engine.axes_mut()[0].lose_north(now, system);
     rig.run_until(3_000, "rest without torque", |rig| {
         rig.state() == DriveState::Faulted && rig.speed().abs() < NANO / 50

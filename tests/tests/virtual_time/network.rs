@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use axisbridge_tests::rig::motion::{NANO, arrival, both, millis, moves};
+use axisbridge_tests::rig::motion_checker::violation::{Rule, Violation};
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::Step;
@@ -32,6 +33,12 @@ fn a_table_of_networks() {
                     ..Knobs::GOOD
                 };
                 let mut rig = Rig::ready(Settings { knobs, seed: 7, ..Settings::default() });
+                if loss > 0 {
+                    // Each gap is bridged by a curve that the one before has bent already.
+                    let bent = |found: &Violation| matches!(found.rule, Rule::Velocity | Rule::Acceleration);
+                    rig.motion_checker
+                        .tolerate("losses one after the other while the axis accelerates", bent);
+                }
                 rig.connect(short_moves());
                 let report = rig.run(millis(60_000));
                 let counters = *rig.engine.devices()[0].device().counters();

@@ -9,6 +9,7 @@ mod drives;
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 pub use self::drives::{DRIVES, DriveKind, configuration};
@@ -49,7 +50,7 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
-    let stop = signal::stop_on_signals()?;
+    let [stop, hurry] = signal::stop_and_hurry_on_signals()?;
     let mut progress = Progress::new(arguments.json);
     let text = drives::configuration(&arguments.drives).replace(ADDRESS, &arguments.listen.to_string());
     let config = Config::parse(&text, "demo.toml")?;
@@ -86,13 +87,16 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         }
     });
     let status = running.status();
-    let dropped = running.stop()?;
+    let stopped = running.stop(&|| hurry.load(Ordering::Relaxed))?;
     progress.step(&format!(
         "{} bus cycles, {} late, {} telegrams lost",
         status.counters.cycles, status.counters.late_cycles, status.counters.lost_telegrams
     ));
-    if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
+    if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
         eprintln!("warning: {dropped} frames are missing in the recording");
+    }
+    if !stopped.unrested.is_empty() {
+        return Err(stopped.unrested.join("\n").into());
     }
     let report = outcome?;
     let capture = Some(arguments.capture.display().to_string());

@@ -1,6 +1,6 @@
 //! From the controller to the axis: actions and resets.
 
-use super::{AxisChannel, Loss, RESET_CYCLES, RESET_TIME_OUT, Reset, caused_by_controller};
+use super::{AxisChannel, Loss, RESET_CYCLES, RESET_TIME_OUT, Reset};
 use profile_cip::target::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::{ActiveFault, Origin};
@@ -9,11 +9,18 @@ use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 impl AxisChannel {
-    /// Takes what the motion device says about this axis; to be called in every cycle after [`Self::from_drive`].
-    pub fn from_controller(&mut self, now: MonotonicTime, system: SystemTime, image: &AxisCommandImage) {
+    /// Takes what the motion device says about this axis; to be called in every cycle after [`Self::from_drive`]. `target` is the
+    /// instant at which its set-points shall be reached, where controller and device share a clock.
+    pub fn from_controller(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        image: &AxisCommandImage,
+        target: Option<MonotonicTime>,
+    ) {
         // Before the action: a lost command stops the axis as its configuration says, whatever the device asks for then.
         if let Command::Withheld(why) = image.command
-            && matches!(why, Withheld::Stale | Withheld::NotConnected | Withheld::NodeFault)
+            && matches!(why, Withheld::Stale | Withheld::ConnectionLost | Withheld::NodeFault)
         {
             self.lose_command(now, system, Loss::Withheld(why));
         }
@@ -35,22 +42,12 @@ impl AxisChannel {
             self.begin_reset(now, system, image.reset_id);
         }
         match image.command {
-            Command::Follow(set_points) => self.take_set_points(now, system, &set_points),
+            Command::Follow(set_points) => self.take_set_points(now, system, &set_points, target),
             Command::Withheld(_) => self.sequence = None,
         }
     }
 
     pub(super) fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
-        let drive_faulted = matches!(self.feedback.report, Report::Faulted | Report::FaultReaction);
-        if action == DriveAction::PowerUp
-            && std::mem::take(&mut self.new_connection)
-            && !drive_faulted
-            && self.fault.is_some_and(|fault| caused_by_controller(fault.cause))
-        {
-            // A new connection with a new configuration; nothing moves before the controller enables the axis anew.
-            self.reset = Some(Reset { id: self.reset_id, since: now, begun: false });
-            self.go_on_with_reset(now, system);
-        }
         if !matches!(action, DriveAction::Enable | DriveAction::Abort) {
             self.end_hold(now, system);
         }
@@ -171,15 +168,5 @@ impl AxisChannel {
     pub fn drive_reset_sent(&mut self) {
         self.drive_reset_wanted = false;
         self.reset_cycles = RESET_CYCLES;
-    }
-
-    /// A controller has opened a connection: what the last one had caused may be forgotten once the axis is powered up.
-    pub fn connection_opened(&mut self) {
-        self.new_connection = true;
-        if let Some(fault) = self.fault.filter(|fault| !caused_by_controller(fault.cause)) {
-            // Its condition may be over, but the axis is still stopped for it: the device, which has forgotten it, has to
-            // know what a reset is for.
-            self.faults.raise(fault, Origin::Event);
-        }
     }
 }

@@ -19,7 +19,7 @@ use arrayvec::ArrayVec;
 use profile_generic::capture::{CaptureKind, CaptureResult, CaptureSet, CaptureStatus};
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Position;
-use profile_generic::time::SystemTime;
+use profile_generic::time::MonotonicTime;
 
 use super::history::History;
 use crate::mapping::{CaptureProgram, Latch};
@@ -128,10 +128,8 @@ impl CaptureUnit {
     /// Tells what is to be captured; to be called in each cycle, after the results were taken.
     pub fn want(&mut self, program: &CaptureProgram, wanted: CaptureSet) {
         self.wanted = wanted;
-        for kind in CaptureKind::all().filter(|kind| !wanted.contains(*kind)) {
-            self.failed.set(kind, false);
-            self.watching.set(kind, false);
-        }
+        self.failed = self.failed.intersection(wanted);
+        self.watching = self.watching.intersection(wanted);
         for (place, sequence) in program.sequences.iter().enumerate() {
             self.awaiting[place] &= wanted.contains(sequence.kind);
         }
@@ -166,7 +164,13 @@ impl CaptureUnit {
 
     /// Takes a fresh telegram of the drive, with its actual position at the instant it was captured. What follows for the
     /// enables is decided in [`CaptureUnit::want`]: an edge that has come may not be wanted again.
-    pub fn sample(&mut self, program: &CaptureProgram, telegram: &[u8], position: Position, at: SystemTime) {
+    pub fn sample(
+        &mut self,
+        program: &CaptureProgram,
+        telegram: &[u8],
+        position: Position,
+        at: MonotonicTime,
+    ) {
         let before = self.history.newest();
         self.history.push(position, at);
         for (word, place) in self.words.iter_mut().zip(&program.words) {
@@ -175,12 +179,13 @@ impl CaptureUnit {
         for gate in &mut self.gates {
             gate.fresh = gate.fresh.saturating_add(1);
         }
-        for place in 0..program.latches.len() {
-            let latch = program.latches[place];
-            if program.words[latch.word].offset.is_some() && self.shows(&latch, place) {
+        let latches = if self.rests() { 0 } else { program.latches.len() };
+        for place in 0..latches {
+            let latch = &program.latches[place];
+            if program.words[latch.word].offset.is_some() && self.shows(latch, place) {
                 match latch.value.place.read(telegram) {
                     Some(raw) if self.is_wanted(latch.kind) => {
-                        self.stored(&latch, raw, before.map(|(_, at)| at))
+                        self.stored(latch, raw, before.map(|(_, at)| at))
                     }
                     Some(_) => {}
                     None => self.unread[place] = self.is_wanted(latch.kind),
@@ -188,10 +193,21 @@ impl CaptureUnit {
             }
         }
         self.compare(program, telegram, position, at, before.map(|(_, at)| at));
-        for kind in CaptureKind::all() {
-            let latch = program.latches.iter().any(|latch| latch.kind == kind);
-            self.watching.set(kind, !latch && self.is_wanted(kind) && program.kinds().contains(kind));
+        self.watching = CaptureSet::EMPTY;
+        if !self.wanted.is_empty() {
+            let kinds = program.kinds();
+            for kind in CaptureKind::all() {
+                let latch = program.latches.iter().any(|latch| latch.kind == kind);
+                self.watching.set(kind, !latch && self.is_wanted(kind) && kinds.contains(kind));
+            }
         }
+    }
+
+    /// Whether nothing is wanted and nothing is under way: then there is nothing to ask of the drive, and no edge to come.
+    fn rests(&self) -> bool {
+        self.wanted.is_empty()
+            && self.gates.iter().all(|gate| gate.phase == Phase::Off)
+            && self.unread.iter().all(|unread| !unread)
     }
 
     fn is_wanted(&self, kind: CaptureKind) -> bool {
@@ -207,7 +223,7 @@ impl CaptureUnit {
     }
 
     /// A latch has stored a raw position, not before `since`.
-    fn stored(&mut self, latch: &Latch, raw: i64, since: Option<SystemTime>) {
+    fn stored(&mut self, latch: &Latch, raw: i64, since: Option<MonotonicTime>) {
         let near = self.history.newest().map_or(0, |(position, _)| position.get());
         let position = Position(latch.value.position(raw, near));
         let at = self.history.time_at(position, since);
@@ -220,9 +236,12 @@ impl CaptureUnit {
         program: &CaptureProgram,
         telegram: &[u8],
         position: Position,
-        at: SystemTime,
-        since: Option<SystemTime>,
+        at: MonotonicTime,
+        since: Option<MonotonicTime>,
     ) {
+        if program.inputs.is_empty() && program.counters.is_empty() && program.sequences.is_empty() {
+            return;
+        }
         let mut switched = [false; crate::mapping::CAPTURES_MAX];
         for (place, input) in program.inputs.iter().enumerate() {
             let Some(word) = input.word.read_word(telegram) else { continue };
@@ -275,6 +294,10 @@ impl CaptureUnit {
     }
 
     fn move_gate(&mut self, program: &CaptureProgram, place: usize) {
+        if self.wanted.is_empty() && self.gates[place].phase == Phase::Off {
+            // It stays as it is.
+            return;
+        }
         let own = |latch: &&Latch| latch.enable == place;
         let wanted = program.latches.iter().filter(own).any(|latch| self.is_wanted(latch.kind));
         let cyclic = program.enables[place].place.offset.is_some();
@@ -324,7 +347,7 @@ impl CaptureUnit {
         }
     }
 
-    fn give(&mut self, kind: CaptureKind, status: CaptureStatus, position: Position, at: SystemTime) {
+    fn give(&mut self, kind: CaptureKind, status: CaptureStatus, position: Position, at: MonotonicTime) {
         if status != CaptureStatus::Captured {
             self.failed.set(kind, true);
         }
@@ -337,7 +360,7 @@ impl CaptureUnit {
 
     /// The next access to the drive's service channel, if one is due and none under way.
     pub fn access(&self, program: &CaptureProgram) -> Option<(Access, CaptureAccess, u8)> {
-        if self.outstanding.is_some() {
+        if self.outstanding.is_some() || self.rests() {
             return None;
         }
         let next = self.next_access(program)?;
@@ -439,7 +462,7 @@ impl CaptureUnit {
     fn fail(&mut self, program: &CaptureProgram, concerns: impl Fn(usize, &Latch) -> bool) {
         for (place, latch) in program.latches.iter().enumerate() {
             if concerns(place, latch) && self.is_wanted(latch.kind) {
-                self.give(latch.kind, CaptureStatus::Failed, Position::ZERO, SystemTime::ZERO);
+                self.give(latch.kind, CaptureStatus::Failed, Position::ZERO, MonotonicTime::ZERO);
             }
         }
     }

@@ -138,7 +138,9 @@ impl AxisChannel {
         if new {
             self.own_words.want();
         }
-        if new || self.fault.is_none_or(|known| caused_by_controller(known.cause)) {
+        // While a reset is under way the drive may still show what is being reset; what stands is found after it.
+        let resetting = self.reset.is_some_and(|reset| reset.begun);
+        if !resetting && (new || self.fault.is_none_or(|known| caused_by_controller(known.cause))) {
             self.take_fault(now, system, fault);
         }
     }

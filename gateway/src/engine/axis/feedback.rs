@@ -2,7 +2,9 @@
 
 use super::diagnosis::CAUSE_TIME_OUT;
 use super::procedure::{ProcedureUnit, Surroundings};
-use super::{AxisChannel, MODE_TIME_OUT, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller};
+use super::{
+    AxisChannel, MODE_TIME_OUT, SILENCE_TIME_OUT, START_TIME_OUT, STOP_TIME_OUT, caused_by_controller,
+};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
 use profile_generic::image::{FeedbackSet, Signal, StatusBits};
@@ -20,7 +22,7 @@ impl AxisChannel {
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
-        sampled: SystemTime,
+        sampled: MonotonicTime,
         received: Option<Received<'_>>,
     ) {
         let Some((program, hearing)) = self.south.as_mut() else {
@@ -96,6 +98,7 @@ impl AxisChannel {
         self.report(now, system, report);
         self.go_on_with_procedure(now);
         self.watch(system);
+        self.watch_software_limits(system, moved);
         self.watch_limit_switches(system, moved);
     }
 
@@ -132,6 +135,7 @@ impl AxisChannel {
 
     pub(super) fn report(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.report = report;
+        self.silent_since = (report == Report::Silent).then(|| self.silent_since.unwrap_or(now));
         self.end_drive_faults();
         if report == Report::Silent && self.state() != DriveState::NotReady {
             // Also when another fault has stopped it: the drive cannot be reset before it is back.
@@ -159,7 +163,9 @@ impl AxisChannel {
             DriveState::Stopping | DriveState::FaultReaction => Some(STOP_TIME_OUT),
             _ => None,
         };
-        if limit.is_some_and(|limit| now.since(self.drive.since) > limit) {
+        let late = limit.is_some_and(|limit| now.since(self.drive.since) > limit);
+        self.unseen = self.silent_since.is_some_and(|since| now.since(since) > SILENCE_TIME_OUT);
+        if late || self.unseen && self.state() == DriveState::FaultReaction {
             let transition = self.drive.machine.handle(Event::Timeout);
             self.follow(now, system, transition);
         }
@@ -178,20 +184,13 @@ impl AxisChannel {
     /// condition, and the controller has said what is to be done about it. It is over when the axis is not led any more.
     pub(super) fn watch(&mut self, system: SystemTime) {
         let operating = self.state() == DriveState::Operating;
-        // Before its homing is done nobody knows where the axis is.
-        let homing = self.command.mode == OperatingMode::Homing;
         let led = operating || self.state() == DriveState::Testing;
-        let (position, velocity) = (self.feedback.position, self.feedback.velocity);
-        let speed = velocity.get().unsigned_abs();
+        let position = self.feedback.position;
+        let speed = self.feedback.velocity.get().unsigned_abs();
         let too_fast = |limit: Velocity| {
             speed > limit.get().unsigned_abs().saturating_add(limit.get().unsigned_abs() / 10)
         };
         let too_fast = self.limits.velocity.is_some_and(too_fast);
-        // Beyond the limit and on the way out: an axis that stands there or comes back may do so.
-        let above =
-            self.limits.position_max.is_some_and(|limit| position > limit) && velocity > Velocity::ZERO;
-        let below =
-            self.limits.position_min.is_some_and(|limit| position < limit) && velocity < Velocity::ZERO;
         let mut astray = false;
         if operating && self.command.selection() == OperatingMode::Position.into() {
             let error = self.command.position.get().saturating_sub(position.get());
@@ -203,8 +202,6 @@ impl AxisChannel {
         }
         for (cause, there) in [
             (FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, too_fast),
-            (FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, above && !homing),
-            (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, below && !homing),
             (FaultCause::EXCESSIVE_POSITION_ERROR, astray),
             (FaultCause::HOMING, self.feedback.status.contains(StatusBits::HOMING_FAILED)),
         ] {

@@ -1,7 +1,7 @@
 //! Where an axis was in the last cycles.
 
 use profile_generic::quantity::Position;
-use profile_generic::time::{DurationNs, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Cycles that are remembered: as long as a service channel needs to tell of an edge.
 const SAMPLES: usize = 128;
@@ -9,39 +9,39 @@ const SAMPLES: usize = 128;
 /// The last actual positions with their instants.
 #[derive(Debug, Clone)]
 pub struct History {
-    samples: [(Position, SystemTime); SAMPLES],
+    samples: [(Position, MonotonicTime); SAMPLES],
     newest: usize,
     len: usize,
 }
 
 impl Default for History {
     fn default() -> Self {
-        Self { samples: [(Position::ZERO, SystemTime::ZERO); SAMPLES], newest: 0, len: 0 }
+        Self { samples: [(Position::ZERO, MonotonicTime::ZERO); SAMPLES], newest: 0, len: 0 }
     }
 }
 
 impl History {
     /// Adds a sample.
-    pub fn push(&mut self, position: Position, at: SystemTime) {
+    pub fn push(&mut self, position: Position, at: MonotonicTime) {
         self.newest = (self.newest + 1) % SAMPLES;
         self.samples[self.newest] = (position, at);
         self.len = (self.len + 1).min(SAMPLES);
     }
 
     /// The last sample.
-    pub fn newest(&self) -> Option<(Position, SystemTime)> {
+    pub fn newest(&self) -> Option<(Position, MonotonicTime)> {
         (self.len > 0).then(|| self.samples[self.newest])
     }
 
     /// The samples, the newest first.
-    fn backward(&self) -> impl Iterator<Item = (Position, SystemTime)> {
+    fn backward(&self) -> impl Iterator<Item = (Position, MonotonicTime)> {
         (0..self.len).map(|back| self.samples[(self.newest + SAMPLES - back) % SAMPLES])
     }
 
     /// When the axis was last at a position, not before `since`: between two samples at even speed. For a position
     /// where it was not, the instant of the closest sample.
-    pub fn time_at(&self, position: Position, since: Option<SystemTime>) -> SystemTime {
-        let since = since.unwrap_or(SystemTime::ZERO);
+    pub fn time_at(&self, position: Position, since: Option<MonotonicTime>) -> MonotonicTime {
+        let since = since.unwrap_or(MonotonicTime::ZERO);
         let pairs =
             self.backward().zip(self.backward().skip(1)).take_while(|(_, (_, begin))| *begin >= since);
         for ((to, end), (from, begin)) in pairs {
@@ -53,9 +53,9 @@ impl History {
                 return begin + DurationNs(i64::try_from(part * span / way).unwrap_or(0));
             }
         }
-        let apart = |sample: &(Position, SystemTime)| sample.0.get().abs_diff(position.get());
+        let apart = |sample: &(Position, MonotonicTime)| sample.0.get().abs_diff(position.get());
         let closest = self.backward().take_while(|(_, at)| *at >= since).min_by_key(apart);
-        closest.map_or(SystemTime::ZERO, |(_, at)| at)
+        closest.map_or(MonotonicTime::ZERO, |(_, at)| at)
     }
 }
 
@@ -66,7 +66,7 @@ mod tests {
     fn history(samples: &[(i64, u64)]) -> History {
         let mut history = History::default();
         for (position, at) in samples {
-            history.push(Position(*position), SystemTime(*at));
+            history.push(Position(*position), MonotonicTime(*at));
         }
         history
     }
@@ -83,12 +83,12 @@ mod tests {
         ];
         for (what, position, since, expected) in rows {
             assert_eq!(
-                history.time_at(Position(position), since.map(SystemTime)),
-                SystemTime(expected),
+                history.time_at(Position(position), since.map(MonotonicTime)),
+                MonotonicTime(expected),
                 "{what}"
             );
         }
-        assert_eq!(History::default().time_at(Position(1), None), SystemTime::ZERO);
+        assert_eq!(History::default().time_at(Position(1), None), MonotonicTime::ZERO);
         assert_eq!(History::default().newest(), None);
     }
 
@@ -96,8 +96,8 @@ mod tests {
     fn old_samples_make_room() {
         let samples: Vec<_> = (0..300_i64).map(|n| (n, 1_000 * n.cast_unsigned())).collect();
         let history = history(&samples);
-        assert_eq!(history.newest(), Some((Position(299), SystemTime(299_000))));
-        assert_eq!(history.time_at(Position(172), None), SystemTime(172_000));
-        assert_eq!(history.time_at(Position(10), None), SystemTime(172_000), "as far back as it goes");
+        assert_eq!(history.newest(), Some((Position(299), MonotonicTime(299_000))));
+        assert_eq!(history.time_at(Position(172), None), MonotonicTime(172_000));
+        assert_eq!(history.time_at(Position(10), None), MonotonicTime(172_000), "as far back as it goes");
     }
 }

@@ -1,6 +1,6 @@
 //! From the axis to the controller.
 
-use super::{AxisChannel, Loss};
+use super::{AxisChannel, Loss, Trip};
 use crate::mapping::CipFault;
 use profile_cip::target::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -12,19 +12,24 @@ impl AxisChannel {
     /// What the motion device has to know of the drive.
     #[must_use]
     pub fn drive_image(&self) -> DriveImage {
-        let mut image = DriveImage {
-            online: self.south.is_some() && self.feedback.report != Report::Silent,
-            action_id: self.action_id,
-            reset_id: self.reset_id,
-            test: self.test_report(),
-            scaling_id: self.scaling_id,
-            ..DriveImage::default()
-        };
+        let mut image = DriveImage::default();
+        self.fill_drive_image(&mut image);
+        image
+    }
+
+    /// Writes what the motion device has to know of the drive over what it was told before.
+    pub fn fill_drive_image(&self, image: &mut DriveImage) {
+        image.clear();
+        image.online = self.south.is_some() && self.feedback.report != Report::Silent;
+        image.action_id = self.action_id;
+        image.reset_id = self.reset_id;
+        image.test = self.test_report();
+        image.scaling_id = self.scaling_id;
         let mut feedback = self.feedback;
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
-        self.north.drive_image(&feedback, &self.faults, &mut image);
-        self.sequence_image(&mut image);
+        self.north.drive_image(&feedback, &self.faults, image);
+        self.sequence_image(image);
         if let Some(program) = self.south() {
             let events = self.north.events();
             image.events = events.checkable(program.captures().kinds(), &feedback);
@@ -34,7 +39,6 @@ impl AxisChannel {
             // The stop ends with the fault that says why, once the drive has told it.
             image.stop_complete = false;
         }
-        image
     }
 
     /// The fault, where the controller knows it as one of the communications node: its code, and since when.
@@ -65,6 +69,20 @@ impl AxisChannel {
     #[must_use]
     pub fn loss(&self) -> Option<Loss> {
         self.loss.filter(|_| self.fault.is_some_and(|fault| fault.cause == FaultCause::COMMAND_LOST))
+    }
+
+    /// The limit that a set-point has exceeded, when that is the fault.
+    #[must_use]
+    pub fn tripped(&self) -> Option<Trip> {
+        let limits = |fault: Fault| {
+            matches!(
+                fault.cause,
+                FaultCause::POSITION_COMMAND_LIMIT
+                    | FaultCause::VELOCITY_COMMAND_LIMIT
+                    | FaultCause::ACCELERATION_COMMAND_LIMIT
+            )
+        };
+        self.tripped.filter(|_| self.fault.is_some_and(limits))
     }
 
     /// The fault that stands.

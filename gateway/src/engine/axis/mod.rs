@@ -12,6 +12,7 @@ mod action;
 pub mod capture;
 mod diagnosis;
 mod feedback;
+mod guard;
 mod handover;
 mod history;
 mod hookup;
@@ -20,11 +21,13 @@ mod north;
 mod overtravel;
 mod own_words;
 pub mod procedure;
+pub mod rest;
 mod sequence;
 mod set_point;
 mod trim;
 mod velocimeter;
 
+pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
 
@@ -37,7 +40,7 @@ use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
 use profile_generic::mode::ModeSelection;
-use profile_generic::quantity::{Position, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::sequence::{Sequencer, StopRamp};
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
@@ -52,6 +55,10 @@ pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
 
 /// How long a drive may take to come to rest before its torque is taken away.
 pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
+
+/// How long the stop of a drive that cannot be heard is waited for. It brakes by itself, as fast as it can, when it misses
+/// its commands; whoever waits longer sees nothing either, and the axis can be of no use before it is heard again.
+pub const SILENCE_TIME_OUT: DurationNs = DurationNs::from_secs(1);
 
 /// How long a drive in operation may take to another operating mode.
 pub const MODE_TIME_OUT: DurationNs = DurationNs::from_millis(100);
@@ -74,8 +81,10 @@ pub struct Limits {
     pub position_min: Option<Position>,
     /// Highest position command.
     pub position_max: Option<Position>,
-    /// Highest speed of the drive, either direction, with a tenth to spare for its overshoot.
+    /// Highest velocity of set-points and of the drive, either direction, with a tenth to spare for its overshoot.
     pub velocity: Option<Velocity>,
+    /// Highest acceleration and deceleration of set-points, with a tenth to spare.
+    pub acceleration: Option<Acceleration>,
     /// Largest distance of actual from commanded position. What follows from it is for the controller to say.
     pub following_error: Option<Position>,
     /// What the hookup tests may do; without it none of them moves the axis.
@@ -132,6 +141,8 @@ pub struct AxisChannel {
     north: CipProgram,
     /// Counts the programs that were taken.
     scaling_id: u32,
+    /// Counts the programs of either side that were taken or given up.
+    programs: u64,
     trackers: CipTrackers,
     south: Option<(DriveProgram, Hearing)>,
     limits: Limits,
@@ -139,6 +150,10 @@ pub struct AxisChannel {
     /// It may be switched on.
     moves: bool,
     drive: BasicDriveClock,
+    /// Since when the drive is not heard.
+    silent_since: Option<MonotonicTime>,
+    /// That is so long ago that the end of its stop is waited for no longer.
+    unseen: bool,
     interpolator: Option<FineInterpolator>,
     sequencer: Sequencer,
     stop_settings: StopSettings,
@@ -146,9 +161,15 @@ pub struct AxisChannel {
     ramp: Option<StopRamp>,
     /// The speed at which the axis was started on the move, until its first set-points.
     caught: Option<Velocity>,
-    /// The instant that the last command is for, and when it was made.
-    acts_at: SystemTime,
-    made_at: MonotonicTime,
+    /// The instant of the grid that the last command is for.
+    acts_at: MonotonicTime,
+    /// By how much the last cycle was late.
+    late: DurationNs,
+    /// How far set-points are ahead of the moment at which they are made.
+    ahead: DurationNs,
+    guard: guard::Guard,
+    /// The limit that the fault is about, when it is about one.
+    tripped: Option<Trip>,
     /// Since when the drive in operation shows another operating mode than it is told.
     other_mode_since: Option<MonotonicTime>,
     command: AxisCommand,
@@ -169,8 +190,6 @@ pub struct AxisChannel {
     reset: Option<Reset>,
     /// Set-points of this number were taken.
     sequence: Option<u32>,
-    /// When set-points were taken last.
-    taken_at: SystemTime,
     /// The fault that has stopped the axis: the first one, until a reset.
     fault: Option<Fault>,
     /// Everything that is wrong now.
@@ -185,8 +204,6 @@ pub struct AxisChannel {
     drive_reset_wanted: bool,
     /// An enable was rejected and is still asked for.
     enable_pending: bool,
-    /// A connection was opened, and the axis has not been powered up on it yet.
-    new_connection: bool,
     /// The hookup test that the controller has asked for.
     test: Option<TestRun>,
     /// The torque was switched on for a test.
@@ -195,6 +212,8 @@ pub struct AxisChannel {
     captures: capture::CaptureUnit,
     procedure: ProcedureUnit,
     overtravel: overtravel::Overtravel,
+    /// The same of the software limits.
+    software_overtravel: overtravel::Overtravel,
     handover: handover::Handover,
     /// Since when the drive is told the operating mode that it is told now.
     told_since: MonotonicTime,
@@ -223,19 +242,25 @@ impl AxisChannel {
         Self {
             north,
             scaling_id: 0,
+            programs: 0,
             trackers,
             south: None,
             limits,
             command_loss,
             moves,
             drive: BasicDriveClock::default(),
+            silent_since: None,
+            unseen: false,
             interpolator: None,
             sequencer: Sequencer::default(),
             stop_settings: StopSettings::default(),
             ramp: None,
             caught: None,
-            acts_at: SystemTime::default(),
-            made_at: MonotonicTime::default(),
+            acts_at: MonotonicTime::default(),
+            late: DurationNs::ZERO,
+            ahead: DurationNs::ZERO,
+            guard: guard::Guard::default(),
+            tripped: None,
             other_mode_since: None,
             command: AxisCommand::default(),
             trims: trim::Trims::default(),
@@ -250,7 +275,6 @@ impl AxisChannel {
             reset_id: 0,
             reset: None,
             sequence: None,
-            taken_at: SystemTime::default(),
             fault: None,
             faults: FaultSet::new(),
             diagnosis: diagnosis::Diagnosis::default(),
@@ -260,13 +284,13 @@ impl AxisChannel {
             cause_wanted: None,
             drive_reset_wanted: false,
             enable_pending: false,
-            new_connection: false,
             test: None,
             started_for_test: false,
             counters: AxisCounters::default(),
             captures: capture::CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
             overtravel: overtravel::Overtravel::default(),
+            software_overtravel: overtravel::Overtravel::default(),
             handover: handover::Handover::default(),
             told_since: MonotonicTime::default(),
             halted_at: None,
@@ -317,6 +341,13 @@ impl AxisChannel {
         self.south.as_ref().map(|(program, _)| program)
     }
 
+    /// A number that is another one after either side has got another program, or its drive is gone: what was made of
+    /// [`Self::north`] and [`Self::south`] may be kept as long as it is the same.
+    #[must_use]
+    pub fn programs(&self) -> u64 {
+        self.programs
+    }
+
     /// Whether the torque may be on: then neither program may be replaced.
     #[must_use]
     pub fn may_have_torque(&self) -> bool {
@@ -330,6 +361,7 @@ impl AxisChannel {
         }
         self.trackers = program.trackers();
         self.north = program;
+        self.programs += 1;
         self.scaling_id = self.scaling_id.wrapping_add(1);
         true
     }
@@ -339,6 +371,7 @@ impl AxisChannel {
         let hearing = program.hearing();
         self.procedure.restart(program.procedures());
         self.south = Some((program, hearing));
+        self.programs += 1;
         self.captures.restart();
         self.action = Action::TorqueOff;
         (self.control, self.status, self.reset_cycles) = (0, 0, 0);
@@ -361,6 +394,7 @@ impl AxisChannel {
         self.velocimeter.restart();
         self.report(now, system, report);
         self.south = None;
+        self.programs += 1;
         self.captures.restart();
         self.procedure.restart(&[]);
         self.shown = None;

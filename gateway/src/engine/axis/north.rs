@@ -44,6 +44,13 @@ impl AxisChannel {
         let mut command = *command;
         let fits = self.take_trims(&mut command, first).is_some();
         let command = &command;
+        if let Some(finding) = self.beyond_limits(command).filter(|_| {
+            fits && command.interpolation == InterpolationSource::Controller
+                && command.mode != OperatingMode::Homing
+        }) {
+            self.trip(now, system, finding);
+            return;
+        }
         let refusal = if fits { self.refusal(command) } else { Some(FaultCause::POSITION_COMMAND_LIMIT) };
         if let Some(cause) = refusal {
             self.raise(now, system, Fault::new(cause, system));
@@ -90,7 +97,7 @@ impl AxisChannel {
             return Some(FaultCause::POSITION_COMMAND_LIMIT);
         }
         if command.interpolation == InterpolationSource::Controller || command.mode == OperatingMode::Homing {
-            return self.beyond_limits(command).filter(|_| command.mode != OperatingMode::Homing);
+            return None;
         }
         let target = command.target_position;
         let far = |step: i64| target.get().abs_diff(self.feedback.position.get()) > step.unsigned_abs();

@@ -1,10 +1,10 @@
-//! The switches at the ends of the way.
+//! The ends of travel: limit switches, and the software limits of the configuration.
 //!
-//! A switch that the axis runs onto is a condition, as the limits of the configuration are: the controller has said what is to
-//! be done about it. It is over when the axis is not led any more, or leaves. An axis that was started on a switch may stand
+//! A switch or limit that the axis runs onto is a condition: the controller has said what is to
+//! be done about it. It is over when the axis is not led any more, or leaves. An axis that was started beyond one may stand
 //! there and may be led away from it, and not deeper.
 
-use super::AxisChannel;
+use super::{AxisChannel, Limits};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::Origin;
 use profile_generic::image::StatusBits;
@@ -18,6 +18,10 @@ const ENDS: [(FaultCause, StatusBits, i64); 2] = [
     (FaultCause::HARDWARE_OVERTRAVEL_POSITIVE, StatusBits::POSITIVE_LIMIT_SWITCH, 1),
     (FaultCause::HARDWARE_OVERTRAVEL_NEGATIVE, StatusBits::NEGATIVE_LIMIT_SWITCH, -1),
 ];
+
+/// Cause of each software limit, with the sign of the motion towards it.
+const SOFTWARE_ENDS: [(FaultCause, i64); 2] =
+    [(FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, 1), (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, -1)];
 
 /// An axis at zero speed may go deeper by what it makes in such a part of a second: it never stands quite still.
 const REST: i64 = 10;
@@ -102,6 +106,36 @@ impl AxisChannel {
         };
         for (end, (cause, bit, sign)) in self.overtravel.0.iter_mut().zip(ENDS) {
             if end.look(status.contains(bit), sign, &motion) {
+                self.faults.raise(Fault::new(cause, system), Origin::Watch);
+            } else {
+                self.faults.clear(cause, Origin::Watch);
+            }
+        }
+    }
+}
+
+impl AxisChannel {
+    /// Looks at the software limits as at limit switches.
+    pub(super) fn watch_software_limits(&mut self, system: SystemTime, moved: bool) {
+        let Limits { position_min, position_max, .. } = self.limits;
+        // Before its homing is done nobody knows where the axis is.
+        let known = self.command.mode != OperatingMode::Homing;
+        let position = self.feedback.position;
+        let motion = Motion {
+            led: known && matches!(self.state(), DriveState::Operating | DriveState::Testing),
+            moves: known && (moved || self.may_move()),
+            position,
+            velocity: self.feedback.velocity,
+            zero_speed: self.stop_settings.times.zero_speed,
+        };
+        let beyond = [
+            position_max.is_some_and(|limit| position > limit),
+            position_min.is_some_and(|limit| position < limit),
+        ];
+        for ((end, (cause, sign)), beyond) in
+            self.software_overtravel.0.iter_mut().zip(SOFTWARE_ENDS).zip(beyond)
+        {
+            if end.look(beyond, sign, &motion) {
                 self.faults.raise(Fault::new(cause, system), Origin::Watch);
             } else {
                 self.faults.clear(cause, Origin::Watch);

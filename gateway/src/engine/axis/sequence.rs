@@ -46,6 +46,12 @@ impl AxisChannel {
         self.stop_settings = settings;
     }
 
+    /// How the axis is to start and stop.
+    #[must_use]
+    pub fn stop_settings(&self) -> &StopSettings {
+        &self.stop_settings
+    }
+
     /// Where in a start or stop the axis is.
     #[must_use]
     pub fn sequence_step(&self) -> SequenceStep {
@@ -139,7 +145,7 @@ impl AxisChannel {
             }
         };
         let deceleration = self.stop_settings.deceleration.unwrap_or_default();
-        self.ramp = StopRamp::new(self.made_at, self.command.position, velocity, deceleration);
+        self.ramp = StopRamp::new(self.acts_at, self.command.position, velocity, deceleration);
         if self.ramp.is_none() {
             self.brake(now, system);
         }
@@ -151,14 +157,14 @@ impl AxisChannel {
         self.begin_stop(now, system, StopPlan { method, ..self.stop_settings.plan });
     }
 
-    /// The command while no controller leads the axis.
-    pub(super) fn led_by_box(&mut self, now: MonotonicTime) -> FinePoints {
+    /// The command for the instant `acts_at` while no controller leads the axis.
+    pub(super) fn led_by_box(&mut self, acts_at: MonotonicTime) -> FinePoints {
         // What the controller had added to its set-points ends with them.
         self.command.velocity_offset = Velocity::ZERO;
         self.command.torque_offset = Torque::ZERO;
         match (self.ramp, self.caught) {
             (Some(ramp), _) => {
-                let (position, velocity) = ramp.at(now);
+                let (position, velocity) = ramp.at(acts_at);
                 FinePoints { position: Some(position), velocity: Some(velocity), ..FinePoints::default() }
             }
             (None, velocity) => FinePoints { velocity, ..FinePoints::default() },
@@ -211,6 +217,8 @@ impl AxisChannel {
             // A fault that ends in a hold has stopped the axis as well: the state is Major Faulted whatever becomes of the
             // torque (CIP Volume 9, 5-2.3.16.1.1).
             SequenceStep::Off => image.stop_complete || self.holds(),
+            // Nobody will see its end; the drive is heard again before the axis can be switched on.
+            _ if self.unseen => image.stop_complete,
             _ => false,
         };
     }

@@ -1,6 +1,8 @@
 //! From the controller's set-points to the telegram of the drive.
 
+use super::guard::{Bounds, Finding, Lead, Trip, way};
 use super::{AxisChannel, Loss, MODE_TIME_OUT};
+use crate::engine::bus::Cycle;
 use crate::mapping::{CyclicValues, DriveProgram, Order};
 use profile_cip::target::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -8,12 +10,20 @@ use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::program::ConversionReport;
-use profile_generic::quantity::{Position, Torque, Velocity};
+use profile_generic::quantity::{Position, Quantity, Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Transition};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 impl AxisChannel {
-    pub(super) fn take_set_points(&mut self, now: MonotonicTime, system: SystemTime, points: &SetPoints) {
+    /// Takes set-points that shall be reached at `target` on the local clock; without a shared clock they are placed by the
+    /// controller's update clock as its arrivals show it.
+    pub(super) fn take_set_points(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        points: &SetPoints,
+        target: Option<MonotonicTime>,
+    ) {
         if self.sequence == Some(points.sequence) {
             return;
         }
@@ -45,23 +55,31 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
             return;
         }
-        if let Some(cause) = self.beyond_limits(&fresh) {
-            self.raise(now, system, Fault::new(cause, system));
+        if let Some(finding) = self.beyond_limits(&fresh) {
+            self.trip(now, system, finding);
             return;
         }
+        let (target_update, target) = match target {
+            Some(target) => {
+                (TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default(), target)
+            }
+            None => {
+                // A period later than the drives could have it at the earliest: by then they can have the next one.
+                let period =
+                    self.interpolator.as_ref().map_or(DurationNs::ZERO, |known| known.config().period);
+                (TargetUpdate::Interpolate, points.paced_at + self.ahead + period)
+            }
+        };
         let counted = points.values.unwind_count.is_some() && mode == OperatingMode::Position;
         let trimmed = trimmed == Some(true) && mode == OperatingMode::Position;
-        let elapsed = system.since(std::mem::replace(&mut self.taken_at, system));
-        let elapsed = if first { DurationNs::ZERO } else { elapsed };
         let watched = if first || !same { trimmed } else { counted || trimmed };
-        if watched && self.leaps(&fresh, elapsed) {
+        if watched && let Some(finding) = self.leaps(&fresh, target) {
             // Position and count that do not belong together: one of them is of the cycle before or after. Or a trim that
             // would throw the axis aside.
-            self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
+            self.trip(now, system, finding);
             return;
         }
-        let target_update = TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default();
-        self.interpolate(now, system, &fresh, first, target_update, points.target_time.map(SystemTime));
+        self.interpolate(now, system, &fresh, first, target_update, Some(target));
     }
 
     /// Hands set-points to the interpolator; `first` are those after a start.
@@ -72,7 +90,7 @@ impl AxisChannel {
         fresh: &AxisCommand,
         first: bool,
         target_update: TargetUpdate,
-        target_time: Option<SystemTime>,
+        target_time: Option<MonotonicTime>,
     ) {
         let other_mode = self.command.selection() != fresh.selection();
         let actual = self.actual_motion();
@@ -99,7 +117,7 @@ impl AxisChannel {
             interpolator.change(self.acts_at, target_update, &actual);
         }
         let period = interpolator.config().period;
-        let target = target_time.unwrap_or_else(|| target_update.target(system, period));
+        let target = target_time.unwrap_or_else(|| target_update.target(now, period));
         match interpolator.update(target, &FinePoints::from(fresh)) {
             Ok(()) => {}
             Err(UpdateError::Jump) => {
@@ -111,25 +129,42 @@ impl AxisChannel {
         }
     }
 
-    /// Whether a position is further from the present command than the axis may move in the time between updates. The
-    /// present command lies up to three periods before the one that the last update brought.
-    fn leaps(&self, fresh: &AxisCommand, elapsed: DurationNs) -> bool {
-        const PERIODS: i64 = 4;
+    /// A position that is further from the present command than the axis may move until it is to be reached, and in the period that
+    /// the update may have been under way.
+    fn leaps(&self, fresh: &AxisCommand, target: MonotonicTime) -> Option<Finding> {
         const SECOND: i128 = 1_000_000_000;
-        let (Some(limit), Some(interpolator)) = (self.limits.velocity, &self.interpolator) else {
-            return false;
-        };
-        let span = i128::from((interpolator.config().period * PERIODS + elapsed).0.max(0));
+        let (limit, interpolator) = (self.limits.velocity?, self.interpolator.as_ref()?);
+        let span = target.since(self.acts_at).max(DurationNs::ZERO) + interpolator.config().period * 2;
+        let span = i128::from(span.as_nanos());
         let way = i128::from(fresh.position.get()) - i128::from(self.command.position.get());
         // A tenth to spare, as everywhere.
-        way.abs() * 10 * SECOND > i128::from(limit.get()).abs() * 11 * span
+        let beyond = way.abs() * 10 * SECOND > i128::from(limit.get()).abs() * 11 * span;
+        let value = i64::try_from(way * SECOND / span.max(1)).unwrap_or(i64::MAX);
+        let trip = Trip { quantity: Quantity::Velocity, value, limit: limit.get(), late: self.late };
+        beyond.then_some(Finding { cause: FaultCause::VELOCITY_COMMAND_LIMIT, trip })
     }
 
-    pub(super) fn beyond_limits(&self, command: &AxisCommand) -> Option<FaultCause> {
-        let position = command.present.contains(CommandSet::POSITION);
-        let below = self.limits.position_min.is_some_and(|limit| command.position < limit);
-        let above = self.limits.position_max.is_some_and(|limit| command.position > limit);
-        (position && (below || above)).then_some(FaultCause::POSITION_COMMAND_LIMIT)
+    /// A position beyond the software limits. An axis that is beyond one already may stand there, to a count, and come back.
+    pub(super) fn beyond_limits(&self, command: &AxisCommand) -> Option<Finding> {
+        if !command.present.contains(CommandSet::POSITION) {
+            return None;
+        }
+        let (position, here) = (command.position, self.command.position);
+        let count = Position(self.north.count());
+        let above = |limit: &Position| position > *limit && position > here.saturating_add(count);
+        let below = |limit: &Position| position < *limit && position < here.saturating_sub(count);
+        let limit = self.limits.position_max.filter(above).or(self.limits.position_min.filter(below))?;
+        let (value, limit) = (position.get(), limit.get());
+        let trip = Trip { quantity: Quantity::Position, value, limit, late: self.late };
+        Some(Finding { cause: FaultCause::POSITION_COMMAND_LIMIT, trip })
+    }
+
+    /// A set-point is beyond a limit: it is not followed, and the axis stops.
+    pub(super) fn trip(&mut self, now: MonotonicTime, system: SystemTime, finding: Finding) {
+        self.raise(now, system, Fault::new(finding.cause, system));
+        if self.fault.is_some_and(|fault| fault.cause == finding.cause && fault.at == system) {
+            self.tripped = Some(finding.trip);
+        }
     }
 
     pub(super) fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
@@ -169,19 +204,20 @@ impl AxisChannel {
 
     // ---- to the drive ------------------------------------------------------------------------------------------
 
-    /// Fills the values of the drive's connection for the cycle that acts at `acts_at`; `false` when there is no program
-    /// or no place, and then nothing may be sent.
+    /// Fills the values of the drive's connection for a cycle; `false` when there is no program or no place, and then nothing may
+    /// be sent.
     pub fn to_drive(
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
-        acts_at: SystemTime,
+        cycle: &Cycle,
         telegram: Option<&mut [u8]>,
     ) -> bool {
-        let before = self.command.position;
-        self.fine_command(now, system, acts_at);
+        (self.late, self.ahead) = (cycle.late, cycle.ahead);
+        let elapsed = cycle.acts_at.since(self.acts_at).max(cycle.span);
+        let lead = self.fine_command(now, system, cycle.acts_at);
         self.hand_over(now, system);
-        self.watch_step(now, system, before);
+        self.guard(now, system, lead, (cycle.span, elapsed));
         let (Some((program, _)), Some(telegram)) = (self.south.as_ref(), telegram) else { return false };
         let mut conversions = ConversionReport::default();
         let action = match self.action {
@@ -227,24 +263,39 @@ impl AxisChannel {
         }
     }
 
-    /// A drive that works modulo takes the short way to its next position: a longer one would lead it backward, so it is
-    /// not sent.
-    fn watch_step(&mut self, now: MonotonicTime, system: SystemTime, before: Position) {
-        let position = self.command.selection() == OperatingMode::Position.into();
-        let led = self.state() == DriveState::Operating && position;
-        let step = self.south.as_ref().and_then(|(program, _)| program.position_step());
-        let far = |step: i64| self.command.position.get().abs_diff(before.get()) > step.unsigned_abs();
-        if led && step.is_some_and(far) {
-            self.command.position = before;
-            self.raise(now, system, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, system));
+    /// Judges the command of this cycle, the last thing before it goes into the telegram.
+    fn guard(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        lead: Lead,
+        (span, elapsed): (DurationNs, DurationNs),
+    ) {
+        let bounds = Bounds {
+            velocity: self.limits.velocity,
+            acceleration: self.limits.acceleration,
+            step: self.south.as_ref().and_then(|(program, _)| program.position_step()),
+            cycle: span,
+            elapsed,
+            period: self.interpolator.as_ref().map_or(span, |known| known.config().period),
+            count: self.north.count(),
+        };
+        let actual = self.feedback.velocity;
+        if let Some(finding) = self.guard.judge(&mut self.command, lead, actual, &bounds, self.late) {
+            self.trip(now, system, finding);
         }
     }
 
     /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it
     /// begins to.
-    pub(super) fn fine_command(&mut self, now: MonotonicTime, system: SystemTime, acts_at: SystemTime) {
+    /// Returns who leads it.
+    pub(super) fn fine_command(
+        &mut self,
+        now: MonotonicTime,
+        system: SystemTime,
+        acts_at: MonotonicTime,
+    ) -> Lead {
         let span = acts_at.since(std::mem::replace(&mut self.acts_at, acts_at));
-        self.made_at = now;
         let test_torque = self.run_test(now, system);
         let operating = self.state() == DriveState::Operating;
         // What comes while the axis is halted leads it nowhere, now or later.
@@ -252,7 +303,11 @@ impl AxisChannel {
         let counts = operating && !halts && self.sequence.is_some() && self.takes_set_points();
         let fine = match self.interpolator.as_mut() {
             Some(interpolator) if counts => Some(interpolator.at(acts_at)),
-            _ => None,
+            Some(interpolator) => {
+                interpolator.pass(acts_at);
+                None
+            }
+            None => None,
         };
         let points = match fine {
             Some(fine) => {
@@ -263,7 +318,7 @@ impl AxisChannel {
             }
             None => {
                 let torque = self.started_for_test.then_some(test_torque);
-                FinePoints { torque, ..self.led_by_box(now) }
+                FinePoints { torque, ..self.led_by_box(acts_at) }
             }
         };
         self.watch_mode(now, system);
@@ -303,6 +358,12 @@ impl AxisChannel {
         };
         all.write_to(&mut self.command);
         self.write_trims(fine.is_some_and(|fine| fine.quality != Quality::Lost));
+        match fine {
+            Some(fine) if fine.quality != Quality::Lost => Lead::SetPoints,
+            // It holds, or ramps down.
+            _ if led || fine.is_some() => Lead::Gateway,
+            _ => Lead::Nobody,
+        }
     }
 
     /// A drive that does not come to the operating mode that it is told follows values that are meant for no one.
@@ -370,10 +431,4 @@ impl AxisChannel {
             self.raise(now, system, Fault::new(cause, system));
         }
     }
-}
-
-/// The way at a velocity in a time.
-fn way(velocity: Velocity, span: DurationNs) -> Position {
-    let way = i128::from(velocity.get()) * i128::from(span.as_nanos()) / 1_000_000_000;
-    Position(i64::try_from(way).unwrap_or(0))
 }

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 use profile_generic::quantity::{Position, Velocity};
-use profile_generic::time::SystemTime;
+use profile_generic::time::MonotonicTime;
 
 /// Positions between which the way is taken: over more of them one count weighs less, and the velocity is older.
 const SAMPLES: usize = 4;
@@ -10,7 +10,7 @@ const SAMPLES: usize = 4;
 /// The last positions with their instants, the oldest first.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Velocimeter {
-    samples: ArrayVec<(Position, SystemTime), SAMPLES>,
+    samples: ArrayVec<(Position, MonotonicTime), SAMPLES>,
 }
 
 impl Velocimeter {
@@ -20,7 +20,7 @@ impl Velocimeter {
     }
 
     /// Takes a position. The velocity since the oldest of the last ones; `None` with the first.
-    pub(super) fn sample(&mut self, position: Position, at: SystemTime) -> Option<Velocity> {
+    pub(super) fn sample(&mut self, position: Position, at: MonotonicTime) -> Option<Velocity> {
         if self.samples.last().is_some_and(|(_, newest)| at <= *newest) {
             // The clock was set.
             self.restart();
@@ -48,7 +48,7 @@ mod tests {
     fn the_way_over_three_cycles() {
         let mut meter = Velocimeter::default();
         let mut sample = |position, ms: u64| {
-            meter.sample(Position(position), SystemTime(ms * MS)).map(|velocity| velocity.get())
+            meter.sample(Position(position), MonotonicTime(ms * MS)).map(|velocity| velocity.get())
         };
         assert_eq!(sample(1_000, 10), None, "one position is no way");
         assert_eq!(sample(3_000, 12), Some(1_000_000));
@@ -64,9 +64,9 @@ mod tests {
     #[test]
     fn positions_of_before_a_restart_count_no_more() {
         let mut meter = Velocimeter::default();
-        meter.sample(Position(0), SystemTime(0));
+        meter.sample(Position(0), MonotonicTime(0));
         meter.restart();
-        assert_eq!(meter.sample(Position(1_000_000), SystemTime(MS)), None);
-        assert_eq!(meter.sample(Position(1_000_001), SystemTime(2 * MS)), Some(Velocity(1_000)));
+        assert_eq!(meter.sample(Position(1_000_000), MonotonicTime(MS)), None);
+        assert_eq!(meter.sample(Position(1_000_001), MonotonicTime(2 * MS)), Some(Velocity(1_000)));
     }
 }

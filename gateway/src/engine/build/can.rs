@@ -7,7 +7,7 @@ use profile_cia402::wire::NodeId;
 use profile_generic::mode::{ModeSelection, OperatingMode};
 
 use super::{BuildError, kind, parameters};
-use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, Config, DriveAt, Lss};
+use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
 use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, pdos};
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdo, FoundPdos, SpareIds};
@@ -87,6 +87,7 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
             producer_ms: bus.heartbeat_ms,
             timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
         }),
+        listens: matches!(bus.link, CanLink::Interface { .. }),
         sdo_frames_per_cycle: u8::try_from(sdo_frames).unwrap_or(1),
         ..MasterConfig::default()
     };

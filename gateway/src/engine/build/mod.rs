@@ -36,8 +36,9 @@ use crate::mapping::{CipScaling, Mapping};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
 
-/// Notices kept until the supervisor takes them.
-const NOTICES: usize = 1024;
+/// Notices kept until the supervisor takes them: for each axis what a phase-up brings, and never fewer than for 16.
+const NOTICES_OF_AXIS: usize = 64;
+const NOTICES_MIN: usize = 16 * NOTICES_OF_AXIS;
 
 /// Largest connection sizes that a device takes, with the sequence count.
 const CONNECTION_SIZE_MAX: u16 = 1400;
@@ -151,9 +152,10 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         devices.push(channel);
         adapters.push((with_sheet(device, &members, host), adapter_end));
     }
-    let (producer, notices) = rtrb::RingBuffer::new(NOTICES);
+    let (producer, notices) = rtrb::RingBuffer::new(NOTICES_MIN.max(config.axes.len() * NOTICES_OF_AXIS));
     let (publisher, status) = latest::latest(BoxStatus::STARTING);
-    let engine = Engine::new(Parts { mapping, buses, devices, axes, notices: producer, publisher });
+    let lead = config.lead;
+    let engine = Engine::new(Parts { mapping, buses, devices, axes, notices: producer, publisher, lead });
     Ok(Built { engine, adapters, notices, status, commissioners })
 }
 
@@ -246,6 +248,7 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
         position_min: axis.limits.position_min,
         position_max: axis.limits.position_max,
         velocity: axis.limits.velocity,
+        acceleration: axis.limits.acceleration,
         following_error: axis.limits.following_error,
         hookup: Some(HookupSettings::new(kind(axis), axis.limits.velocity, axis.limits.torque)),
     };

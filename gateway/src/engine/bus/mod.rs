@@ -88,6 +88,19 @@ pub struct Counts {
     pub refused: u64,
 }
 
+/// A cycle of a bus, as its axes have to know it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cycle {
+    /// The instant on the grid at which drives take what is sent in it.
+    pub acts_at: MonotonicTime,
+    /// Time from one cycle to the next.
+    pub span: DurationNs,
+    /// From the latest moment at which an update still counts for the cycle to the instant at which drives take it.
+    pub ahead: DurationNs,
+    /// By how much the engine was called late for it.
+    pub late: DurationNs,
+}
+
 /// A bus, as the engine sees it. Axes go by their numbers in the box.
 pub trait Bus {
     /// Time from one cycle to the next.
@@ -99,8 +112,14 @@ pub trait Bus {
     /// When it has to do something by itself.
     fn wake_at(&self) -> Option<MonotonicTime>;
 
-    /// Whether a cycle is about to begin: then its axes have a step to do.
-    fn is_due(&self, now: MonotonicTime) -> bool;
+    /// The instant on the grid at which its next cycle begins; `None` while it keeps no grid.
+    fn next_cycle(&self) -> Option<MonotonicTime>;
+
+    /// Leaves out cycles that could only begin late, by more than half of their time. The grid stays where it is.
+    fn skip_late(&mut self, now: MonotonicTime);
+
+    /// Builds what goes out at the instant of the next cycle, as far as the bus can do that ahead.
+    fn prepare(&mut self);
 
     /// Whether every drive that answers at all is in cyclic operation.
     fn is_up(&self) -> bool;
@@ -273,6 +292,29 @@ impl Buses {
     }
 }
 
+/// Where the drive of each axis is among those of a bus, found without a search.
+#[derive(Debug)]
+struct Places<T>(Vec<Option<T>>);
+
+impl<T: Copy> Places<T> {
+    /// The numbers of the axes in the box, each with its place.
+    fn new(axes: impl Iterator<Item = (usize, T)>) -> Self {
+        let mut places = Vec::new();
+        for (axis, place) in axes {
+            if places.len() <= axis {
+                places.resize(axis + 1, None);
+            }
+            places[axis] = Some(place);
+        }
+        Self(places)
+    }
+
+    /// The place of an axis; `None` for one that is on another bus.
+    fn of(&self, axis: usize) -> Option<T> {
+        self.0.get(axis).copied().flatten()
+    }
+}
+
 /// What an axis wants of its drive beside the cycle: the words that tell the cause of a fault or warning, its fault reset,
 /// captures and procedures, one access of each at a time.
 fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Access, Purpose) -> bool) {
@@ -305,5 +347,18 @@ fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Acces
         && access(&wanted, Purpose::Procedure(part, generation))
     {
         axis.procedure_sent(part);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Places;
+
+    #[test]
+    fn every_axis_of_a_bus_has_its_place_and_others_have_none() {
+        let places = Places::new([(5, 'a'), (0, 'b'), (63, 'c')].into_iter());
+        let found: Vec<_> = (0..70).filter_map(|axis| Some((axis, places.of(axis)?))).collect();
+        assert_eq!(found, [(0, 'b'), (5, 'a'), (63, 'c')]);
+        assert_eq!(Places::<u8>::new(std::iter::empty()).of(0), None);
     }
 }

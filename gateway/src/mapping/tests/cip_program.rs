@@ -73,7 +73,7 @@ fn fills_the_image_of_the_device() {
         mode: OperatingMode::Position,
         status: StatusBits::ENABLED | StatusBits::POWER | StatusBits::TRACKING,
         inhibits: Inhibits::HARDWARE_ENABLE | Inhibits::NO_DRIVE,
-        at: SystemTime(42),
+        at: MonotonicTime(42),
         ..AxisFeedback::default()
     };
     feedback.set(Signal::PositionActual, 3_000_000_000_000);
@@ -81,13 +81,18 @@ fn fills_the_image_of_the_device() {
     let mut image = DriveImage { action_id: 7, ..DriveImage::default() };
     let report = program.drive_image(&feedback, &FaultSet::new(), &mut image);
     assert_eq!((image.position, image.action_id, report.missing), (3_000_000_000, 7, 1));
-    assert_eq!((image.velocity, image.captured_at), (Some(-0.5), 42));
+    // Its stamp is in system time, which the device's side of the engine makes of it.
+    assert_eq!((image.velocity, image.captured_at, image.position_rate), (Some(-0.5), 0, -500_000));
     assert!(image.bus_up && image.start_complete && !image.stop_complete);
     // Bits 2, 3, 5, 17 and 22 (Table 5-2.60).
     assert_eq!(image.axis_status.bits(), 0x0042_002C);
     assert_eq!((image.start_inhibits, image.start_inhibits_mfg), (1 << 1, 1 << 5));
     assert!(image.conditions.as_slice().is_empty());
     assert!(image.io_status.is_empty());
+    // The drive is gone: it stands where it was seen last, and nothing is said of how it moves.
+    feedback.present = profile_generic::image::FeedbackSet::empty();
+    program.drive_image(&feedback, &FaultSet::new(), &mut image);
+    assert_eq!((image.position, image.position_rate, image.velocity), (3_000_000_000, 0, None));
 }
 
 #[test]

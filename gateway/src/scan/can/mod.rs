@@ -2,7 +2,7 @@
 //!
 //! A [`Scanner`] asks every node-id for its device type, and who answers for its identity, name and modes. All of that is
 //! reading by SDO, which a device does in every state but stopped; no command of NMT is sent and nothing is written, so that
-//! nothing can move. Devices without a node-id are looked for in the end, by LSS; none is given one.
+//! nothing can move. Before the first question the scan listens: a bus that a master leads is left alone. Devices without a node-id are looked for in the end, by LSS; none is given one.
 
 mod report;
 mod starter;
@@ -15,11 +15,12 @@ use std::collections::VecDeque;
 
 use profile_cia402::drive::index::{AXIS_OFFSET, SUPPORTED_MODES};
 use profile_cia402::drive::modes::SupportedModes;
+use profile_cia402::master::foreign::LISTEN;
 use profile_cia402::sdo::client::{Client, ClientConfig};
 use profile_cia402::sdo::request::{SdoFailure, SdoRequest};
 use profile_cia402::wire::lss::LssAddress;
 use profile_cia402::wire::{Function, Mux, NodeId, cob_id};
-use profile_generic::can::Frame;
+use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use report::{json, text};
@@ -185,6 +186,10 @@ pub struct Scanner {
     again: Option<MonotonicTime>,
     /// Since when it has had none.
     full_since: Option<MonotonicTime>,
+    /// Nothing is asked before then.
+    listens_until: Option<MonotonicTime>,
+    /// What somebody who leads the bus has sent meanwhile.
+    master: Option<Id>,
 }
 
 impl Default for Scanner {
@@ -207,6 +212,8 @@ impl Scanner {
             held: None,
             again: None,
             full_since: None,
+            listens_until: None,
+            master: None,
         }
     }
 
@@ -230,6 +237,13 @@ impl Scanner {
                 None => break,
             }
         }
+        if let Some(id) = self.master {
+            self.give_up(now, &format!("another master is on this bus: it sends {id}; nothing was asked"));
+            return true;
+        }
+        if now < *self.listens_until.get_or_insert(now + LISTEN) {
+            return false;
+        }
         while self.probes.len() < AT_ONCE
             && let Some(node) = self.waiting.pop_front()
         {
@@ -252,6 +266,11 @@ impl Scanner {
     }
 
     fn take(&mut self, now: MonotonicTime, frame: &Frame) {
+        let of_a_master =
+            matches!(Function::of(frame.id()), Some(Function::Sync | Function::Nmt | Function::Rpdo(..)));
+        if of_a_master && self.listens_until.is_none_or(|until| now < until) {
+            self.master = Some(frame.id());
+        }
         if frame.id() == cob_id::LSS_RESPONSE && !frame.is_remote() {
             self.search.handle(now, frame.data());
         }
@@ -286,6 +305,10 @@ impl Scanner {
     /// When to call [`Scanner::step`] again, unless a frame comes before.
     #[must_use]
     pub fn wake_at(&self) -> Option<MonotonicTime> {
+        // Nothing was asked yet.
+        if self.probes.is_empty() && self.found.is_empty() && !self.waiting.is_empty() {
+            return self.listens_until;
+        }
         // Nothing else can be done while the queue is full.
         let clients = || self.probes.iter().filter_map(|probe| probe.client.wake_at());
         self.again.or_else(|| clients().chain(self.search.wake_at()).min())

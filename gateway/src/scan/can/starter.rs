@@ -1,4 +1,5 @@
-//! A configuration to begin with: one device in front, one axis for each axis of each drive that was found.
+//! A configuration to begin with: one axis for each axis of each drive that was found, and in front a device for every 16
+//! of them.
 
 use std::fmt::Write as _;
 
@@ -7,7 +8,7 @@ use profile_cia402::drive::modes::SupportedModes;
 use super::report::title;
 use super::{Bus, Found};
 use crate::config::AXES_MAX;
-use crate::scan::starter::head;
+use crate::scan::starter::{head, instance};
 
 /// Which modes of a drive give which mode of the box.
 const USES: [(&str, SupportedModes); 3] = [
@@ -47,7 +48,7 @@ pub fn starter(bus: &Bus, interface: &str, bit_rate: Option<u32>) -> Option<Stri
     let mut out = String::new();
     head(&mut out, &names, "min = \"10 ms\", max = \"80 ms\"");
     for (place, (device, axis, _)) in drives.iter().enumerate() {
-        let (name, instance) = (name(device, *axis), place + 1);
+        let (name, instance) = (name(device, *axis), instance(place));
         let _ = write!(
             out,
             "

@@ -194,7 +194,7 @@ fn a_device_that_never_answers_fails_where_it_falls_silent() {
 }
 
 #[test]
-fn a_closed_stream_ends_everything() {
+fn a_stream_closed_amid_a_move_is_opened_again_and_the_run_goes_on() {
     let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![enable(), go()]);
     rig.script = Box::new(|now, updates, _, controller| {
         if updates == 300 {
@@ -202,8 +202,49 @@ fn a_closed_stream_ends_everything() {
         }
     });
     let report = rig.run(30);
-    assert_eq!(text(&report), "the device closed the TCP stream");
-    assert!(rig.controller.is_closed());
+    assert_eq!((report.failure, report.steps_finished), (None, 2), "{}", rig.log());
+    let sessions = rig.peer.seen.iter().filter(|seen| *seen == "RegisterSession").count();
+    assert_eq!(sessions, 2, "{:?}", rig.peer.seen);
+    assert!(rig.peer.seen.contains(&"Forward_Close".to_owned()));
+    assert_eq!(rig.peer.seen.iter().filter(|seen| seen.ends_with("Forward_Open")).count(), 1);
+    assert!(rig.log().contains("TCP stream lost; the motion connection goes on"));
+}
+
+#[test]
+fn a_stream_that_cannot_be_opened_again_is_tried_once_a_second_and_ends_no_move() {
+    let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![enable(), go()]);
+    rig.refuse_streams = true;
+    rig.script = Box::new(|now, updates, _, controller| {
+        if updates == 300 {
+            controller.tcp_closed(now);
+        }
+    });
+    let began = rig.now;
+    let report = rig.run(30);
+    assert_eq!((report.failure, report.steps_finished), (None, 2), "{}", rig.log());
+    let seconds = (rig.now - began) / 1_000_000_000;
+    assert!((seconds..=seconds + 1).contains(&rig.streams_refused), "{} in {seconds} s", rig.streams_refused);
+    assert!(seconds < 15, "it does not wait for ever to close in order: {seconds}");
+    assert_eq!(rig.peer.axes[0].state, AxisStateCode::STOPPED, "disabled before the connection ends");
+    assert!(!rig.peer.seen.contains(&"Forward_Close".to_owned()));
+}
+
+#[test]
+fn an_idle_session_is_kept_alive() {
+    let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![Step::Dwell { seconds: 200.0 }]);
+    let report = rig.run(300);
+    assert_eq!(report.failure, None, "{}", rig.log());
+    let kept = rig.peer.seen.iter().filter(|seen| seen.contains("Get_Attribute_Single")).count();
+    assert_eq!(kept, 6, "every 30 s: {:?}", rig.peer.seen);
+}
+
+#[test]
+fn a_session_that_answers_no_more_is_registered_anew() {
+    let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![Step::Dwell { seconds: 60.0 }]);
+    rig.script = Box::new(|now, _, peer, _| peer.mute = (29..34).contains(&(now.0 / 1_000_000_000)));
+    let report = rig.run(300);
+    assert_eq!(report.failure, None, "{}", rig.log());
+    assert_eq!(rig.peer.seen.iter().filter(|seen| *seen == "RegisterSession").count(), 2);
 }
 
 #[test]

@@ -223,6 +223,8 @@ pub struct Peer {
     pub sync_mode: bool,
     /// Answers nothing any more.
     pub dead: bool,
+    /// It answers nothing on the stream.
+    pub mute: bool,
     pub node_fault: NodeFault,
     pub node_alarm: NodeAlarm,
     /// Requests seen on the stream, in order.
@@ -253,6 +255,7 @@ impl Peer {
             sync_answers: VecDeque::new(),
             sync_mode: true,
             dead: false,
+            mute: false,
             node_fault: NodeFault::NONE,
             node_alarm: NodeAlarm::NONE,
             seen: Vec::new(),
@@ -273,7 +276,7 @@ impl Peer {
     /// Answers one encapsulation packet.
     pub fn handle_stream(&mut self, bytes: &[u8]) -> Vec<u8> {
         let packet = Packet::parse(bytes).unwrap();
-        if self.dead {
+        if self.dead || self.mute {
             return Vec::new();
         }
         let data = match packet.command {
@@ -355,6 +358,7 @@ impl Peer {
                 body.resize(answer.buffer_len(), 0);
                 answer.emit(&mut body).unwrap();
             }
+            Service::GET_ATTRIBUTE_SINGLE => body.extend([0x4D, 0]),
             _ => panic!("unexpected {request}"),
         }
         reply.data = &body;

@@ -1,7 +1,9 @@
 //! Controller and peer on one virtual clock.
 
 use super::peer::Peer;
-use crate::controller::{AxisSetup, Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step};
+use crate::controller::{
+    AxisSetup, Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
+};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// System time less monotonic time in the rig.
@@ -31,6 +33,9 @@ pub struct Rig {
     pub script: Box<Script>,
     /// Which answer of the device gets a byte changed or is cut there: number, offset, value, cut.
     pub spoil: Option<(u64, usize, u8, bool)>,
+    /// Another stream is refused, so often so far.
+    pub refuse_streams: bool,
+    pub streams_refused: u64,
     answers: u64,
     commands: u64,
     actuals: u64,
@@ -52,6 +57,8 @@ impl Rig {
             lose_actuals: |_| false,
             script: Box::new(|_, _, _, _| {}),
             spoil: None,
+            refuse_streams: false,
+            streams_refused: 0,
             answers: 0,
             commands: 0,
             actuals: 0,
@@ -98,6 +105,15 @@ impl Rig {
         }
         while let Some(event) = self.controller.poll_event() {
             self.events.push(event);
+        }
+        if self.controller.poll_stream_action() == Some(StreamAction::Reopen) {
+            if self.refuse_streams {
+                self.streams_refused += 1;
+                self.controller.tcp_closed(now);
+            } else {
+                self.controller.tcp_connected(now);
+            }
+            self.drain();
         }
     }
 

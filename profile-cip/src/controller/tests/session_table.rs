@@ -10,6 +10,9 @@ use profile_generic::time::MonotonicTime;
 
 const NOW: MonotonicTime = MonotonicTime(0);
 
+/// When an idle session is kept alive.
+const QUIET: MonotonicTime = MonotonicTime(30_000_000_000);
+
 /// Takes what the session sends, as a list of packets.
 fn sent(session: &mut Session) -> Vec<Vec<u8>> {
     let mut buffer = [0; 2048];
@@ -57,6 +60,21 @@ fn state(requests: usize) -> (Session, Peer, Option<Vec<u8>>) {
     (session, peer, waiting)
 }
 
+/// The states beside the open connection, beyond those of [`state`].
+fn beside(name: &str) -> (Session, Peer, Option<Vec<u8>>) {
+    let (mut session, peer, _) = state(5);
+    match name {
+        "KeepAlive" => session.keep_alive(QUIET),
+        _ => session.lose(),
+    }
+    if name == "Resuming" {
+        session.resume(QUIET);
+    }
+    let waiting = sent(&mut session).pop();
+    while session.poll().is_some() {}
+    (session, peer, waiting)
+}
+
 fn refused(request: &[u8]) -> Vec<u8> {
     let packet = Packet::parse(request).unwrap();
     let mut data = packet.data.to_vec();
@@ -87,13 +105,29 @@ fn the_whole_table() {
         "Open",
         "ForwardClose",
         "Closed",
+        "KeepAlive",
+        "Lost",
+        "Resuming",
     ];
     let mut table = String::new();
     for (index, state_name) in states.iter().enumerate() {
-        for input in ["start", "close", "answer", "refusal", "old answer", "time-out", "stream closed"] {
+        let inputs = [
+            "start",
+            "close",
+            "answer",
+            "refusal",
+            "old answer",
+            "time-out",
+            "stream closed",
+            "keep alive",
+            "stream lost",
+            "resume",
+        ];
+        for input in inputs {
             // Open follows the answer to the Forward_Open, Closed that to the Forward_Close.
             let requests = if index == 7 { 7 } else { index };
-            let (mut session, mut peer, request) = state(requests);
+            let (mut session, mut peer, request) =
+                if index < 8 { state(requests) } else { beside(state_name) };
             match (input, &request) {
                 ("start", _) => session.start(NOW),
                 ("close", _) => session.close(NOW),
@@ -107,7 +141,17 @@ fn the_whole_table() {
                     answer[12] ^= 0x80;
                     session.handle_stream(NOW, &answer);
                 }
-                ("time-out", _) => session.handle_time(MonotonicTime(5_000_000_000)),
+                ("time-out", _) => {
+                    let since = if index < 8 { NOW } else { QUIET };
+                    session.handle_time(MonotonicTime(since.0 + 5_000_000_000));
+                }
+                // Only an open connection outlives its stream.
+                ("keep alive" | "stream lost" | "resume", _) if index < 5 || (6..8).contains(&index) => {
+                    continue;
+                }
+                ("keep alive", _) => session.keep_alive(QUIET),
+                ("stream lost", _) => session.lose(),
+                ("resume", _) => session.resume(QUIET),
                 ("stream closed", _) => session.stream_closed(),
                 _ => continue,
             }
@@ -117,6 +161,7 @@ fn the_whole_table() {
                     Output::Registered(_) => "registered".to_owned(),
                     Output::Opened(_) => "opened".to_owned(),
                     Output::Closed => "closed".to_owned(),
+                    Output::Lost => "lost".to_owned(),
                     Output::Malformed(error) => format!("malformed: {error}"),
                     Output::Failed(failure) => format!("failed: {failure}"),
                     Output::Answered(..) => "answered".to_owned(),

@@ -1,6 +1,6 @@
 //! The cycle: commands out, answers in, and what stays away.
 
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::super::connection::ConnectionKind;
 use super::super::fragmentation::{IoData, IoFrames};
@@ -11,11 +11,30 @@ use super::event::LossReason;
 use super::station::Phase;
 
 impl Master {
+    /// Leaves out cycles that could only begin late, by more than half of their time. The grid stays where it is.
+    pub fn skip_late(&mut self, now: MonotonicTime) {
+        if self.access.is_online() && now.since(self.next_cycle).as_nanos() > self.config.cycle.as_nanos() / 2
+        {
+            self.skip_until(now - DurationNs(self.config.cycle.as_nanos() / 2));
+        }
+    }
+
+    /// Leaves out the cycles up to `now`.
+    fn skip_until(&mut self, now: MonotonicTime) {
+        let cycle = self.config.cycle.as_nanos().max(1);
+        let late = now.since(self.next_cycle).as_nanos();
+        if late >= 0 {
+            let missed = late / cycle + 1;
+            self.next_cycle = self.next_cycle + DurationNs(cycle) * missed;
+            self.statistics.skipped += missed.unsigned_abs();
+        }
+    }
+
     /// Begins a cycle: counts what has not come, and asks every slave that is due.
     pub(super) fn cycle(&mut self, now: MonotonicTime) {
-        let next = self.next_cycle + self.config.cycle;
-        // A master that was late does not make up for cycles in a burst.
-        self.next_cycle = if next <= now { now + self.config.cycle } else { next };
+        self.next_cycle = self.next_cycle + self.config.cycle;
+        // A master that was late does not make up for cycles in a burst, and the grid stays where it is.
+        self.skip_until(now);
         self.statistics.cycles += 1;
         let (mut strobe, mut strobes) = ([0_u8; 8], false);
         for place in 0..self.stations.len() {

@@ -201,6 +201,14 @@ pub enum Event {
         /// Its serial number.
         serial: u32,
     },
+    /// Another master polls a slave. One that is not taken yet is left alone until that has ended; for one that is exchanged
+    /// with the application stops its axis and calls `give_way`. Told once until it has ended.
+    OtherMaster {
+        /// The slave.
+        slave: MacId,
+        /// The other master, where it was heard how it has asked for the slave.
+        master: Option<MacId>,
+    },
     /// The CAN controller has left the bus.
     BusOff,
     /// A slave is allocated and set up, and exchanged with from the next cycle on.
@@ -242,6 +250,12 @@ impl fmt::Display for Event {
                 f,
                 "slave {slave}: another node wants its MAC ID: vendor {vendor:#06x}, serial {serial:#010x}"
             ),
+            Self::OtherMaster { slave, master: Some(master) } => {
+                write!(f, "slave {slave}: another master polls it: MAC ID {master}")
+            }
+            Self::OtherMaster { slave, master: None } => {
+                write!(f, "slave {slave}: another master polls it, whose MAC ID is not known")
+            }
             Self::BusOff => f.write_str("bus off"),
             Self::Exchanging(slave) => write!(f, "slave {slave}: exchanging"),
             Self::Lost { slave, reason } => write!(f, "slave {slave}: {reason}"),

@@ -24,6 +24,7 @@ mod client;
 pub mod config;
 mod cycle;
 pub mod event;
+pub mod foreign;
 pub mod io;
 pub mod motion;
 mod setup;
@@ -39,6 +40,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use self::client::Client;
 use self::config::{CONNECTIONS_MAX, ConfigError, MasterConfig, SlaveConfig};
 use self::event::{Event, ExplicitRequest, LossReason, Outcome, Ticket};
+use self::foreign::Foreign;
 use self::io::{Consumer, IoEnd};
 use self::station::Phase;
 use super::access::{AccessEvent, AccessState, NetworkAccess};
@@ -74,6 +76,8 @@ pub enum SubmitError {
 pub struct Statistics {
     /// Cycles.
     pub cycles: u64,
+    /// Cycles that were left out, because they could only have begun late.
+    pub skipped: u64,
     /// Whole I/O messages of slaves.
     pub received: u64,
     /// Answers that stayed away.
@@ -124,6 +128,8 @@ struct Station {
     retry_pause: DurationNs,
     /// Reason told last.
     told: Option<LossReason>,
+    /// What was heard of another master.
+    foreign: Foreign,
     client: Client,
     /// The request that the client carries out is the master's own.
     own: bool,
@@ -173,6 +179,7 @@ impl Master {
             retry_at: MonotonicTime::ZERO,
             retry_pause: config.retry,
             told: None,
+            foreign: Foreign::default(),
             client: Client::new(config.mac, slave.mac, config.explicit_timeout),
             own: false,
             explicit_gone: false,
@@ -375,6 +382,7 @@ impl Master {
         if let Identifier::DuplicateMacCheck(mac) = identifier {
             return self.check_duplicate(now, identifier, mac, data);
         }
+        self.overhear(now, identifier, data);
         if !self.access.is_online() {
             return Err(Refusal::Offline);
         }

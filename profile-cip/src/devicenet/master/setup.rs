@@ -153,7 +153,7 @@ impl Master {
             let station = &mut self.stations[place];
             if station.phase == Phase::Waiting
                 && running
-                && now >= station.retry_at
+                && now >= station.retry_at.max(station.occupied_until())
                 && station.client.is_free()
             {
                 station.facts = super::Facts::default();
@@ -171,7 +171,7 @@ impl Master {
                     station.enter(now, next);
                     if next == Phase::Exchange {
                         station.ends.iter_mut().for_each(super::IoEnd::reset);
-                        station.told = None;
+                        (station.told, station.foreign) = (None, super::Foreign::default());
                         station.retry_pause = retry;
                         let mac = station.config.mac;
                         self.tell(Event::Exchanging(mac));
@@ -283,7 +283,7 @@ impl Master {
 
     pub(super) fn station_wake_at(&self, station: &Station) -> Option<MonotonicTime> {
         match station.phase {
-            Phase::Waiting => self.running.then_some(station.retry_at),
+            Phase::Waiting => self.running.then(|| station.retry_at.max(station.occupied_until())),
             Phase::Exchange if station.client.is_free() => {
                 let waits = station.explicit_gone
                     || station.places.iter().any(|place| matches!(place, Place::Waiting(..)));

@@ -151,15 +151,80 @@ fn a_slave_that_another_master_has_is_left_alone_until_it_is_free() {
     let now = net.now;
     net.master().start(now);
     net.run_for(5000);
-    let told = net.log.iter().filter(|(_, _, text)| text == "slave 9: another master has it").count();
+    let text = "slave 9: another master polls it: MAC ID 2";
+    let told = net.log.iter().filter(|(_, who, said)| *who == 0 && said == text).count();
     assert_eq!(told, 1, "{}", net.text());
+    assert!(!net.said(0, "slave 9: another master has it"), "it was not even asked for: {}", net.text());
     assert_eq!(net.speed(1).master(), Some(mac(2)));
     assert!(!net.said(1, "released"), "{}", net.text());
     undisturbed(&mut net);
     net.plug(other, false);
-    net.run_for(15_000);
+    // The slave keeps the other one's explicit connection for ten seconds.
+    net.run_for(20_000);
     assert_eq!(net.speed(1).master(), Some(MASTER), "{}", net.text());
     assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange));
+    undisturbed(&mut net);
+}
+
+/// Lets somebody poll a slave.
+fn poll(net: &mut Net, from: usize, slave: u8) {
+    net.inject(from, Identifier::PollCommand(mac(slave)), &[0; 4]);
+}
+
+#[test]
+fn a_slave_that_somebody_polls_is_not_asked_for_before_he_has_ended() {
+    let mut net = Net::new();
+    let mut config = master_config();
+    config.slaves = vec![speed(9, 21).0, speed(12, 21).0];
+    net.add(Node::Master(Master::new(config).unwrap()));
+    net.add(speed(9, 21).1);
+    net.add(speed(12, 21).1);
+    let other = net.add(Node::Dumb);
+    // From the duplicate MAC ID check on, a poll every second.
+    for _ in 0..8 {
+        poll(&mut net, other, 9);
+        net.run_for(1_000);
+    }
+    assert_eq!(net.speed(1).master(), None, "{}", net.text());
+    let text = "slave 9: another master polls it, whose MAC ID is not known";
+    assert_eq!(net.log.iter().filter(|(_, who, said)| *who == 0 && said == text).count(), 1);
+    undisturbed(&mut net);
+    net.run_for(500);
+    assert_eq!(net.speed(1).master(), Some(MASTER), "{}", net.text());
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange));
+}
+
+#[test]
+fn a_slave_that_somebody_else_polls_beside_its_master_is_left_to_him_once_its_axis_stands() {
+    let mut net = two();
+    let other = net.add(Node::Dumb);
+    // One poll is a stray.
+    for _ in 0..3 {
+        poll(&mut net, other, 9);
+        net.run_for(1_200);
+    }
+    assert!(!net.text().contains("another master") && !net.master().has_other_master(mac(9)));
+    for _ in 0..3 {
+        poll(&mut net, other, 9);
+        net.run_for(100);
+    }
+    let text = "slave 9: another master polls it, whose MAC ID is not known";
+    assert_eq!(net.log.iter().filter(|(_, _, said)| said == text).count(), 1);
+    assert!(net.master().has_other_master(mac(9)) && !net.master().has_other_master(mac(12)));
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange), "the axis is stopped first");
+    let now = net.now;
+    net.master().give_way(now, mac(12));
+    net.master().give_way(now, mac(9));
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Waiting));
+    for _ in 0..30 {
+        poll(&mut net, other, 9);
+        net.run_for(100);
+    }
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Waiting), "{}", net.text());
+    undisturbed(&mut net);
+    net.run_for(20_000);
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange), "{}", net.text());
+    assert!(!net.master().has_other_master(mac(9)));
     undisturbed(&mut net);
 }
 

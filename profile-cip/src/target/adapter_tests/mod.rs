@@ -9,6 +9,7 @@ mod motion_connection;
 mod network_objects;
 mod objects;
 mod other_targets;
+mod ownership;
 mod rig;
 mod routing;
 mod sessions;

@@ -33,6 +33,24 @@ fn instant(before: u64, after: u64, part: u64, way: u64) -> u64 {
     before.saturating_add(u64::try_from(passed).unwrap_or(u64::MAX))
 }
 
+/// What of the drive's last report counts for the next one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    online: bool,
+    position: i64,
+    unwind: Option<u32>,
+    torque: Option<f32>,
+    captured_at: u64,
+    pub scaling_id: u32,
+}
+
+impl Sample {
+    pub const fn of(image: &DriveImage) -> Self {
+        let DriveImage { online, position, unwind, torque, captured_at, scaling_id, .. } = *image;
+        Self { online, position, unwind, torque, captured_at, scaling_id }
+    }
+}
+
 impl Axis {
     /// An event that the drive was looking for; `position` is in the reference system of power-up.
     pub fn notify_event(&mut self, event: EventType, status: u8, position: i64, time_stamp: u64) -> bool {
@@ -42,22 +60,23 @@ impl Axis {
 
     /// New actual values are there: tells the event channel what is being looked for, and looks for what the device
     /// evaluates itself. Values of `before` that the controller armed after do not count.
-    pub fn check_events(&mut self, before: &DriveImage) {
-        let now = self.drive;
-        self.events.support(if now.online { now.events } else { EventChecking::empty() });
+    pub(super) fn check_events(&mut self, before: &Sample) {
+        let now = Sample::of(&self.drive);
+        let (events, events_checking) = (self.drive.events, self.drive.events_checking);
+        self.events.support(if now.online { events } else { EventChecking::empty() });
         let timed = now.online && now.captured_at != 0;
         if timed && before.online && before.captured_at != 0 && now.captured_at > before.captured_at {
             self.watch(before, &now);
             self.watch_torque(&now);
         }
-        let mut checking = if now.online { now.events_checking } else { EventChecking::empty() };
+        let mut checking = if now.online { events_checking } else { EventChecking::empty() };
         checking -= EventChecking::WATCHES | EventChecking::HOME_TORQUE;
         checking.set(EventChecking::WATCHES, timed);
         checking.set(EventChecking::HOME_TORQUE, timed && now.torque.is_some());
         self.events.confirm(checking);
     }
 
-    fn watch(&mut self, before: &DriveImage, now: &DriveImage) {
+    fn watch(&mut self, before: &Sample, now: &Sample) {
         let (from, to) = (self.references.actual(before.position), self.references.actual(now.position));
         let range = now.unwind.map_or(DINT_RANGE, u64::from);
         let marks = self.events.parameters().watch_positions;
@@ -72,7 +91,7 @@ impl Axis {
 
     /// The torque counts by its magnitude: an axis is driven against a stop in either direction. The threshold has to be
     /// exceeded in every update for the Home Torque Time, zero if the controller gives none.
-    fn watch_torque(&mut self, now: &DriveImage) {
+    fn watch_torque(&mut self, now: &Sample) {
         let parameters = self.events.parameters();
         let limit = parameters.home_torque_threshold.map_or(f32::INFINITY, f32::abs);
         let seconds = f64::from(parameters.home_torque_time.unwrap_or(0.0));

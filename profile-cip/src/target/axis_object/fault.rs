@@ -5,6 +5,7 @@ use super::super::drive_link::DriveImage;
 use super::super::exception::{DriveCondition, ExceptionAction, ExceptionActions, worst_action};
 use super::super::fault_log::{FaultLog, LogEntry, LogKind};
 use super::super::status_report::RecordLog;
+use super::events::Sample;
 use super::{Axis, RAMP_AND_DISABLE, STATE_CHANGE_SHUTDOWN, fault_code};
 use crate::wire::motion::codes::{AlarmType, ClearingEvent, FaultType};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
@@ -110,6 +111,9 @@ impl Faults {
 
     /// A connection begins or ends: nothing is latched, and the controller is told anew what is there.
     pub fn forget(&mut self, system_time: u64) {
+        if self.any() {
+            self.cleared_at = system_time;
+        }
         let by = ClearingEvent::CONNECTION_RESET;
         self.log.end_faults(by, system_time, |_| true);
         for place in 0..ALARM_WORDS {
@@ -320,8 +324,10 @@ fn alarms_of(place: usize, word: u64) -> impl Iterator<Item = (AlarmType, u8)> {
 }
 
 impl Axis {
-    pub fn set_drive(&mut self, image: DriveImage) {
-        let before = core::mem::replace(&mut self.drive, image);
+    /// What the drive reports is written over what it reported before: `fill` has to leave nothing of that.
+    pub fn update_drive(&mut self, fill: impl FnOnce(&mut DriveImage)) {
+        let before = Sample::of(&self.drive);
+        fill(&mut self.drive);
         self.watch_scaling(&before);
         self.check_events(&before);
     }

@@ -2,7 +2,7 @@
 
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
 use super::super::drive_link::DriveAction;
-use super::super::exception::ExceptionActions;
+use super::super::exception::{DriveCondition, ExceptionActions};
 use super::{Axis, COAST_AND_DISABLE, Context, fault_code, sub_code};
 use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlStatus};
 use crate::wire::status::GeneralStatus;
@@ -33,9 +33,14 @@ impl Axis {
             self.look_at_conditions(actions, context.system_time);
         }
         if self.state == AxisState::Initializing {
+            let reset = self.follow_connection_reset();
             let configured = self.block.control_status.contains(ControlStatus::CONFIGURATION_COMPLETE);
-            let ready = context.connected && configured && self.drive.online;
+            // A drive that is lost is a fault that stands: the controller learns of it, and goes on with the other axes.
+            let lost =
+                !self.drive.online && self.drive.conditions.as_slice().iter().any(DriveCondition::stops);
+            let ready = context.connected && configured && (lost || self.drive.online && reset);
             if ready && !context.node_fault && !self.winding_down {
+                self.connection_reset = false;
                 self.fire(AxisEvent::InitializationComplete);
             }
             return;
@@ -54,6 +59,16 @@ impl Axis {
         // First, because the drive leaves its test in the same cycle in which it reports the end.
         self.follow_test(context);
         self.follow_drive(context);
+    }
+
+    /// Has the drive reset its faults after a connection began or ended, as soon as it is there and has stopped. Returns
+    /// whether it has tried.
+    fn follow_connection_reset(&mut self) -> bool {
+        if self.connection_reset && self.drive.online && !self.winding_down {
+            self.connection_reset = false;
+            self.reset_id = self.reset_id.wrapping_add(1);
+        }
+        !self.connection_reset && self.drive.reset_id == self.reset_id
     }
 
     /// Ends a reset that the drive has carried out, or that its time limit has ended.

@@ -106,11 +106,13 @@ pub(super) struct Held {
     pub at: MonotonicTime,
 }
 
-/// Time stamps of an update, in this device's system time, ns.
+/// Times of an update; the stamp in this device's system time, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct UpdateTimes {
     pub time_stamp: Option<u64>,
     pub period: u64,
+    /// When the update would have arrived on an even network.
+    pub paced_at: MonotonicTime,
 }
 
 /// An instance of the Motion Device Axis Object.
@@ -132,6 +134,8 @@ pub(super) struct Axis {
     pub(super) reset_id: u32,
     /// Fault Reset or Shutdown Reset that waits for the drive.
     reset: Option<AxisControl>,
+    /// A connection began or ended, and the drive has not been asked to reset its faults since.
+    connection_reset: bool,
     /// The axis left an energized state without a stop of its own and has not stopped yet.
     winding_down: bool,
     pub(super) references: References,
@@ -178,6 +182,7 @@ impl Axis {
             action_id: 0,
             reset_id: 0,
             reset: None,
+            connection_reset: false,
             winding_down: false,
             references: References::default(),
             feedback_source: FeedbackSource::default(),
@@ -284,7 +289,8 @@ impl Axis {
 
     // -- connection ---------------------------------------------------------------------------------------------
 
-    /// A connection was opened: defaults, no faults, no shutdown (clause 5-2.6.2.3).
+    /// A connection was opened: defaults, no faults, no shutdown (clause 5-2.6.2.3). That includes the faults of the drive,
+    /// which is asked to reset them; what is still wrong after that is a fault again when the axis leaves Initializing.
     pub fn open(&mut self, system_time: u64) {
         self.fire(AxisEvent::Reconnection);
         self.forget(system_time);
@@ -293,7 +299,7 @@ impl Axis {
         self.update_action();
     }
 
-    /// The controller closed the connection.
+    /// The controller closed the connection: no faults and no alarms (clause 5-2.6.2.3), and the axis stops as for a Disable.
     pub fn close(&mut self, system_time: u64) {
         self.fire(AxisEvent::ConnectionClose);
         self.forget(system_time);
@@ -318,6 +324,7 @@ impl Axis {
         self.shutdown = false;
         self.faults.forget(system_time);
         self.reset = None;
+        self.connection_reset = true;
         self.handshake.reset();
         self.block = CommandBlock::default();
         self.held = None;

@@ -12,8 +12,8 @@
 //!
 //! Everything is derived anew from the one unrolled count, so nothing adds up over any number of cycles.
 
-use super::super::drive_link::DriveImage;
 use super::Axis;
+use super::events::Sample;
 use crate::wire::motion::codes::{AxisControl, ControlMode};
 use crate::wire::motion::{ActualPosition, CommandBlock};
 use crate::wire::status::GeneralStatus;
@@ -163,7 +163,7 @@ impl Axis {
     }
 
     /// Another scaling or another unwind is in use: positions of before mean nothing in it.
-    pub(super) fn watch_scaling(&mut self, before: &DriveImage) {
+    pub(super) fn watch_scaling(&mut self, before: &Sample) {
         if before.scaling_id != self.drive.scaling_id {
             self.references.reset();
         }

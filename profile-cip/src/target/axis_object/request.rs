@@ -32,6 +32,7 @@ impl Axis {
                 target: block.target,
                 time_stamp: times.time_stamp,
                 target_time: times.time_stamp.map(|t| t.saturating_add(ahead)),
+                paced_at: times.paced_at,
                 position_reference: 0,
                 sequence: self.sequence,
                 age_updates: 0,

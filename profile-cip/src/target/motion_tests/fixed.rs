@@ -470,7 +470,7 @@ fn without_updates_the_device_goes_on_answering_and_stops_the_axis() {
     }
     assert_eq!(rig.device.connection(), None, "16 periods of silence end the connection");
     assert_eq!(rig.device.counters().connection_losses, 1);
-    assert_eq!(rig.withheld(), Some(Withheld::NotConnected));
+    assert_eq!(rig.withheld(), Some(Withheld::ConnectionLost));
     assert!(matches!(rig.device.poll_reply(), Some(MotionReply::ConnectionLost { o_to_t_id: 11, .. })));
 }
 

@@ -58,6 +58,8 @@ pub(super) struct FakeDrive {
     pub sticky: bool,
     /// An abort ends at rest with torque.
     pub holds: bool,
+    /// It is still busy with the reset of its faults.
+    pub resetting: bool,
 }
 
 impl FakeDrive {
@@ -72,11 +74,11 @@ impl FakeDrive {
             events_checking: events,
             ..DriveImage::default()
         };
-        Self { image, stuck: false, sticky: false, holds: false }
+        Self { image, stuck: false, sticky: false, holds: false, resetting: false }
     }
 
     fn step(&mut self, command: &AxisCommandImage) {
-        if command.reset_id != self.image.reset_id {
+        if command.reset_id != self.image.reset_id && !self.resetting {
             self.image.reset_id = command.reset_id;
             if !self.sticky {
                 self.image.conditions = DriveConditions::default();

@@ -48,6 +48,7 @@ const NONE: MotionCounters = MotionCounters {
     too_late: 0,
     untimed: 0,
     ahead_of_time: 0,
+    stamp_jumps: 0,
     lost_updates: 0,
     late_updates: 0,
     connection_losses: 0,
@@ -114,7 +115,10 @@ fn a_malformed_update_changes_nothing_else() {
 
 #[test]
 fn node_fault_4_ends_with_a_node_fault_reset_and_the_axes_stay_faulted() {
-    let (_, _, mut rig) = after(|_| vec![9, 9, 9]);
+    let (_, _, mut rig) = after(|rig| {
+        let [low, high] = rig.sequence.wrapping_add(1).to_le_bytes();
+        vec![low, high, 9]
+    });
     rig.cycles(3);
     // Whoever runs the axes sees that they lost their command. That is a consequence, not a fault of its own.
     rig.device.raise_node_fault(NodeFault::CONNECTION_UPDATE);

@@ -221,6 +221,71 @@ fn send_aged(rig: &mut Rig, age: i64) {
     rig.send(&packet);
 }
 
+/// Sends the next update so late that it is `age` ns old when it comes.
+fn send_late(rig: &mut Rig, age: i64) {
+    let stamped = rig.now;
+    rig.now = rig.now.saturating_add_signed(age);
+    send_aged(rig, i64::try_from(rig.now - stamped).expect("fits"));
+}
+
+/// Lets the controller's clock run ahead, up to `ahead` ns in the last update.
+fn send_ahead(rig: &mut Rig, ahead: i64) {
+    let step = i64::try_from(PERIOD).expect("fits") * 2 / 5;
+    let mut reached = 0;
+    while ahead - reached > step {
+        reached += step;
+        send_aged(rig, -reached);
+        rig.run_device();
+        rig.now += PERIOD;
+    }
+    send_aged(rig, -ahead);
+}
+
+/// Updates whose stamps run backwards, or jump, while their IDs and arrivals go on evenly: a clock was set, and the offsets do
+/// not say so. None of them is a command, and after the update delay high limit the connection is at fault.
+#[test]
+fn a_time_stamp_that_does_not_follow_from_the_one_before_commands_nothing() {
+    let period = i64::try_from(PERIOD).expect("fits");
+    for jump in
+        [period, -period, 5 * period, -10 * period, 3_600_000_000_000, -3_600_000_000_000, period / 2 + 1]
+    {
+        let mut rig = synchronous();
+        let before = rig.follow(0).sequence;
+        for late in 1..=4_u64 {
+            send_aged(&mut rig, jump);
+            let sequence = match rig.command(0).command {
+                Command::Follow(points) => points.sequence,
+                Command::Withheld(_) => before,
+            };
+            assert_eq!((sequence, rig.device.counters().stamp_jumps), (before, late), "{jump}");
+            assert_eq!(rig.device.node_fault(), NodeFault::NONE, "{jump}");
+            rig.run_device();
+            rig.now += PERIOD;
+        }
+        // It comes back, as it does when the offset is reported an update later.
+        send_aged(&mut rig, 0);
+        assert_ne!(rig.follow(0).sequence, before, "{jump}");
+        for _ in 0..6 {
+            rig.run_device();
+            rig.now += PERIOD;
+            send_aged(&mut rig, jump);
+        }
+        rig.run_device();
+        assert_eq!(rig.device.node_fault(), NodeFault::CONNECTION_UPDATE, "{jump}");
+    }
+}
+
+/// A controller that has left out cycles has stamps as much later as its updates are.
+#[test]
+fn a_time_stamp_that_is_later_by_as_much_as_its_update_is_good() {
+    let mut rig = synchronous();
+    let before = rig.follow(0).sequence;
+    rig.now += 3 * PERIOD;
+    send_aged(&mut rig, 0);
+    assert_eq!(rig.device.counters().stamp_jumps, 0);
+    assert_ne!(rig.follow(0).sequence, before);
+}
+
 #[test]
 fn late_updates_are_applied_within_the_limit_and_never_beyond() {
     let period = i64::try_from(PERIOD).expect("fits");
@@ -232,14 +297,26 @@ fn late_updates_are_applied_within_the_limit_and_never_beyond() {
         (2 * period + 1, true, 1, NodeAlarm::NONE, NodeFault::NONE),
         (4 * period, true, 1, NodeAlarm::NONE, NodeFault::NONE),
         (4 * period + 1, false, 1, NodeAlarm::NONE, NodeFault::CONNECTION_UPDATE),
-        (-4 * period, true, 0, NodeAlarm::NONE, NodeFault::NONE),
+        // A clock that is ahead is served, and said to be wrong.
+        (-1, true, 0, NodeAlarm::NONE, NodeFault::NONE),
+        (-1_000_001, true, 0, NodeAlarm::CLOCK_SKEW, NodeFault::NONE),
+        (-4 * period, true, 0, NodeAlarm::CLOCK_SKEW, NodeFault::NONE),
         (-4 * period - 1, false, 0, NodeAlarm::CLOCK_SKEW, NodeFault::NONE),
     ];
     for (age, applied, late, alarm, fault) in rows {
         let mut rig = synchronous();
+        if age < 0 {
+            send_ahead(&mut rig, -age - 1);
+            rig.run_device();
+            rig.now += PERIOD;
+        }
         let before = rig.follow(0).sequence;
         let counted = rig.device.counters().applied;
-        send_aged(&mut rig, age);
+        if age < 0 {
+            send_aged(&mut rig, age)
+        } else {
+            send_late(&mut rig, age)
+        }
         assert_eq!(rig.device.counters().applied - counted, u64::from(applied), "age {age}");
         let fresh = matches!(rig.command(0).command, Command::Follow(s) if s.sequence != before);
         let seen =
@@ -377,4 +454,101 @@ fn a_step_of_the_controllers_time_is_compensated() {
     assert_ne!(set_points.sequence, before);
     assert_eq!(set_points.time_stamp, Some(EPOCH + rig.now));
     assert_eq!(rig.device.counters().ahead_of_time, 0);
+}
+
+/// Captures a position, `age` ns before now, with this rate in counts per second.
+fn capture(rig: &mut Rig, axis: usize, position: i64, rate: i64, age: u64) {
+    let captured_at = EPOCH + rig.now - age;
+    let image = &mut rig.drives[axis].image;
+    (image.position, image.position_rate, image.captured_at) = (position, rate, captured_at);
+}
+
+/// Time stamp of the last update, as an age in ns, and the position of each axis in it.
+fn stamped(rig: &Rig) -> (u64, [Option<i64>; 2]) {
+    let stamp = rig.header().time_stamp.expect("a time stamp");
+    let sent = rig.now - PERIOD;
+    let position = |axis| match rig.actual(axis).actual.position {
+        Some(ActualPosition::Dint(position)) => Some(i64::from(position)),
+        Some(ActualPosition::Lint(position)) => Some(position),
+        None => None,
+    };
+    (EPOCH + sent - stamp, [position(0), position(1)])
+}
+
+#[test]
+fn a_lost_drive_holds_back_neither_the_time_stamp_nor_the_other_axis() {
+    for lost in 0..2 {
+        let mut rig = synchronous();
+        let other = 1 - lost;
+        for period in 0..200 {
+            capture(&mut rig, other, 1_000 + period, 0, 300_000);
+            if period == 3 {
+                rig.drives[lost].image.online = false;
+            } else if period < 3 {
+                capture(&mut rig, lost, 7_000, 900_000, 300_000);
+            }
+            rig.cycle();
+            let (age, positions) = stamped(&rig);
+            assert_eq!(age, 300_000, "axis {lost} lost, period {period}");
+            assert_eq!((positions[other], positions[lost]), (Some(1_000 + period), Some(7_000)));
+        }
+        // The controller learns that the position is not measured any more from the state and fault of the axis.
+        assert_eq!(rig.state(other), AxisState::Running);
+        assert_eq!(rig.state(lost), AxisState::MajorFaulted);
+        assert_eq!(rig.device.axis_faults(lost), Some(1 << 63));
+    }
+}
+
+#[test]
+fn with_every_drive_lost_the_time_stamp_is_that_of_the_update() {
+    let mut rig = synchronous();
+    for axis in 0..2 {
+        capture(&mut rig, axis, 5, 1_000_000, 300_000);
+    }
+    rig.cycle();
+    rig.drives.iter_mut().for_each(|drive| drive.image.online = false);
+    for _ in 0..50 {
+        rig.cycle();
+        assert_eq!(stamped(&rig), (0, [Some(5), Some(5)]));
+    }
+}
+
+#[test]
+fn positions_of_different_captures_are_taken_to_the_one_time_stamp() {
+    let mut rig = synchronous();
+    // Position, rate in counts per second, age in ns; expected at the age of the newest capture.
+    let rows = [
+        ("one bus", (100, 2_000_000, 300_000), (-50, -1_000_000, 300_000), 300_000, [100, -50]),
+        ("a slower bus", (100, 2_000_000, 300_000), (-50, -1_000_000, 4_300_000), 300_000, [100, -4_050]),
+        ("the first is older", (100, 2_000_000, 1_300_000), (-50, 0, 300_000), 300_000, [2_100, -50]),
+        ("half a count, away from zero", (0, 1_000, 800_000), (0, -1_000, 300_000), 300_000, [1, 0]),
+        ("at rest", (7, 0, 50_000_000), (8, 0, 0), 0, [7, 8]),
+        ("older than a drive online can be", (7, 1_000_000, 1_000_000_001), (8, 0, 0), 0, [7, 8]),
+        ("the fastest", (i64::MAX, i64::MAX, 1_000_000_000), (0, 0, 0), 0, [-1, 0]),
+    ];
+    for (what, first, second, age, expected) in rows {
+        capture(&mut rig, 0, first.0, first.1, first.2);
+        capture(&mut rig, 1, second.0, second.1, second.2);
+        rig.cycle();
+        assert_eq!(stamped(&rig), (age, expected.map(Some)), "{what}");
+    }
+    // Only the axes of the update count.
+    capture(&mut rig, 0, 3, 0, 900_000);
+    capture(&mut rig, 1, 4, 0, 300_000);
+    rig.blocks.truncate(1);
+    rig.cycle();
+    let stamp = rig.header().time_stamp.expect("a time stamp");
+    assert_eq!(EPOCH + rig.now - PERIOD - stamp, 900_000);
+}
+
+#[test]
+fn a_lost_drive_reports_no_velocity() {
+    let mut rig = synchronous();
+    rig.blocks.iter_mut().for_each(|block| block.actual_data_set |= ActualDataSet::VELOCITY);
+    rig.drives[0].image.velocity = Some(2.5);
+    rig.cycles(2);
+    assert_eq!(rig.actual(0).actual.velocity, Some(2.5));
+    rig.drives[0].image.online = false;
+    rig.cycles(2);
+    assert_eq!(rig.actual(0).actual.velocity, None);
 }

@@ -60,6 +60,7 @@ impl Rig {
 mod bad_input;
 mod disturbance;
 mod faults;
+mod foreign;
 mod full_slaves;
 mod hot_plug;
 mod phase_up;

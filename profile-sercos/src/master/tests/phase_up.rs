@@ -187,9 +187,9 @@ fn pauses_and_phase_bytes() {
     let list = stretches(&rig);
     let bytes: Vec<u8> = list.iter().map(|&(byte, _, _)| byte).collect();
     assert_eq!(bytes, [0x00, 0x81, 0x01, 0x82, 0x02, 0x83, 0x03, 0x84, 0x04, 0x80, 0x00]);
-    // 120 ms of silence before the first telegram and between the end of one telegram layout and the start of the
-    // next, counted from the end of the last cycle; none between CP3 and CP4.
-    assert_eq!(list[0].1, MonotonicTime(120_000_000));
+    // 200 ms of listening before the first telegram; 120 ms of silence between the end of one telegram layout and the start of
+    // the next, counted from the end of the last cycle; none between CP3 and CP4.
+    assert_eq!(list[0].1, MonotonicTime(200_000_000));
     let gaps: Vec<i64> = list.windows(2).map(|pair| (pair[1].1 - pair[0].2).as_nanos() / 1000).collect();
     assert_eq!(gaps, [1000, 121_000, 1000, 121_000, 1000, 121_000, 1000, 1000, 1000, 121_000]);
     // CPS lasts two cycles, towards CP4 three.

@@ -327,9 +327,8 @@ impl Drive {
         let whole = self
             .scales
             .unfold(sign(idn::POSITION_POLARITY, 0) * number(idn::POSITION_COMMAND), self.position);
-        if mode == OperatingMode::Position {
-            self.position = whole;
-        }
+        // Position commands begin where the drive is, whatever way it has gone without them.
+        self.position = if mode == OperatingMode::Position { whole } else { actual };
         let additive = sign(idn::POSITION_POLARITY, 1) * number(idn::POSITION_ADDITIVE);
         command.position = Position(self.scales.position.generic(self.position.saturating_add(additive)));
         let velocity = |value| Velocity(self.scales.velocity.generic(value));

@@ -84,7 +84,7 @@ impl Rig {
         self.at += 1_000_000;
         let program = self.program.captures();
         let position = Position(counts * 2_500 / 9);
-        self.unit.sample(program, &self.feedback, position, SystemTime(self.at));
+        self.unit.sample(program, &self.feedback, position, MonotonicTime(self.at));
         let results = core::iter::from_fn(|| self.unit.poll()).collect();
         self.unit.want(program, wanted.iter().copied().collect());
         let mut telegram = vec![0xA5; usize::from(self.program.telegram.command_bytes)];
@@ -158,7 +158,7 @@ fn a_latch_in_the_telegrams_rises_once_the_command_works_and_rises_again_after_a
         (results[0].edge, results[0].position, results[0].status),
         (Edge::Negative, Position(12_500), CaptureStatus::Captured)
     );
-    let half_way = SystemTime(at + 500_000);
+    let half_way = MonotonicTime(at + 500_000);
     assert!(results[0].at.since(half_way).as_nanos().abs() < 1_000, "{:?} of {at}", results[0].at);
     assert!(enable, "the other edge is still armed");
     assert!(rig.checks(REGISTRATION) && !rig.checks(OTHER_EDGE));
@@ -190,7 +190,7 @@ fn a_latch_over_the_service_channel_goes_the_same_way() {
     let position = Position(25 * 2_500 / 9);
     assert_eq!((results[0].position, results[0].status), (position, CaptureStatus::Captured));
     assert!(
-        results[0].at.since(SystemTime(at - 500_000)).as_nanos().abs() < 100,
+        results[0].at.since(MonotonicTime(at - 500_000)).as_nanos().abs() < 100,
         "{:?} of {at}",
         results[0].at
     );

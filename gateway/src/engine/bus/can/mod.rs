@@ -28,7 +28,7 @@ use self::lss::{Assigner, Assignment};
 use super::backoff::Backoff;
 use super::bus_return::BusReturn;
 use super::outlet::Outlet;
-use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
+use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
@@ -109,6 +109,8 @@ pub struct CanBus {
     master: Master,
     assigner: Assigner,
     devices: Vec<Device>,
+    /// The device of each axis, and the drive there.
+    places: Places<(usize, usize)>,
     commissioner: CommissionerEnd,
     cycles_seen: u64,
     outlet: Outlet,
@@ -148,11 +150,17 @@ impl CanBus {
             runs: 0,
             backoff: Backoff::NONE,
         };
+        let devices: Vec<_> = devices.iter().map(device).collect();
+        let places = devices.iter().enumerate().flat_map(|(place, device)| {
+            let drives = device.drives.iter().enumerate();
+            drives.map(move |(number, drive)| (drive.axis, (place, number)))
+        });
         Ok(Self {
             number,
             master,
             assigner: Assigner::new(assignments),
-            devices: devices.iter().map(device).collect(),
+            places: Places::new(places),
+            devices,
             commissioner,
             cycles_seen: 0,
             outlet: Outlet::new(cycle_time),
@@ -171,12 +179,6 @@ impl CanBus {
     fn is_operational(&self, device: &Device) -> bool {
         matches!(device.stage, Stage::Ready)
             && self.master.node(device.node).is_some_and(|info| info.state == BootState::Operational)
-    }
-
-    fn place(&self, axis: usize) -> Option<(usize, usize)> {
-        self.devices.iter().enumerate().find_map(|(device, known)| {
-            Some((device, known.drives.iter().position(|drive| drive.axis == axis)?))
-        })
     }
 
     /// Puts together what the TPDOs of the cycle that has ended have brought.
@@ -226,6 +228,23 @@ impl CanBus {
                 if off {
                     self.lose(now, system, *node, axes);
                     self.try_later(now, *node);
+                }
+            }
+            Event::OtherMaster(_) => {
+                for drive in self.devices.iter().flat_map(|device| &device.drives) {
+                    axes[drive.axis].doubt_south(now, system);
+                }
+            }
+            Event::GaveWay => {
+                self.up = false;
+                self.outlet.clear();
+                self.assigner.abort();
+                for drive in self.devices.iter_mut().flat_map(|device| {
+                    device.stage = Stage::Absent;
+                    &mut device.drives
+                }) {
+                    (drive.fresh, drive.alive) = (false, false);
+                    axes[drive.axis].leave_south(now, system);
                 }
             }
             Event::BusOff => {
@@ -423,9 +442,15 @@ impl Bus for CanBus {
         self.outlet.wake_at().or_else(own)
     }
 
-    fn is_due(&self, now: MonotonicTime) -> bool {
-        self.master.next_sync().is_none_or(|at| now >= at)
+    fn next_cycle(&self) -> Option<MonotonicTime> {
+        self.master.next_sync()
     }
+
+    fn skip_late(&mut self, now: MonotonicTime) {
+        self.master.skip_late(now);
+    }
+
+    fn prepare(&mut self) {}
 
     fn is_up(&self) -> bool {
         self.up
@@ -481,7 +506,7 @@ impl Bus for CanBus {
     }
 
     fn feedback(&self, axis: usize) -> Option<Received<'_>> {
-        let (device, drive) = self.place(axis)?;
+        let (device, drive) = self.places.of(axis)?;
         let device = self.devices.get(device).filter(|device| self.is_operational(device))?;
         let drive = device.drives.get(drive)?;
         let data = drive.feedback.row.get(..drive.feedback.spread.len())?;
@@ -516,7 +541,14 @@ impl Bus for CanBus {
         }
         self.commission(now, axes, notice);
         self.retry(now);
-        if !self.stopped {
+        let mut drives = self.devices.iter().flat_map(|device| &device.drives);
+        if self.master.leads()
+            && self.master.other_master().is_some()
+            && !drives.any(|drive| axes[drive.axis].may_have_torque())
+        {
+            self.master.give_way(now);
+        }
+        if !self.stopped && self.master.leads() {
             let Self { master, assigner, .. } = self;
             if let Some(told) = assigner.run(now, |node| is_silent(master, node)) {
                 notice(Notice::Lss { bus: self.number, told });
@@ -543,7 +575,7 @@ impl Bus for CanBus {
     }
 
     fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
-        let place = self.place(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
+        let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
         let Some((device, drive)) = place else {
             fill(None);
             return;
@@ -570,7 +602,7 @@ impl Bus for CanBus {
 
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let Some(request) = request(access) else { return false };
-        let place = self.place(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
+        let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
         let Some((device, drive)) = place else { return false };
         let device = &mut self.devices[device];
         let drive = &mut device.drives[drive];

@@ -24,7 +24,7 @@ use self::setup::{SetupFailure, SetupStep};
 use super::backoff::Backoff;
 use super::bus_return::BusReturn;
 use super::outlet::Outlet;
-use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
+use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
@@ -92,6 +92,8 @@ pub struct DevicenetBus {
     number: u8,
     master: Master,
     drives: Vec<Drive>,
+    /// The drive of each axis.
+    places: Places<usize>,
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
@@ -123,10 +125,12 @@ impl DevicenetBus {
             accesses: ArrayVec::new(),
         };
         let cycle = config.cycle;
+        let drives: Vec<_> = drives.into_iter().map(drive).collect();
         Ok(Self {
             number,
             master: Master::new(config)?,
-            drives: drives.into_iter().map(drive).collect(),
+            places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.plan.axis, place))),
+            drives,
             cycles_seen: 0,
             refused: 0,
             outlet: Outlet::new(cycle),
@@ -166,8 +170,14 @@ impl DevicenetBus {
         }
     }
 
-    fn event(&mut self, now: MonotonicTime, event: &Event) {
+    fn event(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel], event: &Event) {
         match event {
+            Event::OtherMaster { slave, .. } => {
+                for drive in self.drives.iter_mut().filter(|drive| drive.plan.mac == *slave) {
+                    drive.tried = true;
+                    axes[drive.plan.axis].doubt_south(now, system);
+                }
+            }
             Event::Online => self.backoff = Backoff::NONE,
             Event::DuplicateMac { .. } => {
                 self.backoff.begin(now);
@@ -291,9 +301,15 @@ impl Bus for DevicenetBus {
         self.outlet.wake_at().or_else(|| self.master.wake_at())
     }
 
-    fn is_due(&self, now: MonotonicTime) -> bool {
-        self.master.next_cycle().is_none_or(|at| now >= at)
+    fn next_cycle(&self) -> Option<MonotonicTime> {
+        self.master.next_cycle()
     }
+
+    fn skip_late(&mut self, now: MonotonicTime) {
+        self.master.skip_late(now);
+    }
+
+    fn prepare(&mut self) {}
 
     fn is_up(&self) -> bool {
         self.up
@@ -346,7 +362,7 @@ impl Bus for DevicenetBus {
     }
 
     fn feedback(&self, axis: usize) -> Option<Received<'_>> {
-        let drive = self.drives.iter().find(|drive| drive.plan.axis == axis)?;
+        let drive = self.drives.get(self.places.of(axis)?)?;
         // The master gives a drive up that has missed too many answers.
         let alive = self.master.phase(drive.plan.mac) == Some(Phase::Exchange);
         let ready = drive.stage == Stage::Ready;
@@ -373,8 +389,13 @@ impl Bus for DevicenetBus {
                 self.outcome(now, *ticket, outcome, axes, answer, notice);
                 continue;
             }
-            self.event(now, &event);
+            self.event(now, system, axes, &event);
             notice(Notice::Devicenet { network: self.number, event });
+        }
+        for drive in &self.drives {
+            if !axes[drive.plan.axis].may_have_torque() {
+                self.master.give_way(now, drive.plan.mac);
+            }
         }
         self.lead_on(now, system, axes);
         for place in 0..self.drives.len() {
@@ -393,8 +414,8 @@ impl Bus for DevicenetBus {
     }
 
     fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
-        let Self { master, drives, .. } = self;
-        let Some(drive) = drives.iter_mut().find(|drive| drive.plan.axis == axis) else {
+        let Self { master, drives, places, .. } = self;
+        let Some(drive) = places.of(axis).and_then(|place| drives.get_mut(place)) else {
             fill(None);
             return;
         };
@@ -422,8 +443,8 @@ impl Bus for DevicenetBus {
             Operation::Command | Operation::Start | Operation::Progress | Operation::Cancel => None,
         };
         let Some(request) = request else { return false };
-        let Self { master, drives, .. } = self;
-        let Some(drive) = drives.iter_mut().find(|drive| drive.plan.axis == axis) else { return false };
+        let Self { master, drives, places, .. } = self;
+        let Some(drive) = places.of(axis).and_then(|place| drives.get_mut(place)) else { return false };
         if drive.stage != Stage::Ready || drive.accesses.is_full() {
             return false;
         }

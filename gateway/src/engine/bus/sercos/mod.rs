@@ -8,6 +8,7 @@ pub mod commissioner;
 pub mod commissioning;
 
 use arrayvec::ArrayVec;
+use profile_generic::state::Report;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
@@ -15,6 +16,7 @@ use profile_sercos::master::connection::{Consumer, ConsumerState};
 use profile_sercos::master::event::{
     Event, HotPlugRefusal, Output, Refusal as FrameRefusal, SlaveId, Ticket,
 };
+use profile_sercos::master::station::Presence;
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
 use profile_sercos::wire::data_status::{CommandState, DataStatus};
 use profile_sercos::wire::header::Phase;
@@ -24,7 +26,7 @@ use profile_sercos::wire::scp::ScpClass;
 
 use self::commissioner::{CommissionerEnd, Done, Job, Run};
 use self::commissioning::{Commissioning, StepFailure};
-use super::{Answer, Bus, Counts, Purpose, Received, Sent, ask};
+use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
@@ -98,13 +100,13 @@ struct Drive {
 pub struct SercosBus {
     master: Master,
     drives: Vec<Drive>,
+    /// The drive of each axis.
+    places: Places<usize>,
     retry_at: Option<MonotonicTime>,
     wanted: Option<Phase>,
     cycles_seen: u64,
     /// Slaves that stand in the way of the others; left out until the next scan.
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
-    /// A slave that was lost is back: the bus is brought up anew once no axis has torque.
-    returned: bool,
     /// Since when a drive is lost that was there.
     lost_since: Option<MonotonicTime>,
     rescan_pause: DurationNs,
@@ -149,14 +151,15 @@ impl SercosBus {
             passed_over: Vec::new(),
             accesses: ArrayVec::new(),
         };
+        let drives: Vec<_> = drives.into_iter().map(drive).collect();
         Ok(Self {
             master,
-            drives: drives.into_iter().map(drive).collect(),
+            places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.axis, place))),
+            drives,
             retry_at: None,
             wanted: Some(Phase::CP4),
             cycles_seen: 0,
             refused: ArrayVec::new(),
-            returned: false,
             lost_since: None,
             rescan_pause: RESCAN_PAUSE,
             idle: true,
@@ -178,7 +181,7 @@ impl SercosBus {
     }
 
     fn drive_of(&self, axis: usize) -> Option<&Drive> {
-        self.drives.iter().find(|drive| drive.axis == axis)
+        self.drives.get(self.places.of(axis)?)
     }
 
     fn event(
@@ -193,9 +196,22 @@ impl SercosBus {
         match event {
             Event::Scanned { .. } => {
                 self.refused.clear();
-                self.returned = false;
             }
-            Event::SlaveReturned { .. } => self.returned = true,
+            // Its data are listened to again, and it was spoken to all the time.
+            Event::SlaveReturned { .. }
+                if self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive)) =>
+            {
+                self.lost_since = None;
+            }
+            Event::OtherMaster(_) => {
+                for drive in &self.drives {
+                    axes[drive.axis].doubt_south(now, system);
+                }
+            }
+            Event::GaveWay => {
+                self.planned = true;
+                self.lose_all(now, system, axes);
+            }
             Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
                 self.exclude_refused();
                 for place in 0..self.drives.len() {
@@ -233,7 +249,7 @@ impl SercosBus {
                     self.lost_since = Some(now);
                 }
             }
-            Event::SlaveLost { slave, address, .. } => {
+            Event::SlaveLost { slave, address, phase } => {
                 // One that comes back by hot plug needs no new scan.
                 let facts = self.master.slave(*slave).map(|info| info.facts);
                 let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
@@ -241,7 +257,11 @@ impl SercosBus {
                 if !has_class && !self.drives.iter().any(configured) {
                     self.lost_since.get_or_insert(now);
                 }
-                self.lose_slave(now, system, *slave, axes);
+                // In CP4 it may hear every word and be back in a moment: it is told to stop as long as its place is kept. That
+                // it is not heard its connection says.
+                if *phase != Phase::CP4 {
+                    self.lose_slave(now, system, *slave, axes);
+                }
             }
             // The master waits again for its application: the others go on without the slave that stands in the way.
             Event::StepFailed { slave, .. }
@@ -259,6 +279,12 @@ impl SercosBus {
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
+    }
+
+    /// Whether the master has lost the slave of a drive, and keeps its place.
+    fn is_lost(&self, drive: &Drive) -> bool {
+        let info = drive.slave.and_then(|slave| self.master.slave(slave));
+        info.is_some_and(|info| info.presence == Presence::Lost)
     }
 
     fn exclude_refused(&mut self) {
@@ -518,9 +544,16 @@ impl Bus for SercosBus {
         self.master.wake_at()
     }
 
-    fn is_due(&self, now: MonotonicTime) -> bool {
-        // Before CP4 there is no cycle to keep to.
-        self.master.phase() != Some(Phase::CP4) || self.master.wake_at().is_none_or(|at| now >= at)
+    fn next_cycle(&self) -> Option<MonotonicTime> {
+        self.master.next_cycle()
+    }
+
+    fn skip_late(&mut self, now: MonotonicTime) {
+        self.master.skip_late(now);
+    }
+
+    fn prepare(&mut self) {
+        self.master.prepare();
     }
 
     fn is_up(&self) -> bool {
@@ -607,7 +640,8 @@ impl Bus for SercosBus {
 
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let Some(request) = request(access) else { return false };
-        let Some(drive) = self.drives.iter_mut().find(|drive| drive.axis == axis) else { return false };
+        let Some(place) = self.places.of(axis) else { return false };
+        let drive = &mut self.drives[place];
         let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
         match self.master.svc_submit(slave, request) {
             Ok(ticket) => {
@@ -642,14 +676,18 @@ impl Bus for SercosBus {
             let axis = self.drives[place].axis;
             ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
         }
-        let alone =
-            self.master.phase() == Some(Phase::CP4) && self.drives.iter().all(|drive| drive.slave.is_none());
-        let free = self.master.phase() == Some(Phase::CP4) && !axes.iter().any(AxisChannel::may_have_torque);
+        let cyclic = self.master.phase() == Some(Phase::CP4);
+        let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
+        let alone = cyclic && self.drives.iter().all(gone);
+        let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
         let rescan = self.idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
-        if alone || (free && (self.returned || rescan)) {
-            self.returned = false;
+        let led = |drive: &Drive| axes[drive.axis].may_have_torque();
+        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
+            self.master.give_way(now);
+        } else if alone || (free && rescan) {
             self.lost_since = None;
-            self.planned = true;
+            // Of drives that are all lost nobody knows that they stand.
+            self.planned = !alone;
             self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
             for slave in self.drives.iter().filter_map(|drive| drive.slave) {
                 self.master.withdraw(slave, COMMAND_CONNECTION);
@@ -658,11 +696,12 @@ impl Bus for SercosBus {
             self.master.set_target_phase(Phase::CP0);
         }
         for drive in &self.drives {
-            let axis = &axes[drive.axis];
-            let Some(slave) = drive.slave.filter(|_| !axis.may_have_torque()) else { continue };
+            // Not before the axis knows: it stops, whatever is heard from now on, and is the sooner usable the sooner the drive
+            // says that it stands.
+            let noticed = axes[drive.axis].feedback().report == Report::Silent;
+            let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
             let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
             if self.master.consumer(slave, FEEDBACK_CONNECTION).is_some_and(failed) {
-                // Too many losses in a row; without torque there is nothing to lose by listening again.
                 self.master.reset_consumer(slave, FEEDBACK_CONNECTION);
             }
         }
