@@ -134,6 +134,14 @@ impl Guest {
         self.folder.join(name)
     }
 
+    /// What each of the processes told, the box first.
+    fn all_logs(&self) -> String {
+        let logs = ["box", "drive1", "drive2", "drive5", "drive9"];
+        let told =
+            logs.map(|name| (name, read(&self.log(name)))).into_iter().filter(|(_, text)| !text.is_empty());
+        told.map(|(name, text)| format!("-- {name}\n{text}")).collect()
+    }
+
     fn drives(&self, interface: &str) -> [Running; 2] {
         [("drive 1", "drive1", 1), ("drive 2", "drive2", 2)].map(|(name, log, node)| {
             let words = format!("simulate can-drive --interface {interface} --node {node} --sync-losses 50");
@@ -158,7 +166,7 @@ impl Guest {
             .stdin(Stdio::null())
             .output()
             .expect("the controller can be started");
-        let told = || format!("{}\n{}", String::from_utf8_lossy(&output.stderr), read(&self.log("box")));
+        let told = || format!("{}\n{}", String::from_utf8_lossy(&output.stderr), self.all_logs());
         let result: serde_json::Value =
             serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}\n{}", told()));
         assert!(output.status.success(), "{result}\n{}", told());

@@ -163,6 +163,40 @@ fn two_axes_go_where_the_controller_sends_them() {
     assert!(rig.torque_free());
 }
 
+/// A host without real-time scheduling: what was built for a cycle that is left out is built again for another one, and the drive
+/// must not count it as an update that was lost (more than four of them are a node fault).
+#[test]
+fn cycles_that_are_left_out_are_no_lost_updates() {
+    let applied = |rig: &Rig, place| match drive(rig, place) {
+        DevicenetNode::Motion(slave) => {
+            let counters = slave.application().device().counters();
+            (counters.applied, counters.lost_updates)
+        }
+        DevicenetNode::Speed(_) => panic!("both are CIP Motion drives"),
+    };
+    // As patient as box and drives on such a host have to be.
+    let patient = BOX
+        .replace("cycle_time = \"10 ms\"\n", "cycle_time = \"10 ms\"\nallowed_losses = 50\n")
+        .replace("\nresolution =", "\npacket_rate = \"250 ms\"\nresolution =");
+    let mut rig = Rig::ready(with(&patient));
+    rig.wake_ups.jitter = millis(10);
+    let before = [0, 1].map(|place| applied(&rig, place).0);
+    rig.run_for(millis(5_000));
+    for (place, before) in before.into_iter().enumerate() {
+        let (applied, lost) = applied(&rig, place);
+        let left_out = 500 - (applied - before);
+        assert!(
+            (50..300).contains(&left_out),
+            "{left_out} cycles of 10 ms were left out: the test shows nothing\n{}",
+            rig.told()
+        );
+        assert_eq!(lost, 0, "{}", rig.told());
+        let axis = &rig.engine.axes()[place];
+        assert_eq!(axis.fault(), None, "{}", rig.told());
+        assert_eq!(axis.state(), DriveState::Inhibited, "{}", rig.told());
+    }
+}
+
 #[test]
 fn a_drive_whose_plug_is_pulled_stops_by_itself_and_comes_back_while_the_other_goes_on() {
     let mut rig = in_motion(BOX, 8.0);

@@ -83,6 +83,11 @@ impl IoEnd {
         true
     }
 
+    /// What was committed last has not gone out.
+    pub const fn is_unsent(&self) -> bool {
+        matches!(self.committed, Some(0))
+    }
+
     /// The command has gone out.
     pub fn sent(&mut self) {
         self.committed = self.committed.map(|age| age.saturating_add(1));

@@ -319,6 +319,14 @@ impl Master {
         }
     }
 
+    /// Whether what was committed last has not gone out: its cycle was left out, or has not come yet. The next commit takes its
+    /// place.
+    #[must_use]
+    pub fn is_unsent(&self, slave: MacId, kind: ConnectionKind) -> bool {
+        self.station(slave)
+            .is_some_and(|station| station.ends.iter().any(|end| end.config.kind == kind && end.is_unsent()))
+    }
+
     /// What a slave has sent.
     #[must_use]
     pub fn consumer(&self, slave: MacId, kind: ConnectionKind) -> Option<Consumer<'_>> {

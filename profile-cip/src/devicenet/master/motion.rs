@@ -103,6 +103,8 @@ pub enum UpdateError {
 #[derive(Debug, Clone)]
 pub struct MotionEnd {
     update_id: u8,
+    /// It has not gone out.
+    unsent: bool,
     set_point: SetPoint,
     watched: Watched,
     reset_node: bool,
@@ -116,6 +118,7 @@ impl MotionEnd {
     pub fn new(set_point: SetPoint, watched: Watched) -> Self {
         Self {
             update_id: 0,
+            unsent: false,
             set_point,
             watched,
             reset_node: false,
@@ -224,7 +227,7 @@ impl MotionEnd {
     /// # Errors
     /// The buffer is shorter than [`UPDATE_LEN`].
     pub fn emit(&mut self, buffer: &mut [u8]) -> Result<(), Error> {
-        let update_id = self.update_id.wrapping_add(1);
+        let update_id = self.update_id.wrapping_add(u8::from(!self.unsent));
         let mut node_control = NodeControl::REMOTE_CONTROL | NodeControl::DATA_VALID;
         node_control.set(NodeControl::FAULT_RESET, self.reset_node);
         let command = FixedCommand {
@@ -241,8 +244,14 @@ impl MotionEnd {
             values: self.set_point.values(),
         };
         command.emit(&mut Writer::new(buffer))?;
-        self.update_id = update_id;
+        (self.update_id, self.unsent) = (update_id, true);
         Ok(())
+    }
+
+    /// The update that was written last has gone out. Until this is said the next one takes its place and has its Update ID,
+    /// because the device counts those that it does not get as lost.
+    pub const fn sent(&mut self) {
+        self.unsent = false;
     }
 
     /// Takes note of an update that somebody else has sent to the device: its next message answers that.
@@ -257,7 +266,7 @@ impl MotionEnd {
 
     /// The next message of the device answers this update.
     pub const fn expect(&mut self, update_id: u8) {
-        self.update_id = update_id;
+        (self.update_id, self.unsent) = (update_id, false);
     }
 
     /// Takes a message of the device.

@@ -343,6 +343,7 @@ fn commit_and_run(net: &mut Net, millis: i64) {
         let now = net.master().statistics().cycles;
         if now != cycle {
             cycle = now;
+            end.sent();
             end.emit(net.master().producer(mac(9), POLL).unwrap()).unwrap();
             net.master().commit(mac(9), POLL);
         }

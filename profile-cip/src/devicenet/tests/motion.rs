@@ -44,6 +44,7 @@ impl Controller {
             }
         }
         let producer = net.master().producer(slave, POLL).unwrap();
+        self.end.sent();
         self.end.emit(producer).unwrap();
         net.master().commit(slave, POLL);
     }

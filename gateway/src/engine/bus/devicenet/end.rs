@@ -79,6 +79,13 @@ impl End {
         }
     }
 
+    /// The message that was written last has gone out: the next one is another one, and does not take its place.
+    pub const fn sent(&mut self) {
+        if let Self::Motion(link) = self {
+            link.end.sent();
+        }
+    }
+
     /// Takes a message that somebody else has sent to the drive into a row of commands: the next message of the drive answers it.
     ///
     /// # Errors

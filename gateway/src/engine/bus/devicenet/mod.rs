@@ -422,6 +422,9 @@ impl Bus for DevicenetBus {
         let mac = drive.plan.mac;
         let ready = drive.stage == Stage::Ready;
         let given = fill(ready.then_some(&mut drive.command[..]));
+        if !master.is_unsent(mac, POLL) {
+            drive.plan.end.sent();
+        }
         let exchanging = master.phase(mac) == Some(Phase::Exchange);
         // Without a command the master sends a message without data, which keeps the connection and commands nothing.
         let Some(message) = master.producer(mac, POLL).filter(|_| exchanging) else { return };
