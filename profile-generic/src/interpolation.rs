@@ -11,6 +11,7 @@
 
 use crate::code::named_enum;
 use crate::image::{AxisCommand, CommandSet};
+use crate::mode::OperatingMode;
 use crate::quantity::{Acceleration, Position, Torque, Velocity};
 use crate::time::{DurationNs, MonotonicTime};
 use arrayvec::ArrayVec;
@@ -291,13 +292,35 @@ impl FineInterpolator {
     /// here on, or updates are meant for another instant. Until the next update takes over the motion goes on as it is,
     /// and that update's curve begins in it: neither position nor velocity steps.
     ///
-    /// What no curve tells of the motion is taken from `actual`. Before the first update and after a loss there is no
-    /// motion to go on with: then only the way changes.
-    pub fn change(&mut self, now: MonotonicTime, target_update: TargetUpdate, actual: &Motion) {
+    /// `modes` are the operating mode of before and that from now on. Of the curves of before only those count that led the
+    /// axis: a velocity of zero beside a commanded torque was a feed-forward value, not the motion. What they do not tell is
+    /// taken from `actual`; the torque is always one that was commanded. Before the first update and after a loss there is no motion to go on with: then only the way changes.
+    pub fn change(
+        &mut self,
+        now: MonotonicTime,
+        target_update: TargetUpdate,
+        modes: (OperatingMode, OperatingMode),
+        actual: &Motion,
+    ) {
         self.config.target_update = target_update;
         self.pass(now);
         let Some(segment) = self.segments.first() else { return };
-        let motion = segment.motion_at(now, actual);
+        let curves = segment.motion_at(now, actual);
+        let motion = match modes {
+            (from, to) if from == to => curves,
+            (OperatingMode::Position, _) => {
+                // The slope of what led it; a velocity beside a position is a feed-forward value.
+                let (position, velocity) =
+                    segment.position.map_or((actual.position.get(), actual.velocity.get()), |curve| {
+                        segment.motion(&curve, now)
+                    });
+                let (position, velocity) = (Position(position), Velocity(velocity));
+                Motion { position, velocity, ..curves }
+            }
+            (OperatingMode::Velocity, _) => Motion { position: actual.position, ..curves },
+            (OperatingMode::Torque, _) => Motion { torque: curves.torque, ..*actual },
+            _ => *actual,
+        };
         self.carry(now, motion);
     }
 

@@ -24,6 +24,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{ArgGroup, Args, Parser, Subcommand};
+use profile_generic::time::DurationNs;
+
+use crate::simulate::clock::{ClockPlan, ClockStep};
 
 /// Motion protocol gateway: to a controller it is CIP Motion drives; behind it, it masters the real ones.
 #[derive(Debug, Parser)]
@@ -478,9 +481,28 @@ struct ControllerArguments {
     /// How long the axes move, in seconds.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
+    /// By how much the controller's clock is ahead of the host's, in milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 0, allow_negative_numbers = true)]
+    clock_offset: i32,
+    /// What the controller's clock gains, in parts per million.
+    #[arg(long, value_name = "PPM", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-5_000..=5_000))]
+    clock_drift: i32,
+    /// Step the controller's clock after so many seconds by so many milliseconds, such as 3:-50; may be given several times.
+    #[arg(long, value_name = "S:MS")]
+    clock_step: Vec<ClockStep>,
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+impl ControllerArguments {
+    fn clock(&self) -> ClockPlan {
+        ClockPlan {
+            offset: DurationNs::from_millis(self.clock_offset.into()),
+            drift_ppb: i64::from(self.clock_drift) * 1_000,
+            steps: self.clock_step.clone(),
+        }
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {

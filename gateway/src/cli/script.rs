@@ -38,7 +38,7 @@ pub fn run(arguments: &ControllerArguments, path: &Path) -> Result<ExitCode, Cli
     let bind = arguments.bind.or(script.places.bind).unwrap_or(Ipv4Addr::UNSPECIFIED);
     let stop = signal::stop_on_signals()?;
     let mut teller = Teller::new(&script, &mapping, arguments.json);
-    let endpoints = Endpoints { target, bind };
+    let endpoints = Endpoints { target, bind, clock: arguments.clock() };
     let steps = script.steps.clone();
     let report =
         controller::run(endpoints, script.config.clone(), steps, &stop, &mut |event| teller.tell(event))?;

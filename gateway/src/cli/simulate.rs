@@ -186,7 +186,8 @@ pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError>
         .collect();
     let mapping = Mapping::embedded()?;
     let config = setup::controller(&mapping, &axes, arguments.update_period_us);
-    let endpoints = Endpoints { target, bind: arguments.bind.unwrap_or(Ipv4Addr::UNSPECIFIED) };
+    let endpoints =
+        Endpoints { target, bind: arguments.bind.unwrap_or(Ipv4Addr::UNSPECIFIED), clock: arguments.clock() };
     let mut progress = Progress::new(arguments.json);
     let steps = program::standard(&plans, seconds);
     let report =

@@ -1,5 +1,5 @@
 //! A CIP Motion controller on real sockets: the engine of `profile_cip::controller` with a TCP stream, a UDP socket and
-//! the host's clocks.
+//! a clock of its own.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
@@ -13,7 +13,7 @@ use profile_cip::controller::{
 use profile_generic::time::DurationNs;
 use profile_generic::time_base::TimeBase;
 
-use crate::sys::clock::{self, HostTime};
+use super::clock::{ClockPlan, ControllerClock};
 use crate::sys::realtime;
 use crate::sys::udp::{self, BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
@@ -35,13 +35,15 @@ const PRIORITY: u8 = 10;
 /// Bytes taken from the stream at once.
 const STREAM_CHUNK: usize = 4096;
 
-/// Where the controller and its device are.
-#[derive(Debug, Clone, Copy)]
+/// Where the controller and its device are, and what time it has.
+#[derive(Debug, Clone)]
 pub struct Endpoints {
     /// The device; TCP 44818 and UDP 2222.
     pub target: Ipv4Addr,
     /// The controller's own address, to which it binds UDP 2222.
     pub bind: Ipv4Addr,
+    /// The controller's clock.
+    pub clock: ClockPlan,
 }
 
 /// Why a run could not begin or go on.
@@ -89,7 +91,8 @@ pub fn run(
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
     let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
-    let mut time = TimeBase::new(HostTime.first_sample());
+    let clock = ControllerClock::start(endpoints.clock);
+    let mut time = TimeBase::new(clock.first_sample());
     let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
     let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
     // Gone when either side has closed it.
@@ -97,38 +100,38 @@ pub fn run(
     // Another one is being opened, while the motion connection goes on.
     let mut opening: Option<Receiver<io::Result<TcpStream>>> = None;
     let mut stopping = false;
-    controller.tcp_connected(clock::monotonic_now());
+    controller.tcp_connected(clock.now());
     while !controller.is_closed() {
-        if let Some(sample) = HostTime.sample() {
-            // A step of the host's clock is told to the device with the controller's time offset.
+        if let Some(sample) = clock.sample() {
+            // A step of the clock is told to the device with the controller's time offset.
             time.feed(&sample);
         }
         if stop.load(Ordering::Relaxed) && !stopping {
             stopping = true;
-            controller.interrupt(clock::monotonic_now());
+            controller.interrupt(clock.now());
         }
         if let Some(opened) = opening.as_ref().and_then(outcome) {
             opening = None;
             match opened {
                 Ok(opened) => {
                     stream = Some(opened);
-                    controller.tcp_connected(clock::monotonic_now());
+                    controller.tcp_connected(clock.now());
                 }
                 // The axes are led by the motion connection, which is still there.
-                Err(_) if controller.is_connected() => controller.tcp_closed(clock::monotonic_now()),
+                Err(_) if controller.is_connected() => controller.tcp_closed(clock.now()),
                 Err(source) => return Err(RunError::Connect { target, source }),
             }
         }
         while let Some(open) = &mut stream {
             match open.read(&mut buffer[..STREAM_CHUNK]) {
                 Ok(length) if length > 0 => {
-                    controller.handle_stream(clock::monotonic_now(), &buffer[..length]);
+                    controller.handle_stream(clock.now(), &buffer[..length]);
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 // However a stream breaks, it is as good as closed by the device.
                 Ok(_) | Err(_) => {
                     stream = None;
-                    controller.tcp_closed(clock::monotonic_now());
+                    controller.tcp_closed(clock.now());
                 }
             }
         }
@@ -136,11 +139,11 @@ pub fn run(
             // A longer datagram than any of ours, or one from elsewhere, is none of the device's.
             if !datagram.truncated && *datagram.from.ip() == endpoints.target {
                 let bytes = &buffer[..datagram.len];
-                let now = clock::monotonic_now();
+                let now = clock.now();
                 controller.handle_datagram(now, time.system_at(now), bytes);
             }
         }
-        let now = clock::monotonic_now();
+        let now = clock.now();
         controller.handle_time(now, time.system_at(now));
         while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
             match io.send_to(&buffer[..length], destination(&controller, endpoints.target)) {
@@ -155,7 +158,7 @@ pub fn run(
         if flush(stream.as_mut(), &mut outgoing).is_err() {
             stream = None;
             outgoing.clear();
-            controller.tcp_closed(clock::monotonic_now());
+            controller.tcp_closed(clock.now());
         }
         match controller.poll_stream_action() {
             Some(StreamAction::Close) => stream = None,
@@ -169,7 +172,7 @@ pub fn run(
         while let Some(event) = controller.poll_event() {
             on_event(&event);
         }
-        let now = clock::monotonic_now();
+        let now = clock.now();
         let latest = now + if outgoing.is_empty() { LOOK_INTERVAL } else { FULL_INTERVAL };
         let wake = controller.wake_at().map_or(latest, |due| due.min(latest));
         if wake > now {

@@ -5,6 +5,7 @@
 pub mod can_bus;
 pub mod can_drive;
 pub mod can_process;
+pub mod clock;
 pub mod controller;
 pub mod devicenet_drive;
 pub mod drives;

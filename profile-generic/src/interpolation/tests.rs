@@ -369,6 +369,7 @@ proptest! {
         changes in prop::collection::vec((any::<bool>(), any::<bool>(), 1..12_i64), 1..12),
     ) {
         const FINE: DurationNs = DurationNs::from_micros(250);
+        let mode = |velocity| if velocity { OperatingMode::Velocity } else { OperatingMode::Position };
         let mut interpolator = interpolator(TargetUpdate::Interpolate, 4);
         interpolator.start_moving(EPOCH, &swing(EPOCH));
         let (mut period, mut by_velocity) = (0, false);
@@ -379,7 +380,8 @@ proptest! {
                 // The update stamped at the start of this period arrives a little later.
                 let (stamp, arrives) = (time(period, 0), time(period, 100));
                 if number == 0 && (velocity != by_velocity || update != interpolator.config().target_update) {
-                    interpolator.change(arrives, update, &swing(arrives));
+                    let modes = (mode(by_velocity), mode(velocity));
+                    interpolator.change(arrives, update, modes, &swing(arrives));
                     by_velocity = velocity;
                 }
                 let target = update.target(stamp, PERIOD);
@@ -420,7 +422,8 @@ fn a_motion_goes_on_until_the_first_update_after_a_change() {
     assert_eq!(position_at(&mut interpolator, time(1, 0)), 2_000);
     assert_eq!(position_at(&mut interpolator, time(1, 500)), 2_500);
     // Then by velocity, from the velocity that there is.
-    interpolator.change(time(1, 500), TargetUpdate::Extrapolate, &Motion::default());
+    let modes = (OperatingMode::Position, OperatingMode::Velocity);
+    interpolator.change(time(1, 500), TargetUpdate::Extrapolate, modes, &Motion::default());
     assert_eq!(interpolator.at(time(1, 500)).set_points.velocity, Some(Velocity(500_000)));
     let points = SetPoints { velocity: Some(Velocity(500_000)), ..SetPoints::default() };
     interpolator.update(time(2, 0), &points).unwrap();
@@ -428,9 +431,47 @@ fn a_motion_goes_on_until_the_first_update_after_a_change() {
     assert_eq!((fine.set_points.velocity, fine.set_points.position), (Some(Velocity(500_000)), None));
     // Before the first update there is nothing to carry on.
     interpolator.start(Some(Position(7)));
-    interpolator.change(time(3, 0), TargetUpdate::Interpolate, &moving);
+    interpolator.change(time(3, 0), TargetUpdate::Interpolate, modes, &moving);
     assert_eq!(
         interpolator.at(time(3, 0)),
         FineCommand { set_points: position(7), quality: Quality::Waiting }
     );
+}
+
+/// On the move from one mode to another: what led the axis counts, and feed-forward values beside it do not.
+#[test]
+fn a_change_of_mode_begins_in_the_motion_that_there_is() {
+    use OperatingMode::{Position as ByPosition, Torque as ByTorque, Velocity as ByVelocity};
+    // The controller's curve, where one leads, is at 500 000 and slower than the axis; the drive gives 30 % of torque.
+    let actual = Motion {
+        position: Position(70_000),
+        velocity: Velocity(600_000),
+        torque: Torque(300_000),
+        ..Motion::default()
+    };
+    let begin = |from, to| {
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+        interpolator.start(Some(Position(1_000)));
+        for period in 0..4_i64 {
+            let points = SetPoints {
+                position: Some(Position(1_000 * (period + 1))),
+                velocity: Some(Velocity(if from == ByVelocity { 500_000 } else { 0 })),
+                acceleration: Some(Acceleration::ZERO),
+                torque: Some(Torque(if from == ByTorque { 100_000 } else { 20_000 })),
+            };
+            interpolator.update(time(period, 0), &points).unwrap();
+        }
+        interpolator.change(time(3, 0), TargetUpdate::Interpolate, (from, to), &actual);
+        let points = interpolator.at(time(3, 0)).set_points;
+        (points.position.unwrap().0, points.velocity.unwrap().0, points.torque.unwrap().0)
+    };
+    assert_eq!(begin(ByPosition, ByVelocity), (4_000, 500_000, 20_000));
+    assert_eq!(begin(ByPosition, ByTorque), (4_000, 500_000, 20_000));
+    assert_eq!(begin(ByVelocity, ByPosition), (70_000, 500_000, 20_000));
+    assert_eq!(begin(ByVelocity, ByTorque), (70_000, 500_000, 20_000));
+    assert_eq!(begin(ByTorque, ByPosition), (70_000, 600_000, 100_000));
+    assert_eq!(begin(ByTorque, ByVelocity), (70_000, 600_000, 100_000));
+    // The same mode for another target goes on as it was commanded.
+    assert_eq!(begin(ByVelocity, ByVelocity), (4_000, 500_000, 20_000));
+    assert_eq!(begin(ByTorque, ByTorque), (4_000, 0, 100_000));
 }

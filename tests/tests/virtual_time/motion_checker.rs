@@ -7,6 +7,7 @@ use axisbridge_tests::rig::motion_checker::known::Known;
 use axisbridge_tests::rig::motion_checker::violation::Rule;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
+use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::time::DurationNs;
 use profile_sercos::police::court::Tried;
 use profile_sercos::police::{self, Breach};
@@ -74,6 +75,24 @@ fn a_controller_clock_that_is_ahead_is_served_or_refused() {
     rig.run_for(millis(600));
     rig.controller_clock.drift(rig.now(), 0);
     rig.run_for(millis(300));
+}
+
+/// From torque to velocity control on the move the axis goes on at the speed that it has: the velocity beside the torque was none of it.
+#[test]
+fn velocity_control_of_an_axis_that_moves_begins_at_its_speed() {
+    let mut rig = Rig::ready(Settings::default());
+    let axis = AxisSet::one(1);
+    rig.connect(vec![
+        Step::Enable(axis),
+        Step::Mode { axis: 1, mode: ControlMode::TORQUE },
+        Step::Torque { axis: 1, torque: 10.0, rate: 100.0, velocity_limit: 20.0 },
+        Step::Dwell { seconds: 0.1 },
+        Step::Mode { axis: 1, mode: ControlMode::VELOCITY },
+        Step::Stop { axis: 1, acceleration: 20.0, jerk: 400.0 },
+        Step::Disable(axis),
+    ]);
+    assert_eq!(rig.run(millis(20_000)).failure, None);
+    assert_eq!(rig.motion_checker.violations(), []);
 }
 
 /// M5: without a shared clock set-points stand until the next update.

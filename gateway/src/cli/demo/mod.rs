@@ -21,6 +21,7 @@ use crate::config::Config;
 use crate::mapping::Mapping;
 use crate::runner::{self, RunningBox, StartError};
 use crate::settings::Store;
+use crate::simulate::clock::ClockPlan;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
@@ -108,7 +109,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
 fn endpoints(listen: Ipv4Addr) -> Endpoints {
     let target = if listen.is_unspecified() { Ipv4Addr::new(127, 0, 0, 2) } else { listen };
     let [.., last] = target.octets();
-    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last) }
+    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last), clock: ClockPlan::default() }
 }
 
 fn wait_until_ready(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {

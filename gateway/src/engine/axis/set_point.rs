@@ -94,6 +94,7 @@ impl AxisChannel {
     ) {
         let other_mode = self.command.selection() != fresh.selection();
         let actual = self.actual_motion();
+        let before = self.command.mode;
         let led = self.takes_set_points();
         self.command.select(fresh.selection());
         self.counters.commands = self.counters.commands.saturating_add(1);
@@ -114,7 +115,7 @@ impl AxisChannel {
         }
         if other_mode || interpolator.config().target_update != target_update {
             // On the move the new command begins where the old one has led the axis.
-            interpolator.change(self.acts_at, target_update, &actual);
+            interpolator.change(self.acts_at, target_update, (before, fresh.mode), &actual);
         }
         let period = interpolator.config().period;
         let target = target_time.unwrap_or_else(|| target_update.target(now, period));
@@ -286,9 +287,8 @@ impl AxisChannel {
         }
     }
 
-    /// The set-points of this cycle. A drive that does not follow is shown its own position: it will not jump when it
-    /// begins to.
-    /// Returns who leads it.
+    /// Works out the set-points of this cycle and returns who leads the axis. A drive that does not follow is shown its own
+    /// position: it will not jump when it begins to.
     pub(super) fn fine_command(
         &mut self,
         now: MonotonicTime,

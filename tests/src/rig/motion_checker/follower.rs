@@ -23,6 +23,11 @@ const MAKING_UP: i64 = 7;
 /// its update, some periods ahead of its time.
 const BEGIN_PERIODS: f64 = 6.0;
 
+/// Cycles in which the actual velocity may have been that at which velocity control begins, and the part of it, or of the way from
+/// there to the curve, by which a polynomial of second order overshoots.
+const BEGIN_CYCLES: usize = 8;
+const BEGIN_OVERSHOOT: f64 = 0.25;
+
 /// Parts of a limit to spare, as the gateway's own supervision of it has.
 const SPARE: f64 = 0.1;
 
@@ -78,6 +83,16 @@ struct Last {
     leader: Leader,
 }
 
+/// The controller has begun to lead the axis, or to lead it by another quantity.
+#[derive(Debug, Clone, Copy)]
+struct Begun {
+    at: MonotonicTime,
+    /// By how much its first position may be away.
+    way: f64,
+    /// The least and the greatest velocity that the axis had then.
+    velocity: (f64, f64),
+}
+
 /// What the change since the last set-point means.
 #[derive(Debug, Clone, Copy)]
 struct Change {
@@ -111,9 +126,8 @@ pub struct Instant {
 #[derive(Debug, Clone, Default)]
 pub struct Follower {
     last: Option<Last>,
-    /// Since when the axis is led by position set-points of the controller, and by how much the first of them may be away.
-    begun: Option<(MonotonicTime, f64)>,
-    /// Where the drive was in the last cycles, in counts, and how fast; the newest first.
+    begun: Option<Begun>,
+    /// Where the drive was in the last cycles, in counts, and its velocity; the newest first.
     actual: VecDeque<(i64, f64)>,
     /// By how many periods updates were overdue lately.
     overdue: VecDeque<(MonotonicTime, f64)>,
@@ -142,7 +156,7 @@ impl Follower {
         statistics: &mut Statistics,
     ) -> Vec<Finding> {
         let mut found = Vec::new();
-        self.actual.push_front((reading.actual_counts, reading.actual_velocity.abs()));
+        self.actual.push_front((reading.actual_counts, reading.actual_velocity));
         self.actual.truncate(START_CYCLES);
         let overdue = self.overdue(curve, instant);
         let Some(set_point) = reading.follows else {
@@ -183,7 +197,12 @@ impl Follower {
             Leader::Controller => {
                 if other {
                     let way = self.speed() * BEGIN_PERIODS * f64_from_i64(instant.period.0) / NANO;
-                    self.begun = Some((instant.at, way + 2.0 * count + ROUNDING));
+                    let actual = self.actual.iter().take(BEGIN_CYCLES).map(|(_, velocity)| *velocity);
+                    let velocity = actual
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), velocity| {
+                            (velocity.min(low), velocity.max(high))
+                        });
+                    self.begun = Some(Begun { at: instant.at, way: way + 2.0 * count + ROUNDING, velocity });
                 }
                 let change = Change { velocity, acceleration, resolution, overdue };
                 found.extend(self.follow(set_point, &change, curve, instant, statistics));
@@ -214,7 +233,7 @@ impl Follower {
 
     /// The highest actual speed lately.
     fn speed(&self) -> f64 {
-        self.actual.iter().fold(0.0, |most, (_, speed)| speed.max(most))
+        self.actual.iter().fold(0.0, |most, (_, velocity)| velocity.abs().max(most))
     }
 
     /// By how many periods updates are overdue, or were when the curve of now was made.
@@ -262,17 +281,31 @@ impl Follower {
             }
             return found;
         }
-        let Some(mut bands) = curve.bands(*at, *cycle_time, overdue, skew) else { return found };
-        statistics.add(velocity, acceleration.map(|(value, _)| value), &bands);
         let period = f64_from_i64(instant.period.0) / NANO;
         let cycle = f64_from_i64(cycle_time.0) / NANO;
-        if let Some((since, away)) = self.begun
-            && at.since(since) < instant.period * 8
-        {
+        let begun = self.begun.filter(|begun| at.since(begun.at) < instant.period * 8);
+        let begins = begun.filter(|_| set_point.quantity == Quantity::Velocity).map(|begun| begun.velocity);
+        let Some(mut bands) = curve.bands(*at, *cycle_time, overdue, skew) else {
+            // The curve begins later: until then the axis goes on.
+            if let (Some((low, high)), Some(velocity)) = (begins, velocity) {
+                let tolerance = BEGIN_OVERSHOOT * low.abs().max(high.abs());
+                check(Rule::Velocity, &Band { low, high, tolerance }, velocity, resolution, NANO);
+            }
+            return found;
+        };
+        statistics.add(velocity, acceleration.map(|(value, _)| value), &bands);
+        if let Some((low, high)) = begins {
+            // It begins at the speed that the axis has, and is on the curve a period later.
+            let band = &mut bands.velocity;
+            (band.low, band.high) = (band.low.min(low), band.high.max(high));
+            band.tolerance += BEGIN_OVERSHOOT * (band.high - band.low);
+        } else if let Some(begun) = begun {
             // The way from where the axis was held to the controller's first position is made in one period: by a
             // polynomial of third order that was at rest before.
-            bands.velocity.tolerance += 11.0 / 6.0 * away / period;
-            bands.acceleration.tolerance += 2.0 * 11.0 / 6.0 * away / period / cycle;
+            bands.velocity.tolerance += 11.0 / 6.0 * begun.way / period;
+        }
+        if let Some(begun) = begun {
+            bands.acceleration.tolerance += 2.0 * 11.0 / 6.0 * begun.way / period / cycle;
         }
         if let Some(velocity) = velocity {
             check(Rule::Velocity, &bands.velocity, velocity, resolution, NANO);
