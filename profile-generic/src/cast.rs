@@ -15,6 +15,12 @@ pub const fn f64_from_u128(value: u128) -> f64 {
     value as f64
 }
 
+/// The nearest single; ties to even.
+#[expect(clippy::cast_precision_loss, reason = "the nearest single is what is wanted")]
+pub const fn f32_from_i64(value: i64) -> f32 {
+    value as f32
+}
+
 /// The nearest single; ties to even. Exact up to 24 bits.
 #[expect(clippy::cast_precision_loss, reason = "rounding to nearest is what this function is for")]
 pub const fn f32_from_u128(value: u128) -> f32 {

@@ -21,7 +21,7 @@ mod polynomial;
 
 pub use arrival::ArrivalClock;
 
-use polynomial::{Channel, Polynomial};
+use polynomial::{Channel, Place, Polynomial};
 
 named_enum! {
     /// How far ahead of its time stamp an update is meant: CIP Motion's Command Target Update (Volume 9,
@@ -312,7 +312,7 @@ impl FineInterpolator {
                 // The slope of what led it; a velocity beside a position is a feed-forward value.
                 let (position, velocity) =
                     segment.position.map_or((actual.position.get(), actual.velocity.get()), |curve| {
-                        segment.motion(&curve, now)
+                        segment.motion(&curve, &segment.place(now), now)
                     });
                 let (position, velocity) = (Position(position), Velocity(velocity));
                 Motion { position, velocity, ..curves }
@@ -383,10 +383,11 @@ impl FineInterpolator {
         } else if let Some(segment) = self.segments.last() {
             for missing in (1..periods).rev() {
                 let at = self.limit_time(segment, target - length * missing);
-                channels.0.fill(segment.position.map(|curve| segment.motion(&curve, at).0));
-                channels.1.fill(segment.velocity.map(|curve| segment.value(&curve, at)));
-                channels.2.fill(segment.acceleration.map(|curve| segment.value(&curve, at)));
-                channels.3.fill(segment.torque.map(|curve| segment.value(&curve, at)));
+                let place = segment.place(at);
+                channels.0.fill(segment.position.map(|curve| segment.motion(&curve, &place, at).0));
+                channels.1.fill(segment.velocity.map(|curve| curve.value(&place)));
+                channels.2.fill(segment.acceleration.map(|curve| curve.value(&place)));
+                channels.3.fill(segment.torque.map(|curve| curve.value(&place)));
             }
         }
         let segment = Segment {
@@ -473,30 +474,31 @@ impl FineInterpolator {
 impl Segment {
     fn at(&self, now: MonotonicTime) -> SetPoints {
         let beyond = now.since(self.start) > self.follow;
-        let motion = self.position.map(|curve| self.motion(&curve, now));
+        let place = self.place(now);
+        let motion = self.position.map(|curve| self.motion(&curve, &place, now));
         let velocity = match (self.velocity, motion) {
             // Beyond its curve a position goes its own way, and its velocity with it.
-            (Some(curve), None) => Some(Velocity(self.value(&curve, now))),
-            (Some(curve), Some(_)) if !beyond => Some(Velocity(self.value(&curve, now))),
+            (Some(curve), None) => Some(Velocity(curve.value(&place))),
+            (Some(curve), Some(_)) if !beyond => Some(Velocity(curve.value(&place))),
             (_, Some((_, velocity))) => Some(Velocity(velocity)),
             (None, None) => None,
         };
         SetPoints {
             position: motion.map(|(position, _)| Position(position)),
             velocity,
-            acceleration: self.acceleration.map(|curve| Acceleration(self.value(&curve, now))),
-            torque: self.torque.map(|curve| Torque(self.value(&curve, now))),
+            acceleration: self.acceleration.map(|curve| Acceleration(curve.value(&place))),
+            torque: self.torque.map(|curve| Torque(curve.value(&place))),
         }
     }
 
     /// The motion at `now`; what no curve tells is taken from `actual`.
     fn motion_at(&self, now: MonotonicTime, actual: &Motion) -> Motion {
         let points = self.at(now);
-        let on_curve = self.on_curve(now);
+        let place = self.place(now);
         let acceleration = match (points.acceleration, self.position, self.velocity) {
             (Some(acceleration), ..) => acceleration.get(),
-            (None, Some(curve), _) => curve.bend_per_second(on_curve, self.length),
-            (None, None, Some(curve)) => curve.slope_per_second(on_curve, self.length),
+            (None, Some(curve), _) => curve.bend_per_second(&place),
+            (None, None, Some(curve)) => curve.slope_per_second(&place),
             (None, None, None) => actual.acceleration.get(),
         };
         Motion {
@@ -524,24 +526,22 @@ impl Segment {
         at.since(self.start).min(self.follow)
     }
 
-    /// A value that stays what it was where the curve ends.
-    fn value(&self, curve: &Polynomial, at: MonotonicTime) -> i64 {
-        curve.value(self.on_curve(at), self.length)
+    /// The place along the curves at `at`: where they end, values stay what they were.
+    fn place(&self, at: MonotonicTime) -> Place {
+        Place::new(self.on_curve(at), self.length)
     }
 
     /// Position and velocity. Where the curve ends the position goes on with the velocity it had; if it was slowing down
     /// it goes on slowing down, until it stands. It never gets faster on its own.
-    fn motion(&self, curve: &Polynomial, at: MonotonicTime) -> (i64, i64) {
+    fn motion(&self, curve: &Polynomial, place: &Place, at: MonotonicTime) -> (i64, i64) {
         const SECOND: i128 = 1_000_000_000;
         let on_curve = self.on_curve(at);
-        let position = curve.value(on_curve, self.length);
-        let velocity = curve.slope_per_second(on_curve, self.length);
+        let (position, velocity) = (curve.value(place), curve.slope_per_second(place));
         let beyond = i128::from(at.since(self.start).0.saturating_sub(on_curve.0).max(0));
         if beyond == 0 {
             return (position, velocity);
         }
-        let (speed, change) =
-            (i128::from(velocity), i128::from(curve.bend_per_second(on_curve, self.length)));
+        let (speed, change) = (i128::from(velocity), i128::from(curve.bend_per_second(place)));
         let slows = speed.signum() * change.signum() < 0;
         let change = if slows { change } else { 0 };
         let time = if slows { beyond.min(speed.abs() * SECOND / change.abs()) } else { beyond };

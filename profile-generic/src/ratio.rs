@@ -371,8 +371,35 @@ pub(crate) fn f64_quotient(num: i128, den: i64) -> FloatOutcome<f64> {
     FloatOutcome { value: if num < 0 { -magnitude } else { magnitude }, inexact }
 }
 
+/// The single nearest to `num / den`, where a division of 64 bits tells it: its quotient has two bits more than a single at
+/// least, and a sticky last bit decides the rounding.
+fn short_f32_quotient(num: i128, den: i64) -> Option<FloatOutcome<f32>> {
+    const DEN_BITS: u32 = u64::BITS - 1 - (f32::MANTISSA_DIGITS + 2);
+    let (num, den) = (narrow(num)?, den.unsigned_abs());
+    let magnitude = num.unsigned_abs();
+    if magnitude == 0 || den >> DEN_BITS != 0 {
+        return None;
+    }
+    // The highest bit stays free: the conversion of a signed number is one instruction.
+    let shift = magnitude.leading_zeros().checked_sub(1)?;
+    let numerator = magnitude << shift;
+    let (quotient, rest) = (numerator / den, numerator % den);
+    let value = cast::f32_from_i64((quotient | u64::from(rest != 0)).cast_signed());
+    let magnitude = value * cast::exp2_f32(-shift.cast_signed());
+    let bits = u64::BITS - quotient.leading_zeros() - quotient.trailing_zeros();
+    let inexact = rest != 0 || bits > f32::MANTISSA_DIGITS;
+    Some(FloatOutcome { value: if num < 0 { -magnitude } else { magnitude }, inexact })
+}
+
 /// The single nearest to `num / den`; `den` is above zero.
 pub(crate) fn f32_quotient(num: i128, den: i64) -> FloatOutcome<f32> {
+    if let Some(outcome) = short_f32_quotient(num, den) {
+        return outcome;
+    }
+    long_f32_quotient(num, den)
+}
+
+fn long_f32_quotient(num: i128, den: i64) -> FloatOutcome<f32> {
     let LongQuotient { quotient, shift, sticky } = LongQuotient::new(num, den);
     // One bit less, because the largest single is just below 2^128.
     let half = quotient >> 1 | quotient & 1 | u128::from(sticky);

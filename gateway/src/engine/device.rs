@@ -143,6 +143,8 @@ pub struct DeviceChannel {
     link: DeviceEnd,
     members: Vec<Member>,
     encapsulation_sequence: u32,
+    /// Room for a datagram.
+    buffer: Box<[u8]>,
     admission: Admission,
     send_failures: u64,
     /// The connection for which the scaling attributes were preset.
@@ -214,6 +216,7 @@ impl DeviceChannel {
             link,
             members,
             encapsulation_sequence: 0,
+            buffer: vec![0; FRAME_MAX].into_boxed_slice(),
             admission: Admission::default(),
             send_failures: 0,
             preset: None,
@@ -269,7 +272,7 @@ impl DeviceChannel {
             let Some(request) = self.link.request() else { break };
             self.device.request(now, Some(system), request);
         }
-        let mut buffer = [0; FRAME_MAX];
+        let mut buffer = std::mem::take(&mut self.buffer);
         let (mut updates, mut refused) = (0, 0);
         while updates < UPDATES_PER_CYCLE && refused < REFUSED_PER_CYCLE {
             let Some(datagram) = port.receive(&mut buffer) else { break };
@@ -278,6 +281,7 @@ impl DeviceChannel {
             let taken = self.datagram((now, arrival), system, &buffer[..datagram.len], datagram.from);
             *(if taken { &mut updates } else { &mut refused }) += 1;
         }
+        self.buffer = buffer;
     }
 
     /// Hands a datagram of the owner to the device; whether that has taken it.
@@ -606,7 +610,7 @@ impl DeviceChannel {
     /// Sends what is due on the I/O connection, and answers the explicit side.
     pub fn transmit(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
         let system = time.system_at(now);
-        let mut buffer = [0; FRAME_MAX];
+        let Self { buffer, .. } = self;
         let data = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
         if let Some(length) = self.device.poll_transmit(now, Some(system), &mut buffer[data..])
             && let Some(connection) = self.device.connection()
@@ -619,7 +623,7 @@ impl DeviceChannel {
                 self.encapsulation_sequence,
                 sequence,
                 length - SEQUENCE_COUNT_LEN,
-                &mut buffer,
+                buffer,
             );
             if header.is_err() || !port.send(&buffer[..data + length], to) {
                 self.send_failures += 1;

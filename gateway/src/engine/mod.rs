@@ -61,6 +61,19 @@ const END_MARGIN: DurationNs = DurationNs::from_secs(1);
 /// Rather than call so shortly before a cycle of a bus, the engine sleeps until that.
 const QUIET_BEFORE_CYCLE: DurationNs = DurationNs::from_micros(250);
 
+/// What the state of the box follows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Outline {
+    stopping: bool,
+    /// All buses are in cyclic operation.
+    up: bool,
+    /// Controllers that are connected.
+    connections: u8,
+}
+
+/// How old the published status may be, where neither the box nor an axis has another state: people and supervisory systems read it.
+const PUBLISH_PERIOD: DurationNs = DurationNs::from_millis(10);
+
 /// The work for a cycle begins at most by this part of it before its instant: the answers of the drives have to be back by then.
 const LEAD_DIVISOR: i64 = 10;
 
@@ -73,6 +86,8 @@ pub struct Engine {
     axes: Vec<AxisChannel>,
     /// The generic state and fault of each axis that was told last.
     told: Vec<(DriveState, bool)>,
+    /// When the status was published last, and what it was in outline.
+    published: Option<(MonotonicTime, Outline)>,
     notices: rtrb::Producer<Notice>,
     publisher: Publisher<BoxStatus>,
     status: BoxStatus,
@@ -156,6 +171,7 @@ impl Engine {
             buses,
             devices,
             told,
+            published: None,
             axes,
             notices,
             publisher,
@@ -341,8 +357,13 @@ impl Engine {
         if self.stopping && self.may_go_down(now) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
-        self.tell_changes();
-        self.publish(now, started);
+        let told = self.tell_changes();
+        let outline = self.outline();
+        let due = |(last, known): (MonotonicTime, _)| now.since(last) >= PUBLISH_PERIOD || known != outline;
+        if told || self.published.is_none_or(due) {
+            self.published = Some((now, outline));
+            self.publish(now, started, outline);
+        }
         let due = self.next_due(now);
         self.due = Some(due);
         due
@@ -494,27 +515,43 @@ impl Engine {
         }
     }
 
-    fn tell_changes(&mut self) {
+    /// Tells states and faults that are new; whether there are any.
+    fn tell_changes(&mut self) -> bool {
+        let mut changed = false;
         for (number, (axis, told)) in self.axes.iter().zip(&mut self.told).enumerate() {
             let number = u8::try_from(number).unwrap_or(u8::MAX);
-            let state = axis.state();
-            if state != told.0 {
-                tell(&mut self.notices, Notice::State { axis: number, from: told.0, to: state });
-                told.0 = state;
+            let now = (axis.state(), axis.fault().is_some());
+            if *told == now {
+                continue;
             }
-            if let Some(fault) = axis.fault().filter(|_| !told.1) {
+            changed = true;
+            let before = std::mem::replace(told, now);
+            if now.0 != before.0 {
+                tell(&mut self.notices, Notice::State { axis: number, from: before.0, to: now.0 });
+            }
+            if let Some(fault) = axis.fault().filter(|_| !before.1) {
                 let (loss, trip) = (axis.loss(), axis.tripped());
                 tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip });
             }
-            told.1 = axis.fault().is_some();
+        }
+        changed
+    }
+
+    fn outline(&self) -> Outline {
+        let connections = self.devices.iter().filter(|channel| channel.device().connection().is_some());
+        Outline {
+            stopping: self.stopping,
+            up: self.buses.iter().all(Bus::is_up),
+            connections: u8::try_from(connections.count()).unwrap_or(u8::MAX),
         }
     }
 
-    fn publish(&mut self, now: MonotonicTime, started: MonotonicTime) {
+    fn publish(&mut self, now: MonotonicTime, started: MonotonicTime, outline: Outline) {
         let status = &mut self.status;
         status.phase = self.buses.iter().find_map(Bus::phase).unwrap_or(PHASE_NONE);
         status.uptime = now.since(started);
-        status.connections = 0;
+        let Outline { stopping, up, connections } = outline;
+        status.connections = connections;
         (status.counters.cycles, status.counters.lost_telegrams, status.counters.refused_frames) = (0, 0, 0);
         for counts in self.buses.iter().map(Bus::counts) {
             status.counters.cycles += counts.cycles;
@@ -524,7 +561,6 @@ impl Engine {
         status.counters.lost_updates = 0;
         for channel in &self.devices {
             let device = channel.device();
-            status.connections += u8::from(device.connection().is_some());
             let lost = device.counters().lost_updates;
             status.counters.lost_updates += lost;
             status.counters.refused_frames += channel.counters().refused;
@@ -548,8 +584,7 @@ impl Engine {
             }
         }
         let was_up = !matches!(status.state, BoxState::STARTING | BoxState::PHASE_UP);
-        let up = self.buses.iter().all(Bus::is_up);
-        status.state = match (self.stopping, up, status.connections) {
+        status.state = match (stopping, up, connections) {
             (true, ..) => BoxState::STOPPING,
             (_, true, 0) => BoxState::READY,
             (_, true, _) => BoxState::RUNNING,

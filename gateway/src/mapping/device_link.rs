@@ -1,12 +1,15 @@
 //! Between the compiled tables and the CIP Motion device: its images.
 
 use profile_cip::target::drive_link::{DriveAction, DriveCondition, DriveImage, ExceptionAction};
-use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, FaultType};
+use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, EventChecking, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_generic::capture::CaptureSet;
 use profile_generic::fault::Reaction;
 use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
 use profile_generic::image::{AxisFeedback, FeedbackSet, StatusBits};
-use profile_generic::state::Request;
+use profile_generic::inhibit::Inhibits;
+use profile_generic::mode::OperatingMode;
+use profile_generic::state::{DriveState, Request};
 
 use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue, CyclicValues};
 
@@ -33,6 +36,71 @@ pub(super) mod bit {
     pub const OF_POSITION: [usize; 2] = [UNWIND_COUNT, DISPLACEMENT];
 }
 
+/// All that the status of an axis in CIP follows from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shown {
+    state: DriveState,
+    mode: OperatingMode,
+    status: StatusBits,
+    inhibits: Inhibits,
+}
+
+/// The status of an axis in CIP.
+#[derive(Debug, Clone, Copy)]
+struct Said {
+    conditions: CipConditions,
+    axis_status: AxisStatus,
+    io_status: AxisIoStatus,
+    start_inhibits: (u16, u16),
+}
+
+/// What was said last of an axis: its drive seldom shows anything new. Another program begins with none.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Told {
+    status: Option<(Shown, Said)>,
+    /// The events that can be checked for: by the number of the axis's programs, and the signals that are there.
+    events: Option<((u64, FeedbackSet), EventChecking)>,
+}
+
+impl Told {
+    fn of(&mut self, program: &CipProgram, feedback: &AxisFeedback) -> Said {
+        let AxisFeedback { state, mode, status, inhibits, .. } = *feedback;
+        let shown = Shown { state, mode, status, inhibits };
+        if let Some((known, said)) = self.status
+            && known == shown
+        {
+            return said;
+        }
+        let said = Said {
+            conditions: program.state(state).conditions,
+            axis_status: AxisStatus::from_bits_retain(program.axis_status(feedback)),
+            io_status: AxisIoStatus::from_bits_retain(program.io_status(feedback)),
+            start_inhibits: program.start_inhibits(inhibits),
+        };
+        self.status = Some((shown, said));
+        said
+    }
+
+    /// The events that can be checked for on an axis whose drive has these captures; they are asked for when the number
+    /// of its programs is another one.
+    pub fn checkable(
+        &mut self,
+        program: &CipProgram,
+        (programs, captures): (u64, impl FnOnce() -> CaptureSet),
+        feedback: &AxisFeedback,
+    ) -> EventChecking {
+        let key = (programs, feedback.present);
+        if let Some((known, events)) = self.events
+            && known == key
+        {
+            return events;
+        }
+        let events = program.events().checkable(captures(), feedback);
+        self.events = Some((key, events));
+        events
+    }
+}
+
 impl From<&CommandValues> for CyclicValues {
     fn from(values: &CommandValues) -> Self {
         let mut cyclic = CyclicValues::default();
@@ -57,11 +125,12 @@ impl CipProgram {
 
     /// Puts what is known of an axis into the image for the device: actual values, conditions, status,
     /// inhibits and what is wrong. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay
-    /// as they are.
+    /// as they are. `told` is kept from one image of this program to the next.
     pub fn drive_image(
         &self,
         feedback: &AxisFeedback,
         faults: &FaultSet,
+        told: &mut Told,
         image: &mut DriveImage,
     ) -> CipReport {
         let mut report = CipReport::default();
@@ -73,18 +142,15 @@ impl CipProgram {
         image.unwind = self.unwind();
         image.velocity = self.actual_real(bit::VELOCITY, feedback, &mut report);
         image.acceleration = self.actual_real(bit::ACCELERATION, feedback, &mut report);
-        let conditions = self.state(feedback.state).conditions;
-        image.bus_up = conditions.contains(CipConditions::BUS_UP);
-        image.start_complete = conditions.contains(CipConditions::START_COMPLETE);
-        image.stop_complete = conditions.contains(CipConditions::STOP_COMPLETE);
+        let said = told.of(self, feedback);
+        image.bus_up = said.conditions.contains(CipConditions::BUS_UP);
+        image.start_complete = said.conditions.contains(CipConditions::START_COMPLETE);
+        image.stop_complete = said.conditions.contains(CipConditions::STOP_COMPLETE);
         image.power_enabled = feedback.status.contains(StatusBits::ENABLED);
         image.tracking = feedback.status.contains(StatusBits::TRACKING);
-        image.axis_status = AxisStatus::from_bits_retain(self.axis_status(feedback));
-        image.io_status = match image.online {
-            true => AxisIoStatus::from_bits_retain(self.io_status(feedback)),
-            false => AxisIoStatus::empty(),
-        };
-        (image.start_inhibits, image.start_inhibits_mfg) = self.start_inhibits(feedback.inhibits);
+        image.axis_status = said.axis_status;
+        image.io_status = if image.online { said.io_status } else { AxisIoStatus::empty() };
+        (image.start_inhibits, image.start_inhibits_mfg) = said.start_inhibits;
         image.conditions.clear();
         for condition in faults.iter().filter_map(|active| self.condition(active)) {
             image.conditions.push(condition);

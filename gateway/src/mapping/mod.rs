@@ -66,6 +66,7 @@ pub use compile_cip::{
     CyclicValues, ELEMENTS, MissingValue,
 };
 pub use compile_sercos::{SercosAxis, SercosError};
+pub use device_link::Told;
 pub use dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,
     Cia402Kind, Cia402Object, Cia402Pdo, Cia402Range, Cia402RangeKind, Cia402SetKind, Cia402Sub, Cia402Type,

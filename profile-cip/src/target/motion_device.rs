@@ -394,6 +394,12 @@ impl MotionDevice {
         self.update_drive(axis, |drive| *drive = image);
     }
 
+    /// What the drive of an axis reported last, or `None` if there is no such axis.
+    #[must_use]
+    pub fn drive(&self, axis: usize) -> Option<&DriveImage> {
+        self.slots.get(axis).map(|slot| slot.axis.drive())
+    }
+
     /// As [`MotionDevice::set_drive`], without a copy: `fill` gets what the drive reported before and has to write all of
     /// it anew ([`DriveImage::clear`] is where to begin). It is not called without such an axis.
     pub fn update_drive(&mut self, axis: usize, fill: impl FnOnce(&mut DriveImage)) {

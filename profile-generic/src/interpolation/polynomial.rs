@@ -44,51 +44,78 @@ impl Polynomial {
         Self { base, first: 6 * within(velocity), second: 3 * within(acceleration), third: 0 }
     }
 
-    /// The value `elapsed` after the start of the segment, saturated; before the start, that at the start.
-    pub(super) fn value(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
-        let part = part(elapsed, length);
+    /// The value at a place, saturated.
+    pub(super) fn value(&self, at: &Place) -> i64 {
+        let part = at.part;
         // Below 2^49 with 20 places; the part of at most 8 with 40 places takes that below 2^116 in the last
         // step.
         let sum = times(self.third << VALUE_PLACES, part) + (self.second << VALUE_PLACES);
         let sum = times(sum, part) + (self.first << VALUE_PLACES);
-        saturate(i128::from(self.base) + rounded(times(sum, part), 6 << VALUE_PLACES))
+        saturate(i128::from(self.base) + rounded_value(times(sum, part), 6))
     }
 
-    /// The derivative `elapsed` after the start of the segment, per second, saturated.
-    pub(super) fn slope_per_second(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
-        let part = part(elapsed, length);
+    /// The derivative at a place, per second, saturated.
+    pub(super) fn slope_per_second(&self, at: &Place) -> i64 {
+        let Place { part, length } = *at;
         let sum = times((3 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
         let per_segment = times(sum, part) + (self.first << VALUE_PLACES);
         // Below 2^90 with 20 places; a second is below 2^30 nanoseconds.
         let per_second = per_segment.saturating_mul(1_000_000_000);
-        saturate(rounded(per_second, (6 * i128::from(length.0)) << VALUE_PLACES))
+        saturate(rounded_value(per_second, 6 * i128::from(length.0)))
     }
 
-    /// The second derivative after `elapsed`, per second squared.
-    pub(super) fn bend_per_second(&self, elapsed: DurationNs, length: DurationNs) -> i64 {
-        let part = part(elapsed, length);
+    /// The second derivative at a place, per second squared.
+    pub(super) fn bend_per_second(&self, at: &Place) -> i64 {
+        let Place { part, length } = *at;
         let per_segment = times((6 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
         // In two steps, each of which stays below 2^120: the value is below 2^70, a second below 2^30 nanoseconds.
         let per_second = rounded(per_segment.saturating_mul(1_000_000_000), i128::from(length.0));
-        saturate(rounded(
-            per_second.saturating_mul(1_000_000_000),
-            (6 * i128::from(length.0)) << VALUE_PLACES,
-        ))
+        saturate(rounded_value(per_second.saturating_mul(1_000_000_000), 6 * i128::from(length.0)))
     }
 }
 
-/// The part of the segment that has passed, with [`TIME_PLACES`] places.
-fn part(elapsed: DurationNs, length: DurationNs) -> i128 {
-    let part = rounded(i128::from(elapsed.0) << TIME_PLACES, i128::from(length.0));
-    part.clamp(0, MAX_LENGTHS << TIME_PLACES)
+/// How far along a segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    /// The part of the segment that has passed, with [`TIME_PLACES`] places.
+    part: i128,
+    length: DurationNs,
+}
+
+impl Place {
+    /// `elapsed` after the start of a segment of this length; before the start, at the start.
+    pub(super) fn new(elapsed: DurationNs, length: DurationNs) -> Self {
+        let part = rounded(i128::from(elapsed.0) << TIME_PLACES, i128::from(length.0));
+        Self { part: part.clamp(0, MAX_LENGTHS << TIME_PLACES), length }
+    }
 }
 
 fn times(value: i128, part: i128) -> i128 {
     rounded(value * part, 1 << TIME_PLACES)
 }
 
+/// A value with [`VALUE_PLACES`] places over `den`, to the nearest, ties away from zero; `den` is above zero. The quotient of
+/// what is left without the places is the same, and mostly one of 64 bits.
+#[inline]
+fn rounded_value(num: i128, den: i128) -> i128 {
+    let half = den.unsigned_abs() << (VALUE_PLACES - 1);
+    let whole = num.unsigned_abs().saturating_add(half) >> VALUE_PLACES;
+    let quotient = match (u64::try_from(whole), u64::try_from(den)) {
+        (Ok(whole), Ok(den)) => i128::from(whole / den),
+        _ => i128::try_from(whole / den.unsigned_abs()).unwrap_or(i128::MAX),
+    };
+    if num < 0 { -quotient } else { quotient }
+}
+
 /// The quotient to the nearest, ties away from zero; `den` is above zero.
+#[inline]
 fn rounded(num: i128, den: i128) -> i128 {
+    if let (Ok(num), Ok(den)) = (i64::try_from(num), i64::try_from(den)) {
+        // Nearly always: one division of the processor in place of one of the library.
+        let (quotient, rest) = (num / den, num % den);
+        let up = rest.unsigned_abs() >= den.unsigned_abs() - rest.unsigned_abs();
+        return i128::from(quotient) + if up { i128::from(num.signum()) } else { 0 };
+    }
     let half = den / 2;
     if num >= 0 { (num + half) / den } else { (num - half) / den }
 }

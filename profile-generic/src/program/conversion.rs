@@ -111,6 +111,12 @@ impl Conversion {
 
     /// The exact result times the denominator, clamped.
     fn numerator(&self, value: i64) -> (i128, bool) {
+        if (self.offset, self.min, self.max) == (0, i64::MIN, i64::MAX)
+            && let Some(product) = value.checked_mul(self.ratio.num())
+        {
+            // Over a denominator of at least one that is within all limits.
+            return (i128::from(product), false);
+        }
         let den = i128::from(self.ratio.den());
         // At most 2^126 plus less than 2^126.
         let num = i128::from(value) * i128::from(self.ratio.num()) + i128::from(self.offset) * den;

@@ -339,10 +339,12 @@ impl Master {
         if let Some(event) = self.events.pop_front() {
             return Some(event);
         }
-        let stations = self.stations.len();
-        for turn in 0..stations {
-            let index = (self.next_outcome + turn) % stations;
-            if let Some((place, serial, outcome)) = self.stations[index].channel.take_outcome() {
+        // Each in its turn, those that were there before the last scan as well.
+        for index in (self.next_outcome..self.stations.len()).chain(0..self.next_outcome) {
+            let channel = &mut self.stations[index].channel;
+            if channel.has_outcome()
+                && let Some((place, serial, outcome)) = channel.take_outcome()
+            {
                 self.next_outcome = index + 1;
                 let ticket = Ticket { slave: SlaveId::from_index(index), place, serial };
                 return Some(Event::Svc { ticket, outcome });

@@ -387,7 +387,7 @@ impl Many {
         self.line.handle_time(now);
         self.south.exchange(now, &mut self.court, Some(&mut self.line), &mut |_| true);
         for seat in &mut self.seats {
-            while let Some((datagram, _)) = seat.north.outbound.pop_front() {
+            while let Some((datagram, _)) = seat.north.outbound.pop() {
                 seat.actuals.send(now, &Knobs::GOOD, datagram);
             }
         }
@@ -403,7 +403,10 @@ impl Many {
         for seat in &mut self.seats {
             let from = SocketAddrV4::new(seat.address, IO_PORT);
             while let Some(datagram) = seat.commands.receive(now) {
-                seat.north.inbound.push_back((datagram, from, self.now));
+                assert!(
+                    seat.north.inbound.push(datagram.as_slice(), (from, self.now)),
+                    "no room for an update"
+                );
             }
             while let Some(datagram) = seat.actuals.receive(now) {
                 if let Some(controller) = seat.controller.as_mut() {

@@ -538,13 +538,19 @@ impl Rig {
     }
 
     /// Sends a datagram to the box, past the network's knobs.
+    ///
+    /// # Panics
+    /// When there is no room for it.
     pub fn inject_datagram(&mut self, bytes: &[u8], from: SocketAddrV4) {
-        self.north.inbound.push_back((Bytes::of(bytes), from, self.now));
+        assert!(self.north.inbound.push(bytes, (from, self.now)), "no room for another datagram");
     }
 
     /// Puts a frame on the box's SERCOS port.
+    ///
+    /// # Panics
+    /// When there is no room for it.
     pub fn inject_frame(&mut self, frame: &[u8]) {
-        self.south.inbound.push_back(Bytes::of(frame));
+        assert!(self.south.inbound.push(frame, ()), "no room for another frame");
     }
 
     /// Datagrams that the network lost, doubled and held back: commands, then actual values.
@@ -630,7 +636,7 @@ impl Rig {
     fn deliver(&mut self) {
         let from = SocketAddrV4::new(CONTROLLER, self.command_port);
         while let Some(datagram) = self.commands.receive(self.now) {
-            self.north.inbound.push_back((datagram, from, self.now));
+            assert!(self.north.inbound.push(datagram.as_slice(), (from, self.now)), "no room for an update");
         }
         let (now, system) = self.controller_time();
         while let Some(datagram) = self.actuals.receive(self.now) {
@@ -670,7 +676,7 @@ impl Rig {
         let format = self.config.devices[0].connection_format;
         let sample = TimeSample { at: self.now, system: self.system(), rate_ppb: 0 };
         self.engine.feed_time(&sample);
-        for (datagram, ..) in &self.north.inbound {
+        for datagram in self.north.inbound.iter() {
             if let Some(update) = updates::read(datagram.as_slice(), format, None) {
                 self.motion_checker.arrived(update.id);
             }
@@ -685,7 +691,7 @@ impl Rig {
         let tamper = &mut self.tamper_frame;
         let mut back = |frame: &mut Bytes| tamper.as_mut().is_none_or(|tamper| tamper(frame));
         self.south.exchange(self.now, &mut self.court, line, &mut back);
-        while let Some((mut datagram, _)) = self.north.outbound.pop_front() {
+        while let Some((mut datagram, _)) = self.north.outbound.pop() {
             if self.tamper_actual.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
                 self.actuals.send(self.now, &self.knobs, datagram);
             }

@@ -1,7 +1,6 @@
 //! The engine's ports as queues. They own fixed storage: what the engine does in a cycle can be weighed
 //! without them.
 
-use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
 use axisbridge::engine::port::{CanInput, CanPort, CanSent, Datagram, EthernetPort, FRAME_MAX, NorthPort};
@@ -52,51 +51,88 @@ impl Bytes {
     }
 }
 
-/// The UDP port of a device.
+/// A queue of frames or datagrams in fixed storage, each with what belongs to it. In and out go as many bytes as a frame has, and
+/// not as many as it could have: that would be most of what a cycle of the engine seems to cost.
 #[derive(Debug)]
-pub struct NorthQueue {
-    /// What the device receives, with its sender and when it arrived.
-    pub inbound: VecDeque<(Bytes, SocketAddrV4, MonotonicTime)>,
-    /// What the device has sent, with its destination.
-    pub outbound: VecDeque<(Bytes, SocketAddrV4)>,
+pub struct Ring<T> {
+    slots: Vec<(Bytes, Option<T>)>,
+    first: usize,
+    count: usize,
 }
 
-impl Default for NorthQueue {
+impl<T> Default for Ring<T> {
     fn default() -> Self {
-        Self { inbound: VecDeque::with_capacity(QUEUE), outbound: VecDeque::with_capacity(QUEUE) }
+        let slot = || (Bytes::of(&[]), None);
+        Self { slots: std::iter::repeat_with(slot).take(QUEUE).collect(), first: 0, count: 0 }
     }
+}
+
+impl<T> Ring<T> {
+    /// Puts a copy behind the others; `false` when there is no room, or it is too long.
+    pub fn push(&mut self, bytes: &[u8], with: T) -> bool {
+        let slot = &mut self.slots[(self.first + self.count) % QUEUE];
+        let Some(place) = slot.0.bytes.get_mut(..bytes.len()).filter(|_| self.count < QUEUE) else {
+            return false;
+        };
+        place.copy_from_slice(bytes);
+        (slot.0.len, slot.1) = (bytes.len(), Some(with));
+        self.count += 1;
+        true
+    }
+
+    /// Takes the oldest out into `buffer`: its length, and what belongs to it.
+    ///
+    /// # Panics
+    /// When the buffer is too short.
+    pub fn pop_into(&mut self, buffer: &mut [u8]) -> Option<(usize, T)> {
+        self.count = self.count.checked_sub(1)?;
+        let (bytes, with) = &mut self.slots[self.first];
+        self.first = (self.first + 1) % QUEUE;
+        buffer[..bytes.len].copy_from_slice(bytes.as_slice());
+        Some((bytes.len, with.take()?))
+    }
+
+    /// Takes the oldest out.
+    pub fn pop(&mut self) -> Option<(Bytes, T)> {
+        self.count = self.count.checked_sub(1)?;
+        let (bytes, with) = &mut self.slots[self.first];
+        self.first = (self.first + 1) % QUEUE;
+        Some((bytes.clone(), with.take()?))
+    }
+
+    /// All that are in it, the oldest first.
+    pub fn iter(&self) -> impl Iterator<Item = &Bytes> {
+        (0..self.count).map(|at| &self.slots[(self.first + at) % QUEUE].0)
+    }
+}
+
+/// The UDP port of a device.
+#[derive(Debug, Default)]
+pub struct NorthQueue {
+    /// What the device receives, with its sender and when it arrived.
+    pub inbound: Ring<(SocketAddrV4, MonotonicTime)>,
+    /// What the device has sent, with its destination.
+    pub outbound: Ring<SocketAddrV4>,
 }
 
 impl NorthPort for NorthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram> {
-        let (datagram, from, arrived_at) = self.inbound.pop_front()?;
-        let bytes = datagram.as_slice();
-        buffer[..bytes.len()].copy_from_slice(bytes);
-        Some(Datagram { len: bytes.len(), from, arrived_at: Some(arrived_at) })
+        let (len, (from, arrived_at)) = self.inbound.pop_into(buffer)?;
+        Some(Datagram { len, from, arrived_at: Some(arrived_at) })
     }
 
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
-        let room = self.outbound.len() < QUEUE && datagram.len() <= FRAME_MAX;
-        if room {
-            self.outbound.push_back((Bytes::of(datagram), to));
-        }
-        room
+        self.outbound.push(datagram, to)
     }
 }
 
 /// The Ethernet port of the SERCOS master.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct SouthQueue {
     /// What comes back from the line.
-    pub inbound: VecDeque<Bytes>,
+    pub inbound: Ring<()>,
     /// What the master has sent.
-    pub outbound: VecDeque<Bytes>,
-}
-
-impl Default for SouthQueue {
-    fn default() -> Self {
-        Self { inbound: VecDeque::with_capacity(QUEUE), outbound: VecDeque::with_capacity(QUEUE) }
-    }
+    pub outbound: Ring<()>,
 }
 
 impl SouthQueue {
@@ -112,7 +148,7 @@ impl SouthQueue {
         mut line: Option<&mut DriveNetwork>,
         back: &mut dyn FnMut(&mut Bytes) -> bool,
     ) {
-        while let Some(mut frame) = self.outbound.pop_front() {
+        while let Some((mut frame, ())) = self.outbound.pop() {
             let Some(line) = line.as_deref_mut() else {
                 court.sent(now, Port::One, frame.as_slice());
                 continue;
@@ -121,7 +157,7 @@ impl SouthQueue {
             let mut arrived = |port, frame: &mut [u8]| {
                 let mut frame = Bytes::of(frame);
                 if port == Port::One && back(&mut frame) {
-                    inbound.push_back(frame);
+                    inbound.push(frame.as_slice(), ());
                 }
             };
             court.send(now, Port::One, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
@@ -132,18 +168,11 @@ impl SouthQueue {
 
 impl EthernetPort for SouthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
-        let frame = self.inbound.pop_front()?;
-        let bytes = frame.as_slice();
-        buffer[..bytes.len()].copy_from_slice(bytes);
-        Some((Port::One, bytes.len()))
+        self.inbound.pop_into(buffer).map(|(len, ())| (Port::One, len))
     }
 
     fn send(&mut self, _now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
-        let room = port == Port::One && self.outbound.len() < QUEUE && frame.len() <= FRAME_MAX;
-        if room {
-            self.outbound.push_back(Bytes::of(frame));
-        }
-        room
+        port == Port::One && self.outbound.push(frame, ())
     }
 }
 

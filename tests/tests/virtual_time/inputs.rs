@@ -9,6 +9,7 @@ use profile_cia402::node::drive::Axis;
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AttributeSet, AxisSet, Condition, Failure, Step};
 use profile_cip::target::axis_state::AxisState;
+use profile_cip::target::drive_link::DriveImage;
 use profile_cip::target::exception::ExceptionAction;
 use profile_cip::wire::motion::attribute_list::{AttributeSelector, Range};
 use profile_cip::wire::motion::codes::{AxisIoStatus, FaultType, StatusDataSet};
@@ -60,8 +61,13 @@ fn position(rig: &Rig) -> i64 {
     axis(rig).actual().position.get()
 }
 
+/// What the motion device knows of the drive.
+fn image(rig: &Rig) -> &DriveImage {
+    rig.engine.devices()[0].device().drive(0).expect("the turntable")
+}
+
 fn io_status(rig: &Rig) -> u32 {
-    rig.engine.axes()[0].drive_image().io_status.bits()
+    image(rig).io_status.bits()
 }
 
 /// Codes of the exceptions that the controller got.
@@ -174,7 +180,7 @@ fn an_axis_whose_limit_switches_are_to_be_checked_and_are_not_told_is_inhibited(
     assert!(report.failure.is_some(), "{report}");
     assert_eq!(rig.engine.axes()[0].feedback().inhibits, Inhibits::LIMIT_SWITCHES_NOT_TOLD);
     // Start Inhibits - Mfg, attribute 677.
-    assert_eq!(rig.engine.axes()[0].drive_image().start_inhibits_mfg, 1 << 13);
+    assert_eq!(image(&rig).start_inhibits_mfg, 1 << 13);
     let states = rig.axis_states(0);
     assert!(states.contains(&AxisState::StartInhibited), "{states:?}");
     assert!(!states.contains(&AxisState::Starting), "{states:?}");

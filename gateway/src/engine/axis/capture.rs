@@ -111,6 +111,8 @@ pub struct CaptureUnit {
     outstanding: Option<CaptureAccess>,
     /// Answers of before the drive was lost do not count.
     generation: u8,
+    /// Nothing is wanted and nothing is under way, since [`CaptureUnit::want`] has looked.
+    rests: bool,
 }
 
 impl CaptureUnit {
@@ -127,6 +129,9 @@ impl CaptureUnit {
 
     /// Tells what is to be captured; to be called in each cycle, after the results were taken.
     pub fn want(&mut self, program: &CaptureProgram, wanted: CaptureSet) {
+        if self.rests && wanted.is_empty() {
+            return;
+        }
         self.wanted = wanted;
         self.failed = self.failed.intersection(wanted);
         self.watching = self.watching.intersection(wanted);
@@ -142,10 +147,14 @@ impl CaptureUnit {
         for place in 0..program.enables.len() {
             self.move_gate(program, place);
         }
+        self.rests = self.is_at_rest();
     }
 
     /// What is being looked for at this moment.
     pub fn checking(&self, program: &CaptureProgram) -> CaptureSet {
+        if self.rests {
+            return CaptureSet::EMPTY;
+        }
         let armed = program.latches.iter().enumerate().filter(|(place, latch)| {
             let armed = self.gates[latch.enable].phase == Phase::Armed;
             armed && !self.latched[*place] && self.is_wanted(latch.kind)
@@ -176,11 +185,15 @@ impl CaptureUnit {
         for (word, place) in self.words.iter_mut().zip(&program.words) {
             *word = place.read_word(telegram).unwrap_or(*word);
         }
+        if self.rests {
+            // The levels count that are there when something is wanted.
+            self.compare(program, telegram, position, at, before.map(|(_, at)| at));
+            return;
+        }
         for gate in &mut self.gates {
             gate.fresh = gate.fresh.saturating_add(1);
         }
-        let latches = if self.rests() { 0 } else { program.latches.len() };
-        for place in 0..latches {
+        for place in 0..program.latches.len() {
             let latch = &program.latches[place];
             if program.words[latch.word].offset.is_some() && self.shows(latch, place) {
                 match latch.value.place.read(telegram) {
@@ -204,10 +217,14 @@ impl CaptureUnit {
     }
 
     /// Whether nothing is wanted and nothing is under way: then there is nothing to ask of the drive, and no edge to come.
-    fn rests(&self) -> bool {
+    fn is_at_rest(&self) -> bool {
         self.wanted.is_empty()
+            && self.watching.is_empty()
+            && self.failed.is_empty()
+            && self.command != Command::Refused
             && self.gates.iter().all(|gate| gate.phase == Phase::Off)
-            && self.unread.iter().all(|unread| !unread)
+            && !self.unread.contains(&true)
+            && !self.awaiting.contains(&true)
     }
 
     fn is_wanted(&self, kind: CaptureKind) -> bool {
@@ -360,7 +377,7 @@ impl CaptureUnit {
 
     /// The next access to the drive's service channel, if one is due and none under way.
     pub fn access(&self, program: &CaptureProgram) -> Option<(Access, CaptureAccess, u8)> {
-        if self.outstanding.is_some() || self.rests() {
+        if self.outstanding.is_some() || self.rests {
             return None;
         }
         let next = self.next_access(program)?;

@@ -9,16 +9,8 @@ use profile_generic::state::Report;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 impl AxisChannel {
-    /// What the motion device has to know of the drive.
-    #[must_use]
-    pub fn drive_image(&self) -> DriveImage {
-        let mut image = DriveImage::default();
-        self.fill_drive_image(&mut image);
-        image
-    }
-
     /// Writes what the motion device has to know of the drive over what it was told before.
-    pub fn fill_drive_image(&self, image: &mut DriveImage) {
+    pub fn fill_drive_image(&mut self, image: &mut DriveImage) {
         image.clear();
         image.online = self.south.is_some() && self.feedback.report != Report::Silent;
         image.action_id = self.action_id;
@@ -28,12 +20,12 @@ impl AxisChannel {
         let mut feedback = self.feedback;
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
-        self.north.drive_image(&feedback, &self.faults, image);
+        self.north.drive_image(&feedback, &self.faults, &mut self.said, image);
         self.sequence_image(image);
-        if let Some(program) = self.south() {
-            let events = self.north.events();
-            image.events = events.checkable(program.captures().kinds(), &feedback);
-            image.events_checking = events.captured(self.captures.checking(program.captures()));
+        if let Some((program, _)) = &self.south {
+            let captures = program.captures();
+            image.events = self.said.checkable(&self.north, (self.programs, || captures.kinds()), &feedback);
+            image.events_checking = self.north.events().captured(self.captures.checking(captures));
         }
         if self.cause_wanted.is_some() {
             // The stop ends with the fault that says why, once the drive has told it.

@@ -32,7 +32,7 @@ pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
 
 use self::hookup::TestRun;
-use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing};
+use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing, Told};
 use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -144,6 +144,8 @@ pub struct AxisChannel {
     /// Counts the programs of either side that were taken or given up.
     programs: u64,
     trackers: CipTrackers,
+    /// The status that the controller was told last.
+    said: Told,
     south: Option<(DriveProgram, Hearing)>,
     limits: Limits,
     command_loss: Reaction,
@@ -244,6 +246,7 @@ impl AxisChannel {
             scaling_id: 0,
             programs: 0,
             trackers,
+            said: Told::default(),
             south: None,
             limits,
             command_loss,
@@ -360,6 +363,7 @@ impl AxisChannel {
             return false;
         }
         self.trackers = program.trackers();
+        self.said = Told::default();
         self.north = program;
         self.programs += 1;
         self.scaling_id = self.scaling_id.wrapping_add(1);

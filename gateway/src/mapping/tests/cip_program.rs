@@ -79,7 +79,7 @@ fn fills_the_image_of_the_device() {
     feedback.set(Signal::PositionActual, 3_000_000_000_000);
     feedback.set(Signal::VelocityActual, -500_000_000);
     let mut image = DriveImage { action_id: 7, ..DriveImage::default() };
-    let report = program.drive_image(&feedback, &FaultSet::new(), &mut image);
+    let report = program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
     assert_eq!((image.position, image.action_id, report.missing), (3_000_000_000, 7, 1));
     // Its stamp is in system time, which the device's side of the engine makes of it.
     assert_eq!((image.velocity, image.captured_at, image.position_rate), (Some(-0.5), 0, -500_000));
@@ -91,7 +91,7 @@ fn fills_the_image_of_the_device() {
     assert!(image.io_status.is_empty());
     // The drive is gone: it stands where it was seen last, and nothing is said of how it moves.
     feedback.present = profile_generic::image::FeedbackSet::empty();
-    program.drive_image(&feedback, &FaultSet::new(), &mut image);
+    program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
     assert_eq!((image.position, image.position_rate, image.velocity), (3_000_000_000, 0, None));
 }
 
@@ -116,7 +116,7 @@ fn switches_become_axis_io_status_while_the_drive_is_heard() {
             let feedback = AxisFeedback { status, ..AxisFeedback::default() };
             for online in [false, true] {
                 let mut image = DriveImage { online, ..DriveImage::default() };
-                program.drive_image(&feedback, &FaultSet::new(), &mut image);
+                program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
                 let expected = if online { expected[place] } else { 0 };
                 assert_eq!(image.io_status.bits(), expected, "{status:?}, inverted {inverted}, {online}");
             }
@@ -144,7 +144,7 @@ fn reports_conditions_by_type_and_code() {
         let mut faults = FaultSet::new();
         faults.raise(fault, origin);
         let mut image = DriveImage::default();
-        program.drive_image(&AxisFeedback::default(), &faults, &mut image);
+        program.drive_image(&AxisFeedback::default(), &faults, &mut Told::default(), &mut image);
         let conditions = image.conditions.as_slice().iter();
         let as_numbers = |c: &DriveCondition| (c.fault_type.0, c.code, c.sub_code, c.action, c.least.0);
         conditions.map(as_numbers).collect::<Vec<_>>()

@@ -111,7 +111,7 @@ impl Chain {
         back[2..6].copy_from_slice(&telegram[2..6]);
         self.south.decode(&back, false, &mut self.feedback, &mut self.hearing, &mut report).unwrap();
         let mut image = DriveImage::default();
-        self.north.drive_image(&self.feedback, &FaultSet::new(), &mut image);
+        self.north.drive_image(&self.feedback, &FaultSet::new(), &mut Told::default(), &mut image);
         seen(&image)
     }
 }

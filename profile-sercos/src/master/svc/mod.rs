@@ -195,9 +195,15 @@ impl ServiceChannel {
         self.serial
     }
 
+    /// Whether a request of the application is finished.
+    #[inline]
+    pub fn has_outcome(&self) -> bool {
+        self.finished > 0
+    }
+
     /// The outcome of one finished request of the application, oldest first, with its place and serial number.
     pub fn take_outcome(&mut self) -> Option<(usize, u64, SvcOutcome)> {
-        if self.finished == 0 {
+        if !self.has_outcome() {
             return None;
         }
         let index = (0..OWN)

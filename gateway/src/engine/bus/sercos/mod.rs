@@ -116,6 +116,8 @@ pub struct SercosBus {
     planned: bool,
     /// Who commissions drives that come later.
     commissioner: CommissionerEnd,
+    /// Room for a frame.
+    buffer: Box<[u8; FRAME_MAX]>,
 }
 
 impl SercosBus {
@@ -165,6 +167,7 @@ impl SercosBus {
             idle: true,
             planned: false,
             commissioner,
+            buffer: Box::new([0; FRAME_MAX]),
         })
     }
 
@@ -575,11 +578,11 @@ impl Bus for SercosBus {
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
         let SouthPort::Ethernet(port) = port else { return };
-        let mut buffer = [0; FRAME_MAX];
+        let Self { master, buffer, .. } = self;
         for _ in 0..FRAMES_PER_CYCLE {
-            let Some((port, length)) = port.receive(&mut buffer) else { break };
+            let Some((port, length)) = port.receive(&mut buffer[..]) else { break };
             // A refused frame is counted by the master and changes nothing.
-            let _ = self.master.handle_frame(now, port, &buffer[..length]);
+            let _ = master.handle_frame(now, port, &buffer[..length]);
         }
     }
 
