@@ -66,6 +66,12 @@ impl FaultSet {
         self.list.iter().any(|known| known.fault.cause == cause && known.origin == origin)
     }
 
+    /// Whether anything of this origin is there.
+    #[must_use]
+    pub fn has(&self, origin: Origin) -> bool {
+        self.list.iter().any(|known| known.origin == origin)
+    }
+
     /// Adds a fault; `true` when it was not there yet. In a full set a warning gives way to what stops the axis.
     pub fn raise(&mut self, fault: Fault, origin: Origin) -> bool {
         if self.contains(fault.cause, origin) {
@@ -128,5 +134,6 @@ mod tests {
         assert!(set.raise(fault(2).with_reaction(Reaction::CoastAndDisable), Origin::Drive));
         assert_eq!((set.dropped(), set.iter().count()), (2, FAULT_SET_MAX));
         assert!(set.contains(FaultCause(2), Origin::Drive));
+        assert!(set.has(Origin::Drive) && set.has(Origin::Warning) && !set.has(Origin::Watch));
     }
 }

@@ -26,6 +26,10 @@ const RECORD: [(u16, u8); 5] = [
     (AXIS_FAULT_TIME_STAMP, 8),
 ];
 
+/// Updates after which the record of an axis that stands for a fault is read again: a device may tell at first only that its
+/// drive has one, and a moment later which.
+const READ_AGAIN: u16 = 16;
+
 /// One thing to be read.
 #[derive(Debug, Default)]
 struct Reading {
@@ -78,6 +82,10 @@ pub(super) struct FaultReader {
     axis: Reading,
     faulted: bool,
     state: AxisStateCode,
+    /// Updates since the axis' record was read.
+    updates: u16,
+    /// The axis' record that was told last in this trouble; what is read after it need not be new.
+    told: Option<FaultRecord>,
 }
 
 /// States that an axis is in for a fault.
@@ -88,7 +96,7 @@ fn is_troubled(state: AxisStateCode) -> bool {
 impl FaultReader {
     /// Whether a fault is there or may be there of which nobody knows yet which one it is.
     pub const fn is_busy(&self) -> bool {
-        self.node.is_busy() || self.axis.is_busy()
+        self.node.is_busy() || self.axis.is_busy() && self.told.is_none()
     }
 
     /// What was asked is not answered any more; it is asked again.
@@ -106,7 +114,13 @@ impl FaultReader {
         if actual.node_status.contains(NodeStatus::DATA_VALID) {
             let (before, after) = (self.state, actual.axis_state);
             // The record of the clearing event follows the one of the fault.
-            self.axis.wanted |= before != after && (is_troubled(before) || is_troubled(after));
+            let changed = before != after && (is_troubled(before) || is_troubled(after));
+            if changed {
+                self.told = None;
+            }
+            let again = is_troubled(after) && self.updates >= READ_AGAIN && !self.axis.is_busy();
+            self.updates = if again { 0 } else { self.updates.saturating_add(1) };
+            self.axis.wanted |= changed || again;
             self.state = after;
         }
     }
@@ -126,14 +140,16 @@ impl FaultReader {
         }
         let Some(values) = self.axis.poll(1, &RECORD, services, room)? else { return Ok(None) };
         let stamp = value(&values, AXIS_FAULT_TIME_STAMP).and_then(|bytes| bytes.try_into().ok());
-        Ok(Some(FaultRead::Axis(FaultRecord {
+        let record = FaultRecord {
             fault_type: FaultType(octet(&values, 1, AXIS_FAULT_TYPE)?),
             code: octet(&values, 1, AXIS_FAULT_CODE)?,
             // A device may do without these.
             sub_code: octet(&values, 1, AXIS_FAULT_SUB_CODE).unwrap_or(0),
             action: octet(&values, 1, AXIS_FAULT_ACTION).unwrap_or(0),
             time_stamp: stamp.map_or(0, u64::from_le_bytes),
-        })))
+        };
+        let known = self.told.replace(record) == Some(record);
+        Ok((!known).then_some(FaultRead::Axis(record)))
     }
 }
 

@@ -226,7 +226,9 @@ fn a_fault_of_the_drive_is_told_with_its_cause_and_reset() {
         .servo_mut()
         .raise_fault(FaultCause::OVER_CURRENT);
     BUS.stops_within(&mut rig, 1_000);
-    assert_eq!(codes(&rig), [(FaultType::AXIS, 10)], "Inverter Overcurrent\n{}", rig.told());
+    // Before the drive has said which: number 1 of the manufacturer.
+    let told = [(FaultType::AXIS_MFG, 1), (FaultType::AXIS, 10)];
+    assert_eq!(codes(&rig), told, "Inverter Overcurrent\n{}", rig.told());
     rig.devicenet[0]
         .bus
         .nodes_mut()

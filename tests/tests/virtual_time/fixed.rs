@@ -116,11 +116,15 @@ fn an_axis_moves_half_a_revolution_in_position_control() {
 
 #[test]
 fn a_fault_of_the_drive_is_read_by_a_service_and_reset() {
-    let pattern = FaultPattern { fault_type: Some(FaultType::AXIS), code: Some(10), sub_code: None };
+    let pattern =
+        |fault_type, code| FaultPattern { fault_type: Some(fault_type), code: Some(code), sub_code: None };
+    // The drive has an error; then which one.
+    let (undiagnosed, overcurrent) = (pattern(FaultType::AXIS_MFG, 1), pattern(FaultType::AXIS, 10));
     let mut rig = rig();
     rig.connect(vec![
         Step::Enable(ONE),
-        expect(Condition::Fault { axis: 1, pattern }),
+        expect(Condition::Fault { axis: 1, pattern: undiagnosed }),
+        expect(Condition::Fault { axis: 1, pattern: overcurrent }),
         Step::FaultReset(ONE),
         Step::Enable(ONE),
         go(0.25),
@@ -129,11 +133,11 @@ fn a_fault_of_the_drive_is_read_by_a_service_and_reset() {
     ]);
     rig.run_until(millis(20_000), "the axis enabled", |rig| rig.report().steps_finished == 1);
     rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
-    rig.run_until(millis(1_000), "the fault told", |rig| rig.report().steps_finished == 2);
+    rig.run_until(millis(1_000), "the fault told", |rig| rig.report().steps_finished == 3);
     rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT);
     let report = rig.run(millis(30_000));
     assert_eq!(report.failure, None, "step {:?}\n{}\n{}", report.failed_step, rig.log(), rig.told());
-    assert_eq!(report.axes[0].faults.kept().iter().map(|fault| fault.code).collect::<Vec<_>>(), [10]);
+    assert_eq!(report.axes[0].faults.kept().iter().map(|fault| fault.code).collect::<Vec<_>>(), [1, 10]);
     assert!(rig.velocity(0).abs() < NANO / 100);
 }
 

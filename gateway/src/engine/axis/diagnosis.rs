@@ -16,7 +16,7 @@ use crate::mapping::Item;
 use super::own_words::Reading;
 use super::{AxisChannel, caused_by_controller};
 
-/// How long a fault of the drive waits for its cause to be read before it is reported without.
+/// How long the words of a drive with a fault are read without a pause for its cause.
 pub(super) const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
 
 /// How often the words are read while the drive shows an error or a warning.
@@ -123,7 +123,14 @@ impl AxisChannel {
         }
     }
 
-    /// The cause of an error of the drive is known, or will not be.
+    /// The drive shows an error, and nothing is known of it yet: the axis stops for it, and the controller is told.
+    pub(super) fn undiagnosed_fault(&mut self, now: MonotonicTime, system: SystemTime) {
+        let cause = FaultCause::DRIVE_SPECIFIC;
+        self.drive_fault(now, system, cause, cause.default_reaction(), 0);
+        self.cause_wanted = Some(now);
+    }
+
+    /// The cause of an error of the drive is known, or is not known yet.
     pub(super) fn drive_fault(
         &mut self,
         now: MonotonicTime,
@@ -132,7 +139,7 @@ impl AxisChannel {
         reaction: Reaction,
         word: u32,
     ) {
-        self.cause_wanted = None;
+        let refines = self.cause_wanted.take().is_some();
         let fault = Fault::new(cause, system).with_reaction(reaction).with_vendor_code(word);
         let new = self.faults.raise(fault, Origin::Drive);
         if new {
@@ -140,7 +147,15 @@ impl AxisChannel {
         }
         // While a reset is under way the drive may still show what is being reset; what stands is found after it.
         let resetting = self.reset.is_some_and(|reset| reset.begun);
-        if !resetting && (new || self.fault.is_none_or(|known| caused_by_controller(known.cause))) {
+        if resetting {
+            return;
+        }
+        let undiagnosed = |known: &Fault| refines && known.cause == FaultCause::DRIVE_SPECIFIC;
+        if let Some(known) = self.fault.filter(undiagnosed) {
+            // It came when the drive first showed it.
+            self.fault = Some(Fault { at: known.at, ..fault });
+        }
+        if new || self.fault.is_none_or(|known| caused_by_controller(known.cause)) {
             self.take_fault(now, system, fault);
         }
     }
@@ -186,6 +201,9 @@ impl AxisChannel {
 
     /// What the drive no longer shows is gone.
     pub(super) fn end_drive_faults(&mut self) {
+        if !self.shows_error() && !self.shows_warning() {
+            self.end_own_words();
+        }
         if !self.shows_error() {
             self.faults.clear_all(Origin::Drive, |_| false);
             self.diagnosis.errors = Round::default();

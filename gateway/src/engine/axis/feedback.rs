@@ -141,13 +141,12 @@ impl AxisChannel {
             // Also when another fault has stopped it: the drive cannot be reset before it is back.
             self.faults.raise(Fault::new(FaultCause::SOUTH_SILENCE, system), Origin::Event);
         }
-        let faulted = matches!(report, Report::Faulted | Report::FaultReaction);
-        let unknown = self.fault.is_none_or(|fault| caused_by_controller(fault.cause));
-        if !faulted {
+        if !self.shows_error() {
             self.cause_wanted = None;
-        } else if unknown && self.reset.is_none() && self.cause_wanted.is_none() {
-            // While a reset is under way the drive may still show what is being reset.
-            self.cause_wanted = Some(now);
+        } else if self.reset.is_none() && !self.faults.has(Origin::Drive) {
+            // A fault from its first telegram: the diagnosis says later which one, and may come too late to find any. While
+            // a reset is under way the drive may still show what is being reset.
+            self.undiagnosed_fault(now, system);
         }
         let transition = self.drive.machine.report(report);
         self.follow(now, system, transition);
@@ -169,10 +168,8 @@ impl AxisChannel {
             let transition = self.drive.machine.handle(Event::Timeout);
             self.follow(now, system, transition);
         }
-        if self.cause_wanted.is_some_and(|since| now.since(since) > CAUSE_TIME_OUT) {
-            let cause = FaultCause::DRIVE_SPECIFIC;
-            self.drive_fault(now, system, cause, cause.default_reaction(), 0);
-        }
+        // Nothing but how often its words are read depends on it.
+        self.cause_wanted.take_if(|since| now.since(*since) > CAUSE_TIME_OUT);
         self.go_on_with_sequence(now, system);
         self.go_on_with_reset(now, system);
         self.feedback.state = self.state();

@@ -27,10 +27,6 @@ impl AxisChannel {
             image.events = self.said.checkable(&self.north, (self.programs, || captures.kinds()), &feedback);
             image.events_checking = self.north.events().captured(self.captures.checking(captures));
         }
-        if self.cause_wanted.is_some() {
-            // The stop ends with the fault that says why, once the drive has told it.
-            image.stop_complete = false;
-        }
     }
 
     /// The fault, where the controller knows it as one of the communications node: its code, and since when.

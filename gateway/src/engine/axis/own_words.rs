@@ -33,6 +33,8 @@ pub(super) struct Reading {
     place: Option<usize>,
     asked: Option<(Item, MonotonicTime)>,
     said: OwnWords,
+    /// What it said last; that is told once as long as something is there.
+    told: OwnWords,
 }
 
 impl Reading {
@@ -57,7 +59,7 @@ impl AxisChannel {
     pub fn own_words_asked(&mut self, now: MonotonicTime, item: Item) {
         let reading = &mut self.own_words;
         if reading.place.is_none() {
-            *reading = Reading { place: Some(0), ..Reading::default() };
+            *reading = Reading { place: Some(0), told: reading.told, ..Reading::default() };
         }
         reading.asked = Some((item, now));
     }
@@ -78,7 +80,16 @@ impl AxisChannel {
         let said = *said;
         self.own_words.place = (!last).then_some(place);
         let there = self.shows_error() || self.shows_warning();
-        (last && there && said != OwnWords::default()).then_some(said)
+        if !last || !there || said == OwnWords::default() || said == self.own_words.told {
+            return None;
+        }
+        self.own_words.told = said;
+        Some(said)
+    }
+
+    /// What the drive showed is over: it will be told again when it comes again.
+    pub(super) fn end_own_words(&mut self) {
+        self.own_words.told = OwnWords::default();
     }
 }
 
