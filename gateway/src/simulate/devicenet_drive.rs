@@ -111,6 +111,14 @@ pub fn node(mac: MacId, rate: DataRate, kind: &DevicenetKind) -> DevicenetNode {
 }
 
 impl DevicenetNode {
+    /// Switches main power, where the kind of drive tells anything of it.
+    pub fn set_main_power(&mut self, on: bool) {
+        match self {
+            Self::Motion(slave) => slave.application_mut().set_power(on),
+            Self::Speed(_) => {}
+        }
+    }
+
     /// The servo, to load it and to raise faults.
     pub fn servo_mut(&mut self) -> &mut Servo {
         match self {

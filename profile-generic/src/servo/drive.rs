@@ -208,6 +208,21 @@ impl Servo {
         self.active.retain(|active| *active != cause);
     }
 
+    /// Ends the condition of a fault, and the fault with it, as in a drive that resets itself: it goes on with the stop that it has
+    /// begun, and then can be enabled again.
+    pub fn recover(&mut self, cause: FaultCause) {
+        self.clear_fault(cause);
+        if self.active.is_empty() {
+            self.latched = None;
+        }
+    }
+
+    /// Takes the torque away without a word, as a drive does whose enable input is opened.
+    pub fn lose_torque(&mut self) {
+        self.switch_off();
+        self.armed = false;
+    }
+
     /// Lets `dt_ns` nanoseconds pass with these inputs. Longer steps than [`MAX_STEP`] and such below one
     /// nanosecond are held at these ends.
     pub fn step(&mut self, dt_ns: i64, command: &ServoCommand) -> ServoActual {

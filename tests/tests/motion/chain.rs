@@ -108,6 +108,15 @@ impl Chain {
         }
     }
 
+    /// The cycle of the bus.
+    pub const fn cycle(self) -> DurationNs {
+        match self.bus {
+            Bus::Sercos => DurationNs::from_millis(2),
+            Bus::Canopen => DurationNs::from_millis(4),
+            Bus::Devicenet => DurationNs::from_millis(10),
+        }
+    }
+
     /// A rig whose bus is up.
     pub fn ready(self) -> Rig {
         let (south, cycle, drives) = match self.bus {

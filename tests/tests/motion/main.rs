@@ -5,6 +5,7 @@
 
 mod chain;
 mod clocks;
+mod drive_faults;
 mod modes;
 mod scenario;
 mod table;

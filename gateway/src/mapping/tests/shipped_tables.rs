@@ -140,6 +140,21 @@ fn let_a_drive_that_only_warns_go_on() {
     }
 }
 
+/// What is wrong with one drive stops its axis, and no other: a fault of the node is one of all axes of the device, and needs a reset of
+/// its own.
+#[test]
+fn no_fault_of_a_drive_is_one_of_the_node() {
+    let mapping = shipped();
+    let cip = mapping.cip_program(&rotary_counts()).unwrap();
+    let causes = mapping.sercos.faults().iter().chain(mapping.cia402.faults()).map(|row| row.cause);
+    let mut tried = 0;
+    for cause in causes {
+        tried += 1;
+        assert!(matches!(cip.fault(cause), Some(CipFault::Axis { .. })), "{cause}");
+    }
+    assert!(tried > 150, "{tried} rows");
+}
+
 /// Every IDN of the drive profile is named by a row, or by a word of one, or stands among the unbound with a reason.
 #[test]
 fn every_idn_of_the_profile_is_bound_or_has_a_reason() {

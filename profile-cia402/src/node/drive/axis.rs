@@ -1,6 +1,7 @@
 //! One axis: the state machine, the modes of operation, and the servo behind them.
 
 use arrayvec::ArrayVec;
+use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
@@ -93,6 +94,8 @@ pub struct Axis {
     /// Set-points of the master are followed.
     follows: bool,
     fault: Option<ErrorCode>,
+    /// It leaves Fault by itself.
+    recovering: bool,
     reports: ArrayVec<Report, REPORTS_MAX>,
     main_power: bool,
     remote: bool,
@@ -135,6 +138,7 @@ impl Axis {
             limited: false,
             follows: false,
             fault: None,
+            recovering: false,
             reports: ArrayVec::new(),
             main_power: true,
             remote: true,
@@ -267,6 +271,22 @@ impl Axis {
         self.actual.fault.is_none()
     }
 
+    /// Out of Fault, to Switch on disabled.
+    fn leave_fault(&mut self, dictionary: &mut Dictionary) {
+        self.recovering = false;
+        self.disable();
+        if let Some(code) = self.fault.take() {
+            self.report(code, false);
+        }
+        self.set(dictionary, index::ERROR_CODE, 0);
+    }
+
+    /// Ends a fault of the servo, as in a drive that resets itself: it leaves Fault when the reaction to it has ended.
+    pub fn recover(&mut self, cause: FaultCause) {
+        self.servo.recover(cause);
+        self.recovering = true;
+    }
+
     /// Something happens to the communication.
     pub(super) fn event(&mut self, event: Event, dictionary: &mut Dictionary) {
         let runs = self.enabling || matches!(self.state, State::OperationEnabled | State::QuickStopActive);
@@ -379,13 +399,7 @@ impl Axis {
             }
             7 | 9 | 10 | 12 => self.disable(),
             11 => self.quick_stop(),
-            15 if self.acknowledge() => {
-                self.disable();
-                if let Some(code) = self.fault.take() {
-                    self.report(code, false);
-                }
-                self.set(dictionary, index::ERROR_CODE, 0);
-            }
+            15 if self.acknowledge() => self.leave_fault(dictionary),
             16 => {
                 self.state = State::OperationEnabled;
                 self.brake = None;
@@ -784,6 +798,7 @@ impl Axis {
                 self.brake = None;
                 self.state = State::Fault;
             }
+            State::Fault if self.recovering && self.actual.fault.is_none() => self.leave_fault(dictionary),
             _ => {}
         }
     }

@@ -169,6 +169,11 @@ impl Drive {
         self.servo.clear_fault(cause);
     }
 
+    /// Ends a fault, as in a drive that resets itself.
+    pub fn recover(&mut self, cause: FaultCause) {
+        self.servo.recover(cause);
+    }
+
     /// Sets the warnings that come from outside, bits of S-0-0012.
     pub fn set_warnings(&mut self, bits: u16) {
         self.warnings = bits;
