@@ -161,7 +161,8 @@ fn cia402_reports(mapping: &Mapping, findings: &mut Findings) {
     for (at, (rule, row)) in rules.iter().zip(&file.rows.report).enumerate() {
         let hidden = rules[..at].iter().position(|other| {
             hides(other.pattern, rule.pattern)
-                && (other.follows.is_none() || other.follows == rule.follows)
+                && (other.drives.follows.is_none() || other.drives.follows == rule.drives.follows)
+                && (other.drives.voltage.is_none() || other.drives.voltage == rule.drives.voltage)
                 && (other.modes.is_empty()
                     || !rule.modes.is_empty() && rule.modes.iter().all(|mode| other.modes.contains(mode)))
         });

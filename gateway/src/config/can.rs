@@ -42,6 +42,10 @@ const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
     ("inputs", (Signal::DigitalInputs, false)),
 ];
 
+/// What bit 4 of the statusword is: nothing to go by, or the supply of the power stage. maxon shows by it that the stage is on, others keep
+/// it at 0: a drive that is ready is ready.
+const VOLTAGE_BIT: [(&str, bool); 2] = [("ignore", false), ("dc-link", true)];
+
 /// Offsets that can be sent.
 const OFFSETS: [(&str, Signal); 2] = [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
 
@@ -178,6 +182,10 @@ impl Checker {
             None => Some(Vec::new()),
             Some(names) => self.words(names, "offset", &OFFSETS),
         };
+        let tells_voltage = match &table.voltage_bit {
+            None => Some(false),
+            Some(word) => self.word(word, "meaning of bit 4", &VOLTAGE_BIT),
+        };
         let way_of_a_turn = match &table.millimetres_per_turn {
             None => Some(None),
             Some(value) => self.exact(value, "the way of a turn").map(Some),
@@ -193,7 +201,8 @@ impl Checker {
             modes: modes?,
             left_out: left_out?,
             offsets: offsets?,
-            acknowledges: table.acknowledges.unwrap_or(true),
+            acknowledges: table.acknowledges.unwrap_or(false),
+            tells_voltage: tells_voltage?,
             way_of_a_turn: way_of_a_turn?,
             counts: counts?,
         })

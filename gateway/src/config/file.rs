@@ -333,8 +333,11 @@ pub struct CanDriveTable {
     /// Which trims go to the drive in every cycle, for it to add them: `"velocity"` (60B1) in position control, `"torque"` (60B2)
     /// in position and velocity control. Default: none, and such a trim of the controller has no effect.
     pub offsets: Option<Spanned<Vec<Spanned<String>>>>,
-    /// Whether its statusword tells by bit 12 that it follows command values. Default: true.
+    /// Whether its statusword tells by bit 12 that it follows command values. Default: false; a drive in operation follows.
     pub acknowledges: Option<bool>,
+    /// What bit 4 of its statusword is: `"dc-link"` where the drive tells by it that its power stage is supplied, `"ignore"` otherwise. Default:
+    /// ignore; a drive that is ready is ready.
+    pub voltage_bit: Option<Spanned<String>>,
     /// Millimetres that a linear axis makes in a turn of its motor; needed for a linear axis whose drive counts turns.
     pub millimetres_per_turn: Option<Spanned<f64>>,
     /// What its counts are, for a drive whose factor group does not say it, or says it wrong. Default: what the drive says.

@@ -615,6 +615,8 @@ pub struct CanDrive {
     pub offsets: Vec<Signal>,
     /// Whether its statusword tells that it follows command values.
     pub acknowledges: bool,
+    /// Whether its statusword tells that the power stage is supplied.
+    pub tells_voltage: bool,
     /// Nanounits of a linear axis in a nanoturn.
     pub way_of_a_turn: Option<Ratio>,
     /// Generic units in one count, where the drive is not to be asked.

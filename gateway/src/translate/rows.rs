@@ -48,7 +48,7 @@ impl StageAxis {
     pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
         match &self.behind {
             Behind::Sercos(drive) => mapping.report_row(status, drive.silent),
-            Behind::Can(drive) => mapping.object_report_row(self.known(status), drive.needs.silent),
+            Behind::Can(drive) => mapping.object_report_row(self.known(status), &drive.needs),
             Behind::Devicenet(drive) => {
                 let [code, ..] = status.to_le_bytes();
                 drive.is_motion().then(|| mapping.axis_state_row(code))?
@@ -60,7 +60,7 @@ impl StageAxis {
         match &self.behind {
             Behind::Sercos(drive) => mapping.status_rows(status, words, drive.silent),
             Behind::Devicenet(_) => Vec::new(),
-            Behind::Can(_) => {
+            Behind::Can(drive) => {
                 let first = |item: &Item| match *item {
                     Item::Object(object) => {
                         Item::object(Cia402Dictionary::on_first_axis(object.index), object.sub)
@@ -68,7 +68,7 @@ impl StageAxis {
                     item => item,
                 };
                 let words: Vec<_> = words.iter().map(|(item, word)| (first(item), *word)).collect();
-                mapping.object_status_rows(self.known(status), &words)
+                mapping.object_status_rows(self.known(status), &words, &drive.needs)
             }
         }
     }

@@ -12,8 +12,9 @@ use profile_generic::time::DurationNs;
 
 use super::captures::{CaptureRule, LatchRule};
 use super::{
-    ActionRule, Base, Cia402Tables, DriveMode, FixedUnit, Handover, Method, ModeRule, Object, ParameterRule,
-    ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value, Words,
+    ActionRule, Base, Cia402Tables, DriveMode, Drives, FixedUnit, Handover, Method, ModeRule, Object,
+    ParameterRule, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value,
+    Words,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
@@ -445,7 +446,8 @@ impl<'a> Builder<'a> {
             let pattern = self.pattern("Statusword", &row.pattern);
             let modes = self.mode_codes(&row.modes);
             let (Some(report), Some(state), Some(pattern)) = (report, state, pattern) else { continue };
-            let rule = ReportRule { pattern: both(state, pattern), modes, follows: row.follows, report };
+            let drives = Drives { follows: row.follows, voltage: row.voltage };
+            let rule = ReportRule { pattern: both(state, pattern), modes, drives, report };
             self.tables.reports.push(rule);
         }
         for row in &rows.status {
@@ -466,7 +468,8 @@ impl<'a> Builder<'a> {
             else {
                 continue;
             };
-            let rule = StatusRule { object, pattern: both(state, pattern), modes, bit, inverted };
+            let drives = Drives { follows: row.follows, voltage: row.voltage };
+            let rule = StatusRule { object, pattern: both(state, pattern), modes, drives, bit, inverted };
             self.tables.status.push(rule);
         }
     }

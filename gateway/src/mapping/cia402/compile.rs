@@ -42,8 +42,10 @@ pub struct Cia402Axis {
     pub cycle: DurationNs,
     /// Parameters to write at start, in generic units.
     pub parameters: Vec<(Parameter, i64)>,
-    /// The drive's statusword does not tell whether it follows command values.
-    pub silent: bool,
+    /// The drive tells by bit 12 of its statusword whether it follows command values.
+    pub acknowledges: bool,
+    /// It tells by bit 4 whether its power stage is supplied.
+    pub tells_voltage: bool,
     /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
     /// Offsets that the drive is to add to its set-points; they go to it in every cycle, so none does unless it is named here.
@@ -457,18 +459,16 @@ impl Cia402Tables {
                 None => program.actions.set(rule.action, rule.pattern),
             }
         }
-        for rule in
-            self.reports.iter().filter(|rule| rule.follows.is_none_or(|follows| follows != axis.silent))
-        {
+        for rule in self.reports.iter().filter(|rule| rule.drives.include(axis)) {
             for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
                 // A drive that carries out something by itself need not follow command values.
-                let led = rule.follows == Some(true) || program.led_reports.push(pattern, rule.report);
+                let led = rule.drives.follows == Some(true) || program.led_reports.push(pattern, rule.report);
                 if !led || !program.reports.push(pattern, rule.report) {
                     return Err(Cia402Error::Full("the table of reports"));
                 }
             }
         }
-        for rule in self.status.iter() {
+        for rule in self.status.iter().filter(|rule| rule.drives.include(axis)) {
             let word = (rule.object != self.words.status).then(|| axis.item(rule.object)).flatten();
             if word.is_some_and(|word| !program.status_words.iter().any(|place: &Place| place.item == word)) {
                 continue;

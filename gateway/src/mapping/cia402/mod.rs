@@ -123,12 +123,29 @@ pub(super) struct ActionRule {
     pub pattern: BitPattern,
 }
 
+/// Drives that a row is for, by bits of the statusword that not all of them keep.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Drives {
+    /// Those that tell by bit 12 whether they follow command values, or those that do not.
+    pub follows: Option<bool>,
+    /// Those that tell by bit 4 whether there is power, or those that do not.
+    pub voltage: Option<bool>,
+}
+
+impl Drives {
+    /// Whether the drive of an axis is one of them.
+    pub fn include(self, axis: &Cia402Axis) -> bool {
+        self.follows.is_none_or(|follows| follows == axis.acknowledges)
+            && self.voltage.is_none_or(|voltage| voltage == axis.tells_voltage)
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(crate) struct ReportRule {
     pub pattern: BitPattern,
     /// Modes that the drive shows; empty = any.
     pub modes: Vec<i8>,
-    pub follows: Option<bool>,
+    pub drives: Drives,
     pub report: Report,
 }
 
@@ -137,6 +154,7 @@ pub(super) struct StatusRule {
     pub object: Object,
     pub pattern: BitPattern,
     pub modes: Vec<i8>,
+    pub drives: Drives,
     pub bit: StatusBits,
     /// The same in a drive that inverts its positions.
     pub inverted: StatusBits,

@@ -22,6 +22,8 @@ fn axis(modes: &[OperatingMode]) -> Cia402Axis {
         modes: modes.iter().map(|mode| (*mode).into()).collect(),
         cycle: DurationNs::from_millis(2),
         left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
+        acknowledges: true,
+        tells_voltage: true,
         ..Cia402Axis::default()
     }
 }
@@ -120,20 +122,24 @@ fn a_drive_is_led_from_its_start_into_operation() {
 #[test]
 fn what_every_status_says() {
     let program = program(&ALL);
-    let silent = Cia402Axis { silent: true, ..axis(&ALL) };
-    let silent = shipped().cia402_program(&silent, &servo()).unwrap();
+    // One whose bits 4 and 12 are not looked at.
+    let plain = Cia402Axis { acknowledges: false, tells_voltage: false, ..axis(&ALL) };
+    let plain = shipped().cia402_program(&plain, &servo()).unwrap();
     let mut text = String::new();
     for mode in [8_u32, 9, 3, 0] {
         for (name, state) in STATES {
             for bits in [0, 0x10, 0x1000, 0x1490] {
                 let status = mode << 16 | state | bits;
-                let shown: Vec<_> =
-                    program.status_bits(status, &[]).iter_names().map(|(name, _)| name).collect();
-                let (report, without) = (program.report(status), silent.report(status));
+                let bits = |program: &DriveProgram| {
+                    let bits = program.status_bits(status, &[]);
+                    bits.iter_names().map(|(name, _)| name).collect::<Vec<_>>().join(" ")
+                };
                 let mode = program.mode(status).map_or("-".to_owned(), |mode| mode.to_string());
-                let shown = shown.join(" ");
-                writeln!(text, "{status:06X} {name:<22} {mode:<9} {report:<15} {without:<15} {shown}")
-                    .unwrap();
+                for (keeps, program) in [("4 12", &program), ("", &plain)] {
+                    let (report, shown) = (program.report(status), bits(program));
+                    writeln!(text, "{status:06X} {name:<22} {mode:<9} {keeps:<5} {report:<15} {shown}")
+                        .unwrap();
+                }
             }
         }
     }

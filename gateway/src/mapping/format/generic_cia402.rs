@@ -236,6 +236,9 @@ pub struct Cia402ReportRow {
     pub modes: Vec<Name>,
     /// Whether it is for drives that tell whether they follow command values, or for those that do not. Default: both.
     pub follows: Option<bool>,
+    /// Whether it is for drives that tell by bit 4 whether the power stage has its supply, or for those whose bit 4 is not looked at. Default:
+    /// both.
+    pub voltage: Option<bool>,
     /// Report.
     pub report: Name,
     /// Where it comes from.
@@ -256,6 +259,10 @@ pub struct Cia402StatusRow {
     /// As in a report.
     #[serde(default)]
     pub modes: Vec<Name>,
+    /// As in a report.
+    pub follows: Option<bool>,
+    /// As in a report.
+    pub voltage: Option<bool>,
     /// Generic status bit.
     pub status: Name,
     /// The bit in its place in a drive that inverts its positions. Default: the same.

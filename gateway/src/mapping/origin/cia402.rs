@@ -6,6 +6,7 @@ use profile_generic::parameter::Parameter;
 use profile_generic::state::Action;
 
 use super::{Origin, find, origin};
+use crate::mapping::Cia402Axis;
 use crate::mapping::cia402::DriveMode;
 use crate::mapping::drive_program::MODE_SHIFT;
 use crate::mapping::{Item, Mapping, Object};
@@ -48,14 +49,12 @@ impl Mapping {
         Some(beside(origin(&file.text, "action", &row.action), row.when.as_ref()))
     }
 
-    /// The `[[report]]` row that a status meets, mode of operation included; `silent` as in [`crate::mapping::Cia402Axis`].
+    /// The `[[report]]` row that a status meets, mode of operation included.
     #[must_use]
-    pub fn object_report_row(&self, status: u32, silent: bool) -> Option<Origin> {
+    pub fn object_report_row(&self, status: u32, axis: &Cia402Axis) -> Option<Origin> {
         let file = &self.tables.generic_cia402;
         let at = self.cia402.reports.iter().position(|rule| {
-            rule.follows.is_none_or(|follows| follows != silent)
-                && shows(&rule.modes, status)
-                && rule.pattern.matches(status)
+            rule.drives.include(axis) && shows(&rule.modes, status) && rule.pattern.matches(status)
         })?;
         let row = file.rows.report.get(at)?;
         Some(beside(origin(&file.text, "report", &row.report), Some(&row.state)))
@@ -63,14 +62,16 @@ impl Mapping {
 
     /// The `[[status]]` rows that a status and the words beside it meet.
     #[must_use]
-    pub fn object_status_rows(&self, status: u32, words: &[(Item, u32)]) -> Vec<Origin> {
+    pub fn object_status_rows(&self, status: u32, words: &[(Item, u32)], axis: &Cia402Axis) -> Vec<Origin> {
         let file = &self.tables.generic_cia402;
         let value = |object: Object| match words.iter().find(|(known, _)| *known == Item::Object(object)) {
             Some((_, word)) => Some(*word),
             None => (object == self.cia402.words.status).then_some(status),
         };
         let rows = self.cia402.status.iter().zip(&file.rows.status).filter(|(rule, _)| {
-            shows(&rule.modes, status) && value(rule.object).is_some_and(|word| rule.pattern.matches(word))
+            rule.drives.include(axis)
+                && shows(&rule.modes, status)
+                && value(rule.object).is_some_and(|word| rule.pattern.matches(word))
         });
         rows.map(|(_, row)| beside(origin(&file.text, "status", &row.status), row.state.as_ref())).collect()
     }
@@ -135,11 +136,12 @@ mod tests {
         );
         assert_eq!(key(mapping.object_action_row(Action::Enable, 0x08)), Some("action enable".to_owned()));
         // csp follows, csp ignores, profile velocity has no bit 12.
-        let report = |status| key(mapping.object_report_row(status, false));
+        let axis = Cia402Axis { acknowledges: true, ..Cia402Axis::default() };
+        let report = |status| key(mapping.object_report_row(status, &axis));
         assert_eq!(report(0x08_1027), Some("report operating, Operation enabled".to_owned()));
         assert_eq!(report(0x08_0027), Some("report enabling, Operation enabled".to_owned()));
         assert_eq!(report(0x03_0027), Some("report operating, Operation enabled".to_owned()));
-        assert_ne!(mapping.object_report_row(0x08_1027, false), mapping.object_report_row(0x03_0027, false));
+        assert_ne!(mapping.object_report_row(0x08_1027, &axis), mapping.object_report_row(0x03_0027, &axis));
         assert_eq!(line(mapping.object_fault_row(0x8611)), "cause = \"excessive_position_error\"");
         assert_eq!(
             key(mapping.object_fault_row(0x86FF)),

@@ -96,6 +96,8 @@ pub struct Axis {
     fault: Option<ErrorCode>,
     /// It leaves Fault by itself.
     recovering: bool,
+    /// Bits of the statusword that stay as they are, and how.
+    held_bits: (Statusword, Statusword),
     reports: ArrayVec<Report, REPORTS_MAX>,
     main_power: bool,
     remote: bool,
@@ -139,6 +141,7 @@ impl Axis {
             follows: false,
             fault: None,
             recovering: false,
+            held_bits: (Statusword::empty(), Statusword::empty()),
             reports: ArrayVec::new(),
             main_power: true,
             remote: true,
@@ -175,6 +178,11 @@ impl Axis {
     /// Whether the controlword is obeyed: bit 9 of the statusword.
     pub fn set_remote(&mut self, remote: bool) {
         self.remote = remote;
+    }
+
+    /// Holds bits of the statusword at a value whatever the drive does, as makers do who use them for something else.
+    pub fn hold_status_bits(&mut self, bits: Statusword, value: Statusword) {
+        self.held_bits = (bits, value.intersection(bits));
     }
 
     /// Sets where the limit switches close, in positions of the servo: one at and below, the other at and above its place.
@@ -921,7 +929,8 @@ impl Axis {
 
     /// The statusword.
     fn show_status(&self, dictionary: &mut Dictionary) {
-        let word = self.status();
+        let (held, value) = self.held_bits;
+        let word = self.status().difference(held).union(value);
         self.set(dictionary, index::STATUSWORD, i64::from(word.bits()));
     }
 
