@@ -925,7 +925,24 @@ impl Checker {
         let set_scaling = table.set_scaling.unwrap_or(false);
         let acknowledges = table.acknowledges.unwrap_or(true);
         let hot_plug = table.hot_plug.as_ref().is_some_and(|hot_plug| *hot_plug.get_ref());
-        Some(Drive { name: name?, address: address?, set_scaling, acknowledges, rated: rated?, hot_plug })
+        let modes = match &table.modes {
+            None => Some(None),
+            Some(names) if names.get_ref().is_empty() => self.report(
+                names.span(),
+                "an axis that is used for nothing",
+                "expected at least one mode of \"position\", \"velocity\" and \"torque\"",
+            ),
+            Some(names) => self.words(names, "mode", &super::can::MODES).map(Some),
+        };
+        Some(Drive {
+            name: name?,
+            address: address?,
+            set_scaling,
+            acknowledges,
+            modes: modes?,
+            rated: rated?,
+            hot_plug,
+        })
     }
 
     /// A name that other parts of the file refer to.

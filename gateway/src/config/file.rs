@@ -279,6 +279,9 @@ pub struct DriveTable {
     /// Whether its status word (S-0-0135) tells that it follows command values (bit 3) and that it is halted (bit 4). A
     /// drive without them is held by its command instead of its halt. Default: true.
     pub acknowledges: Option<bool>,
+    /// The operating modes that the drive must have, the first being active at start: "position", "velocity", "torque". Default:
+    /// all three, each only where the drive has it, and one at least.
+    pub modes: Option<Spanned<Vec<Spanned<String>>>>,
     /// Rated (continuous stall) torque or force of its motor, such as `"2.5 Nm"` or `"200 N"`: needed where the drive's
     /// torque values are in newton metre, newton or their inch units. Default: not known.
     pub rated_torque: Option<Spanned<String>>,

@@ -475,6 +475,8 @@ pub struct Drive {
     pub set_scaling: bool,
     /// Whether its status word tells that it follows command values, and that it is halted.
     pub acknowledges: bool,
+    /// The operating modes that it must have; `None`: all that it has.
+    pub modes: Option<Vec<OperatingMode>>,
     /// Rated torque or force of its motor, where it is known.
     pub rated: Option<Rated>,
     /// Whether it may be plugged in while the bus is in operation.

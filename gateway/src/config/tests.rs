@@ -117,6 +117,7 @@ fn defaults_are_those_of_the_documentation() {
                     address: 1,
                     set_scaling: false,
                     acknowledges: true,
+                    modes: None,
                     rated: None,
                     hot_plug: false
                 },
@@ -125,6 +126,7 @@ fn defaults_are_those_of_the_documentation() {
                     address: 2,
                     set_scaling: false,
                     acknowledges: true,
+                    modes: None,
                     rated: None,
                     hot_plug: false
                 },

@@ -10,6 +10,7 @@ use super::compile_sercos::{Compiler, SercosAxis, SercosError, mode_rules};
 use super::dictionary::SercosDictionary;
 use super::drive_facts::DriveFacts;
 use super::drive_program::Telegram;
+use super::fixed_connections::{Survey, survey};
 use super::item::Item;
 use super::sercos_tables::{Elements, SercosTables, StepKind, StepRule};
 
@@ -64,6 +65,8 @@ pub enum Step {
 pub struct CommissioningPlan {
     /// The steps.
     pub steps: Vec<Step>,
+    /// The phase is planned again, with what these steps tell.
+    pub more: bool,
 }
 
 impl CommissioningPlan {
@@ -78,12 +81,38 @@ impl CommissioningPlan {
         phase: u8,
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
-        let compiler = Compiler { tables, dictionary, axis, facts };
         let mut plan = Self::default();
+        if let Some(survey) = survey(facts) {
+            plan.survey(survey);
+            return Ok(plan);
+        }
+        let compiler = Compiler { tables, dictionary, axis, facts };
         for rule in tables.steps.iter().filter(|rule| rule.phase == phase && applies(rule, axis)) {
             compiler.step(rule, &mut plan.steps)?;
         }
         Ok(plan)
+    }
+}
+
+impl CommissioningPlan {
+    fn survey(&mut self, survey: Survey) {
+        self.more = true;
+        let mut read = |idn, elements: &[Element], refused| {
+            self.steps.push(Step::Read { idn, elements: elements.iter().copied().collect(), refused });
+        };
+        match survey {
+            Survey::Lists(lists) => {
+                for (setup, list) in lists {
+                    read(setup, &[Element::Data], Refused::Continue);
+                    read(list, &[Element::Data], Refused::Fail);
+                }
+            }
+            Survey::Values(idns) => {
+                for idn in idns {
+                    read(idn, &DESCRIPTION, Refused::Fail);
+                }
+            }
+        }
     }
 }
 
@@ -129,9 +158,12 @@ impl Compiler<'_> {
                 }
             }
             StepKind::WriteModes => {
-                for (mode, slot) in mode_rules(self.tables, self.axis)?.iter().zip(&self.tables.slots) {
+                for (mode, slot) in
+                    mode_rules(self.tables, self.axis, self.facts)?.iter().zip(&self.tables.slots)
+                {
                     let candidates = mode.codes.iter().map(|code| code.to_le_bytes().to_vec()).collect();
-                    let refused = if mode.optional { Refused::Continue } else { refused };
+                    let optional = mode.optional || self.axis.any_mode;
+                    let refused = if optional { Refused::Continue } else { refused };
                     steps.push(Step::Write { idn: slot.idn, candidates, refused });
                 }
             }

@@ -18,6 +18,7 @@ use super::drive_program::{
     DriveProgram, MAX_MODES, ModeEntry, PROCEDURE_COMMANDS_MAX, PROCEDURES_MAX, ParameterEntry, Procedure,
     ProcedureBy, StatusRow, Telegram, WORD_BYTES,
 };
+use super::fixed_connections::FixedConnections;
 use super::item::Item;
 use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
 use super::sercos_tables::{ModeRule, ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
@@ -32,6 +33,8 @@ pub struct SercosAxis {
     pub units: AxisUnits,
     /// Modes in the order of their slots, with those among them that are procedures; the first is active at start.
     pub modes: ArrayVec<ModeSelection, { MAX_MODES + PROCEDURES_MAX }>,
+    /// One of the modes is enough: those that the drive does not have are left out.
+    pub any_mode: bool,
     /// Whether positions wrap.
     pub modulo: bool,
     /// Whether commissioning sets the scaling of the drive; it is left alone otherwise.
@@ -59,7 +62,9 @@ pub enum SercosError {
         led_in: ModeSelection,
     },
     /// No operation mode at all.
-    #[error("expected at least one operation mode, got none")]
+    #[error(
+        "expected at least one operation mode, got none: the drive has none of those that the axis is configured for"
+    )]
     NoMode,
     /// More modes than slots.
     #[error("expected at most {slots} operating modes, got {modes}")]
@@ -76,6 +81,66 @@ pub enum SercosError {
         idn: Idn,
         /// The signal.
         signal: Signal,
+    },
+    /// A fixed configuration list lacks a value that a mode needs.
+    #[error(
+        "{list}: expected {idn} in the list of this slave of class SCP_FixCFG, which carries {signal} for {mode}, and it is not there; \
+         configure the list in the slave, or give its drive in the configuration only `modes` that its lists serve"
+    )]
+    FixedMissing {
+        /// S-0-1050.x.6.
+        list: Idn,
+        /// The IDN.
+        idn: Idn,
+        /// The signal.
+        signal: Signal,
+        /// The mode that needs it.
+        mode: ModeSelection,
+    },
+    /// A fixed configuration list has a command value that nothing fills.
+    #[error(
+        "{list}: the list of this slave of class SCP_FixCFG has {idn}, for which none of the modes of this drive has a value, and 0 \
+         may be dangerous; take it out of the list in the slave, or add the mode that commands it to `modes` of the drive"
+    )]
+    FixedUnfilled {
+        /// S-0-1050.x.6.
+        list: Idn,
+        /// The IDN.
+        idn: Idn,
+    },
+    /// A value stands in a fixed configuration list twice.
+    #[error(
+        "{list}: {idn} stands in the list of this slave of class SCP_FixCFG twice; configure the list in the slave with each value once"
+    )]
+    FixedTwice {
+        /// S-0-1050.x.6.
+        list: Idn,
+        /// The IDN.
+        idn: Idn,
+    },
+    /// No fixed connection carries the control word or the status word.
+    #[error(
+        "expected {word} in a configuration list of this slave of class SCP_FixCFG, found {lists}; configure the lists in the slave"
+    )]
+    FixedWord {
+        /// Control or status word.
+        word: Idn,
+        /// The lists, for people.
+        lists: String,
+    },
+    /// What a fixed connection carries and what its setup says do not agree.
+    #[error(
+        "{list}: expected a connection with {word} to be {} by the slave, and S-0-1050.x.1 bit 14 says that it is not; correct the setup \
+         in the slave",
+        if *produces { "produced" } else { "consumed" }
+    )]
+    FixedDirection {
+        /// S-0-1050.x.6.
+        list: Idn,
+        /// Control or status word.
+        word: Idn,
+        /// Whether the slave should produce it.
+        produces: bool,
     },
     /// Nobody knows how long a value is.
     #[error("{0}: neither the drive nor the dictionary tells the length")]
@@ -122,6 +187,24 @@ impl Telegram {
     ) -> Result<Self, SercosError> {
         let mut telegram = Telegram::default();
         let (command, actual) = signals(tables, axis, facts)?;
+        if let Some(fixed) = FixedConnections::of(tables, facts)? {
+            let unfilled =
+                |idn: &&Idn| **idn != tables.control && !command.iter().any(|(_, known)| known == *idn);
+            if let Some(&idn) = fixed.command.idns.iter().find(unfilled) {
+                return Err(SercosError::FixedUnfilled { list: fixed.command.list(), idn });
+            }
+            for (idns, items, bytes) in [
+                (fixed.command.idns, &mut telegram.command, &mut telegram.command_bytes),
+                (fixed.feedback.idns, &mut telegram.feedback, &mut telegram.feedback_bytes),
+            ] {
+                for idn in idns {
+                    let width = facts.width(idn, dictionary).ok_or(SercosError::Length(idn))?;
+                    items.push(idn.into());
+                    *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
+                }
+            }
+            return Ok(telegram);
+        }
         for (word, signals, idns, bytes) in [
             (tables.control, command, &mut telegram.command, &mut telegram.command_bytes),
             (tables.status_word, actual, &mut telegram.feedback, &mut telegram.feedback_bytes),
@@ -200,10 +283,13 @@ fn signals(
     facts: &DriveFacts,
 ) -> Result<(Signals, Signals), SercosError> {
     let (mut command, mut actual) = (Signals::new(), Signals::new());
-    for (rule, slot) in mode_rules(tables, axis)?.iter().zip(&tables.slots) {
-        if !is_available(tables, rule, slot, facts) {
+    let fixed = FixedConnections::of(tables, facts)?;
+    let mut available = false;
+    for (rule, slot) in mode_rules(tables, axis, facts)?.iter().zip(&tables.slots) {
+        if !is_available(tables, axis, rule, slot, facts) {
             continue;
         }
+        available = true;
         for (wanted, list) in [(&rule.command, &mut command), (&rule.actual, &mut actual)] {
             for &signal in wanted {
                 let Some(row) = tables.signal(signal) else { continue };
@@ -213,39 +299,73 @@ fn signals(
                 if row.refuse && facts.is_missing(row.idn) {
                     return Err(SercosError::Missing { idn: row.idn, signal });
                 }
-                if row.refuse || captures::may_be_cyclic(tables, facts, row.idn, signal.is_command()) {
+                if let Some(fixed) = &fixed {
+                    if fixed.of_signal(signal).idns.contains(&row.idn) {
+                        list.push((signal, row.idn));
+                    }
+                } else if row.refuse || captures::may_be_cyclic(tables, facts, row.idn, signal.is_command()) {
                     list.push((signal, row.idn));
                 }
             }
         }
     }
+    if !available {
+        return Err(SercosError::NoMode);
+    }
     Ok((command, actual))
 }
 
 /// Whether the drive has an operation mode: one that the axis can do without may have been refused.
-fn is_available(tables: &SercosTables, rule: &ModeRule, slot: &SlotRule, facts: &DriveFacts) -> bool {
+fn is_available(
+    tables: &SercosTables,
+    axis: &SercosAxis,
+    rule: &ModeRule,
+    slot: &SlotRule,
+    facts: &DriveFacts,
+) -> bool {
     let lacks =
         |signal: &Signal| tables.signal(*signal).is_some_and(|row| row.refuse && facts.is_missing(row.idn));
     let signals = || rule.command.iter().chain(&rule.actual);
-    !rule.optional || !(facts.is_refused(slot.idn) || facts.is_missing(slot.idn) || signals().any(lacks))
+    !(rule.optional || axis.any_mode)
+        || !(facts.is_refused(slot.idn) || facts.is_missing(slot.idn) || signals().any(lacks))
 }
 
-/// The rows of the operation modes of an axis, in the order of their slots.
+/// A value that a mode needs and that the fixed connections of a drive do not carry.
+fn lacking(tables: &SercosTables, rule: &ModeRule, fixed: &FixedConnections) -> Option<SercosError> {
+    let signals = rule.command.iter().chain(&rule.actual);
+    signals.filter_map(|signal| Some((*signal, tables.signal(*signal)?))).find_map(|(signal, row)| {
+        let connection = fixed.of_signal(signal);
+        let lacks = row.refuse && !connection.idns.contains(&row.idn);
+        let (list, idn, mode) = (connection.list(), row.idn, rule.selection);
+        lacks.then_some(SercosError::FixedMissing { list, idn, signal, mode })
+    })
+}
+
+/// The rows of the operation modes of an axis, in the order of their slots. A mode that fixed connections do not serve takes
+/// no slot where the axis can do without it.
 pub(super) fn mode_rules<'t>(
     tables: &'t SercosTables,
     axis: &SercosAxis,
+    facts: &DriveFacts,
 ) -> Result<Vec<&'t ModeRule>, SercosError> {
+    let fixed = FixedConnections::of(tables, facts)?;
     let mut rules = Vec::with_capacity(axis.modes.len());
+    let mut first_lack = None;
     for selection in &axis.modes {
         let rule = tables.modes.iter().find(|rule| rule.selection == *selection);
         match (rule, tables.procedure(*selection)) {
-            (Some(rule), _) => rules.push(rule),
+            (Some(rule), _) => match fixed.as_ref().and_then(|fixed| lacking(tables, rule, fixed)) {
+                None => rules.push(rule),
+                Some(_) if rule.optional => {}
+                Some(error) if axis.any_mode => first_lack = first_lack.or(Some(error)),
+                Some(error) => return Err(error),
+            },
             (None, Some(_)) => {}
             (None, None) => return Err(SercosError::Mode(*selection)),
         }
     }
     if rules.is_empty() {
-        return Err(SercosError::NoMode);
+        return Err(first_lack.unwrap_or(SercosError::NoMode));
     }
     if rules.len() > tables.slots.len() {
         return Err(SercosError::Slots { slots: tables.slots.len(), modes: rules.len() });
@@ -342,14 +462,20 @@ impl DriveProgram {
         let mut program = Self::new(telegram, !axis.silent);
         let compiler = Compiler { tables, dictionary, axis, facts };
         program.position_step = compiler.position_step()?;
-        let mut offset = WORD_BYTES;
+        program.words_at = [
+            compiler.offset(tables.control, &program.telegram.command)?,
+            compiler.offset(tables.status_word, &program.telegram.feedback)?,
+        ];
+        program.carriers = Some([
+            command_signals.iter().map(|(_, idn)| Item::from(*idn)).collect(),
+            actual_signals.iter().map(|(_, idn)| Item::from(*idn)).collect(),
+        ]);
         for (signal, idn) in command_signals {
-            let field = compiler.field(signal, idn, &mut offset)?;
+            let field = compiler.field(signal, idn, compiler.offset(idn, &program.telegram.command)?)?;
             program.command.push(field).map_err(|_| SercosError::Full("the master's telegram"))?;
         }
-        let mut offset = WORD_BYTES;
         for (signal, idn) in actual_signals {
-            let field = compiler.field(signal, idn, &mut offset)?;
+            let field = compiler.field(signal, idn, compiler.offset(idn, &program.telegram.feedback)?)?;
             program.feedback.push(field).map_err(|_| SercosError::Full("the drive's telegram"))?;
         }
         for (action, pattern) in &tables.actions {
@@ -364,8 +490,8 @@ impl DriveProgram {
                 return Err(SercosError::Full("the table of reports"));
             }
         }
-        for (rule, slot) in mode_rules(tables, axis)?.iter().zip(&tables.slots) {
-            if is_available(tables, rule, slot, facts) {
+        for (rule, slot) in mode_rules(tables, axis, facts)?.iter().zip(&tables.slots) {
+            if is_available(tables, axis, rule, slot, facts) {
                 let SlotRule { control, status, .. } = *slot;
                 let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
                 let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
@@ -455,7 +581,12 @@ impl Compiler<'_> {
         unit_of(self.tables, self.dictionary, self.axis.units, self.facts, idn, quantity)
     }
 
-    fn field(&self, signal: Signal, idn: Idn, offset: &mut u16) -> Result<Field, SercosError> {
+    /// Where a value that is in a telegram begins.
+    fn offset(&self, idn: Idn, telegram: &[Item]) -> Result<u16, SercosError> {
+        self.place(idn, telegram).and_then(|place| place.offset).ok_or(SercosError::Length(idn))
+    }
+
+    fn field(&self, signal: Signal, idn: Idn, offset: u16) -> Result<Field, SercosError> {
         let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
         let lsb = self.unit(idn, signal.quantity())?;
         let absolute = signal.quantity() == Quantity::Position
@@ -479,9 +610,7 @@ impl Compiler<'_> {
             let range = (width.bits() == 32).then_some(FULL_RANGE).filter(|_| absolute);
             (from_drive(idn, generic, lsb.zero)?, wraps.or(range))
         };
-        let field = Field { signal, offset: *offset, width, conversion, modulo };
-        *offset += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
-        Ok(field)
+        Ok(Field { signal, offset, width, conversion, modulo })
     }
 
     /// Whether the sign of a value in the telegram is not that of the axis: the drive inverts each value by a bit of its

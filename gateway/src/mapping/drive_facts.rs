@@ -13,6 +13,7 @@ use super::dictionary::{IdnFormat, IdnUnit, SercosDictionary};
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DriveFacts {
     facts: BTreeMap<Idn, Fact>,
+    fixed_connections: bool,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -53,6 +54,16 @@ impl DriveFacts {
     /// Nothing known.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// What the drive's communication classes say: it is one of SCP_FixCFG, whose connections cannot be configured.
+    pub fn note_fixed_connections(&mut self, fixed: bool) {
+        self.fixed_connections = fixed;
+    }
+
+    /// Whether the connections of the drive cannot be configured.
+    pub fn has_fixed_connections(&self) -> bool {
+        self.fixed_connections
     }
 
     /// The drive has given element 3 of an IDN.

@@ -263,6 +263,10 @@ pub struct DriveProgram {
     pub(super) steps: ArrayVec<StepRow, STEPS_MAX>,
     /// Octets of the operating mode in both telegrams, where the drive has such.
     pub(super) mode_octets: Option<[u16; 2]>,
+    /// Where the control and the status word begin.
+    pub(super) words_at: [u16; 2],
+    /// What carries each value to and from the drive, where it is not their order in the telegrams.
+    pub(super) carriers: Option<[Vec<Item>; 2]>,
     /// What a status word says.
     pub reports: StateTable<REPORTS_MAX>,
     /// What it says while the drive carries out a procedure.
@@ -307,6 +311,8 @@ impl DriveProgram {
             actions: ActionTable::new(),
             steps: ArrayVec::new(),
             mode_octets: None,
+            words_at: [0; 2],
+            carriers: None,
             reports: StateTable::new(),
             led_reports: StateTable::new(),
             procedures: ArrayVec::new(),
@@ -339,13 +345,20 @@ impl DriveProgram {
                 }
             }
             let place = places.iter().position(|offset| *offset == field.offset).unwrap_or(places.len());
+            if let Some([carriers, _]) = &self.carriers {
+                return Some((field, *carriers.get(place)?));
+            }
             Some((field, *self.telegram.command.get(self.heads() + place)?))
         })
     }
 
     /// The values from the drive, each with what carries it.
     pub fn feedback_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
-        self.feedback.fields().zip(self.telegram.feedback.iter().skip(self.heads()).copied())
+        let carriers = match &self.carriers {
+            Some([_, carriers]) => carriers.as_slice(),
+            None => self.telegram.feedback.get(self.heads()..).unwrap_or_default(),
+        };
+        self.feedback.fields().zip(carriers.iter().copied())
     }
 
     /// Whether the drive tells this value in every cycle.
@@ -412,7 +425,8 @@ impl DriveProgram {
         let told = self.told(order, command.selection());
         let control = self.control_in(told, order, control, status);
         let [low, high, mode, _] = control.to_le_bytes();
-        if let Some(bytes) = telegram.get_mut(..usize::from(WORD_BYTES)) {
+        let [at, _] = self.words_at.map(usize::from);
+        if let Some(bytes) = telegram.get_mut(at..at + usize::from(WORD_BYTES)) {
             bytes.copy_from_slice(&[low, high]);
         }
         if let Some(octet) = self.mode_octets.and_then(|[at, _]| telegram.get_mut(usize::from(at))) {
@@ -544,7 +558,8 @@ impl DriveProgram {
 
     /// The status in a telegram: the status word, and the operating mode above it where it has an octet of its own.
     fn status(&self, telegram: &[u8]) -> Option<u32> {
-        let [low, high] = *telegram.first_chunk()?;
+        let [_, at] = self.words_at.map(usize::from);
+        let [low, high] = *telegram.get(at..)?.first_chunk()?;
         let mode = match self.mode_octets {
             Some([_, at]) => *telegram.get(usize::from(at))?,
             None => 0,

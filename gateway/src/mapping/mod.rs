@@ -28,6 +28,7 @@ mod dictionary;
 mod drive_facts;
 mod drive_program;
 mod examples;
+mod fixed_connections;
 pub mod format;
 mod generic_names;
 mod item;
@@ -82,6 +83,7 @@ pub use drive_program::{
     DriveProgram, FaultRow, Hearing, MAX_MODES, ModeProcedure, Order, ParameterEntry, Procedure, ProcedureBy,
     Telegram,
 };
+pub use fixed_connections::{FixedConnection, FixedConnections};
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
@@ -271,6 +273,14 @@ impl Mapping {
     /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
     pub fn telegram(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<Telegram, SercosError> {
         Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// The connections of a drive of class SCP_FixCFG, as it has said them; `None` of a drive that takes others.
+    ///
+    /// # Errors
+    /// They lack the control or the status word, or contradict themselves.
+    pub fn fixed_connections(&self, facts: &DriveFacts) -> Result<Option<FixedConnections>, SercosError> {
+        FixedConnections::of(&self.sercos, facts)
     }
 
     /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by

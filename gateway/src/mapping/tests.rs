@@ -64,6 +64,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
             .map(ModeSelection::from)
             .collect(),
         modulo,
+        any_mode: false,
         set_scaling: true,
         parameters: Vec::new(),
         captures: CaptureMode::Off,

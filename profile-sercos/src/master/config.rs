@@ -43,6 +43,9 @@ pub struct ConnectionConfig {
     pub producer_cycles: u16,
     /// Consecutive losses which the consumer bears, S-0-1050.x.11.
     pub allowed_losses: u16,
+    /// Bytes of the values by the application's account, without C-CON. A slave whose S-0-1050.x.5 does not agree is refused.
+    /// `None`: the application does not know.
+    pub data_len: Option<u16>,
 }
 
 impl ConnectionConfig {
@@ -58,6 +61,7 @@ impl ConnectionConfig {
             idns: ArrayVec::try_from(idns).ok()?,
             producer_cycles: 1,
             allowed_losses: 10,
+            data_len: None,
         })
     }
 

@@ -31,6 +31,7 @@ pub(super) enum Step {
     ConnectionImage,
     Setup,
     ConfigurationList,
+    FixedList,
     Length,
     FeedbackTime,
     AtStartMinimum,
@@ -80,6 +81,7 @@ pub(super) const READ: &[Step] = &[
 pub(super) const CONNECT: &[Step] = &[
     Step::Setup,
     Step::ConfigurationList,
+    Step::FixedList,
     Step::Length,
     Step::FeedbackTime,
     Step::AtStartMinimum,
@@ -172,6 +174,7 @@ impl Step {
             self,
             Step::Setup
                 | Step::ConfigurationList
+                | Step::FixedList
                 | Step::Length
                 | Step::Assignment
                 | Step::Number
@@ -187,6 +190,7 @@ impl Step {
             Step::Address
                 | Step::ScpClasses
                 | Step::ConfigurationList
+                | Step::FixedList
                 | Step::Length
                 | Step::CycleTime
                 | Step::ControlOffset
@@ -231,6 +235,10 @@ impl Step {
             (Step::ConfigurationList, Some(connection)) => {
                 variable && connection.configuration == ConfigurationType::IdnList
             }
+            // What cannot be written is compared.
+            (Step::FixedList, Some(connection)) => {
+                !variable && connection.configuration == ConfigurationType::IdnList
+            }
             (Step::Number, Some(_)) => variable,
             (_, Some(_)) => true,
         }
@@ -248,7 +256,7 @@ impl Step {
             Step::Number => Idn::connection(instance, 2),
             Step::Assignment => Idn::connection(instance, 3),
             Step::Length => Idn::connection(instance, 5),
-            Step::ConfigurationList => Idn::connection(instance, 6),
+            Step::ConfigurationList | Step::FixedList => Idn::connection(instance, 6),
             Step::ProducerCycle => Idn::connection(instance, 10),
             Step::AllowedLosses => Idn::connection(instance, 11),
             Step::FeedbackTime => Idn::FEEDBACK_TIME,
@@ -299,7 +307,7 @@ impl Step {
             Step::ScpClasses => {
                 SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))
             }
-            Step::CheckInvalid => {
+            Step::CheckInvalid | Step::FixedList => {
                 SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))
             }
             Step::ActivateClasses => list(idn, station.facts.active_classes()),

@@ -352,14 +352,33 @@ fn learn(
                 let given = usize::from(len);
                 return Err(SvcFailure::Length { expected: CONNECTION_CONTROL_LEN, given });
             }
-            let slave_produces =
-                station.connection(instance).is_some_and(|connection| connection.slave_produces);
+            let connection = station.connection(instance);
+            // Some slaves count the byte that makes an odd length even.
+            let data_len = connection.and_then(|connection| connection.data_len);
+            let expected = data_len.map(|bytes| bytes.saturating_add(2));
+            if let Some(expected) = expected.filter(|&bytes| bytes != len && bytes.next_multiple_of(2) != len)
+            {
+                return Err(SvcFailure::ConnectionLength { expected, found: len });
+            }
+            let slave_produces = connection.is_some_and(|connection| connection.slave_produces);
             // As many as there are connections in the configuration, which have the same bound.
             let _ = station.need.connections.try_push(ConnectionNeed {
                 instance,
                 slave_produces,
                 len: len.saturating_add(len % 2),
             });
+        }
+        Step::FixedList => {
+            let wanted = station.connection(instance).map_or(&[][..], |connection| &connection.idns);
+            let mut found = outcome.data.double_words().map(Idn);
+            // One more than either has, so that a longer list shows.
+            for place in 0..=u16::try_from(wanted.len()).unwrap_or(u16::MAX) {
+                let (expected, found) = (wanted.get(usize::from(place)).copied(), found.next());
+                if expected != found {
+                    let (expected, found) = (expected.unwrap_or(Idn(0)), found.unwrap_or(Idn(0)));
+                    return Err(SvcFailure::FixedList { place, expected, found });
+                }
+            }
         }
         Step::FeedbackTime => station.need.feedback_ns = number.unwrap_or(0),
         Step::SlaveJitter => station.need.jitter_ns = number.unwrap_or(0),

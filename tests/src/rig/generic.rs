@@ -191,6 +191,7 @@ impl GenericRig {
             units: AxisUnits { kind: UnitKind::Rotary, ..AxisUnits::default() },
             modes: modes.into_iter().collect(),
             modulo: false,
+            any_mode: false,
             set_scaling: true,
             parameters: Vec::new(),
             captures: CaptureMode::Off,

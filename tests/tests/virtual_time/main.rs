@@ -14,6 +14,7 @@ mod ending;
 mod events;
 mod faults;
 mod fixed;
+mod fixed_connections;
 mod hookup;
 mod hot_plug;
 mod indicators;

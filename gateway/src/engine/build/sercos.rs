@@ -79,14 +79,16 @@ pub fn needs(axis: &Axis, drive: &Drive) -> SercosAxis {
         units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: drive.rated },
         // A drive that is only looked at is set up in one mode, because its telegram belongs to one; it is never on.
         modes: match axis.function {
-            AxisFunction::Drive => [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque]
-                .into_iter()
-                .map(ModeSelection::from)
-                .collect(),
+            AxisFunction::Drive => {
+                let all = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
+                let wanted = drive.modes.as_deref().unwrap_or(&all);
+                wanted.iter().copied().map(ModeSelection::from).collect()
+            }
             AxisFunction::Encoder | AxisFunction::Converter => {
                 [OperatingMode::Position.into()].into_iter().collect()
             }
         },
+        any_mode: drive.modes.is_none(),
         // Positions of a linear drive reach for hundreds of kilometres.
         modulo: axis.kind == AxisKind::Rotary && axis.unwind_counts.is_some(),
         set_scaling: drive.set_scaling,

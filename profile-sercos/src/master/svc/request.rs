@@ -252,6 +252,26 @@ pub enum SvcFailure {
         /// The largest possible value.
         max: u32,
     },
+    /// The slave's fixed configuration list is not the one that the telegram was laid out for.
+    #[error(
+        "the list of a slave with SCP_FixCFG is {found} at place {place}, the telegram was laid out for {expected}"
+    )]
+    FixedList {
+        /// First place, from 0, at which they differ.
+        place: u16,
+        /// What the telegram was laid out for; `S-0-0000` behind its end.
+        expected: Idn,
+        /// What the slave has; `S-0-0000` behind its end.
+        found: Idn,
+    },
+    /// The slave's length of a connection is not what its list makes.
+    #[error("the slave says {found} bytes with C-CON, its configuration list makes {expected}")]
+    ConnectionLength {
+        /// What the list makes.
+        expected: u16,
+        /// What the slave says.
+        found: u16,
+    },
     /// The procedure command failed or was interrupted.
     #[error("procedure command {}", .0.command_state())]
     CommandFailed(DataStatus),

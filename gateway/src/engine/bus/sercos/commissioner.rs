@@ -35,8 +35,8 @@ pub struct Run {
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
 pub enum Job {
-    /// A drive can be set up as in CP2, or then as in CP3.
-    Begin(Run, Phase),
+    /// A drive can be set up as in CP2, or then as in CP3; whether its connections cannot be configured.
+    Begin(Run, Phase, bool),
     /// What came of a request.
     Outcome(Run, SvcOutcome),
     /// A request that could not be made.
@@ -155,7 +155,7 @@ impl Commissioner {
     pub fn poll(&mut self) {
         while let Ok(job) = self.jobs.pop() {
             match job {
-                Job::Begin(run, phase) => self.begin(run, phase),
+                Job::Begin(run, phase, fixed) => self.begin(run, phase, fixed),
                 Job::Outcome(run, outcome) => {
                     let work = self.drives.get_mut(usize::from(run.place)).filter(|work| work.run == run);
                     if let Some(work) = work
@@ -180,11 +180,12 @@ impl Commissioner {
         }
     }
 
-    fn begin(&mut self, run: Run, phase: Phase) {
+    fn begin(&mut self, run: Run, phase: Phase, fixed: bool) {
         let Some(work) = self.drives.get_mut(usize::from(run.place)) else { return };
         (work.run, work.phase) = (run, phase);
         if phase == Phase::CP2 {
             work.facts = DriveFacts::new();
+            work.facts.note_fixed_connections(fixed);
             work.passed_over.clear();
         }
         match self.mapping.commissioning(&work.needs, phase.0, &work.facts) {
@@ -212,7 +213,25 @@ impl Commissioner {
             }
             let (axis, address) = (work.axis, work.address);
             let failed = plan.failure();
+            let more = plan.wants_more();
             work.passed_over.append(&mut plan.take_passed_over());
+            if more {
+                match mapping.commissioning(&work.needs, work.phase.0, &work.facts) {
+                    Ok(next) => {
+                        let next = work.plan.insert(Commissioning::new(next));
+                        next.poll_with(|request| {
+                            *serial += 1;
+                            waiting.push_back(Done::Submit(run, request));
+                            Some(*serial)
+                        });
+                    }
+                    Err(error) => {
+                        work.plan = None;
+                        waiting.push_back(Done::Failed(run, Notice::Program { axis, address, error }));
+                    }
+                }
+                continue;
+            }
             if (failed.is_some() || work.phase != Phase::CP2) && !work.passed_over.is_empty() {
                 let failures = std::mem::take(&mut work.passed_over);
                 waiting.push_back(Done::Told(Notice::PassedOver { axis, failures }));

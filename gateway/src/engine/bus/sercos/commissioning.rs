@@ -58,6 +58,12 @@ impl<T: Copy + PartialEq> Commissioning<T> {
         self.failure.is_some() || self.at >= self.plan.steps.len()
     }
 
+    /// Whether the phase is to be planned again, with what the drive has told.
+    #[must_use]
+    pub fn wants_more(&self) -> bool {
+        self.plan.more && self.failure.is_none()
+    }
+
     /// The step that ended the plan early.
     #[must_use]
     pub fn failure(&self) -> Option<StepFailure> {

@@ -84,6 +84,8 @@ struct Drive {
     /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
     allowed_losses: u16,
     slave: Option<SlaveId>,
+    /// Numbers of its two connections, to it and from it.
+    connections: [u8; 2],
     stage: Stage,
     facts: DriveFacts,
     /// It may come later: nothing is missing without it.
@@ -146,6 +148,7 @@ impl SercosBus {
             needs,
             allowed_losses,
             slave: None,
+            connections: [COMMAND_CONNECTION, FEEDBACK_CONNECTION],
             stage: Stage::Absent,
             facts: DriveFacts::new(),
             hot_plug: later.contains(&address),
@@ -328,6 +331,7 @@ impl SercosBus {
         let found = self.master.slave_by_address(drive.address);
         drive.slave = found.filter(|slave| !self.refused.contains(slave));
         drive.facts = DriveFacts::new();
+        drive.facts.note_fixed_connections(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
         drive.passed_over.clear();
         if drive.slave.is_some() {
             drive.plan(mapping, Phase::CP2.0, notice);
@@ -350,8 +354,18 @@ impl SercosBus {
                 busy = true;
                 continue;
             }
-            let failure = work.failure();
+            let (failure, more) = (work.failure(), work.wants_more());
             drive.passed_over.append(&mut work.take_passed_over());
+            if more {
+                drive.plan(mapping, phase.0, notice);
+                if matches!(drive.stage, Stage::Commissioning(_)) {
+                    busy = true;
+                } else {
+                    let _ = self.refused.try_push(slave);
+                    let _ = self.master.exclude(slave);
+                }
+                continue;
+            }
             drive.stage = Stage::Ready;
             let last = failure.is_some() || phase != Phase::CP2;
             if last && !drive.passed_over.is_empty() {
@@ -404,7 +418,8 @@ impl SercosBus {
         drive.slave = Some(slave);
         drive.stage = Stage::Joining { ticket: None };
         let run = drive.run(place);
-        if !self.commissioner.push(Job::Begin(run, phase)) {
+        let fixed = is_fixed(&self.master, slave);
+        if !self.commissioner.push(Job::Begin(run, phase, fixed)) {
             // It is tried again after a while.
             drive.lose();
             let _ = self.master.exclude(slave);
@@ -455,7 +470,10 @@ impl SercosBus {
                     }
                     continue;
                 }
-                Done::Connect(_, connections) => self.master.set_connections(slave, connections).is_ok(),
+                Done::Connect(_, connections) => {
+                    self.drives[place].connections = numbers(&connections);
+                    self.master.set_connections(slave, connections).is_ok()
+                }
                 Done::Program(_, program) => {
                     axes[axis].set_south(program);
                     true
@@ -619,7 +637,8 @@ impl Bus for SercosBus {
         if self.master.phase() != Some(Phase::CP4) {
             return None;
         }
-        let consumer = self.master.consumer(drive.there()?, FEEDBACK_CONNECTION)?;
+        let [_, feedback] = drive.connections;
+        let consumer = self.master.consumer(drive.there()?, feedback)?;
         // Without the ATs of this cycle what is there is that of the last one.
         Some(Received {
             data: consumer.data,
@@ -629,15 +648,16 @@ impl Bus for SercosBus {
     }
 
     fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
-        let slave = self.drive_of(axis).and_then(Drive::there);
-        let Some(slave) = slave else {
+        let drive = self.drive_of(axis);
+        let there = drive.and_then(|drive| Some((drive.there()?, drive.connections)));
+        let Some((slave, [command, _])) = there else {
             fill(None);
             return;
         };
-        if fill(self.master.producer(slave, COMMAND_CONNECTION)) {
-            self.master.commit(slave, COMMAND_CONNECTION);
+        if fill(self.master.producer(slave, command)) {
+            self.master.commit(slave, command);
         } else {
-            self.master.withdraw(slave, COMMAND_CONNECTION);
+            self.master.withdraw(slave, command);
         }
     }
 
@@ -692,8 +712,10 @@ impl Bus for SercosBus {
             // Of drives that are all lost nobody knows that they stand.
             self.planned = !alone;
             self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
-            for slave in self.drives.iter().filter_map(|drive| drive.slave) {
-                self.master.withdraw(slave, COMMAND_CONNECTION);
+            for (slave, [command, _]) in
+                self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
+            {
+                self.master.withdraw(slave, command);
             }
             self.lose_all(now, system, axes);
             self.master.set_target_phase(Phase::CP0);
@@ -704,8 +726,9 @@ impl Bus for SercosBus {
             let noticed = axes[drive.axis].feedback().report == Report::Silent;
             let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
             let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
-            if self.master.consumer(slave, FEEDBACK_CONNECTION).is_some_and(failed) {
-                self.master.reset_consumer(slave, FEEDBACK_CONNECTION);
+            let [_, feedback] = drive.connections;
+            if self.master.consumer(slave, feedback).is_some_and(failed) {
+                self.master.reset_consumer(slave, feedback);
             }
         }
         if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
@@ -762,7 +785,10 @@ impl Drive {
         notice: &mut dyn FnMut(Notice),
     ) -> bool {
         match connections(mapping, &self.needs, &self.facts, self.allowed_losses) {
-            Ok(connections) => master.set_connections(slave, connections).is_ok(),
+            Ok(connections) => {
+                self.connections = numbers(&connections);
+                master.set_connections(slave, connections).is_ok()
+            }
             Err(error) => {
                 notice(Notice::Program { axis: index(self.axis), address: self.address, error });
                 false
@@ -792,16 +818,35 @@ pub(super) fn connections(
     allowed_losses: u16,
 ) -> Result<Connections, SercosError> {
     let telegram = mapping.telegram(needs, facts)?;
+    let fixed = mapping.fixed_connections(facts)?;
+    let [command, feedback] = fixed.map_or([COMMAND_CONNECTION, FEEDBACK_CONNECTION], |fixed| {
+        [fixed.command.instance, fixed.feedback.instance]
+    });
     let mut connections = Connections::new();
-    let both =
-        [(COMMAND_CONNECTION, false, &telegram.command), (FEEDBACK_CONNECTION, true, &telegram.feedback)];
-    for (instance, slave_produces, items) in both {
+    let both = [
+        (command, false, &telegram.command, telegram.command_bytes),
+        (feedback, true, &telegram.feedback, telegram.feedback_bytes),
+    ];
+    for (instance, slave_produces, items, bytes) in both {
         let idns: Vec<Idn> = items.iter().copied().filter_map(Item::idn).collect();
         let connection = ConnectionConfig::new(instance, slave_produces, &idns);
         let connection = connection.ok_or(SercosError::Full("a connection"))?;
-        connections.push(ConnectionConfig { allowed_losses, ..connection });
+        connections.push(ConnectionConfig { allowed_losses, data_len: Some(bytes), ..connection });
     }
     Ok(connections)
+}
+
+/// The numbers of the connections to and from a drive.
+fn numbers(connections: &Connections) -> [u8; 2] {
+    let of = |produced| connections.iter().find(|connection| connection.slave_produces == produced);
+    let number = |produced, usual| of(produced).map_or(usual, |connection| connection.instance);
+    [number(false, COMMAND_CONNECTION), number(true, FEEDBACK_CONNECTION)]
+}
+
+/// Whether the connections of a slave cannot be configured.
+fn is_fixed(master: &Master, slave: SlaveId) -> bool {
+    let version = |class| master.slave(slave).and_then(|info| info.facts.version(class));
+    version(ScpClass::FIX_CFG).is_some() && version(ScpClass::VAR_CFG).is_none()
 }
 
 /// The request that an access is on the service channel; `None` for what no SERCOS drive has.
