@@ -243,7 +243,7 @@ fn scalings_that_cannot_be_used_say_why() {
     0086 = [42, 00]: S-0-0122 is needed for the scaling and was not read from the drive
     nothing read: S-0-0076 is needed for the scaling and was not read from the drive
     no [[mode]] or [[procedure]] row for operating mode acceleration
-    expected at least one operation mode, got none
+    expected at least one operation mode, got none: the drive has none of those that the axis is configured for
     ");
 }
 
