@@ -34,8 +34,8 @@ use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
 
-use self::axis::AxisChannel;
 use self::axis::rest::Unrested;
+use self::axis::{Awaited, AxisChannel};
 use self::bus::sercos::SercosBus;
 use self::bus::{Bus, Buses, Cycle, Purpose};
 use self::device::DeviceChannel;
@@ -60,6 +60,18 @@ const END_MARGIN: DurationNs = DurationNs::from_secs(1);
 
 /// Rather than call so shortly before a cycle of a bus, the engine sleeps until that.
 const QUIET_BEFORE_CYCLE: DurationNs = DurationNs::from_micros(250);
+
+/// How long an axis waits before it is told what for; ten times as long before it is told again.
+const WAIT_TOLD: DurationNs = DurationNs::from_secs(1);
+
+/// A wait of an axis.
+#[derive(Debug, Clone, Copy, Default)]
+struct Wait {
+    /// What it waits for, and since when.
+    since: Option<(Awaited, MonotonicTime)>,
+    /// How long it may last until it is told, or told again.
+    limit: DurationNs,
+}
 
 /// What the state of the box follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,6 +98,8 @@ pub struct Engine {
     axes: Vec<AxisChannel>,
     /// The generic state and fault of each axis that was told last.
     told: Vec<(DriveState, bool)>,
+    /// What the axes wait for.
+    waits: Vec<Wait>,
     /// When the status was published last, and what it was in outline.
     published: Option<(MonotonicTime, Outline)>,
     notices: rtrb::Producer<Notice>,
@@ -172,6 +186,7 @@ impl Engine {
             devices,
             told,
             published: None,
+            waits: vec![Wait::default(); axes.len()],
             axes,
             notices,
             publisher,
@@ -358,6 +373,7 @@ impl Engine {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
         let told = self.tell_changes();
+        self.tell_waits(now);
         let outline = self.outline();
         let due = |(last, known): (MonotonicTime, _)| now.since(last) >= PUBLISH_PERIOD || known != outline;
         if told || self.published.is_none_or(due) {
@@ -535,6 +551,26 @@ impl Engine {
             }
         }
         changed
+    }
+
+    /// Tells of axes that wait for long.
+    fn tell_waits(&mut self, now: MonotonicTime) {
+        for (number, (axis, wait)) in self.axes.iter().zip(&mut self.waits).enumerate() {
+            let awaited = axis.awaited();
+            let Some((known, since)) = wait.since.filter(|(known, _)| Some(*known) == awaited) else {
+                *wait = Wait { since: awaited.map(|awaited| (awaited, now)), limit: WAIT_TOLD };
+                continue;
+            };
+            let time = now.since(since);
+            if time < wait.limit {
+                continue;
+            }
+            wait.limit = wait.limit * 10;
+            if let Some(waiting) = axis.waiting().filter(|waiting| waiting.awaited == known) {
+                let axis = u8::try_from(number).unwrap_or(u8::MAX);
+                tell(&mut self.notices, Notice::Waiting { axis, time, waiting });
+            }
+        }
     }
 
     fn outline(&self) -> Outline {

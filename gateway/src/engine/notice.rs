@@ -17,7 +17,7 @@ use profile_sercos::master::event::Event;
 use profile_sercos::master::topology::Topology;
 
 use super::admission::Refused;
-use super::axis::{Loss, OwnWords, Trip};
+use super::axis::{Loss, OwnWords, Trip, Waiting};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::setup::SetupFailure;
@@ -169,6 +169,15 @@ pub enum Notice {
         /// The limit that a set-point has exceeded, when that is the fault.
         trip: Option<Trip>,
     },
+    /// An axis has waited for longer than a second.
+    Waiting {
+        /// The axis.
+        axis: u8,
+        /// For how long.
+        time: DurationNs,
+        /// What for, and what its drive shows.
+        waiting: Waiting,
+    },
     /// The source of system time has stepped.
     TimeStep {
         /// By how much.
@@ -226,6 +235,7 @@ impl Notice {
         match self {
             Self::State { .. }
             | Self::AxisState { .. }
+            | Self::Waiting { .. }
             | Self::PassedOver { .. }
             | Self::ObjectsPassedOver { .. }
             | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
@@ -288,6 +298,7 @@ impl Notice {
             | Self::Ends { axis }
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
+            | Self::Waiting { axis, .. }
             | Self::Fault { axis, .. }
             | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
@@ -300,6 +311,9 @@ impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sercos(event) => write!(f, "{event}"),
+            Self::Waiting { time, waiting, .. } => {
+                write!(f, "waits since {} s for {waiting}", time.as_nanos() / 1_000_000_000)
+            }
             Self::Retry => f.write_str("phase-up failed; the next attempt follows"),
             Self::DriveMissing { address, .. } => {
                 write!(f, "expected a drive with SERCOS address {address} on the bus, found none")

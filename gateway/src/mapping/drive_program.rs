@@ -12,6 +12,7 @@ use profile_generic::program::{
 };
 use profile_generic::state::{Action, Report};
 use profile_generic::time::DurationNs;
+use profile_sercos::wire::idn::Idn;
 
 use super::capture_program::{CaptureProgram, Place};
 use super::item::Item;
@@ -359,6 +360,15 @@ impl DriveProgram {
             None => self.telegram.feedback.get(self.heads()..).unwrap_or_default(),
         };
         self.feedback.fields().zip(carriers.iter().copied())
+    }
+
+    /// The word that shows the state of the drive; `None` where none does.
+    pub fn status_item(&self) -> Option<Item> {
+        /// S-0-0135.
+        const DRIVE_STATUS: Idn = Idn(135);
+        let first = self.telegram.feedback.first().copied().filter(|_| self.mode_octets.is_some());
+        first
+            .or_else(|| self.telegram.feedback.iter().copied().find(|item| *item == Item::from(DRIVE_STATUS)))
     }
 
     /// Whether the drive tells this value in every cycle.

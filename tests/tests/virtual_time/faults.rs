@@ -431,3 +431,33 @@ fn a_lost_drive_is_major_faulted_when_nobody_waits_for_its_stop_any_longer_and_a
         log.entries().filter(|entry| entry.kind == LogKind::Fault(FaultType::AXIS_MFG) && entry.code == 17);
     assert!(silence.count() >= 1);
 }
+
+/// Nothing happens, and somebody stands before the machine: the log says what each axis waits for, and by which bit of which word.
+#[test]
+fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.drive_mut(0).set_main_power(false);
+    rig.run_for(millis(12_000));
+    let waits = |rig: &Rig, of: u8| -> Vec<String> {
+        let notices = rig.notices.iter();
+        notices
+            .filter(|notice| matches!(notice, Notice::Waiting { axis, .. } if *axis == of))
+            .map(ToString::to_string)
+            .collect()
+    };
+    let line = |seconds| {
+        format!(
+            "waits since {seconds} s for its drive to be ready, or for main power; S-0-0135 = 4000, expected \
+             bit 14 = 0, bit 15 = 1"
+        )
+    };
+    let up = "waits since 1 s for its drive: it is not on the bus, or not commissioned yet".to_owned();
+    let told = [up.clone(), line(1), line(10)];
+    assert_eq!(waits(&rig, 0), told, "after a second, and ten times as long after it");
+    assert_eq!(waits(&rig, 1), [up.clone()], "it has all it needs");
+    rig.drive_mut(0).set_main_power(true);
+    rig.line.cut(1);
+    rig.run_for(millis(3_000));
+    assert_eq!(waits(&rig, 0).len(), 3);
+    assert_eq!(waits(&rig, 1), [up, "waits since 1 s for its drive to be heard again".to_owned()]);
+}

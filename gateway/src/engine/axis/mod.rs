@@ -26,10 +26,12 @@ mod sequence;
 mod set_point;
 mod trim;
 mod velocimeter;
+mod waiting;
 
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
+pub use self::waiting::{Awaited, Waiting};
 
 use self::hookup::TestRun;
 use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing, Told};
