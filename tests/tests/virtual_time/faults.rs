@@ -454,7 +454,7 @@ fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {
     let up = "waits since 1 s for its drive: it is not on the bus, or not commissioned yet".to_owned();
     let told = [up.clone(), line(1), line(10)];
     assert_eq!(waits(&rig, 0), told, "after a second, and ten times as long after it");
-    assert_eq!(waits(&rig, 1), [up.clone()], "it has all it needs");
+    assert_eq!(waits(&rig, 1), std::slice::from_ref(&up), "it has all it needs");
     rig.drive_mut(0).set_main_power(true);
     rig.line.cut(1);
     rig.run_for(millis(3_000));
