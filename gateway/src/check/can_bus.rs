@@ -93,3 +93,52 @@ fn scaling(written: &Written, findings: &mut Findings) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+    use crate::config::Config;
+
+    /// A bus at 1 Mbit/s with so many drives of one RPDO and one TPDO each: position only, no actual value beside it.
+    fn fits(mapping: &Mapping, drives: u32, cycle_ms: u32) -> bool {
+        let (mut names, mut axes, mut bus) = (String::new(), String::new(), String::new());
+        for number in 1..=drives {
+            write!(names, "\"a{number}\", ").expect("a string takes everything");
+            write!(
+                axes,
+                "[[axis]]\nname = \"a{number}\"\ninstance = {number}\ndrive = \"d{number}\"\nunit = \"revolution\"\n\
+                 motion_resolution = 10_000\n"
+            )
+            .expect("a string takes everything");
+            write!(
+                bus,
+                "[[south.can.drive]]\nname = \"d{number}\"\nnode = {number}\nmodes = [\"position\"]\nactual_values = []\n"
+            )
+            .expect("a string takes everything");
+        }
+        let text = format!(
+            "[box]\nname = \"plan\"\n[[device]]\nname = \"front\"\nlisten = \"127.0.0.2\"\naxes = [{names}]\n\
+             update_period = {{ min = \"8 ms\", max = \"16 ms\" }}\n[device.identity]\nvendor_id = 1\nproduct_code = 1\n\
+             serial_number = 1\nproduct_name = \"plan\"\n{axes}[[south.can]]\ninterface = \"in-process\"\n\
+             cycle_time = \"{cycle_ms} ms\"\n{bus}"
+        );
+        let config = Config::parse(&text, "plan.toml").expect("the configuration is sound");
+        let Network { master, .. } = network(&config, 0, mapping).expect("the drives have PDOs");
+        let traffic = traffic(&master);
+        plan(&master, config.can[0].bit_rate, &traffic).check().is_ok()
+    }
+
+    /// What the guide promises is what the plan lets pass, to the drive.
+    #[test]
+    fn the_guide_says_how_many_drives_fit_a_bus() {
+        let mapping = Mapping::embedded().expect("the shipped tables are sound");
+        let most = |cycle_ms| (1..=16).take_while(|drives| fits(&mapping, *drives, cycle_ms)).last().unwrap_or(0);
+        let counts = [1, 2, 4].map(|cycle_ms| (cycle_ms, most(cycle_ms)));
+        let [(_, one), (_, two), (_, four)] = counts;
+        let sentence = format!("there is room for {one} drives at 1 ms, {two} at 2 ms and {four} at 4 ms");
+        let guide = include_str!("../../../docs/guide.md").replace('\n', " ");
+        assert!(guide.contains(&sentence), "{sentence}");
+    }
+}

@@ -73,14 +73,12 @@ impl Trouble {
     }
 
     fn begin(self, rig: &mut Rig, bus: Bus) {
-        match (self, bus) {
-            (Self::Silence, _) => silence(rig, bus, true),
-            (Self::MainPower, Bus::Sercos) => rig.drive_mut(0).set_main_power(false),
-            (Self::MainPower, Bus::Canopen) => can_axis(rig).set_main_power(false),
-            (Self::MainPower, Bus::Devicenet) => devicenet(rig).set_main_power(false),
-            (Self::Fault(cause), _) => servo(rig, bus).raise_fault(cause),
-            (Self::TorqueLost, _) => servo(rig, bus).lose_torque(),
-            (Self::PositionJump, _) => {
+        match self {
+            Self::Silence => silence(rig, bus, true),
+            Self::MainPower => main_power(rig, bus, false),
+            Self::Fault(cause) => servo(rig, bus).raise_fault(cause),
+            Self::TorqueLost => servo(rig, bus).lose_torque(),
+            Self::PositionJump => {
                 let servo = servo(rig, bus);
                 let there = servo.position();
                 servo.set_position(Position(there.get() + 2_000_000_000));
@@ -89,15 +87,21 @@ impl Trouble {
     }
 
     fn end(self, rig: &mut Rig, bus: Bus) {
-        match (self, bus) {
-            (Self::Silence, _) => silence(rig, bus, false),
-            (Self::MainPower, Bus::Sercos) => rig.drive_mut(0).set_main_power(true),
-            (Self::MainPower, Bus::Canopen) => can_axis(rig).set_main_power(true),
-            (Self::MainPower, Bus::Devicenet) => devicenet(rig).set_main_power(true),
-            (Self::Fault(cause), Bus::Canopen) => can_axis(rig).recover(cause),
-            (Self::Fault(cause), _) => servo(rig, bus).recover(cause),
-            (Self::TorqueLost | Self::PositionJump, _) => {}
+        match self {
+            Self::Silence => silence(rig, bus, false),
+            Self::MainPower => main_power(rig, bus, true),
+            Self::Fault(cause) if bus == Bus::Canopen => can_axis(rig).recover(cause),
+            Self::Fault(cause) => servo(rig, bus).recover(cause),
+            Self::TorqueLost | Self::PositionJump => {}
         }
+    }
+}
+
+fn main_power(rig: &mut Rig, bus: Bus, on: bool) {
+    match bus {
+        Bus::Sercos => rig.drive_mut(0).set_main_power(on),
+        Bus::Canopen => can_axis(rig).set_main_power(on),
+        Bus::Devicenet => devicenet(rig).set_main_power(on),
     }
 }
 
