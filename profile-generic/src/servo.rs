@@ -85,8 +85,13 @@ pub struct ServoParameters {
     pub velocity_feed_forward: i64,
     /// Time constant of the torque (current) loop.
     pub torque_time_constant: DurationNs,
-    /// From the enable to the torque.
+    /// From the enable to the torque: commutation.
     pub starting_time: DurationNs,
+    /// From a charged DC bus until the drive is ready.
+    pub power_up_time: DurationNs,
+    /// How long the brake takes to open once there is torque, and to close at standstill before the torque ends. The
+    /// axis follows nothing meanwhile.
+    pub brake_time: DurationNs,
     /// Position error that makes the drive fault; zero for none.
     pub position_error_tolerance: Position,
     /// Distance from the set-point within which the axis is in position.
@@ -135,6 +140,8 @@ impl Default for ServoParameters {
             velocity_feed_forward: 0,
             torque_time_constant: DurationNs::from_micros(500),
             starting_time: DurationNs::from_millis(5),
+            power_up_time: DurationNs::ZERO,
+            brake_time: DurationNs::ZERO,
             position_error_tolerance: Position(2_000_000_000),
             in_position_window: Position(1_000_000),
             standstill_window: Velocity(50_000_000),
@@ -250,6 +257,8 @@ pub struct ServoActual {
     pub status: StatusBits,
     /// The latched fault.
     pub fault: Option<FaultCause>,
+    /// The warning raised from outside.
+    pub warning: Option<FaultCause>,
     /// The simulated instant.
     pub at: MonotonicTime,
 }

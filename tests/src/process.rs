@@ -72,6 +72,21 @@ impl Running {
         self.child.id()
     }
 
+    /// Types a line on its standard input, which has to be a pipe.
+    ///
+    /// # Panics
+    /// When it has none, or does not read it.
+    pub fn type_line(&mut self, line: &str) {
+        use std::io::Write as _;
+        let stdin = self.child.stdin.as_mut().expect("standard input is a pipe");
+        writeln!(stdin, "{line}").expect("the process reads its standard input");
+    }
+
+    /// Ends its standard input.
+    pub fn end_input(&mut self) {
+        self.child.stdin = None;
+    }
+
     /// Its exit status if it has ended.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         self.child.try_wait().expect("a child can be waited for")

@@ -390,6 +390,9 @@ struct SercosDriveArguments {
     /// They can be plugged in while the bus runs (SCP_HP).
     #[arg(long)]
     hot_plug: bool,
+    /// Events to play, one a line; the same can be typed while the drives run ("help" lists them).
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
@@ -413,6 +416,9 @@ struct CanDriveArguments {
     /// Where to write the drive's electronic data sheet.
     #[arg(long, value_name = "FILE")]
     eds: Option<PathBuf>,
+    /// Events to play, one a line; the same can be typed while the drive runs ("help" lists them).
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
@@ -436,6 +442,9 @@ struct DevicenetDriveArguments {
     /// Output assembly of a velocity drive: 20, 21, 22 or 23.
     #[arg(long, value_name = "N", default_value_t = 21, value_parser = clap::value_parser!(u8).range(20..=23))]
     assembly: u8,
+    /// Events to play, one a line; the same can be typed while the drive runs ("help" lists them).
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
     /// End by itself after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,

@@ -1,10 +1,11 @@
 //! `axisbridge simulate`: the other sides as processes of their own.
 
 use std::net::Ipv4Addr;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use arrayvec::ArrayVec;
 use profile_cia402::wire::NodeId;
@@ -22,20 +23,30 @@ use super::{
 };
 use crate::config::DevicenetKind;
 use crate::mapping::Mapping;
+use crate::simulate::can_actor::Actor;
 use crate::simulate::can_drive;
 use crate::simulate::can_process;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::devicenet_drive;
-use crate::simulate::drives;
+use crate::simulate::drive_events::console::{Director, say, typed_lines};
+use crate::simulate::drive_events::{Names, Script};
+use crate::simulate::drives::{self, DriveLine};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 use crate::sys::can_interface;
 use crate::sys::can_socket::{self, CanSocket};
-use crate::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
+use crate::sys::clock;
+use crate::sys::packet_socket::{self, ETHER_TYPE_SERCOS, PacketSocket};
 use crate::sys::realtime;
 
 /// `SCHED_FIFO` priority of simulated drives: above a master on the same host, as hardware would answer.
 const DRIVE_PRIORITY: u8 = 85;
+
+/// How often it is said that an interface is down.
+const DOWN_SAID_EVERY: Duration = Duration::from_secs(10);
+
+/// How often an interface that is down is looked at.
+const DOWN_WAIT: Duration = Duration::from_millis(100);
 
 /// How far from its target an axis may end, in its units.
 const WINDOW: f64 = 0.005;
@@ -57,24 +68,23 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
             format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into()
         );
     }
-    let mut sockets = ArrayVec::new();
-    sockets.push(PacketSocket::open(&arguments.interface, ETHER_TYPE_SERCOS)?);
-    if let Some(ring) = &arguments.ring {
-        sockets.push(PacketSocket::open(ring, ETHER_TYPE_SERCOS)?);
-    }
+    let names = Names { what: "drive", numbers: arguments.address..=last };
+    let script = events(arguments.script.as_deref(), &names)?;
     let kind =
         |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
     let addresses = (arguments.address..=last).map(|address| (address, kind(&address)));
     let ring = arguments.ring.is_some();
-    let mut drives = if arguments.hot_plug {
-        drives::hot_plug_drives(addresses, ring)
-    } else {
-        drives::drives(addresses, ring)
-    };
-    let stop = signal::stop_on_signals()?;
-    if let Some(seconds) = arguments.seconds {
-        end_after(Arc::clone(&stop), seconds);
+    let mut drives = DriveLine::new(addresses, ring, arguments.hot_plug, &script.setup)?;
+    let stop = stop_after(arguments.seconds)?;
+    let mut sockets = ArrayVec::new();
+    for interface in std::iter::once(&arguments.interface).chain(&arguments.ring) {
+        let open = || PacketSocket::open(interface, ETHER_TYPE_SERCOS);
+        let is_down = |error: &_| matches!(error, packet_socket::OpenError::InterfaceDown { .. });
+        let Some(socket) = when_up(interface, &stop, open, is_down)? else { return Ok(ExitCode::SUCCESS) };
+        sockets.push(socket);
     }
+    // Before the priority of this thread rises: typing needs none.
+    let lines = typed_lines()?;
     // Without it the drives answer later, which the master counts; nothing else changes.
     let refused = ask_for_real_time();
     let mut progress = Progress::new(false);
@@ -85,23 +95,26 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         arguments.ring.iter().fold(arguments.interface.clone(), |all, ring| format!("{all}, {ring}")),
         refused
     ));
-    drives::run(&mut drives, &sockets, &stop)?;
+    let mut director = Director::new(names, script, clock::monotonic_now(), lines);
+    drives::run(&mut drives, &sockets, &mut director, &stop)?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// A simulated CiA 402 drive on a CAN interface.
 pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
     let node = arguments.node.map(NodeId::new).transpose()?;
-    let mut drive = can_drive::drive(node, arguments.axes)?;
+    let names = Names { what: "axis", numbers: 1..=u16::from(arguments.axes) };
+    let script = events(arguments.script.as_deref(), &names)?;
+    let mut drive = can_drive::drive_with(node, arguments.axes, &script.setup)?;
     drive.set_sync_cycles(arguments.sync_losses);
     if let Some(path) = &arguments.eds {
         std::fs::write(path, drive.eds()).map_err(|error| format!("{}: {error}", path.display()))?;
     }
-    let mut socket = CanSocket::open(&arguments.interface, &can_socket::Options::default())?;
-    let stop = signal::stop_on_signals()?;
-    if let Some(seconds) = arguments.seconds {
-        end_after(Arc::clone(&stop), seconds);
-    }
+    let stop = stop_after(arguments.seconds)?;
+    let Some(mut socket) = can_socket_when_up(&arguments.interface, &stop)? else {
+        return Ok(ExitCode::SUCCESS);
+    };
+    let lines = typed_lines()?;
     // Without it the drive answers later; nothing else changes.
     let refused = ask_for_real_time();
     let mut progress = Progress::new(false);
@@ -112,7 +125,8 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
         node.map_or("waiting for a node-id".into(), |node| format!("node {node}")),
         refused
     ));
-    can_process::run(&mut drive, &mut socket, &stop)?;
+    let mut director = Director::new(names, script, clock::monotonic_now(), lines);
+    can_process::run(&mut Actor::new(drive), &mut socket, &mut director, &stop)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -132,22 +146,70 @@ pub fn devicenet_drive(arguments: &DevicenetDriveArguments) -> Result<ExitCode, 
             (DevicenetKind::Speed { assembly, scale: 0 }, format!("a velocity drive with {assembly}"))
         }
     };
-    let mut socket = CanSocket::open(&arguments.interface, &can_socket::Options::default())?;
+    let names = Names { what: "MAC ID", numbers: arguments.mac.into()..=arguments.mac.into() };
+    let script = events(arguments.script.as_deref(), &names)?;
+    let stop = stop_after(arguments.seconds)?;
+    let Some(mut socket) = can_socket_when_up(&arguments.interface, &stop)? else {
+        return Ok(ExitCode::SUCCESS);
+    };
     // A virtual interface has no rate.
     let rate = can_interface::state(&arguments.interface).ok().and_then(|state| state.nominal);
     let known = [DataRate::Rate125, DataRate::Rate250, DataRate::Rate500];
     let rate = known.into_iter().find(|known| rate == Some(known.bits_per_second()));
-    let mut node = devicenet_drive::node(mac, rate.unwrap_or_default(), &kind);
-    let stop = signal::stop_on_signals()?;
-    if let Some(seconds) = arguments.seconds {
-        end_after(Arc::clone(&stop), seconds);
-    }
+    let node = devicenet_drive::node_with(mac, rate.unwrap_or_default(), &kind, &script.setup)?;
+    let lines = typed_lines()?;
     // Without it the drive answers later; nothing else changes.
     let refused = ask_for_real_time();
     let mut progress = Progress::new(false);
     progress.step(&format!("{shown} on {}, MAC ID {mac}{refused}", arguments.interface));
-    can_process::run(&mut node, &mut socket, &stop)?;
+    let mut director = Director::new(names, script, clock::monotonic_now(), lines);
+    can_process::run(&mut Actor::new(node), &mut socket, &mut director, &stop)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The script of simulated drives; an empty one where none is named.
+fn events(path: Option<&Path>, names: &Names) -> Result<Script, CliError> {
+    Ok(path.map(|path| Script::load(path, names)).transpose()?.unwrap_or_default())
+}
+
+/// Opens a CAN interface as soon as it is up; `None` when the process is to end before.
+fn can_socket_when_up(interface: &str, stop: &AtomicBool) -> Result<Option<CanSocket>, CliError> {
+    let open = || CanSocket::open(interface, &can_socket::Options::default());
+    let is_down = |error: &_| matches!(error, can_socket::OpenError::InterfaceDown { .. });
+    Ok(when_up(interface, stop, open, is_down)?)
+}
+
+/// Opens an interface as soon as it is up; `None` when the process is to end before.
+fn when_up<S, E>(
+    interface: &str,
+    stop: &AtomicBool,
+    mut open: impl FnMut() -> Result<S, E>,
+    is_down: impl Fn(&E) -> bool,
+) -> Result<Option<S>, E> {
+    let start = clock::monotonic_now();
+    let mut said: Option<Instant> = None;
+    while !stop.load(Ordering::Relaxed) {
+        match open() {
+            Err(error) if is_down(&error) => {
+                if said.is_none_or(|said| said.elapsed() >= DOWN_SAID_EVERY) {
+                    say(clock::monotonic_now(), start, &format!("waiting for {interface}: link down"));
+                    said = Some(Instant::now());
+                }
+                std::thread::sleep(DOWN_WAIT);
+            }
+            opened => return opened.map(Some),
+        }
+    }
+    Ok(None)
+}
+
+/// A flag that a signal sets, or the time that the process was given.
+fn stop_after(seconds: Option<u64>) -> Result<Arc<AtomicBool>, CliError> {
+    let stop = signal::stop_on_signals()?;
+    if let Some(seconds) = seconds {
+        end_after(Arc::clone(&stop), seconds);
+    }
+    Ok(stop)
 }
 
 /// Asks for the scheduling of a drive. Returns what was refused, in brackets behind a space; empty when all was granted.

@@ -37,7 +37,7 @@ pub(crate) fn parse(text: &str) -> Option<DurationNs> {
 }
 
 /// Writes a time in the largest unit that needs no decimals.
-pub(super) fn show(time: DurationNs) -> String {
+pub(crate) fn show(time: DurationNs) -> String {
     let nanoseconds = time.0;
     for (scale, unit) in [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")] {
         if nanoseconds != 0 && nanoseconds % scale == 0 {

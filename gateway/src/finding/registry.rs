@@ -381,7 +381,7 @@ registry! {
         "[[south.can.device]]\nnode = 1\npdo_mapping = \"keep\"",
         "Nothing; or name the data sheet of the drive (EDS, DCF) as its `configuration`.";
     SCRIPT = 95 Error "a script that cannot be run":
-        "A step of a script for the simulated controller is none, or cannot be done.",
+        "A step of a script for the simulated controller, or an event of one for simulated drives, is none, or cannot be done.",
         "[[step]]\nenabel = 1",
         "Correct the step; the guide lists them all.";
 }

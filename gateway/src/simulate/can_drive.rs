@@ -1,11 +1,18 @@
 //! A simulated CiA 402 drive on CANopen.
 
-use profile_cia402::node::drive::{Device, DeviceError, identity};
+use profile_cia402::drive::State;
+use profile_cia402::drive::index::{AXIS_OFFSET, GEAR_RATIO};
+use profile_cia402::node::dictionary::Group;
+use profile_cia402::node::drive::{Axis, Device, DeviceError, identity};
 use profile_cia402::node::{Config, Node};
 use profile_cia402::wire::NodeId;
-use profile_generic::servo::ServoParameters;
+use profile_cia402::wire::nmt::NmtState;
+use profile_generic::servo::{Servo, ServoParameters};
 use profile_generic::time::DurationNs;
 
+use super::can_actor::ActingNode;
+use super::drive_events::Shown;
+use super::drive_events::setup::Setup;
 use crate::config::CanDevice;
 
 /// From a reset to the boot-up message.
@@ -20,7 +27,15 @@ pub type DriveNode = Node<Device>;
 /// # Errors
 /// Another number of axes.
 pub fn drive(node: Option<NodeId>, axes: u8) -> Result<DriveNode, DeviceError> {
-    made(node, axes, |_| {})
+    drive_with(node, axes, &Setup::default())
+}
+
+/// The same with what a script makes of its axes, 1 to 8.
+///
+/// # Errors
+/// Another number of axes, or one that cannot work.
+pub fn drive_with(node: Option<NodeId>, axes: u8, setup: &Setup) -> Result<DriveNode, DeviceError> {
+    made(node, axes, setup, |_| {})
 }
 
 /// A device that stands in for one of a configuration, with so many axes: it is what the configuration expects it to be. One that
@@ -29,7 +44,7 @@ pub fn drive(node: Option<NodeId>, axes: u8) -> Result<DriveNode, DeviceError> {
 /// # Errors
 /// Another number of axes than 1 to 8.
 pub fn stand_in(node: NodeId, axes: u8, device: Option<&CanDevice>) -> Result<DriveNode, DeviceError> {
-    made(Some(node), axes, |config| {
+    made(Some(node), axes, &Setup::default(), |config| {
         let Some(device) = device else { return };
         let (own, expected) = (&mut config.identity, device.expected);
         let numbers = [
@@ -46,8 +61,14 @@ pub fn stand_in(node: NodeId, axes: u8, device: Option<&CanDevice>) -> Result<Dr
     })
 }
 
-fn made(node: Option<NodeId>, axes: u8, change: impl FnOnce(&mut Config)) -> Result<DriveNode, DeviceError> {
-    let servos = vec![ServoParameters::default(); usize::from(axes)];
+fn made(
+    node: Option<NodeId>,
+    axes: u8,
+    setup: &Setup,
+    change: impl FnOnce(&mut Config),
+) -> Result<DriveNode, DeviceError> {
+    let numbers = 1..=u16::from(axes);
+    let servos: Vec<_> = numbers.clone().map(|axis| setup.servo(axis, ServoParameters::default())).collect();
     let mut config = Config {
         node,
         identity: identity(servos.len(), node.map_or(0, |node| u32::from(node.get()))),
@@ -56,7 +77,43 @@ fn made(node: Option<NodeId>, axes: u8, change: impl FnOnce(&mut Config)) -> Res
         has_mapping: true,
     };
     change(&mut config);
-    Ok(Node::new(&config, Device::new(&servos)?))
+    let mut node = Node::new(&config, Device::new(&servos)?);
+    let gears = numbers.filter_map(|axis| setup.gear(axis).map(|gear| (axis - 1, gear)));
+    for (number, (motor, load)) in gears {
+        let index = GEAR_RATIO + number * AXIS_OFFSET;
+        let dictionary = node.dictionary_mut();
+        dictionary.set(index, 1, i64::from(motor));
+        dictionary.set(index, 2, i64::from(load));
+        // A reset of the node keeps it.
+        dictionary.store(Group::All);
+        dictionary.reset(Group::All);
+    }
+    Ok(node)
+}
+
+impl ActingNode for DriveNode {
+    type State = Shown<NmtState, State>;
+
+    fn state(&self, drive: u16) -> Option<Self::State> {
+        let axis = self.application().axes().get(usize::from(drive).checked_sub(1)?)?;
+        let actual = axis.actual();
+        let (link, state) = (DriveNode::state(self), axis.state());
+        Some(Shown { link, state, fault: actual.fault, warning: actual.warning, silent: false })
+    }
+
+    fn servo_mut(&mut self, drive: u16) -> Option<&mut Servo> {
+        axis_mut(self, drive).map(Axis::servo_mut)
+    }
+
+    fn set_power(&mut self, drive: u16, on: bool) {
+        if let Some(axis) = axis_mut(self, drive) {
+            axis.set_main_power(on);
+        }
+    }
+}
+
+fn axis_mut(node: &mut DriveNode, number: u16) -> Option<&mut Axis> {
+    node.application_mut().axes_mut().get_mut(usize::from(number).checked_sub(1)?)
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use profile_generic::can::Frame;
 use profile_generic::time::MonotonicTime;
 
 use super::can_bus::CanNode;
+use super::drive_events::SimulatedDrives;
+use super::drive_events::console::Director;
 use crate::sys::can_error::BusEvent;
 use crate::sys::can_socket::{CanSocket, Content};
 use crate::sys::clock;
@@ -24,7 +26,12 @@ const FRAMES_PER_WAKE: usize = 64;
 ///
 /// # Errors
 /// The interface is gone.
-pub fn run<N: CanNode>(node: &mut N, socket: &mut CanSocket, stop: &AtomicBool) -> io::Result<()> {
+pub fn run<N: CanNode + SimulatedDrives>(
+    node: &mut N,
+    socket: &mut CanSocket,
+    director: &mut Director<N>,
+    stop: &AtomicBool,
+) -> io::Result<()> {
     node.start(clock::monotonic_now());
     // What the transmit queue had no room for.
     let mut held: Option<Frame> = None;
@@ -54,6 +61,7 @@ pub fn run<N: CanNode>(node: &mut N, socket: &mut CanSocket, stop: &AtomicBool) 
         }
         let now = clock::monotonic_now();
         node.handle_time(now);
+        director.poll(now, node);
         send(node, socket, &mut held, now)?;
     }
     Ok(())

@@ -1,20 +1,28 @@
 //! Simulated drives on DeviceNet.
 
+use std::fmt;
+
 use arrayvec::ArrayString;
+use profile_cip::devicenet::access::AccessState;
 use profile_cip::devicenet::master::config::DataRate;
 use profile_cip::devicenet::slave::application::Application;
 use profile_cip::devicenet::slave::motion_drive::{MotionDrive, MotionDriveConfig};
 use profile_cip::devicenet::slave::speed_drive::{SpeedDrive, SpeedDriveConfig};
 use profile_cip::devicenet::slave::{Slave, SlaveConfig};
+use profile_cip::devicenet::wire::speed::SupervisorState;
 use profile_cip::devicenet::wire::{BodyFormat, MacId};
 use profile_cip::target::attribute::{Access, AttributeDefinition, DataType, Scope};
+use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use profile_generic::can::Frame;
 use profile_generic::fault::FaultCause;
 use profile_generic::servo::{Servo, ServoActual, ServoParameters};
 use profile_generic::time::MonotonicTime;
 
+use super::can_actor::ActingNode;
 use super::can_bus::CanNode;
+use super::drive_events::setup::Setup;
+use super::drive_events::{Change, Shown};
 use crate::config::{Devicenet, DevicenetDrive, DevicenetKind};
 
 /// Attributes that hold limits, which the box writes: number and name of the standard.
@@ -83,7 +91,27 @@ pub fn drive(network: &Devicenet, drive: &DevicenetDrive) -> DevicenetNode {
 /// With an encoder without counts, or an assembly that is no output assembly.
 #[must_use]
 pub fn node(mac: MacId, rate: DataRate, kind: &DevicenetKind) -> DevicenetNode {
+    node_with(mac, rate, kind, &Setup::default()).expect("a checked configuration")
+}
+
+/// The same with what a script makes of it.
+///
+/// # Errors
+/// It cannot work so.
+pub fn node_with(
+    mac: MacId,
+    rate: DataRate,
+    kind: &DevicenetKind,
+    setup: &Setup,
+) -> Result<DevicenetNode, String> {
     let rate = rate.code();
+    let drive = u16::from(mac.get());
+    if setup.gear(drive).is_some() {
+        return Err(format!(
+            "MAC ID {drive}: expected no `gear`: drives on DeviceNet have no object for one"
+        ));
+    }
+    let wrong = |error: &dyn fmt::Display| format!("MAC ID {drive} cannot work as it is set up: {error}");
     match kind {
         DevicenetKind::Motion { resolution, .. } => {
             let attribute = |(id, name): &(u16, &str)| AttributeDefinition {
@@ -93,29 +121,32 @@ pub fn node(mac: MacId, rate: DataRate, kind: &DevicenetKind) -> DevicenetNode {
             let config = MotionDriveConfig {
                 attributes: LIMITS.iter().map(attribute).collect(),
                 faults: AXIS_FAULTS.to_vec(),
-                servo: ServoParameters { encoder_counts: *resolution, ..ServoParameters::default() },
+                servo: setup.servo(
+                    drive,
+                    ServoParameters { encoder_counts: *resolution, ..ServoParameters::default() },
+                ),
             };
-            let motion = MotionDrive::new(config).expect("a servo with an encoder");
-            DevicenetNode::Motion(slave(mac, DEVICE_TYPE_CIP_MOTION_DRIVE, rate, motion))
+            let motion = MotionDrive::new(config).map_err(|error| wrong(&error))?;
+            Ok(DevicenetNode::Motion(slave(mac, DEVICE_TYPE_CIP_MOTION_DRIVE, rate, motion)))
         }
         DevicenetKind::Speed { assembly, .. } => {
             let config = SpeedDriveConfig {
                 output: *assembly,
                 faults: FAULT_CODES.to_vec(),
-                servo: ServoParameters::default(),
+                servo: setup.servo(drive, ServoParameters::default()),
             };
-            let speed = SpeedDrive::new(config).expect("an output assembly");
-            DevicenetNode::Speed(slave(mac, DEVICE_TYPE_AC_DRIVE, rate, speed))
+            let speed = SpeedDrive::new(config).map_err(|error| wrong(&error))?;
+            Ok(DevicenetNode::Speed(slave(mac, DEVICE_TYPE_AC_DRIVE, rate, speed)))
         }
     }
 }
 
 impl DevicenetNode {
-    /// Switches main power, where the kind of drive tells anything of it.
+    /// Switches main power.
     pub fn set_main_power(&mut self, on: bool) {
         match self {
             Self::Motion(slave) => slave.application_mut().set_power(on),
-            Self::Speed(_) => {}
+            Self::Speed(slave) => slave.application_mut().set_power(on),
         }
     }
 
@@ -134,6 +165,76 @@ impl DevicenetNode {
             Self::Motion(slave) => slave.application().actual(),
             Self::Speed(slave) => slave.application().actual(),
         }
+    }
+}
+
+/// How a node stands on its network, for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OnNetwork(pub AccessState);
+
+impl fmt::Display for OnNetwork {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.0 {
+            AccessState::Off => "off",
+            AccessState::Checking(_) => "checking its MAC ID",
+            AccessState::Online => "on line",
+            AccessState::Faulted => "communication faulted",
+        })
+    }
+}
+
+/// State of a drive of either kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DevicenetState {
+    /// Of a CIP Motion drive.
+    Motion(AxisState),
+    /// Of a velocity drive.
+    Speed(SupervisorState),
+}
+
+impl fmt::Display for DevicenetState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Motion(state) => state.fmt(f),
+            Self::Speed(state) => state.fmt(f),
+        }
+    }
+}
+
+impl ActingNode for DevicenetNode {
+    type State = Shown<OnNetwork, DevicenetState>;
+
+    fn state(&self, drive: u16) -> Option<Self::State> {
+        let (mac, access, state) = match self {
+            Self::Motion(slave) => {
+                let state = DevicenetState::Motion(slave.application().axis_state());
+                (slave.config().mac, slave.access(), state)
+            }
+            Self::Speed(slave) => {
+                let state = DevicenetState::Speed(slave.application().state());
+                (slave.config().mac, slave.access(), state)
+            }
+        };
+        let actual = self.actual();
+        let (fault, warning) = (actual.fault, actual.warning);
+        // The requests of the check are not told apart.
+        let access =
+            if matches!(access, AccessState::Checking(_)) { AccessState::Checking(0) } else { access };
+        let shown = Shown { link: OnNetwork(access), state, fault, warning, silent: false };
+        (u16::from(mac.get()) == drive).then_some(shown)
+    }
+
+    fn servo_mut(&mut self, _drive: u16) -> Option<&mut Servo> {
+        Some(self.servo_mut())
+    }
+
+    fn set_power(&mut self, _drive: u16, on: bool) {
+        self.set_main_power(on);
+    }
+
+    fn refuses(&self, change: Change) -> Option<&'static str> {
+        let warns = matches!((self, change), (Self::Motion(_), Change::Warning(_)));
+        warns.then_some("a CIP Motion drive on DeviceNet reports no warnings")
     }
 }
 

@@ -6,13 +6,19 @@ use std::time::Duration;
 use arrayvec::ArrayVec;
 use profile_generic::quantity::{Acceleration, Position, Torque, TorqueAbsolute, Velocity};
 use profile_generic::scaling::UnitKind;
-use profile_generic::servo::ServoParameters;
+use profile_generic::servo::{ServoError, ServoParameters};
+use profile_generic::state::Report;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::slave::drive::Drive;
+use profile_sercos::slave::drive::scaling;
+use profile_sercos::slave::phase::State;
 use profile_sercos::slave::{Config as SlaveConfig, Network, Slave, communication};
 use profile_sercos::wire::scp::ScpEntry;
 
+use super::drive_events::console::Director;
+use super::drive_events::setup::Setup;
+use super::drive_events::{Change, Shown, SimulatedDrives};
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
 use crate::config::{AxisKind, Config, DriveAt, Sercos};
@@ -71,34 +77,117 @@ pub fn linear() -> ServoParameters {
 /// Never with the servos of this module; a test builds both.
 #[must_use]
 pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    of_classes(drives, ring, communication::CLASSES)
+    let network = built(drives, ring, communication::CLASSES, &Setup::default());
+    network.expect("the servos of this module work")
 }
 
-/// The same with hot plug (SCP_HP): they can be plugged in while the bus runs.
-#[must_use]
-pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    of_classes(drives, ring, communication::CLASSES_WITH_HOT_PLUG)
-}
-
-fn of_classes(
+fn built(
     drives: impl IntoIterator<Item = (u16, UnitKind)>,
     ring: bool,
     classes: &'static [ScpEntry],
-) -> DriveNetwork {
+    setup: &Setup,
+) -> Result<DriveNetwork, DriveError> {
     let slaves = drives.into_iter().map(|(address, kind)| {
         let servo = match kind {
             UnitKind::Rotary => rotary(),
             UnitKind::Linear => linear(),
         };
-        let drive = Drive::new(servo).expect("the servos of this module work");
+        let servo = setup.servo(address, servo);
+        let drive = Drive::new(servo).map_err(|error| DriveError { address, error })?;
         let [low, high] = address.to_le_bytes();
         let mac = [0x02, 0x41, 0x42, 0x01, high, low];
         let config =
             SlaveConfig { address, mac, serial: u32::from(address), classes, ..SlaveConfig::default() };
-        Slave::new(&config, drive)
+        let mut slave = Slave::new(&config, drive);
+        if let Some((motor, load)) = setup.gear(address) {
+            slave.preset(scaling::idn::GEAR_INPUT, i64::from(motor));
+            slave.preset(scaling::idn::GEAR_OUTPUT, i64::from(load));
+        }
+        Ok(slave)
     });
-    let slaves = slaves.collect();
-    if ring { Network::ring(slaves) } else { Network::line(slaves) }
+    let slaves = slaves.collect::<Result<_, _>>()?;
+    Ok(if ring { Network::ring(slaves) } else { Network::line(slaves) })
+}
+
+/// A drive that cannot be built.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("drive {address} cannot work as it is set up: {error}")]
+pub struct DriveError {
+    /// Its address.
+    address: u16,
+    /// What is wrong with its servo.
+    error: ServoError,
+}
+
+/// What is shown of a SERCOS drive: its communication phase and its state.
+pub type DriveShown = Shown<State, Report>;
+
+/// Drives with SERCOS addresses that count up, for events.
+#[derive(Debug)]
+pub struct DriveLine {
+    network: DriveNetwork,
+    first: u16,
+}
+
+impl DriveLine {
+    /// Drives with consecutive addresses, nearest to the master's port 1 first.
+    ///
+    /// # Errors
+    /// A drive cannot work with what `setup` makes of it.
+    pub fn new(
+        drives: impl IntoIterator<Item = (u16, UnitKind)>,
+        ring: bool,
+        hot_plug: bool,
+        setup: &Setup,
+    ) -> Result<Self, DriveError> {
+        let mut drives = drives.into_iter().peekable();
+        let first = drives.peek().map_or(1, |(address, _)| *address);
+        let classes = if hot_plug { communication::CLASSES_WITH_HOT_PLUG } else { communication::CLASSES };
+        Ok(Self { network: built(drives, ring, classes, setup)?, first })
+    }
+
+    /// The drives and their cables.
+    pub fn network_mut(&mut self) -> &mut DriveNetwork {
+        &mut self.network
+    }
+
+    fn index(&self, drive: u16) -> Option<usize> {
+        let index = usize::from(drive.checked_sub(self.first)?);
+        (index < self.network.slaves().len()).then_some(index)
+    }
+}
+
+impl SimulatedDrives for DriveLine {
+    type State = DriveShown;
+
+    fn state(&self, drive: u16) -> Option<DriveShown> {
+        let index = self.index(drive)?;
+        let slave = &self.network.slaves()[index];
+        let actual = slave.application().actual();
+        let shown = Shown {
+            link: slave.state(),
+            state: actual.report,
+            fault: actual.fault,
+            warning: actual.warning,
+            silent: self.network.is_mute(index),
+        };
+        // Before its first step the servo has no state.
+        (actual.report != Report::Silent).then_some(shown)
+    }
+
+    fn apply(&mut self, drive: u16, change: Change) -> Result<(), &'static str> {
+        let index = self.index(drive).ok_or("there is no such drive")?;
+        let application = self.network.slaves_mut()[index].application_mut();
+        if change.apply_to(application.servo_mut()) {
+            return Ok(());
+        }
+        match change {
+            Change::Power(on) => application.set_main_power(on),
+            Change::Silence(silent) => self.network.set_mute(index, silent),
+            _ => {}
+        }
+        Ok(())
+    }
 }
 
 /// Drives inside this process: what is sent comes back at once, changed as the slaves change it. The frames are the
@@ -197,21 +286,27 @@ impl EthernetPort for InProcessDrives {
 /// # Errors
 /// An interface is gone.
 pub fn run(
-    network: &mut DriveNetwork,
+    drives: &mut DriveLine,
     sockets: &ArrayVec<PacketSocket, 2>,
+    director: &mut Director<DriveLine>,
     stop: &AtomicBool,
 ) -> std::io::Result<()> {
     let mut buffer = [0; FRAME_MAX];
     // As the links were when they were looked at last; all drives begin with both.
     let mut up = [true; 2];
     while !stop.load(Ordering::Relaxed) {
-        network.handle_time(clock::monotonic_now());
+        let now = clock::monotonic_now();
+        drives.network.handle_time(now);
+        director.poll(now, drives);
+        let network = &mut drives.network;
         let waiting = packet_socket::wait(sockets, WAIT)?;
         for (number, socket) in sockets.iter().enumerate() {
             let is_up = socket.link_state() == LinkState::Up;
             if std::mem::replace(&mut up[number], is_up) != is_up {
                 let cable = if number == 0 { 0 } else { network.slaves().len() };
                 network.set_cable(cable, is_up, is_up);
+                let text = if is_up { "link up" } else { "link down" };
+                director.say(clock::monotonic_now(), &format!("{}: {text}", socket.name()));
             }
         }
         if !waiting {

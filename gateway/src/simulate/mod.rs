@@ -2,12 +2,14 @@
 //!
 //! The protocol engines live in the profile crates; here they get sockets, a clock and a program.
 
+pub mod can_actor;
 pub mod can_bus;
 pub mod can_drive;
 pub mod can_process;
 pub mod clock;
 pub mod controller;
 pub mod devicenet_drive;
+pub mod drive_events;
 pub mod drives;
 pub mod program;
 pub mod script;

@@ -68,6 +68,14 @@ pub struct Servo {
     /// Faults whose condition is present.
     active: ArrayVec<FaultCause, MAX_ACTIVE_FAULTS>,
     latched: Option<(FaultCause, Reaction)>,
+    warning: Option<FaultCause>,
+    /// How long the DC bus has been charged, up to the power-up time.
+    charged_for: DurationNs,
+    /// How long the brake has been closing at the end of a stop.
+    closing: DurationNs,
+    /// Feedback values are those of the last step before.
+    frozen: bool,
+    last: ServoActual,
     now: MonotonicTime,
 }
 
@@ -95,6 +103,11 @@ impl Servo {
             set_point: None,
             active: ArrayVec::new(),
             latched: None,
+            warning: None,
+            charged_for: DurationNs::ZERO,
+            closing: DurationNs::ZERO,
+            frozen: false,
+            last: ServoActual::default(),
             now: MonotonicTime::ZERO,
         })
     }
@@ -138,6 +151,23 @@ impl Servo {
         if let Stage::Holding(place) = &mut self.stage {
             *place = place.saturating_add(shift);
         }
+    }
+
+    /// Lets the encoder count a motion that there was none: a slipped coupling, lost lines. Set-points stay, so that an
+    /// axis with position control goes back by this distance.
+    pub fn jump_position(&mut self, distance: Position) {
+        self.plant.set_position(self.plant.position().saturating_add(distance));
+    }
+
+    /// Freezes the feedback values that the drive shows, position, velocity, acceleration, torque, current and following
+    /// error, as they are now, or lets them go on. The loops see the true ones.
+    pub fn set_frozen(&mut self, frozen: bool) {
+        self.frozen = frozen;
+    }
+
+    /// Raises a warning, or ends it. It stops nothing.
+    pub fn set_warning(&mut self, warning: Option<FaultCause>) {
+        self.warning = warning;
     }
 
     /// Where the axis is, to the nanounit: what the encoder cannot show.
@@ -223,6 +253,11 @@ impl Servo {
         self.armed = false;
     }
 
+    /// Ends the conditions of all faults.
+    pub fn clear_faults(&mut self) {
+        self.active.clear();
+    }
+
     /// Lets `dt_ns` nanoseconds pass with these inputs. Longer steps than [`MAX_STEP`] and such below one
     /// nanosecond are held at these ends.
     pub fn step(&mut self, dt_ns: i64, command: &ServoCommand) -> ServoActual {
@@ -247,7 +282,9 @@ impl Servo {
             self.sub_step(DurationNs(until - done), command, set_point.map(|place| (place, speed)));
             done = until;
         }
-        self.actual(command)
+        let actual = self.actual(command);
+        self.last = if self.frozen { stale(actual, &self.last) } else { actual };
+        self.last
     }
 
     /// The position set-point at the end of this step, when position control is on.
@@ -289,10 +326,10 @@ impl Servo {
         match command.control {
             ServoControl::TorqueOff => {
                 self.switch_off();
-                self.armed = self.plant.is_charged();
+                self.armed = self.is_ready();
             }
             ServoControl::Disable => match self.stage {
-                Stage::Off => self.armed = self.plant.is_charged(),
+                Stage::Off => self.armed = self.is_ready(),
                 Stage::Starting(_) => self.switch_off(),
                 Stage::Stopping { ramp, .. } => {
                     self.stage = Stage::Stopping { ramp, then: Afterwards::Off };
@@ -309,13 +346,14 @@ impl Servo {
 
     fn enable(&mut self, command: &ServoCommand) {
         match self.stage {
-            Stage::Off if self.armed && self.plant.is_charged() && command.power => match command.mode {
+            Stage::Off if self.armed && self.is_ready() && command.power => match command.mode {
                 OperatingMode::None => {}
                 OperatingMode::Homing => self.latch(FaultCause::ILLEGAL_MODE, Reaction::default()),
                 _ => {
                     self.armed = false;
                     self.control.reset();
-                    self.stage = Stage::Starting(self.parameters.starting_time);
+                    let time = self.parameters.starting_time + self.parameters.brake_time;
+                    self.stage = Stage::Starting(time);
                 }
             },
             // A halt ends when the drive is enabled again; a stop that was to end without torque does not.
@@ -324,6 +362,11 @@ impl Servo {
             }
             _ => {}
         }
+    }
+
+    /// Whether the DC bus has its voltage, and the power-up time is over.
+    fn is_ready(&self) -> bool {
+        self.plant.is_charged() && self.charged_for >= self.parameters.power_up_time
     }
 
     const fn has_torque(&self) -> bool {
@@ -338,6 +381,7 @@ impl Servo {
     fn begin_stop(&mut self, then: Afterwards) {
         self.stage = Stage::Stopping { ramp: self.plant.velocity, then };
         self.set_point = None;
+        self.closing = DurationNs::ZERO;
     }
 
     /// Latches a fault and begins its reaction; a fault that is latched already gives way only to a stronger
@@ -396,6 +440,11 @@ impl Servo {
         let from = self.plant.position();
         let torque = target.map(|target| self.control.torque(target, offsets, seen, &self.plant, time_s));
         self.plant.step(time_s, torque, command.power);
+        self.charged_for = if self.plant.is_charged() {
+            (self.charged_for + time).min(self.parameters.power_up_time)
+        } else {
+            DurationNs::ZERO
+        };
         let stretch = Stretch { from, to: self.plant.position(), begin: self.now, length: time };
         self.captures.on_motion(&stretch);
         self.now = self.now + time;
@@ -416,7 +465,8 @@ impl Servo {
                 let stands = self.plant.velocity.abs() <= units(self.parameters.standstill_window.0);
                 if *ramp == 0.0 && stands {
                     match then {
-                        Afterwards::Off => self.switch_off(),
+                        Afterwards::Off if self.closing >= self.parameters.brake_time => self.switch_off(),
+                        Afterwards::Off => self.closing = self.closing + time,
                         Afterwards::Hold => self.stage = Stage::Holding(self.plant.position()),
                     }
                 }
@@ -476,7 +526,7 @@ impl Servo {
         match (self.stage, self.latched) {
             (Stage::Off, Some(_)) => Report::Faulted,
             (Stage::Stopping { .. }, Some(_)) => Report::FaultReaction,
-            (Stage::Off, None) if self.plant.is_charged() => Report::Ready,
+            (Stage::Off, None) if self.is_ready() => Report::Ready,
             (Stage::Off, None) => Report::AwaitingPower,
             (Stage::Starting(_), _) => Report::Enabling,
             (Stage::Following, _) => Report::Operating,
@@ -493,7 +543,7 @@ impl Servo {
         let velocity_error = self.plant.velocity - units(command.velocity.0);
         let mut status = StatusBits::empty();
         status.set(StatusBits::READY, matches!(report, Report::Ready));
-        status.set(StatusBits::POWER, self.plant.is_charged());
+        status.set(StatusBits::POWER, self.is_ready());
         status.set(StatusBits::ENABLED, self.has_torque());
         status.set(StatusBits::TRACKING, follows);
         let positions = follows && command.mode == OperatingMode::Position;
@@ -505,7 +555,10 @@ impl Servo {
         status.set(StatusBits::TORQUE_LIMIT, self.has_torque() && self.control.torque_limited);
         status.set(StatusBits::HALT, report == Report::Halted);
         status.set(StatusBits::FAULT, self.latched.is_some());
-        status.set(StatusBits::BRAKE_RELEASED, self.has_torque());
+        let moves_brake = self.parameters.brake_time > DurationNs::ZERO
+            && (matches!(self.stage, Stage::Starting(_)) || self.closing > DurationNs::ZERO);
+        status.set(StatusBits::BRAKE_RELEASED, self.has_torque() && !moves_brake);
+        status.set(StatusBits::WARNING, self.warning.is_some());
         status
     }
 
@@ -537,7 +590,22 @@ impl Servo {
                 .fold(self.inputs, |inputs, (set, bit)| inputs | if *set { *bit } else { 0 }),
             status: self.status(command, report),
             fault: self.latched.map(|(cause, _)| cause),
+            warning: self.warning,
             at: self.now,
         }
+    }
+}
+
+/// The state of now with the feedback values of before.
+fn stale(now: ServoActual, before: &ServoActual) -> ServoActual {
+    ServoActual {
+        position: before.position,
+        encoder: before.encoder,
+        velocity: before.velocity,
+        acceleration: before.acceleration,
+        torque: before.torque,
+        current: before.current,
+        following_error: before.following_error,
+        ..now
     }
 }

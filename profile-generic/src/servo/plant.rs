@@ -198,6 +198,8 @@ pub(super) fn check(parameters: &ServoParameters) -> Result<(), ServoError> {
         ("velocity_feed_forward", parameters.velocity_feed_forward),
         ("torque_time_constant", parameters.torque_time_constant.0),
         ("starting_time", parameters.starting_time.0),
+        ("power_up_time", parameters.power_up_time.0),
+        ("brake_time", parameters.brake_time.0),
         ("position_error_tolerance", parameters.position_error_tolerance.0),
         ("in_position_window", parameters.in_position_window.0),
         ("standstill_window", parameters.standstill_window.0),

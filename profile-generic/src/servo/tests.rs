@@ -584,3 +584,67 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_jump_of_the_encoder_is_an_error_that_the_axis_follows_back() {
+    let target = command(OperatingMode::Position);
+    let mut servo = enabled(ServoParameters::default(), &target);
+    run(&mut servo, 100, &target);
+    servo.jump_position(Position(UNIT / 10));
+    let jumped = servo.step(1, &target);
+    assert!((jumped.position.0 - UNIT / 10).abs() < UNIT / 1000, "{}", jumped.position);
+    let back = run(&mut servo, 500, &target);
+    assert!(back.position.0.abs() < UNIT / 1000, "{}", back.position);
+    servo.jump_position(Position(3 * UNIT));
+    assert_eq!(servo.step(MS, &target).fault, Some(FaultCause::EXCESSIVE_POSITION_ERROR));
+}
+
+#[test]
+fn frozen_feedback_stands_while_the_axis_moves_on() {
+    let (mut servo, command) = turning(Velocity(2 * UNIT));
+    let before = servo.step(MS, &command);
+    servo.set_frozen(true);
+    let frozen = run(&mut servo, 100, &command);
+    assert_eq!((frozen.position, frozen.velocity), (before.position, before.velocity));
+    assert!(frozen.at > before.at);
+    servo.set_frozen(false);
+    let moved = servo.step(MS, &command).position.0 - before.position.0;
+    assert!((moved - 202 * UNIT / 1000).abs() < UNIT / 1000, "{moved}");
+}
+
+#[test]
+fn a_warning_is_shown_and_stops_nothing() {
+    let (mut servo, command) = turning(Velocity(2 * UNIT));
+    servo.set_warning(Some(FaultCause::MOTOR_OVERLOAD));
+    let warned = run(&mut servo, 10, &command);
+    assert_eq!((warned.report, warned.warning), (Report::Operating, Some(FaultCause::MOTOR_OVERLOAD)));
+    assert!(warned.status.contains(StatusBits::WARNING));
+    servo.set_warning(None);
+    assert!(!servo.step(MS, &command).status.contains(StatusBits::WARNING));
+}
+
+#[test]
+fn the_drive_takes_its_time_to_be_ready_to_have_torque_and_to_move_its_brake() {
+    let mut servo = Servo::new(ServoParameters::default()).unwrap();
+    let slow = ServoParameters {
+        power_up_time: DurationNs::from_millis(700),
+        starting_time: DurationNs::from_millis(40),
+        brake_time: DurationNs::from_millis(60),
+        ..ServoParameters::default()
+    };
+    servo.set_parameters(slow).unwrap();
+    assert_eq!(run(&mut servo, 700, &ServoCommand::default()).report, Report::AwaitingPower);
+    assert_eq!(run(&mut servo, 200, &ServoCommand::default()).report, Report::Ready);
+    let enable = command(OperatingMode::Velocity);
+    let starting = run(&mut servo, 99, &enable);
+    assert_eq!(starting.report, Report::Enabling);
+    assert!(!starting.status.contains(StatusBits::BRAKE_RELEASED));
+    assert_eq!(run(&mut servo, 2, &enable).report, Report::Operating);
+    let disable = ServoCommand { control: ServoControl::Disable, ..enable };
+    let closing = run(&mut servo, 59, &disable);
+    assert_eq!(closing.report, Report::Stopping);
+    assert!(!closing.status.contains(StatusBits::BRAKE_RELEASED));
+    assert_eq!(run(&mut servo, 4, &disable).report, Report::Ready);
+    let negative = ServoParameters { power_up_time: DurationNs(-1), ..slow };
+    assert_eq!(servo.set_parameters(negative), Err(ServoError::OutOfRange("power_up_time")));
+}

@@ -54,10 +54,12 @@ struct Place {
     powered: bool,
     /// Its port 2 is the one nearer to the master's port 1.
     turned: bool,
+    /// It takes telegrams and passes them on, but writes nothing into them.
+    mute: bool,
 }
 
 impl Place {
-    const NEW: Place = Place { powered: true, turned: false };
+    const NEW: Place = Place { powered: true, turned: false, mute: false };
 
     /// The port on which a frame comes in on its way.
     const fn entry(&self, way: Way) -> Port {
@@ -164,6 +166,20 @@ impl<A: Application> Network<A> {
             place.powered = on;
         }
         self.update_links();
+    }
+
+    /// Makes a slave mute, or lets it speak again. A mute slave takes telegrams and passes them on as its topology says, but
+    /// what it writes into them is lost: the master hears nothing of it, and the slaves around it are heard as before.
+    pub fn set_mute(&mut self, index: usize, mute: bool) {
+        if let Some(place) = self.places.get_mut(index) {
+            place.mute = mute;
+        }
+    }
+
+    /// Whether a slave is mute.
+    #[must_use]
+    pub fn is_mute(&self, index: usize) -> bool {
+        self.places.get(index).is_some_and(|place| place.mute)
     }
 
     /// Whether a master's port has a link.
@@ -300,11 +316,14 @@ impl<A: Application> Network<A> {
             if !place.powered {
                 return;
             }
-            if watch.is_some() {
+            if watch.is_some() || place.mute {
                 before[..frame.len()].copy_from_slice(frame);
             }
             let slave = &mut self.slaves[index];
             let forward = slave.handle_frame(now, place.entry(way), frame);
+            if place.mute {
+                frame.copy_from_slice(&before[..frame.len()]);
+            }
             if let Some(watch) = watch {
                 let number = match slave.topology_address() {
                     0 => STRANGER + u16::try_from(index).unwrap_or(0),

@@ -4,6 +4,7 @@
 
 mod flood;
 mod masters;
+mod misbehaviour;
 mod sercos;
 
 use std::fmt::Write as _;

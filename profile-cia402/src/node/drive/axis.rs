@@ -938,7 +938,8 @@ impl Axis {
         let mut word = Statusword::empty().with_state(self.state);
         let parameters = self.servo.parameters();
         let hot = self.actual.temperature.0 > parameters.max_temperature.0 - TEMPERATURE_MARGIN_MILLIDEGREE;
-        word.set(Statusword::WARNING, hot || self.actual.overload > OVERLOAD_WARNING_PPM);
+        let warns = hot || self.actual.overload > OVERLOAD_WARNING_PPM || self.actual.warning.is_some();
+        word.set(Statusword::WARNING, warns);
         word.set(Statusword::VOLTAGE_ENABLED, self.actual.status.contains(StatusBits::POWER));
         word.set(Statusword::REMOTE, self.remote);
         let enabled = self.state == State::OperationEnabled;

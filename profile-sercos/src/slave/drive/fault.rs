@@ -72,6 +72,13 @@ pub const CLASS_2_TEXTS: [&str; 16] = [
     "manufacturer-specific warning",
 ];
 
+/// The bit of S-0-0012 that a warning sets.
+pub fn class_2_bit(cause: FaultCause) -> u16 {
+    let bit = class_1_bit(cause);
+    let same_meaning = [0, 1, 2, 3, 9].contains(&bit);
+    if same_meaning { bit } else { MANUFACTURER }
+}
+
 /// S-0-0390 of a class 1 (`0xF`) or class 2 (`0xE`) diagnosis. No public list of codes of the drive profile is
 /// known: the low word is the number of the bit in S-0-0011 or S-0-0012.
 pub fn number(class: u32, bit: u32) -> u32 {
@@ -95,6 +102,14 @@ mod tests {
         ];
         for (cause, text) in cases {
             assert_eq!(CLASS_1_TEXTS[usize::from(class_1_bit(cause))], text);
+        }
+        let warnings = [
+            (FaultCause::MOTOR_OVER_TEMPERATURE, "motor overtemperature warning"),
+            (FaultCause::UNDER_VOLTAGE, "undervoltage warning"),
+            (FaultCause::OVER_CURRENT, "manufacturer-specific warning"),
+        ];
+        for (cause, text) in warnings {
+            assert_eq!(CLASS_2_TEXTS[usize::from(class_2_bit(cause))], text);
         }
         assert_eq!(number(0xF, 11), 0xC00F_000B);
     }

@@ -603,7 +603,8 @@ impl Drive {
         let parameters = self.servo.parameters();
         let hot = self.actual.temperature.0 > parameters.max_temperature.0 - TEMPERATURE_MARGIN_MILLIDEGREE;
         let overload = self.actual.overload > OVERLOAD_WARNING_PPM;
-        self.warnings | u16::from(overload) | u16::from(hot) << 2
+        let raised = self.actual.warning.map_or(0, |cause| 1 << fault::class_2_bit(cause));
+        self.warnings | raised | u16::from(overload) | u16::from(hot) << 2
     }
 }
 

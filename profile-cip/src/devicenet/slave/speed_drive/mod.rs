@@ -344,6 +344,7 @@ impl SpeedDrive {
         );
         status.set(SpeedStatus::RUNNING_FORWARD, moves && forward);
         status.set(SpeedStatus::RUNNING_REVERSE, moves && !forward);
+        status.set(SpeedStatus::WARNING, self.actual.warning.is_some());
         let ready =
             matches!(state, SupervisorState::READY | SupervisorState::ENABLED | SupervisorState::STOPPING);
         status.set(SpeedStatus::READY, ready);
