@@ -81,6 +81,16 @@ pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> 
     network.expect("the servos of this module work")
 }
 
+/// The same with hot plug (SCP_HP): they can be plugged in while the bus runs.
+///
+/// # Panics
+/// As [`drives`].
+#[must_use]
+pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
+    let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &Setup::default());
+    network.expect("the servos of this module work")
+}
+
 fn built(
     drives: impl IntoIterator<Item = (u16, UnitKind)>,
     ring: bool,
