@@ -84,7 +84,7 @@ pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> 
 /// The same with hot plug (SCP_HP): they can be plugged in while the bus runs.
 ///
 /// # Panics
-/// As [`drives`].
+/// Never with the servos of this module.
 #[must_use]
 pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
     let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &Setup::default());

@@ -18,7 +18,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use profile_generic::cast;
-use profile_generic::fault::FaultCause;
+use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::quantity::Position;
 use profile_generic::servo::{Servo, ServoParameters};
 use profile_generic::time::DurationNs;
@@ -75,7 +75,12 @@ impl Change {
     /// Carries out what concerns the servo alone; `false` for main power and silence, which are the drive's own.
     pub fn apply_to(self, servo: &mut Servo) -> bool {
         match self {
-            Self::Fault(cause) => servo.raise_fault(cause),
+            Self::Fault(cause) => {
+                // A cause that only alarms by itself is a fault here all the same: somebody asked for one.
+                let reaction = cause.default_reaction();
+                let stops = if reaction.stops() { reaction } else { Reaction::DecelerateAndDisable };
+                servo.raise_fault_with(cause, stops);
+            }
             Self::Clear(Some(cause)) => servo.clear_fault(cause),
             Self::Clear(None) => servo.clear_faults(),
             Self::Warning(cause) => servo.set_warning(cause),

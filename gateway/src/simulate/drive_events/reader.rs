@@ -109,7 +109,7 @@ impl Script {
                 Ok((_, Order::Property(drive, property))) => script.setup.set(drive, property),
                 // `line` lets nothing else pass.
                 Ok((_, Order::Status | Order::Help | Order::Causes)) => {}
-                Err(problem) => findings.push(&source, problem),
+                Err(problem) => findings.push(&source, *problem),
             }
         }
         // Events of the same time stay in the order of the file.
@@ -130,7 +130,7 @@ impl Order {
         }
         Some(words.typed().map_err(|problem| {
             let mut findings = Findings::default();
-            findings.push(&Source::new("standard input", line), problem);
+            findings.push(&Source::new("standard input", line), *problem);
             findings
         }))
     }
@@ -146,10 +146,10 @@ struct Words<'l> {
     usage: &'static str,
 }
 
-type Read<T> = Result<T, Problem>;
+type Read<T> = Result<T, Box<Problem>>;
 
 fn problem<T>(span: Range<usize>, title: impl Into<String>, expected: impl Into<String>) -> Read<T> {
-    Err(Problem::new(code::SCRIPT, span).title(title).expected(expected))
+    Err(Box::new(Problem::new(code::SCRIPT, span).title(title).expected(expected)))
 }
 
 impl<'l> Words<'l> {

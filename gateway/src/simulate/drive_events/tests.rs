@@ -12,7 +12,7 @@ use profile_generic::can::{Frame, Id};
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::TorqueAbsolute;
 use profile_generic::scaling::UnitKind;
-use profile_generic::servo::ServoParameters;
+use profile_generic::servo::{ServoCommand, ServoParameters};
 use profile_generic::state::Report;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::Master;
@@ -421,6 +421,19 @@ fn drives_have_the_encoder_the_torque_and_the_gear_of_the_script() {
     setup.set(None, Property::Gear(2, 1));
     let error = devicenet(&kinds()[0], &setup).unwrap_err();
     assert_eq!(error, "MAC ID 9: expected no `gear`: drives on DeviceNet have no object for one");
+}
+
+#[test]
+fn every_cause_faults_a_drive() {
+    let mut servo = Servo::new(ServoParameters::default()).unwrap();
+    for (cause, name) in FaultCause::NAMED {
+        assert!(Change::Fault(*cause).apply_to(&mut servo));
+        assert_eq!(servo.step(1, &ServoCommand::default()).fault, Some(*cause), "{name}");
+        assert!(Change::Clear(None).apply_to(&mut servo));
+        let reset = ServoCommand { reset_fault: true, ..ServoCommand::default() };
+        assert_eq!(servo.step(1, &reset).fault, None, "{name}");
+        servo.step(1, &ServoCommand::default());
+    }
 }
 
 #[test]

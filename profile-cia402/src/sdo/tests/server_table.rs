@@ -144,6 +144,21 @@ fn more_bytes_than_there_is_room_for_are_refused_and_not_kept() {
     assert_eq!((store.values[&TEXT].clone(), store.writes), (before, 0));
 }
 
+/// A client that does not tell the size sends four bytes for every value: those that the object has no room for are none.
+#[test]
+fn an_expedited_download_without_a_size_writes_as_many_bytes_as_the_object_has() {
+    let mut store = Store { max: 2, ..Store::default() };
+    let mut server = server_in(&["22 00 20 00 31 32 33 34"], &mut store);
+    assert_eq!((store.values[&TEXT].as_slice(), store.writes), (&b"12"[..], 1));
+    // With the size they are too many.
+    server.handle(ms(0), &hex("23 00 20 00 31 32 33 34"), &mut store).unwrap();
+    assert_eq!(server.poll(ms(0)), Some(hex("80 00 20 00 10 00 07 06")));
+    assert_eq!(store.writes, 1);
+    store.max = 10;
+    server.handle(ms(0), &hex("22 00 20 00 31 32 33 34"), &mut store).unwrap();
+    assert_eq!((store.values[&TEXT].as_slice(), store.writes), (&b"1234"[..], 2), "there is room for all");
+}
+
 #[test]
 fn a_switch_threshold_turns_a_block_upload_into_an_ordinary_one() {
     let mut store = Store::default();
