@@ -134,7 +134,8 @@ mod tests {
     #[test]
     fn the_guide_says_how_many_drives_fit_a_bus() {
         let mapping = Mapping::embedded().expect("the shipped tables are sound");
-        let most = |cycle_ms| (1..=16).take_while(|drives| fits(&mapping, *drives, cycle_ms)).last().unwrap_or(0);
+        let most =
+            |cycle_ms| (1..=16).take_while(|drives| fits(&mapping, *drives, cycle_ms)).last().unwrap_or(0);
         let counts = [1, 2, 4].map(|cycle_ms| (cycle_ms, most(cycle_ms)));
         let [(_, one), (_, two), (_, four)] = counts;
         let sentence = format!("there is room for {one} drives at 1 ms, {two} at 2 ms and {four} at 4 ms");

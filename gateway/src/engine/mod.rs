@@ -30,6 +30,7 @@ use std::cell::RefCell;
 use profile_cip::target::motion_device::SyncState;
 use profile_cip::target::visualization::display::{self, Line};
 use profile_cip::target::visualization::{self, Indication};
+use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
@@ -97,7 +98,7 @@ pub struct Engine {
     devices: Vec<DeviceChannel>,
     axes: Vec<AxisChannel>,
     /// The generic state and fault of each axis that was told last.
-    told: Vec<(DriveState, bool)>,
+    told: Vec<(DriveState, Option<FaultCause>)>,
     /// What the axes wait for.
     waits: Vec<Wait>,
     /// When the status was published last, and what it was in outline.
@@ -173,7 +174,7 @@ impl Engine {
                 }
             }
         }
-        let told = axes.iter().map(|axis| (axis.state(), false)).collect();
+        let told = axes.iter().map(|axis| (axis.state(), None)).collect();
         let ending = Ending {
             deadline: MonotonicTime::MAX,
             awaited: vec![false; axes.len()],
@@ -536,7 +537,7 @@ impl Engine {
         let mut changed = false;
         for (number, (axis, told)) in self.axes.iter().zip(&mut self.told).enumerate() {
             let number = u8::try_from(number).unwrap_or(u8::MAX);
-            let now = (axis.state(), axis.fault().is_some());
+            let now = (axis.state(), axis.fault().map(|fault| fault.cause));
             if *told == now {
                 continue;
             }
@@ -545,7 +546,8 @@ impl Engine {
             if now.0 != before.0 {
                 tell(&mut self.notices, Notice::State { axis: number, from: before.0, to: now.0 });
             }
-            if let Some(fault) = axis.fault().filter(|_| !before.1) {
+            // Once more when it is known which one the drive has.
+            if let Some(fault) = axis.fault().filter(|fault| before.1 != Some(fault.cause)) {
                 let (loss, trip) = (axis.loss(), axis.tripped());
                 tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip });
             }

@@ -152,7 +152,7 @@ fn an_expedited_download_without_a_size_writes_as_many_bytes_as_the_object_has()
     assert_eq!((store.values[&TEXT].as_slice(), store.writes), (&b"12"[..], 1));
     // With the size they are too many.
     server.handle(ms(0), &hex("23 00 20 00 31 32 33 34"), &mut store).unwrap();
-    assert_eq!(server.poll(ms(0)), Some(hex("80 00 20 00 10 00 07 06")));
+    assert_eq!(server.poll(ms(0)), Some(hex("80 00 20 00 12 00 07 06")));
     assert_eq!(store.writes, 1);
     store.max = 10;
     server.handle(ms(0), &hex("22 00 20 00 31 32 33 34"), &mut store).unwrap();
