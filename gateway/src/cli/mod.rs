@@ -407,6 +407,9 @@ struct CanDriveArguments {
     /// Node-id; without one the drive waits until LSS gives it one.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
+    /// Serial number, by which LSS tells drives without a node-id apart [default: the node-id, or the number of the process]
+    #[arg(long, value_name = "N")]
+    serial: Option<u32>,
     /// How many axes the drive has.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     axes: u8,

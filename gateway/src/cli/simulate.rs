@@ -105,7 +105,10 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
     let node = arguments.node.map(NodeId::new).transpose()?;
     let names = Names { what: "axis", numbers: 1..=u16::from(arguments.axes) };
     let script = events(arguments.script.as_deref(), &names)?;
-    let mut drive = can_drive::drive_with(node, arguments.axes, &script.setup)?;
+    // Two that wait for a node-id must not be one to LSS.
+    let own = || node.map_or_else(std::process::id, |node| u32::from(node.get()));
+    let serial = arguments.serial.unwrap_or_else(own);
+    let mut drive = can_drive::drive_with(node, serial, arguments.axes, &script.setup)?;
     drive.set_sync_cycles(arguments.sync_losses);
     if let Some(path) = &arguments.eds {
         std::fs::write(path, drive.eds()).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -122,7 +125,9 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
         "a drive with {} on {}, {}{}",
         if arguments.axes == 1 { "one axis".into() } else { format!("{} axes", arguments.axes) },
         arguments.interface,
-        node.map_or("waiting for a node-id".into(), |node| format!("node {node}")),
+        node.map_or(format!("with serial number {serial}, waiting for a node-id"), |node| format!(
+            "node {node}"
+        )),
         refused
     ));
     let mut director = Director::new(names, script, clock::monotonic_now(), lines);

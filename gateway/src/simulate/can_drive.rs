@@ -27,15 +27,24 @@ pub type DriveNode = Node<Device>;
 /// # Errors
 /// Another number of axes.
 pub fn drive(node: Option<NodeId>, axes: u8) -> Result<DriveNode, DeviceError> {
-    drive_with(node, axes, &Setup::default())
+    drive_with(node, serial_of(node), axes, &Setup::default())
 }
 
-/// The same with what a script makes of its axes, 1 to 8.
+fn serial_of(node: Option<NodeId>) -> u32 {
+    node.map_or(0, |node| u32::from(node.get()))
+}
+
+/// The same with a serial number of its own, by which LSS tells it from others, and with what a script makes of its axes, 1 to 8.
 ///
 /// # Errors
 /// Another number of axes, or one that cannot work.
-pub fn drive_with(node: Option<NodeId>, axes: u8, setup: &Setup) -> Result<DriveNode, DeviceError> {
-    made(node, axes, setup, |_| {})
+pub fn drive_with(
+    node: Option<NodeId>,
+    serial: u32,
+    axes: u8,
+    setup: &Setup,
+) -> Result<DriveNode, DeviceError> {
+    made(node, axes, setup, |config| config.identity.serial = serial)
 }
 
 /// A device that stands in for one of a configuration, with so many axes: it is what the configuration expects it to be. One that
@@ -71,7 +80,7 @@ fn made(
     let servos: Vec<_> = numbers.clone().map(|axis| setup.servo(axis, ServoParameters::default())).collect();
     let mut config = Config {
         node,
-        identity: identity(servos.len(), node.map_or(0, |node| u32::from(node.get()))),
+        identity: identity(servos.len(), serial_of(node)),
         boot_time: BOOT_TIME,
         has_blocks: true,
         has_mapping: true,
@@ -119,6 +128,15 @@ fn axis_mut(node: &mut DriveNode, number: u16) -> Option<&mut Axis> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn drives_without_a_node_id_are_told_apart_by_their_serial_numbers() {
+        let serial = |serial| {
+            let node = drive_with(None, serial, 1, &Setup::default()).expect("a drive");
+            node.dictionary().number(0x1018, 4)
+        };
+        assert_eq!([serial(0x1234), serial(0xFFFF_FFFF)], [0x1234, 0xFFFF_FFFF]);
+    }
 
     #[test]
     fn drives_have_one_to_eight_axes() {

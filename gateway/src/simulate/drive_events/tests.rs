@@ -273,7 +273,7 @@ fn a_silent_sercos_drive_stays_in_its_phase_and_writes_nothing() {
 }
 
 fn can(setup: &Setup) -> Actor<DriveNode> {
-    Actor::new(can_drive::drive_with(NodeId::new(5).ok(), 2, setup).unwrap())
+    Actor::new(can_drive::drive_with(NodeId::new(5).ok(), 5, 2, setup).unwrap())
 }
 
 #[test]
