@@ -15,6 +15,9 @@ use profile_sercos::police::court::Court;
 /// Frames or datagrams that a queue holds; more are lost.
 const QUEUE: usize = 64;
 
+/// Datagrams for a device that a queue holds: a flood comes between two calls.
+const FLOOD: usize = 1024;
+
 /// Identifiers whose last frame is remembered: a box uses fewer.
 const SENT_MAX: usize = 256;
 
@@ -62,16 +65,33 @@ pub struct Ring<T> {
 
 impl<T> Default for Ring<T> {
     fn default() -> Self {
-        let slot = || (Bytes::of(&[]), None);
-        Self { slots: std::iter::repeat_with(slot).take(QUEUE).collect(), first: 0, count: 0 }
+        Self::with_room(QUEUE)
     }
 }
 
 impl<T> Ring<T> {
+    /// A queue for so many.
+    fn with_room(room: usize) -> Self {
+        let slot = || (Bytes::of(&[]), None);
+        Self { slots: std::iter::repeat_with(slot).take(room).collect(), first: 0, count: 0 }
+    }
+
+    fn slot(&mut self, at: usize) -> &mut (Bytes, Option<T>) {
+        let room = self.slots.len();
+        &mut self.slots[(self.first + at) % room]
+    }
+
+    /// The oldest leaves; an empty queue begins where it began, in memory that was used before.
+    fn leave(&mut self) {
+        self.count -= 1;
+        self.first = if self.count == 0 { 0 } else { (self.first + 1) % self.slots.len() };
+    }
+
     /// Puts a copy behind the others; `false` when there is no room, or it is too long.
     pub fn push(&mut self, bytes: &[u8], with: T) -> bool {
-        let slot = &mut self.slots[(self.first + self.count) % QUEUE];
-        let Some(place) = slot.0.bytes.get_mut(..bytes.len()).filter(|_| self.count < QUEUE) else {
+        let (full, count) = (self.count == self.slots.len(), self.count);
+        let slot = self.slot(count);
+        let Some(place) = slot.0.bytes.get_mut(..bytes.len()).filter(|_| !full) else {
             return false;
         };
         place.copy_from_slice(bytes);
@@ -85,34 +105,42 @@ impl<T> Ring<T> {
     /// # Panics
     /// When the buffer is too short.
     pub fn pop_into(&mut self, buffer: &mut [u8]) -> Option<(usize, T)> {
-        self.count = self.count.checked_sub(1)?;
-        let (bytes, with) = &mut self.slots[self.first];
-        self.first = (self.first + 1) % QUEUE;
-        buffer[..bytes.len].copy_from_slice(bytes.as_slice());
-        Some((bytes.len, with.take()?))
+        let (bytes, with) = self.slot(0);
+        let with = with.take()?;
+        let len = bytes.len;
+        buffer[..len].copy_from_slice(bytes.as_slice());
+        self.leave();
+        Some((len, with))
     }
 
     /// Takes the oldest out.
     pub fn pop(&mut self) -> Option<(Bytes, T)> {
-        self.count = self.count.checked_sub(1)?;
-        let (bytes, with) = &mut self.slots[self.first];
-        self.first = (self.first + 1) % QUEUE;
-        Some((bytes.clone(), with.take()?))
+        let (bytes, with) = self.slot(0);
+        let with = with.take()?;
+        let bytes = bytes.clone();
+        self.leave();
+        Some((bytes, with))
     }
 
     /// All that are in it, the oldest first.
     pub fn iter(&self) -> impl Iterator<Item = &Bytes> {
-        (0..self.count).map(|at| &self.slots[(self.first + at) % QUEUE].0)
+        (0..self.count).map(|at| &self.slots[(self.first + at) % self.slots.len()].0)
     }
 }
 
 /// The UDP port of a device.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct NorthQueue {
     /// What the device receives, with its sender and when it arrived.
     pub inbound: Ring<(SocketAddrV4, MonotonicTime)>,
     /// What the device has sent, with its destination.
     pub outbound: Ring<SocketAddrV4>,
+}
+
+impl Default for NorthQueue {
+    fn default() -> Self {
+        Self { inbound: Ring::with_room(FLOOD), outbound: Ring::default() }
+    }
 }
 
 impl NorthPort for NorthQueue {

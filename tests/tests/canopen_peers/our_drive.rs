@@ -120,7 +120,7 @@ fn our_drive_does_what_a_foreign_library_expects_of_one() {
     let sheet = std::env::temp_dir().join("drive.eds");
     let sheet = sheet.to_str().unwrap();
     // Without a node-id; the library finds it by LSS and reads its objects from the data sheet that it writes.
-    let mut drive = drive(&binary, &["--eds", sheet]);
+    let mut drive = drive(&binary, &["--serial", "0", "--eds", sheet]);
     let said = Peer::script(&python, "canopen_remote.py", &[INTERFACE, "5", sheet]).succeeds();
     has_lines(
         &said,
