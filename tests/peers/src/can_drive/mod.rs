@@ -1,0 +1,1 @@
+//! A CANopen drive of CiA 402.

@@ -1,0 +1,1 @@
+//! A DeviceNet slave with a drive in it.

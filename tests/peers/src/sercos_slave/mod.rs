@@ -1,0 +1,1 @@
+//! A SERCOS III slave with a drive in it.
