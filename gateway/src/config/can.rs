@@ -46,6 +46,10 @@ const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
 /// it at 0: a drive that is ready is ready.
 const VOLTAGE_BIT: [(&str, bool); 2] = [("ignore", false), ("dc-link", true)];
 
+/// Modes of operation of drives (6060).
+const DRIVE_MODES: [(&str, i8); 9] =
+    [("pp", 1), ("vl", 2), ("pv", 3), ("tq", 4), ("hm", 6), ("ip", 7), ("csp", 8), ("csv", 9), ("cst", 10)];
+
 /// Offsets that can be sent.
 const OFFSETS: [(&str, Signal); 2] = [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
 
@@ -186,6 +190,17 @@ impl Checker {
             None => Some(false),
             Some(word) => self.word(word, "meaning of bit 4", &VOLTAGE_BIT),
         };
+        let drive_modes = match &table.drive_modes {
+            None => Some(None),
+            Some(names) => self.words(names, "mode of operation", &DRIVE_MODES).map(Some),
+        };
+        if let Some(names) = table.drive_modes.as_ref().filter(|names| names.get_ref().is_empty()) {
+            self.report::<()>(
+                names.span(),
+                "a drive without modes",
+                "expected at least one mode of operation",
+            );
+        }
         let way_of_a_turn = match &table.millimetres_per_turn {
             None => Some(None),
             Some(value) => self.exact(value, "the way of a turn").map(Some),
@@ -203,6 +218,7 @@ impl Checker {
             offsets: offsets?,
             acknowledges: table.acknowledges.unwrap_or(false),
             tells_voltage: tells_voltage?,
+            drive_modes: drive_modes?,
             way_of_a_turn: way_of_a_turn?,
             counts: counts?,
         })

@@ -3,6 +3,7 @@
 use profile_cia402::master::config::{Expected, GuardingConfig};
 use profile_cia402::wire::NodeId;
 use profile_cia402::wire::lss::LssAddress;
+use profile_cia402::wire::pdo::TransmissionType;
 
 use super::can::NODES;
 use super::check::Checker;
@@ -17,6 +18,14 @@ const DEFAULT_LIFE_TIME_FACTOR: u8 = 3;
 
 /// Whether a node-id is kept.
 const LSS: [(&str, bool); 2] = [("assign", false), ("store", true)];
+
+/// What a device has to say of itself.
+const DEVICE_TYPES: [(&str, Expected); 2] =
+    [("drive", Expected::DRIVE), ("any", Expected { profile: None, ..Expected::DRIVE })];
+
+/// Transmission types that PDOs can be used with.
+const RPDO_TYPES: &[core::ops::RangeInclusive<u8>] = &[0..=240, 254..=255];
+const TPDO_TYPES: &[core::ops::RangeInclusive<u8>] = &[1..=1, 254..=255];
 
 /// Whether the mapping of PDOs is kept.
 const MAPPINGS: [(&str, bool); 2] = [("write", false), ("keep", true)];
@@ -75,6 +84,7 @@ impl Checker {
             None => Some(false),
             Some(word) => self.word(word, "handling of the PDO mapping", &MAPPINGS),
         };
+        let types = self.transmission_types(table);
         let guarding = self.guarding(table);
         let lss = self.lss(table, expected.as_ref());
         Some(CanDevice {
@@ -85,12 +95,39 @@ impl Checker {
             file: None,
             stores: table.store.as_ref().is_some_and(|store| *store.get_ref()),
             keeps_mapping: keeps_mapping?,
+            types: types?,
             guarding: guarding?,
         })
     }
 
+    fn transmission_types(&mut self, table: &CanDeviceTable) -> Option<[Option<TransmissionType>; 2]> {
+        let both = [
+            (&table.rpdo_type, "RPDOs", RPDO_TYPES, "expected 0 to 240, 254 or 255"),
+            (&table.tpdo_type, "TPDOs", TPDO_TYPES, "expected 1, 254 or 255: it has to send in every cycle"),
+        ];
+        let types = both.map(|(value, which, allowed, expected)| {
+            let Some(value) = value else { return Some(None) };
+            let number = u8::try_from(*value.get_ref()).ok();
+            match number.filter(|number| allowed.iter().any(|range| range.contains(number))) {
+                Some(number) => Some(Some(TransmissionType(number))),
+                None => self.report_as(
+                    code::OUT_OF_RANGE,
+                    value.span(),
+                    format_args!("{} cannot be the transmission type of {which}", value.get_ref()),
+                    expected,
+                ),
+            }
+        });
+        let [receive, transmit] = types;
+        Some([receive?, transmit?])
+    }
+
     fn can_identity(&mut self, table: &CanDeviceTable) -> Option<Expected> {
-        let Some(identity) = &table.identity else { return Some(Expected::default()) };
+        let any = match &table.device_type {
+            None => Expected::DRIVE,
+            Some(word) => self.word(word, "device type", &DEVICE_TYPES)?,
+        };
+        let Some(identity) = &table.identity else { return Some(any) };
         let given = identity.get_ref();
         let all = [
             (&given.vendor_id, "the vendor-ID"),
@@ -110,13 +147,7 @@ impl Checker {
             Some(number) => self.number(number, what, NUMBERS).map(Some),
         });
         let [vendor, product, revision, serial] = numbers;
-        Some(Expected {
-            device_type: None,
-            vendor: vendor?,
-            product: product?,
-            revision: revision?,
-            serial: serial?,
-        })
+        Some(Expected { vendor: vendor?, product: product?, revision: revision?, serial: serial?, ..any })
     }
 
     fn lss(&mut self, table: &CanDeviceTable, expected: Option<&Expected>) -> Option<Option<Lss>> {

@@ -341,6 +341,9 @@ pub struct CanDriveTable {
     /// What bit 4 of its statusword is: `"dc-link"` where the drive tells by it that its power stage is supplied, `"ignore"` otherwise. Default:
     /// ignore; a drive that is ready is ready.
     pub voltage_bit: Option<Spanned<String>>,
+    /// Modes of operation that the drive has, such as `"csp"` and `"pv"`, where it does not tell them by 6502 or tells wrong ones.
+    /// Default: what it tells; one that tells none is tried.
+    pub drive_modes: Option<Spanned<Vec<Spanned<String>>>>,
     /// Millimetres that a linear axis makes in a turn of its motor; needed for a linear axis whose drive counts turns.
     pub millimetres_per_turn: Option<Spanned<f64>>,
     /// What its counts are, for a drive whose factor group does not say it, or says it wrong. Default: what the drive says.
@@ -355,6 +358,9 @@ pub struct CanDeviceTable {
     pub node: Spanned<i64>,
     /// What it has to be (1018); a device that is something else is not led. Default: any, or what `configuration` is for.
     pub identity: Option<Spanned<CanIdentityTable>>,
+    /// What it has to say of itself in 1000: `"drive"`, the device profile 402, whatever stands above it, or `"any"`, for a drive that
+    /// says something else. Nothing is written to another device. Default: `"drive"`.
+    pub device_type: Option<Spanned<String>>,
     /// What happens when nobody answers under its node-id: `"assign"`, a device with all of this `identity` that has no node-id is
     /// given it by LSS; `"store"`, and keeps it. Default: nothing.
     pub lss: Option<Spanned<String>>,
@@ -366,6 +372,12 @@ pub struct CanDeviceTable {
     pub store: Option<Spanned<bool>>,
     /// `"write"`: its PDOs are mapped as its axes need them; `"keep"`: they are used as they are. Default: `"write"`.
     pub pdo_mapping: Option<Spanned<String>>,
+    /// Transmission type of its RPDOs: 0 to 240, 254, 255, or left to the device, which is asked to take 1, then 0, 255 and 254.
+    /// Default: left to the device.
+    pub rpdo_type: Option<Spanned<i64>>,
+    /// Transmission type of its TPDOs: 1, 254 or 255, or left to the device, which is asked to take 1, then 255 and 254. With 254 and
+    /// 255 it sends by its event timer, once in a cycle. Default: left to the device.
+    pub tpdo_type: Option<Spanned<i64>>,
     /// Node guarding in place of a heartbeat, for a device without 1017: the time between two requests, `10 ms` to `10 s`.
     /// Default: none, it has a heartbeat.
     pub guarding: Option<Spanned<String>>,

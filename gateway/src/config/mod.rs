@@ -21,6 +21,7 @@ use profile_cia402::eds::drive::Pdo;
 use profile_cia402::master::config::{Expected, GuardingConfig, Stamp, Write};
 use profile_cia402::wire::NodeId;
 use profile_cia402::wire::lss::LssAddress;
+use profile_cia402::wire::pdo::TransmissionType;
 use profile_cip::devicenet::master::config::{DataRate, ExpectedIdentity};
 use profile_cip::devicenet::wire::MacId;
 use profile_cip::devicenet::wire::speed::Assembly;
@@ -551,6 +552,8 @@ pub struct CanDevice {
     pub stores: bool,
     /// Whether its PDOs are used as they are.
     pub keeps_mapping: bool,
+    /// Transmission types of its RPDOs and TPDOs, where it is not left to the device.
+    pub types: [Option<TransmissionType>; 2],
     /// Node guarding, in place of a heartbeat.
     pub guarding: Option<GuardingConfig>,
 }
@@ -619,6 +622,8 @@ pub struct CanDrive {
     pub acknowledges: bool,
     /// Whether its statusword tells that the power stage is supplied.
     pub tells_voltage: bool,
+    /// Its modes of operation, where it does not tell them, or tells wrong ones.
+    pub drive_modes: Option<Vec<i8>>,
     /// Nanounits of a linear axis in a nanoturn.
     pub way_of_a_turn: Option<Ratio>,
     /// Generic units in one count, where the drive is not to be asked.

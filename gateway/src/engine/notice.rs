@@ -3,6 +3,7 @@
 use std::fmt;
 use std::net::SocketAddrV4;
 
+use profile_cia402::master::boot::BootStatus;
 use profile_cia402::master::event::Event as CanEvent;
 use profile_cia402::wire::NodeId;
 use profile_cip::devicenet::master::event::Event as DevicenetEvent;
@@ -18,7 +19,7 @@ use profile_sercos::master::topology::Topology;
 
 use super::admission::Refused;
 use super::axis::{Loss, OwnWords, Trip, Waiting};
-use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure};
+use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
@@ -132,6 +133,15 @@ pub enum Notice {
         node: NodeId,
         /// Why.
         error: Misfit,
+    },
+    /// The drive of a CANopen device does not tell its modes of operation, and they were tried.
+    ModesTried {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// What came out.
+        tried: Tried,
     },
     /// Steps failed that may fail, at a CANopen drive.
     ObjectsPassedOver {
@@ -292,6 +302,7 @@ impl Notice {
             | Self::SlaveSetup { axis, .. }
             | Self::NodeCommissioning { axis, .. }
             | Self::NodeProgram { axis, .. }
+            | Self::ModesTried { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
             | Self::Difference { axis, .. }
@@ -324,7 +335,15 @@ impl fmt::Display for Notice {
                     "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
                 )
             }
-            Self::Can { bus, event } => write!(f, "CAN bus {}: {event}", bus + 1),
+            Self::Can { bus, event } => {
+                write!(f, "CAN bus {}: {event}", bus + 1)?;
+                match event {
+                    CanEvent::BootFailed { status: Some(BootStatus::DEVICE_TYPE), .. } => f.write_str(
+                        "; nothing was written to it; for a drive nevertheless, `device_type = \"any\"` in its [[south.can.device]]",
+                    ),
+                    _ => Ok(()),
+                }
+            }
             Self::Lss { bus, told } => write!(f, "CAN bus {}: {told}", bus + 1),
             Self::Devicenet { network, event } => write!(f, "DeviceNet {}: {event}", network + 1),
             Self::SlaveSetup { mac, failure, .. } => {
@@ -336,6 +355,7 @@ impl fmt::Display for Notice {
             Self::NodeProgram { node, error, .. } => {
                 write!(f, "node {node} cannot be used: {error}; it is left out")
             }
+            Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
             Self::PassedOver { failures, .. } => {
                 let all = failures.iter().map(|failure| (failure.what, failure.idn, failure.failure));
                 passed_over(f, &all.collect::<Vec<_>>())

@@ -54,7 +54,7 @@ pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
-pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, ObjectFacts, ObjectStep, Plan};
+pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, ModeWords, ObjectFacts, ObjectStep, Plan};
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
@@ -316,6 +316,18 @@ impl Mapping {
         facts: &ObjectFacts,
     ) -> Result<Vec<ObjectStep>, Cia402Error> {
         self.cia402.steps(plan, axis, facts)
+    }
+
+    /// What has to be tried of a CiA 402 drive that does not tell its modes of operation; `None` where it does, or where the
+    /// configuration tells them, which is noted.
+    #[must_use]
+    pub fn cia402_modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
+        self.cia402.modes_untold(axis, facts)
+    }
+
+    /// Notes that a CiA 402 drive has these modes of operation and no others.
+    pub fn cia402_has_modes(&self, facts: &mut ObjectFacts, codes: impl Iterator<Item = i8>) {
+        self.cia402.has_modes(facts, codes);
     }
 
     /// What the telegrams of an axis carry at most, of a CiA 402 drive that lacks nothing.

@@ -54,9 +54,12 @@ pub struct PdoConfig {
     pub id: Option<Id>,
     /// Transmission type.
     pub transmission: TransmissionType,
+    /// Types that do as well: they are tried in this order where the device refuses that one, and one that it has and does not
+    /// let be changed is taken.
+    pub others: &'static [TransmissionType],
     /// TPDO: shortest time between two, 100 microseconds.
     pub inhibit_100us: u16,
-    /// Event timer, ms; 0 for none.
+    /// RPDO: event timer, ms; TPDO: event timer of an event-driven one, ms. 0 for none.
     pub event_timer_ms: u16,
     /// TPDO: counter value of the SYNC that cycles are counted from; 0 for any.
     pub sync_start: u8,
@@ -66,7 +69,7 @@ pub struct PdoConfig {
     pub policy: MappingPolicy,
     /// TPDO: how many may be missing in a row before the application is told.
     pub allowed_losses: u16,
-    /// TPDO that is not cyclic: longest time between two, ms; 0 for no limit.
+    /// Event-driven TPDO: longest time between two, ms; 0 for no limit.
     pub deadline_ms: u16,
 }
 
@@ -78,6 +81,7 @@ impl PdoConfig {
             number,
             id: None,
             transmission: TransmissionType::EVERY_SYNC,
+            others: &[],
             inhibit_100us: 0,
             event_timer_ms: 0,
             sync_start: 0,
@@ -103,6 +107,8 @@ impl PdoConfig {
 pub struct Expected {
     /// 1000.
     pub device_type: Option<u32>,
+    /// The device profile in 1000, its low 16 bits. What stands above differs from drive to drive.
+    pub profile: Option<u16>,
     /// 1018:1.
     pub vendor: Option<u32>,
     /// 1018:2.
@@ -111,6 +117,18 @@ pub struct Expected {
     pub revision: Option<u32>,
     /// 1018:4.
     pub serial: Option<u32>,
+}
+
+impl Expected {
+    /// Any drive: the device profile is 402, whatever 1000 says beside it.
+    pub const DRIVE: Self = Self {
+        device_type: None,
+        profile: Some(402),
+        vendor: None,
+        product: None,
+        revision: None,
+        serial: None,
+    };
 }
 
 /// One value of a device's configuration.

@@ -1,6 +1,7 @@
 //! What goes on the bus, and when.
 
 use super::boot::BootState;
+use super::ends::RpdoEnd;
 use super::*;
 use crate::wire::error_control::HEARTBEAT_LEN;
 use crate::wire::frame;
@@ -60,9 +61,7 @@ impl Master {
             if station.state != BootState::Operational {
                 continue;
             }
-            for end in &mut station.rpdos {
-                end.due |= core::mem::take(&mut end.committed);
-            }
+            station.rpdos.iter_mut().for_each(RpdoEnd::sync);
             for place in 0..self.stations[index].tpdos.len() {
                 let (missed, lost) = self.stations[index].tpdos[place].sync();
                 self.count_missed(index, place, missed, lost);
@@ -97,13 +96,13 @@ impl Master {
             let sync = Sync { counter };
             return Some(frame(cob_id::SYNC, &sync.emit()[..sync.buffer_len()]));
         }
-        let fd = self.config.fd;
+        let (fd, held) = (self.config.fd, self.config.sync.is_some());
         let ends = self.stations.iter_mut().flat_map(|station| &mut station.rpdos);
         let end = ends.into_iter().find(|end| end.due)?;
         end.due = false;
         match fd {
-            Some(fast) => Frame::fd(end.id, end.data(), fast).ok(),
-            None => Some(frame(end.id, end.data())),
+            Some(fast) => Frame::fd(end.id, end.outgoing(held), fast).ok(),
+            None => Some(frame(end.id, end.outgoing(held))),
         }
     }
 

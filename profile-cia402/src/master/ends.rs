@@ -12,7 +12,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::config::{Direction, PdoConfig};
 use crate::wire::NodeId;
-use crate::wire::pdo::{MappingEntry, mapped_len};
+use crate::wire::pdo::{MappingEntry, TransmissionType, mapped_len};
 
 /// Most bytes of a PDO, in an FD frame.
 const DATA_MAX: usize = 64;
@@ -46,6 +46,8 @@ pub struct Consumer<'a> {
     /// Whether values came since the last SYNC. In a network without SYNC, whether any came in operation and no deadline has passed
     /// since.
     pub fresh: bool,
+    /// Whether it is sent at SYNC. Another one belongs to the moment at which it came.
+    pub cyclic: bool,
     /// When they came; `None` before the first ones in operation.
     pub at: Option<MonotonicTime>,
     /// Whether they came after the synchronous window.
@@ -68,10 +70,13 @@ pub(super) struct TpdoEnd {
     late: bool,
     missed: u32,
     allowed: u32,
+    transmission: TransmissionType,
     /// Every how many SYNCs it is due; 0 when it is not cyclic.
     every: u32,
     /// SYNCs since it was due.
     syncs: u32,
+    /// Longest time between two where it is event-driven, and what it is while it is.
+    longest_of_events: DurationNs,
     longest: DurationNs,
     deadline: Option<MonotonicTime>,
     /// TPDOs that came in this period, without those that were due before.
@@ -109,9 +114,11 @@ impl TpdoEnd {
             late: false,
             missed: 0,
             allowed: u32::from(pdo.allowed_losses),
-            every: u32::from(pdo.transmission.syncs().unwrap_or(0)),
+            transmission: pdo.transmission,
+            every: 0,
             syncs: 0,
-            longest: DurationNs::from_millis(i64::from(pdo.deadline_ms)),
+            longest_of_events: DurationNs::from_millis(i64::from(pdo.deadline_ms)),
+            longest: DurationNs::ZERO,
             deadline: None,
             frames: 0,
             owed: 0,
@@ -119,7 +126,19 @@ impl TpdoEnd {
             length_told: false,
         };
         end.map(&pdo.mapping);
+        end.send_as(pdo.transmission);
         end
+    }
+
+    pub fn transmission(&self) -> TransmissionType {
+        self.transmission
+    }
+
+    /// It is sent by this transmission type.
+    pub fn send_as(&mut self, transmission: TransmissionType) {
+        self.transmission = transmission;
+        self.every = u32::from(transmission.syncs().unwrap_or(0));
+        self.longest = if transmission.is_event_driven() { self.longest_of_events } else { DurationNs::ZERO };
     }
 
     /// Takes another mapping, whose length has been checked.
@@ -138,6 +157,7 @@ impl TpdoEnd {
             data: &self.data[..self.len],
             state: self.state,
             fresh: self.fresh,
+            cyclic: self.every > 0,
             at: self.at,
             late: self.late,
             missed: self.missed,
@@ -236,12 +256,15 @@ pub(super) struct RpdoEnd {
     pub mapping: Vec<MappingEntry>,
     len: usize,
     data: [u8; DATA_MAX],
-    /// Goes out at once, not after SYNC.
-    pub event_driven: bool,
+    transmission: TransmissionType,
     /// To be sent.
     pub committed: bool,
     /// To be sent in this period.
     pub due: bool,
+    /// Event-driven: the values of the last period, which are to count from now, and those of the period that begins.
+    held: [[u8; DATA_MAX]; 2],
+    /// There are such of the period that begins.
+    holds: bool,
 }
 
 impl RpdoEnd {
@@ -252,9 +275,11 @@ impl RpdoEnd {
             mapping: Vec::with_capacity(crate::wire::pdo::MAPPING_MAX),
             len: 0,
             data: [0; DATA_MAX],
-            event_driven: pdo.transmission.is_event_driven(),
+            transmission: pdo.transmission,
             committed: false,
             due: false,
+            held: [[0; DATA_MAX]; 2],
+            holds: false,
         };
         end.map(&pdo.mapping);
         end
@@ -267,8 +292,37 @@ impl RpdoEnd {
         self.len = mapped_len(mapping).unwrap_or(0).min(DATA_MAX);
     }
 
-    pub fn data(&self) -> &[u8] {
-        &self.data[..self.len]
+    pub fn transmission(&self) -> TransmissionType {
+        self.transmission
+    }
+
+    /// The device takes it by this transmission type.
+    pub fn take_as(&mut self, transmission: TransmissionType) {
+        self.transmission = transmission;
+    }
+
+    /// Goes out whenever there are values, in a network without SYNC.
+    pub fn is_event_driven(&self) -> bool {
+        self.transmission.is_event_driven()
+    }
+
+    /// A SYNC period begins. A synchronous RPDO is sent in it, and the device takes it at the next SYNC. An event-driven one counts
+    /// as soon as it is there, and is kept until then: both get their values for the same instant.
+    pub fn sync(&mut self) {
+        let committed = core::mem::take(&mut self.committed);
+        if !self.is_event_driven() {
+            self.due |= committed;
+            return;
+        }
+        self.held.swap(0, 1);
+        self.due |= core::mem::replace(&mut self.holds, committed);
+        self.held[1][..self.len].copy_from_slice(&self.data[..self.len]);
+    }
+
+    /// What is to be sent. `held` in a network with SYNC.
+    pub fn outgoing(&self, held: bool) -> &[u8] {
+        let from = if held && self.is_event_driven() { &self.held[0] } else { &self.data };
+        &from[..self.len]
     }
 
     pub fn data_mut(&mut self) -> &mut [u8] {
@@ -277,8 +331,13 @@ impl RpdoEnd {
 
     /// Nothing is sent any more; the values are zeros again, so that no old ones go out when the device is back.
     pub fn stop(&mut self) {
-        (self.committed, self.due) = (false, false);
+        self.withdraw();
         self.data = [0; DATA_MAX];
+    }
+
+    /// Takes back what has not been sent yet.
+    pub fn withdraw(&mut self) {
+        (self.committed, self.due, self.holds) = (false, false, false);
     }
 }
 

@@ -11,6 +11,7 @@ use super::report::ReportRow;
 use crate::sdo::request::SdoOutcome;
 use crate::wire::emcy::Emcy;
 use crate::wire::nmt::NmtState;
+use crate::wire::pdo::{SUB_TYPE, TransmissionType};
 use crate::wire::{Function, NodeId};
 
 /// Names one submitted SDO request.
@@ -120,6 +121,20 @@ pub enum Event {
         /// The device.
         node: NodeId,
     },
+    /// A PDO has another transmission type than it was to have: the device does not take that one. Told before
+    /// [`Event::Operational`].
+    TransmissionAdopted {
+        /// The device.
+        node: NodeId,
+        /// Which way the PDO goes.
+        direction: Direction,
+        /// Its number.
+        number: u16,
+        /// What it was to have.
+        wanted: TransmissionType,
+        /// What it has.
+        found: TransmissionType,
+    },
     /// More TPDOs than permitted did not come.
     PdoLost {
         /// The device.
@@ -196,6 +211,21 @@ impl fmt::Display for Event {
             }
             Self::MappingAdopted { node, direction, number } => {
                 write!(f, "node {node} keeps its own mapping of {direction} {number}")
+            }
+            Self::TransmissionAdopted { node, direction, number, wanted, found } => {
+                let object = direction.communication_object(*number, SUB_TYPE);
+                let effect = match (direction, found.is_event_driven()) {
+                    (_, false) => "",
+                    (Direction::Receive, true) => {
+                        "; it counts as soon as it is there, and is sent a cycle later"
+                    }
+                    (Direction::Transmit, true) => "; it comes by its event timer, not at SYNC",
+                };
+                write!(
+                    f,
+                    "node {node} does not take transmission type {} for {direction} {number} ({object}), and has {}{effect}",
+                    wanted.0, found.0
+                )
             }
             Self::Operational { node } => write!(f, "node {node} is in operation"),
             Self::BootFailed { node, status, step, .. } => {

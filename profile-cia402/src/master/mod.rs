@@ -427,15 +427,16 @@ impl Master {
         Some(end.data_mut())
     }
 
-    /// Sends the values once: after the next SYNC, or at once if the RPDO is event-driven. Has an effect only while the device is in
-    /// operation; `false` otherwise.
+    /// Sends the values once: after the next SYNC, for the device to take them at the one behind it. An event-driven RPDO goes after
+    /// that one, or at once in a network without SYNC. Has an effect only while the device is in operation; `false` otherwise.
     pub fn commit(&mut self, node: NodeId, rpdo: u16) -> bool {
+        let has_sync = self.config.sync.is_some();
         let Some(station) = self.end_mut(node).filter(|station| station.state == BootState::Operational)
         else {
             return false;
         };
         let Some(end) = station.rpdos.iter_mut().find(|end| end.number == rpdo) else { return false };
-        if end.event_driven {
+        if end.is_event_driven() && !has_sync {
             end.due = true;
         } else {
             end.committed = true;
@@ -448,7 +449,7 @@ impl Master {
         let end =
             self.end_mut(node).and_then(|station| station.rpdos.iter_mut().find(|end| end.number == rpdo));
         if let Some(end) = end {
-            (end.committed, end.due) = (false, false);
+            end.withdraw();
         }
     }
 

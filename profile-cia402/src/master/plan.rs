@@ -15,6 +15,7 @@ use super::station::Station;
 use crate::sdo::request::{SdoFailure, SdoOutcome, SdoRequest};
 use crate::wire::pdo::{
     MAPPING_MAX, MappingEntry, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT, SUB_SYNC_START, SUB_TYPE,
+    TransmissionType,
 };
 use crate::wire::{CobId, Mux};
 
@@ -202,6 +203,14 @@ fn number(object: Mux, value: impl Into<u64>, len: usize) -> SdoRequest {
     SdoRequest::download_number(object, value.into(), len)
 }
 
+/// The event timer of a PDO, ms: a TPDO has one only while it is event-driven.
+fn event_timer(direction: Direction, pdo: &PdoConfig, transmission: TransmissionType) -> u16 {
+    match direction {
+        Direction::Transmit if !transmission.is_event_driven() => 0,
+        _ => pdo.event_timer_ms,
+    }
+}
+
 /// The COB-ID that a PDO shall have.
 fn cob_id(direction: Direction, pdo: &PdoConfig, node: &NodeConfig, station: &Station) -> CobId {
     let id = pdo.id(direction, node.node).map_or(CobId(1 << 31), CobId::new);
@@ -257,7 +266,7 @@ pub(super) fn request(
             let Some(pdo) = node.pdos(direction).get(place) else {
                 return SdoRequest::upload(Mux::DEVICE_TYPE);
             };
-            pdo_request(step, direction, pdo, node, station)
+            pdo_request(step, direction, place, pdo, node, station)
         }
     }
 }
@@ -265,6 +274,7 @@ pub(super) fn request(
 fn pdo_request(
     step: PdoStep,
     direction: Direction,
+    place: usize,
     pdo: &PdoConfig,
     node: &NodeConfig,
     station: &Station,
@@ -274,6 +284,7 @@ fn pdo_request(
     let map = |sub| direction.mapping_object(pdo.number, sub);
     let id = cob_id(direction, pdo, node, station);
     let count = u8::try_from(pdo.mapping.len()).unwrap_or(u8::MAX);
+    let transmission = station.transmission(direction, place).unwrap_or(pdo.transmission);
     match step {
         P::ReadOld | P::ReadCobId => SdoRequest::upload(parameter(SUB_COB_ID)),
         P::Disable => number(parameter(SUB_COB_ID), id.with_valid(false).0, 4),
@@ -283,9 +294,9 @@ fn pdo_request(
             number(map(place), entry, 4)
         }
         P::Count => number(map(0), count, 1),
-        P::Type => number(parameter(SUB_TYPE), pdo.transmission.0, 1),
+        P::Type => number(parameter(SUB_TYPE), transmission.0, 1),
         P::Inhibit => number(parameter(SUB_INHIBIT), pdo.inhibit_100us, 2),
-        P::EventTimer => number(parameter(SUB_EVENT_TIMER), pdo.event_timer_ms, 2),
+        P::EventTimer => number(parameter(SUB_EVENT_TIMER), event_timer(direction, pdo, transmission), 2),
         P::SyncStart => number(parameter(SUB_SYNC_START), pdo.sync_start, 1),
         P::Enable => number(parameter(SUB_COB_ID), id.with_valid(true).0, 4),
         P::ReadCount => SdoRequest::upload(map(0)),
@@ -320,7 +331,11 @@ pub(super) fn judge(
         Step::DeviceType => {
             station.device_type = value;
             // An abort is an answer; it is no answer to what the device is.
-            compare(expected.device_type, value, BootStatus::DEVICE_TYPE, optional_or(BootStatus::NO_ANSWER))
+            // Of the profile the low half counts, of a whole type all of it.
+            let profile = expected.device_type.is_none().then_some(expected.profile).flatten().map(u32::from);
+            let high = profile.and(value).unwrap_or(0) & 0xFFFF_0000;
+            let expected = expected.device_type.or(profile.map(|profile| high | profile));
+            compare(expected, value, BootStatus::DEVICE_TYPE, optional_or(BootStatus::NO_ANSWER))
         }
         Step::Identity(sub) => {
             let (expected, status) = match sub {
@@ -426,13 +441,16 @@ impl PdoJudge<'_> {
             (P::Disable | P::Clear | P::Entry(_) | P::Count, Some(failure)) if lenient => {
                 (RowOutcome::Tolerated(failure), Verdict::SkipTo(self.step(P::Type)))
             }
-            (P::Type | P::Enable, Some(failure)) if lenient => tolerated(failure),
+            (P::Type, Some(failure)) if lenient || !self.pdo.others.is_empty() => {
+                self.refused_type(failure, station)
+            }
+            (P::Enable, Some(failure)) if lenient => tolerated(failure),
             (P::Inhibit, Some(failure)) if self.pdo.inhibit_100us == 0 => tolerated(failure),
-            (P::EventTimer, Some(failure)) if self.pdo.event_timer_ms == 0 => tolerated(failure),
+            (P::EventTimer, Some(failure)) if self.timer(station) == 0 => tolerated(failure),
             (P::SyncStart, Some(failure)) if self.pdo.sync_start == 0 => tolerated(failure),
             (P::ReadCount, None) => self.read_count(value, row, station),
             (P::ReadEntry(place), None) => self.read_entry(place, value, row, station),
-            (P::ReadType, None) => self.same(value, u32::from(self.pdo.transmission.0), row),
+            (P::ReadType, None) => self.read_type(value, row, station),
             (P::ReadCobId, None) => {
                 let wanted = cob_id(self.direction, self.pdo, self.node, station);
                 // Bit 30 does not matter to the master, who sends no remote frames.
@@ -450,6 +468,59 @@ impl PdoJudge<'_> {
             }
             _ => required(row),
         }
+    }
+
+    fn timer(&self, station: &Station) -> u16 {
+        event_timer(self.direction, self.pdo, self.transmission(station))
+    }
+
+    /// The transmission type that the PDO is used with.
+    fn transmission(&self, station: &Station) -> TransmissionType {
+        station.transmission(self.direction, self.place).unwrap_or(self.pdo.transmission)
+    }
+
+    /// The device does not take a transmission type: it is asked for the next one, and for what it has if there is none, or if it
+    /// lets nothing be changed.
+    fn refused_type(&self, failure: SdoFailure, station: &mut Station) -> (RowOutcome, Verdict) {
+        let tried = self.transmission(station);
+        let all = core::iter::once(&self.pdo.transmission).chain(self.pdo.others);
+        let next = all.skip_while(|kind| **kind != tried).nth(1).filter(|_| !failure.is_read_only());
+        let step = match next {
+            Some(next) => {
+                station.take_transmission(self.direction, self.place, *next);
+                PdoStep::Type
+            }
+            None => PdoStep::ReadType,
+        };
+        (RowOutcome::Tolerated(failure), Verdict::Then(self.step(step)))
+    }
+
+    /// What it has: what it was given, or another one that does.
+    fn read_type(&self, value: Option<u32>, row: RowOutcome, station: &mut Station) -> (RowOutcome, Verdict) {
+        let used = self.transmission(station);
+        let found = value.and_then(|value| u8::try_from(value).ok()).map(TransmissionType);
+        // All synchronous types are one to a device that receives.
+        let receives = |kind: TransmissionType| {
+            self.direction == Direction::Receive && kind.is_synchronous() && !kind.is_remote()
+        };
+        let all = || core::iter::once(&self.pdo.transmission).chain(self.pdo.others);
+        let does =
+            |found: TransmissionType| all().any(|kind| *kind == found || receives(*kind) && receives(found));
+        let taken = match found.filter(|found| *found != used && !self.pdo.others.is_empty() && does(*found))
+        {
+            Some(found) => {
+                station.take_transmission(self.direction, self.place, found);
+                found
+            }
+            None => used,
+        };
+        let (row, verdict) = self.same(value, u32::from(taken.0), row);
+        let told = (self.direction, self.pdo.number, self.pdo.transmission, taken);
+        if verdict == Verdict::Next && taken != self.pdo.transmission && !station.types.contains(&told) {
+            // As many as there are PDOs.
+            let _ = station.types.try_push(told);
+        }
+        (row, verdict)
     }
 
     fn read_count(

@@ -5,6 +5,7 @@ use core::fmt;
 use super::boot::BootState;
 use crate::sdo::request::{SdoFailure, SdoOperation, SdoOutcome};
 use crate::wire::Mux;
+use crate::wire::pdo::{Direction, SUB_COB_ID};
 
 /// How a step ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +61,18 @@ impl ReportRow {
                 Err(failure) => RowOutcome::Failed(failure),
             },
         }
+    }
+
+    /// Whether the device has refused to have the mapping or the identifier of a PDO changed.
+    #[must_use]
+    pub fn is_refused_mapping(&self) -> bool {
+        let refused = matches!(self.outcome, RowOutcome::Failed(SdoFailure::Refused(_)));
+        let index = self.object.index;
+        let concerned = Direction::BOTH.iter().any(|way| {
+            way.mapping().contains(&index)
+                || way.communication().contains(&index) && self.object.sub == SUB_COB_ID
+        });
+        refused && concerned && self.operation == SdoOperation::Download
     }
 
     pub(super) fn with(self, outcome: RowOutcome) -> Self {

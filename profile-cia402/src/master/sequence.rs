@@ -74,7 +74,12 @@ impl Master {
                 let node = station.node;
                 self.emit(Event::AwaitingApplication { node, kept });
             }
-            BootState::Map => station.adopted.clear(),
+            BootState::Map => {
+                station.adopted.clear();
+                if !kept {
+                    station.reset_transmissions(node);
+                }
+            }
             BootState::Ready => {
                 station.heartbeat_deadline = node.silence_max().map(|longest| now + longest);
                 station.guard_at = node.guarding.map(|_| station.guard_at.unwrap_or(now));
@@ -314,6 +319,9 @@ impl Master {
             let station = &mut self.stations[index];
             station.kept |= event == BootEvent::Kept;
             let (node, adopted) = (station.node, core::mem::take(&mut station.adopted));
+            for (direction, number, wanted, found) in core::mem::take(&mut station.types) {
+                self.emit(Event::TransmissionAdopted { node, direction, number, wanted, found });
+            }
             for (direction, number) in adopted {
                 self.emit(Event::MappingAdopted { node, direction, number });
             }

@@ -14,7 +14,7 @@ use super::report::ReportRow;
 use crate::sdo::client::{Client, ClientConfig};
 use crate::wire::emcy::Emcy;
 use crate::wire::nmt::{NmtCommand, NmtState};
-use crate::wire::pdo::{MAPPING_MAX, MappingEntry};
+use crate::wire::pdo::{MAPPING_MAX, MappingEntry, TransmissionType};
 use crate::wire::{CobId, NodeId};
 
 /// Most rows of a report.
@@ -103,6 +103,8 @@ pub(super) struct Station {
     pub found: ArrayVec<MappingEntry, MAPPING_MAX>,
     pub found_count: usize,
     pub adopted: ArrayVec<(Direction, u16), { 2 * PDOS_MAX }>,
+    /// PDOs with another transmission type than it was to have: PDO, that one, and its own.
+    pub types: ArrayVec<(Direction, u16, TransmissionType, TransmissionType), { 2 * PDOS_MAX }>,
     pub tpdos: Vec<TpdoEnd>,
     pub rpdos: Vec<RpdoEnd>,
     /// What its heartbeat told last.
@@ -154,6 +156,7 @@ impl Station {
             found: ArrayVec::new(),
             found_count: 0,
             adopted: ArrayVec::new(),
+            types: ArrayVec::new(),
             tpdos: Vec::new(),
             rpdos: Vec::new(),
             heartbeat: None,
@@ -192,6 +195,41 @@ impl Station {
                 }
             }
         }
+    }
+
+    /// The transmission type of a PDO; by the configuration until the device has told another one.
+    pub fn transmission(&self, direction: Direction, place: usize) -> Option<TransmissionType> {
+        match direction {
+            Direction::Receive => self.rpdos.get(place).map(RpdoEnd::transmission),
+            Direction::Transmit => self.tpdos.get(place).map(TpdoEnd::transmission),
+        }
+    }
+
+    /// Gives a PDO another transmission type.
+    pub fn take_transmission(&mut self, direction: Direction, place: usize, transmission: TransmissionType) {
+        match direction {
+            Direction::Receive => {
+                if let Some(end) = self.rpdos.get_mut(place) {
+                    end.take_as(transmission);
+                }
+            }
+            Direction::Transmit => {
+                if let Some(end) = self.tpdos.get_mut(place) {
+                    end.send_as(transmission);
+                }
+            }
+        }
+    }
+
+    /// Gives all PDOs the transmission types of the configuration.
+    pub fn reset_transmissions(&mut self, node: &NodeConfig) {
+        for (end, pdo) in self.rpdos.iter_mut().zip(&node.rpdos) {
+            end.take_as(pdo.transmission);
+        }
+        for (end, pdo) in self.tpdos.iter_mut().zip(&node.tpdos) {
+            end.send_as(pdo.transmission);
+        }
+        self.types.clear();
     }
 
     /// Keeps a row of the report while there is room.

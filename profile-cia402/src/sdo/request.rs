@@ -200,6 +200,12 @@ impl SdoFailure {
     pub const fn is_absent(self) -> bool {
         matches!(self, Self::Refused(code) if code.is_absent())
     }
+
+    /// Whether the device lets no value be written.
+    #[must_use]
+    pub const fn is_read_only(self) -> bool {
+        matches!(self, Self::Refused(AbortCode::READ_ONLY | AbortCode::ACCESS))
+    }
 }
 
 /// A finished request.

@@ -472,6 +472,15 @@ impl Rig {
 
     // ---- the box --------------------------------------------------------------------------------
 
+    /// The box starts again with another configuration.
+    ///
+    /// # Panics
+    /// When the configuration is not sound.
+    pub fn restart_box_with(&mut self, configuration: &str) {
+        self.config = Config::parse(configuration, "box.toml").expect("the configuration is sound");
+        self.restart_box();
+    }
+
     /// The box loses its power and starts again, as a process does that is restarted. Streams break; the
     /// drives stay
     /// as they are.

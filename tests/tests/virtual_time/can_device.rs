@@ -170,6 +170,82 @@ fn what_a_kept_mapping_lacks_is_named() {
     assert_eq!(node(&mut rig, 0).statistics().rpdos, 0);
 }
 
+/// A drive that does not let its mapping be written, and of which nobody has said so.
+#[test]
+fn a_drive_that_does_not_let_its_mapping_be_changed_is_led_by_the_pdos_that_it_has() {
+    let modes = "modes = [\"position\", \"velocity\"]\nactual_values = [\"velocity\"]";
+    let mut rig = Rig::new(settings("pdo_mapping = \"keep\"", modes));
+    rig.restart_box_with(&settings("", modes).configuration);
+    node(&mut rig, 0)
+        .dictionary_mut()
+        .make_constant(|index| matches!(index, 0x1600..0x1800 | 0x1A00..0x1C00));
+    goes(&mut rig);
+    assert_eq!(told(&rig, "map write 1600:00: refused with 06010002"), 1, "{}", rig.told());
+    let mapped = |index: u16| [1, 2].map(|sub| (index, sub));
+    let [first, second] = mapped(0x1602).map(|(index, sub)| number(&mut rig, index, sub));
+    assert_eq!([first, second], [0x6040_0010, 0x607A_0020]);
+    assert_eq!(number(&mut rig, 0x1402, 1) >> 31, 0, "it is used");
+}
+
+/// Nobody says which modes the drive has: they are tried, before it has torque.
+#[test]
+fn modes_that_the_drive_does_not_tell_are_tried() {
+    let mut rig = Rig::new(settings("", ""));
+    node(&mut rig, 0).dictionary_mut().set(0x6502, 0, 0);
+    goes(&mut rig);
+    let text = "node 1: 6502 tells no modes of operation; tried by 6060 and 6061, it has csp, ip, csv, pv, vl, cst, tq";
+    assert_eq!(told(&rig, text), 1, "{}", rig.told());
+    // One that is told what it has is not tried, even where it tells something else.
+    let mut rig = Rig::new(settings("", "drive_modes = [\"ip\", \"pv\", \"tq\"]"));
+    goes(&mut rig);
+    assert_eq!(told(&rig, "tried by 6060"), 0);
+    assert_eq!(number(&mut rig, 0x6060, 0), 7, "{}", rig.told());
+}
+
+/// What 6502 does not name is not used, and what it is told with its value.
+#[test]
+fn a_mode_that_the_drive_lacks_is_told_with_what_it_has() {
+    let mut rig = Rig::new(settings("", ""));
+    node(&mut rig, 0).dictionary_mut().set(0x6502, 0, 0x2D);
+    rig.run_for(millis(5_000));
+    let text = "node 1 cannot be used: position needs one of the modes csp, ip, the drive has none of them: 6502:00 is 0x0000002d; it is left out";
+    assert!(told(&rig, text) > 0, "{}", rig.told());
+    assert_eq!(node(&mut rig, 0).statistics().rpdos, 0);
+}
+
+/// Nothing is written to a device that is no drive, and the other one is led.
+#[test]
+fn a_device_that_is_no_drive_is_left_alone() {
+    for (key, led) in [("", false), ("device_type = \"drive\"", false), ("device_type = \"any\"", true)] {
+        let mut rig = Rig::new(settings(key, ""));
+        node(&mut rig, 0).dictionary_mut().set(0x1000, 0, 0x0003_0191);
+        rig.run_for(millis(5_000));
+        let text = "C: another device type: identify read 1000:00: expected 0x30192, got 0x30191; nothing was written to it; \
+                    for a drive nevertheless, `device_type = \"any\"` in its [[south.can.device]]";
+        assert_eq!(told(&rig, text) > 0, !led, "{key}: {}", rig.told());
+        assert_eq!(number(&mut rig, 0x1017, 0) > 0, led, "{key}");
+        assert_eq!(node(&mut rig, 0).statistics().rpdos > 0, led, "{key}");
+        assert!(node(&mut rig, 1).statistics().rpdos > 0, "{key}: the other one is led");
+    }
+}
+
+/// PDOs that are taken as they arrive, and sent by a timer: the axis goes as with those at SYNC.
+#[test]
+fn asynchronous_pdos_lead_a_drive_as_well() {
+    for (keys, types) in [
+        ("rpdo_type = 0", [0, 1, 0]),
+        ("rpdo_type = 255", [255, 1, 0]),
+        ("tpdo_type = 254", [1, 254, 4]),
+        ("rpdo_type = 254\ntpdo_type = 255", [254, 255, 4]),
+    ] {
+        let mut rig = Rig::new(settings(keys, ""));
+        goes(&mut rig);
+        let found = [(0x1400, 2), (0x1800, 2), (0x1800, 5)].map(|(index, sub)| number(&mut rig, index, sub));
+        assert_eq!(found, types, "{keys}");
+        assert_eq!(told(&rig, "missing"), 0, "{}", rig.told());
+    }
+}
+
 const IDENTITY: &str =
     "identity = { vendor_id = 0x319, product_code = 7, revision_number = 0x1_0002, serial_number = 42 }";
 
@@ -219,16 +295,17 @@ fn a_device_that_has_another_node_id_keeps_it() {
     let device = CanDevice {
         node: NodeId::new(9).unwrap(),
         expected: Expected {
-            device_type: None,
             vendor: Some(0x319),
             product: Some(7),
             revision: Some(0x1_0002),
             serial: Some(42),
+            ..Expected::DRIVE
         },
         lss: None,
         file: None,
         stores: false,
         keeps_mapping: false,
+        types: [None; 2],
         guarding: None,
     };
     rig.can[0].bus.add(stand_in(device.node, 1, Some(&device)).unwrap());

@@ -35,9 +35,12 @@ impl AxisChannel {
             self.report(now, system, Report::Silent);
             return;
         };
+        let sampled = received.at.unwrap_or(sampled);
         if !received.fresh {
             self.age_feedback();
-            self.counters.lost_telegrams = self.counters.lost_telegrams.saturating_add(1);
+            if received.at.is_none() {
+                self.counters.lost_telegrams = self.counters.lost_telegrams.saturating_add(1);
+            }
             self.tick(now, system);
             return;
         }

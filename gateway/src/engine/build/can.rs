@@ -1,7 +1,7 @@
 //! The CANopen buses of a configuration.
 
 use profile_cia402::master::config::{
-    HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, SyncConfig,
+    Expected, HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, SyncConfig,
 };
 use profile_cia402::wire::NodeId;
 use profile_generic::mode::{ModeSelection, OperatingMode};
@@ -57,7 +57,10 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
         let needs = needs(axis, bus, drive);
         let mut axis_pdos = AxisPdos::new(drive.axis, bus.allowed_losses, &mut spare)
             .ok_or_else(|| misfit(Misfit::Identifiers))?;
-        axis_pdos.kept = bus.device(drive.node).is_some_and(|device| device.keeps_mapping);
+        axis_pdos.cycle = bus.cycle_time;
+        if let Some(device) = bus.device(drive.node) {
+            (axis_pdos.kept, axis_pdos.types) = (device.keeps_mapping, device.types);
+        }
         let telegram = mapping.cia402_telegram(&needs).map_err(|error| misfit(error.into()))?;
         let found = described(bus, drive.node);
         let both = pdos(mapping, &axis_pdos, &telegram.command, &telegram.feedback, found.as_ref());
@@ -116,7 +119,7 @@ fn node(bus: &Can, node: NodeId) -> NodeConfig {
         timeout_ms: bus.heartbeat_ms.saturating_mul(HEARTBEATS),
     };
     NodeConfig {
-        expected: device.map(|device| device.expected).unwrap_or_default(),
+        expected: device.map_or(Expected::DRIVE, |device| device.expected),
         stamp: file.filter(|file| !file.writes.is_empty()).map(|file| file.stamp),
         writes: file.map(|file| file.writes.clone()).unwrap_or_default(),
         store: device.is_some_and(|device| device.stores),
@@ -159,6 +162,7 @@ pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
         parameters: parameters(axis),
         acknowledges: drive.acknowledges,
         tells_voltage: drive.tells_voltage,
+        drive_modes: drive.drive_modes.clone(),
         left_out: drive.left_out.clone(),
         offsets: drive.offsets.clone(),
         captures: axis.events,

@@ -64,6 +64,8 @@ pub struct Received<'a> {
     pub data: &'a [u8],
     /// Whether they came in the last cycle.
     pub fresh: bool,
+    /// When they came, of a drive that sends by a timer of its own and not in step with the cycle: not every cycle has some.
+    pub at: Option<MonotonicTime>,
     /// Whether the drive takes part: it was heard, and has not been lost for longer than its connection bears.
     pub alive: bool,
 }

@@ -46,6 +46,8 @@ pub struct Cia402Axis {
     pub acknowledges: bool,
     /// It tells by bit 4 whether its power stage is supplied.
     pub tells_voltage: bool,
+    /// Its modes of operation, where it does not tell them by 6502, or tells wrong ones.
+    pub drive_modes: Option<Vec<i8>>,
     /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
     /// Offsets that the drive is to add to its set-points; they go to it in every cycle, so none does unless it is named here.
@@ -78,6 +80,17 @@ impl Cia402Axis {
     }
 }
 
+/// How modes of operation are tried: by these objects of the axis, and which ones, by name and number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModeWords {
+    /// Where a mode is written.
+    pub mode: Object,
+    /// Where it is shown.
+    pub shown: Object,
+    /// The modes.
+    pub modes: Vec<(String, i8)>,
+}
+
 /// Why no program can be made for an axis.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Cia402Error {
@@ -88,10 +101,12 @@ pub enum Cia402Error {
     #[error("expected at least one operating mode, got none")]
     NoMode,
     /// The drive has no mode of operation that an operating mode can be.
-    #[error("{mode} needs one of the modes {wanted}, the drive has none of them by 6502")]
+    #[error("{mode} needs one of the modes {wanted}, the drive has none of them: 6502:00 is {told:#010x}")]
     NotSupported {
         /// The mode.
         mode: ModeSelection,
+        /// What the drive tells, or what was tried.
+        told: u32,
         /// The drive's modes that would do.
         wanted: String,
     },
@@ -170,7 +185,9 @@ impl Cia402Tables {
                 None => {
                     let names: Vec<_> =
                         rules.flat_map(|rule| &rule.modes).map(|mode| mode.name.as_str()).collect();
-                    return Err(Cia402Error::NotSupported { mode: *selection, wanted: names.join(", ") });
+                    let told = self.modes_told(facts).unwrap_or_default();
+                    let wanted = names.join(", ");
+                    return Err(Cia402Error::NotSupported { mode: *selection, told, wanted });
                 }
             }
         }
@@ -194,8 +211,60 @@ impl Cia402Tables {
     }
 
     fn has_mode(&self, mode: &DriveMode, facts: &ObjectFacts) -> bool {
-        let supported = facts.integer(self.words.modes_supported, Width::U32);
-        supported.is_none_or(|word| word >> mode.bit & 1 != 0)
+        self.modes_told(facts).is_none_or(|word| word >> mode.bit & 1 != 0)
+    }
+
+    /// What 6502 tells.
+    fn modes_told(&self, facts: &ObjectFacts) -> Option<u32> {
+        u32::try_from(facts.integer(self.words.modes_supported, Width::U32)?).ok()
+    }
+
+    /// What has to be tried of a drive that does not tell its modes of operation, as one without 6502 and one with a 6502 of 0.
+    pub(in crate::mapping) fn modes_untold(
+        &self,
+        axis: &Cia402Axis,
+        facts: &mut ObjectFacts,
+    ) -> Option<ModeWords> {
+        if let Some(codes) = &axis.drive_modes {
+            self.has_modes(facts, codes.iter().copied());
+            return None;
+        }
+        if self.modes_told(facts).is_some_and(|word| word != 0) {
+            return None;
+        }
+        let on_axis = |object: Object| match axis.item(object)? {
+            Item::Object(object) => Some(object),
+            _ => None,
+        };
+        let mut modes: Vec<(String, i8)> = Vec::new();
+        for mode in self.modes_of(axis) {
+            if !modes.iter().any(|(_, code)| *code == mode.code) {
+                modes.push((mode.name.clone(), mode.code));
+            }
+        }
+        Some(ModeWords { mode: on_axis(self.words.mode)?, shown: on_axis(self.words.mode_shown)?, modes })
+    }
+
+    /// Notes that the drive has these modes of operation and no others.
+    pub(in crate::mapping) fn has_modes(&self, facts: &mut ObjectFacts, codes: impl Iterator<Item = i8>) {
+        let bit = |code: i8| self.all_modes().find(|mode| mode.code == code).map(|mode| mode.bit);
+        let word = codes.filter_map(bit).fold(0_u32, |word, bit| word | 1 << bit);
+        facts.note_data(self.words.modes_supported, &word.to_le_bytes());
+    }
+
+    /// The modes of operation of an axis, those that are wanted most first.
+    fn modes_of<'a>(&'a self, axis: &'a Cia402Axis) -> impl Iterator<Item = &'a DriveMode> {
+        axis.modes.iter().flat_map(|selection| {
+            let led =
+                self.modes.iter().filter(|rule| rule.selection == *selection).flat_map(|rule| &rule.modes);
+            let own = self.procedures.iter().filter(|rule| rule.selection == *selection);
+            led.chain(own.flat_map(|rule| &rule.modes))
+        })
+    }
+
+    fn all_modes(&self) -> impl Iterator<Item = &DriveMode> {
+        let own = self.procedures.iter().flat_map(|rule| &rule.modes);
+        self.modes.iter().flat_map(|rule| &rule.modes).chain(own)
     }
 
     /// Whether the drive lacks a value without which a mode does not work.

@@ -24,7 +24,7 @@ use profile_generic::state::{Action, Report};
 use profile_generic::time::DurationNs;
 
 pub use self::commissioning::{ObjectStep, Plan};
-pub use self::compile::{Cia402Axis, Cia402Error};
+pub use self::compile::{Cia402Axis, Cia402Error, ModeWords};
 pub use self::facts::ObjectFacts;
 
 use self::captures::CaptureRule;

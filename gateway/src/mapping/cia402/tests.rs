@@ -24,6 +24,7 @@ fn axis(modes: &[OperatingMode]) -> Cia402Axis {
         left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
         acknowledges: true,
         tells_voltage: true,
+        drive_modes: None,
         ..Cia402Axis::default()
     }
 }

@@ -1,5 +1,6 @@
 //! How devices come up: the order of the steps, odd devices, and the error statuses.
 
+use super::peer::Objects;
 use super::*;
 use crate::sdo::request::SdoOperation;
 
@@ -361,6 +362,126 @@ fn a_mapping_that_the_device_does_not_take() {
         assert_eq!(rig.master.mapping(id(1), Direction::Transmit, 1), Some(&[STATUSWORD][..]));
         rig.comes_up(&[1, 2]);
         assert_eq!(rig.master.consumer(id(1), 1).unwrap().data, [0x27, 6]);
+    }
+}
+
+/// What a device takes and has for RPDO 1 and TPDO 1, and what it is used with: the type of RPDO 1 and TPDO 1, event timer.
+#[test]
+fn a_transmission_type_that_the_device_does_not_take_is_followed_by_the_next_one() {
+    use TransmissionType as T;
+    const RPDO: &[TransmissionType] = &[T::SYNC_ON_EVENT, T::EVENT_PROFILE, T::EVENT_MANUFACTURER];
+    const TPDO: &[TransmissionType] = &[T::EVENT_PROFILE, T::EVENT_MANUFACTURER];
+    type Case = (&'static str, fn(&mut Objects), Result<[u32; 3], &'static str>);
+    let (rpdo, tpdo) = (Mux::new(0x1400, 2), Mux::new(0x1800, 2));
+    let cases: [Case; 9] = [
+        ("all", |_| {}, Ok([1, 1, 0])),
+        ("0, 254, 255", |it| it.take(0x1400, &[0, 254, 255]), Ok([0, 1, 0])),
+        ("254", |it| it.take(0x1400, &[254]), Ok([254, 1, 0])),
+        ("TPDO 255", |it| it.take(0x1800, &[255]), Ok([1, 255, 5])),
+        ("TPDO 254", |it| it.take(0x1800, &[254]), Ok([1, 254, 5])),
+        ("fixed", |it| it.fix(&[(0x1400, 255), (0x1800, 255)]), Ok([255, 255, 5])),
+        ("fixed, each 17th", |it| it.fix(&[(0x1400, 17)]), Ok([17, 1, 0])),
+        (
+            "TPDO fixed, by remote frame",
+            |it| it.fix(&[(0x1800, 253)]),
+            Err("map read 1800:02: expected 0x1, got 0xfd"),
+        ),
+        (
+            "no event timer",
+            |it| {
+                it.take(0x1800, &[255]);
+                it.refuse.insert(Mux::new(0x1800, 5), AbortCode::NO_SUB_INDEX);
+            },
+            Err("map write 1800:05: refused with 06090011: sub-index does not exist"),
+        ),
+    ];
+    for (name, misdeed, expected) in cases {
+        let mut config = network(2);
+        let drive = &mut config.nodes[0];
+        drive.rpdos[0].others = RPDO;
+        drive.tpdos[0].others = TPDO;
+        (drive.tpdos[0].event_timer_ms, drive.tpdos[0].deadline_ms) = (5, 10);
+        let mut rig = rig(config);
+        misdeed(&mut rig.device(1).objects);
+        rig.master.start(rig.now);
+        let Ok(expected) = expected else {
+            rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+            assert_eq!(rig.failed(), (BootStatus::CONFIGURATION, expected.unwrap_err().into()), "{name}");
+            rig.comes_up(&[2]);
+            continue;
+        };
+        rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+        let has = |object| rig.devices[0].objects.number(object);
+        assert_eq!([has(rpdo), has(tpdo), has(Mux::new(0x1800, 5))], expected, "{name}");
+        let wanted = T::EVERY_SYNC;
+        let told: Vec<_> = [(Direction::Receive, expected[0]), (Direction::Transmit, expected[1])]
+            .into_iter()
+            .filter(|(_, found)| *found != 1)
+            .map(|(direction, found)| Event::TransmissionAdopted {
+                node: id(1),
+                direction,
+                number: 1,
+                wanted,
+                found: TransmissionType(u8::try_from(found).unwrap()),
+            })
+            .collect();
+        let said: Vec<_> =
+            rig.log.iter().filter(|event| matches!(event, Event::TransmissionAdopted { .. })).collect();
+        assert_eq!(said, told.iter().collect::<Vec<_>>(), "{name}");
+        rig.comes_up(&[1, 2]);
+    }
+}
+
+#[test]
+fn what_an_adopted_transmission_type_means_is_said() {
+    let said = |direction, found| {
+        let wanted = TransmissionType::EVERY_SYNC;
+        Event::TransmissionAdopted {
+            node: id(3),
+            direction,
+            number: 2,
+            wanted,
+            found: TransmissionType(found),
+        }
+        .to_string()
+    };
+    assert_eq!(
+        said(Direction::Receive, 0),
+        "node 3 does not take transmission type 1 for RPDO 2 (1401:02), and has 0"
+    );
+    assert_eq!(
+        said(Direction::Receive, 255),
+        "node 3 does not take transmission type 1 for RPDO 2 (1401:02), and has 255; it counts as soon as it is there, and is sent a cycle later"
+    );
+    assert_eq!(
+        said(Direction::Transmit, 254),
+        "node 3 does not take transmission type 1 for TPDO 2 (1801:02), and has 254; it comes by its event timer, not at SYNC"
+    );
+}
+
+/// Nothing is written to a device that is no drive.
+#[test]
+fn a_device_of_another_profile_is_told_by_its_type_before_anything_is_written() {
+    for (device_type, comes_up) in
+        [(0x0002_0192, true), (0xFFFF_0192, true), (0x0002_0191, false), (0x0022_0811, false), (0, false)]
+    {
+        let mut config = network(2);
+        config.nodes[0].expected = Expected { profile: Some(0x192), ..Expected::default() };
+        let data = SdoData::inline(&[1]).unwrap();
+        config.nodes[0].writes = vec![Write { object: Mux::new(0x6060, 0), data }];
+        let mut rig = rig(config);
+        rig.device(1).objects.set(Mux::DEVICE_TYPE, device_type);
+        rig.master.start(rig.now);
+        if comes_up {
+            rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+            continue;
+        }
+        rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+        let expected = device_type & 0xFFFF_0000 | 0x192;
+        let step = format!("identify read 1000:00: expected {expected:#x}, got {device_type:#x}");
+        assert_eq!(rig.failed(), (BootStatus::DEVICE_TYPE, step));
+        assert_eq!(rig.devices[0].objects.writes, []);
+        rig.comes_up(&[2]);
     }
 }
 

@@ -113,23 +113,62 @@ fn sdo_frames_are_bounded_per_period() {
     }
 }
 
-#[test]
-fn event_driven_rpdos_go_at_once() {
+/// A network with an event-driven RPDO 2 at its device, in operation.
+fn event_driven(sync: Option<SyncConfig>) -> Rig {
     let mut config = network(1);
-    config.nodes[0].rpdos.push(PdoConfig {
+    config.sync = sync;
+    config.nodes[0].rpdos = vec![PdoConfig {
         transmission: TransmissionType::EVENT_PROFILE,
         ..PdoConfig::cyclic(2, vec![CONTROLWORD])
-    });
+    }];
+    if sync.is_none() {
+        config.nodes[0].tpdos.clear();
+    }
     let mut rig = rig(config);
+    rig.cyclic = false;
     rig.master.start(rig.now);
     rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
     rig.run_ms(1);
     rig.forget();
+    rig
+}
+
+#[test]
+fn event_driven_rpdos_go_at_once_in_a_network_without_sync() {
+    let mut rig = event_driven(None);
     rig.master.producer(id(1), 2).unwrap().copy_from_slice(&[6, 0]);
     assert!(rig.master.commit(id(1), 2));
     rig.settle();
     let sent: Vec<_> = rig.sent.iter().map(|(_, frame)| frame.to_string()).collect();
     assert_eq!(sent, ["301#06 00"]);
+}
+
+/// A device that takes an RPDO as soon as it is there gets it when a synchronous one takes what it was sent a period before.
+#[test]
+fn event_driven_rpdos_wait_for_the_sync_at_which_synchronous_ones_count() {
+    let mut rig = event_driven(network(1).sync);
+    // Values of three periods, of which the second has none, and one that is taken back.
+    let mut periods = Vec::new();
+    for value in [Some(6), None, Some(7), Some(15), None] {
+        rig.until("SYNC", |rig| rig.sent.iter().any(|(_, frame)| frame.id() == cob_id::SYNC));
+        rig.settle();
+        let sent = rig.sent.iter().filter(|(_, frame)| frame.id() == Id::Standard(0x301));
+        periods.push(sent.map(|(_, frame)| frame.data()[0]).collect::<Vec<_>>());
+        rig.forget();
+        if let Some(value) = value {
+            rig.master.producer(id(1), 2).unwrap().copy_from_slice(&[value, 0]);
+            assert!(rig.master.commit(id(1), 2));
+        }
+        if value == Some(15) {
+            rig.master.withdraw(id(1), 2);
+        }
+    }
+    assert_eq!(periods, [vec![], vec![], vec![6], vec![], vec![]], "7 was sent with 15 taken back");
+    rig.master.producer(id(1), 2).unwrap().copy_from_slice(&[9, 0]);
+    assert!(rig.master.commit(id(1), 2));
+    rig.run_ms(9);
+    let sent: Vec<_> = rig.sent.iter().filter(|(_, frame)| frame.id() == Id::Standard(0x301)).collect();
+    assert_eq!(sent.iter().map(|(_, frame)| frame.data()[0]).collect::<Vec<_>>(), [9]);
 }
 
 #[test]

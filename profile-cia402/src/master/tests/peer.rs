@@ -13,6 +13,8 @@ pub struct Objects {
     pub values: BTreeMap<Mux, Vec<u8>>,
     /// Objects that refuse to be written.
     pub refuse: BTreeMap<Mux, AbortCode>,
+    /// Values that an object takes, where it does not take all.
+    pub takes: BTreeMap<Mux, Vec<u64>>,
     /// Whether mappings cannot be changed.
     pub fixed_mapping: bool,
     /// What a reset of the communication gives to parameters of PDOs instead.
@@ -112,6 +114,7 @@ impl Objects {
         let mut objects = Self {
             values: BTreeMap::new(),
             refuse: BTreeMap::new(),
+            takes: BTreeMap::new(),
             fixed_mapping: false,
             fixed: vec![],
             writes: vec![],
@@ -166,6 +169,21 @@ impl Objects {
         }
         for (object, value) in self.fixed.clone() {
             self.set(object, value);
+        }
+    }
+
+    /// The first PDO with these communication parameters takes no other transmission types.
+    pub fn take(&mut self, communication: u16, types: &[u64]) {
+        self.takes.insert(Mux::new(communication, 2), types.to_vec());
+    }
+
+    /// These transmission types cannot be changed.
+    pub fn fix(&mut self, types: &[(u16, u32)]) {
+        for (communication, value) in types {
+            let object = Mux::new(*communication, 2);
+            self.refuse.insert(object, AbortCode::READ_ONLY);
+            self.fixed.push((object, *value));
+            self.set(object, *value);
         }
     }
 
@@ -243,6 +261,9 @@ impl ObjectAccess for Objects {
             return Err(AbortCode::LENGTH);
         }
         let number = data.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte));
+        if self.takes.get(&object).is_some_and(|takes| !takes.contains(&number)) {
+            return Err(AbortCode::VALUE);
+        }
         self.writes.push((object, number));
         self.values.insert(object, data.to_vec());
         Ok(())
@@ -257,6 +278,8 @@ pub struct Device {
     server: Server,
     out: VecDeque<(MonotonicTime, Frame)>,
     next_heartbeat: Option<MonotonicTime>,
+    /// When TPDO 1 was sent last by its event timer.
+    event_at: MonotonicTime,
     /// Bytes of its TPDOs.
     pub values: [u8; 8],
     /// RPDOs that came.
@@ -294,6 +317,7 @@ impl Device {
             server: Server::new(ServerConfig { capacity: 1_024, ..ServerConfig::default() }),
             out: VecDeque::new(),
             next_heartbeat: None,
+            event_at: MonotonicTime::ZERO,
             values: [0x27, 6, 1, 2, 3, 4, 5, 6],
             received: vec![],
             syncs: vec![],
@@ -406,19 +430,34 @@ impl Device {
             let word = CobId(self.objects.number(Mux::new(0x1800 + number, 1)));
             let every = self.objects.number(Mux::new(0x1800 + number, 2));
             if word.is_valid() && every == 1 {
-                let mapping = 0x1A00 + number;
-                let count = u8::try_from(self.objects.number(Mux::new(mapping, 0))).unwrap();
-                let bits: u32 =
-                    (1..=count).map(|sub| self.objects.number(Mux::new(mapping, sub)) & 0xFF).sum();
-                let len = self.tpdo_len.unwrap_or(usize::try_from(bits / 8).unwrap());
-                self.send(now + DurationNs::from_micros(500), frame(word.id(), &self.values[..len]));
+                let tpdo = self.tpdo(number);
+                self.send(now + DurationNs::from_micros(500), tpdo);
             }
         }
     }
 
+    /// A TPDO, counted from 0.
+    fn tpdo(&self, number: u16) -> Frame {
+        let word = CobId(self.objects.number(Mux::new(0x1800 + number, 1)));
+        let mapping = 0x1A00 + number;
+        let count = u8::try_from(self.objects.number(Mux::new(mapping, 0))).unwrap();
+        let bits: u32 = (1..=count).map(|sub| self.objects.number(Mux::new(mapping, sub)) & 0xFF).sum();
+        let len = self.tpdo_len.unwrap_or(usize::try_from(bits / 8).unwrap());
+        frame(word.id(), &self.values[..len])
+    }
+
+    /// When TPDO 1 is due by its event timer.
+    fn next_event(&self) -> Option<MonotonicTime> {
+        let word = CobId(self.objects.number(Mux::new(0x1800, 1)));
+        let kind = self.objects.number(Mux::new(0x1800, 2));
+        let timer = self.objects.number(Mux::new(0x1800, 5));
+        let runs = self.state.has_pdo() && word.is_valid() && kind >= 254 && timer > 0;
+        runs.then(|| self.event_at + DurationNs::from_millis(timer.into()))
+    }
+
     pub fn wake_at(&self) -> Option<MonotonicTime> {
         let frames = self.out.front().map(|(at, _)| *at);
-        [frames, self.next_heartbeat].into_iter().flatten().min().filter(|_| !self.dead)
+        [frames, self.next_heartbeat, self.next_event()].into_iter().flatten().min().filter(|_| !self.dead)
     }
 
     pub fn poll(&mut self, now: MonotonicTime) -> Option<Frame> {
@@ -432,6 +471,10 @@ impl Device {
             if !self.no_heartbeat {
                 return Some(heartbeat);
             }
+        }
+        if self.next_event().is_some_and(|at| now >= at) {
+            self.event_at = now;
+            return Some(self.tpdo(0));
         }
         match self.out.front() {
             Some((at, _)) if now >= *at => self.out.pop_front().map(|(_, frame)| frame),

@@ -21,6 +21,8 @@ use profile_cia402::wire::{Mux, NodeId};
 
 use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, Spread, object};
 use super::look::Look;
+use super::trial::Trial;
+pub use super::trial::Tried;
 use crate::engine::notice::Notice;
 use crate::mapping::{
     Cia402Axis, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep, Plan,
@@ -47,6 +49,8 @@ pub struct Run {
 pub enum Job {
     /// A device can be set up.
     Begin(Run),
+    /// The device does not let its mapping be changed, so that the PDOs that it has are to be used; or it is to be tried again.
+    Keep(Run, bool),
     /// What came of a request.
     Outcome(Run, SdoOutcome),
     /// A request that could not be made.
@@ -162,6 +166,8 @@ pub enum Misfit {
 enum Task {
     /// A plan of the tables.
     Plan(Plan),
+    /// Modes of operation are tried, of a drive that does not tell them.
+    Try(Trial),
     /// The PDOs are read that its device keeps.
     Look(Look),
 }
@@ -179,6 +185,8 @@ struct Work {
     steps: VecDeque<ObjectStep>,
     sent: VecDeque<ObjectStep>,
     passed_over: Vec<StepFailure>,
+    /// The PDOs that the device has are used, because it does not let them be changed.
+    falls_back: bool,
     pdos: [Vec<PdoConfig>; 2],
 }
 
@@ -220,6 +228,7 @@ impl Commissioner {
             steps: VecDeque::new(),
             sent: VecDeque::new(),
             passed_over: Vec::new(),
+            falls_back: false,
             pdos: [Vec::new(), Vec::new()],
         };
         let devices = devices.into_iter().map(work).collect();
@@ -242,6 +251,11 @@ impl Commissioner {
                 Job::Begin(run) => {
                     if let Some(work) = devices.get_mut(usize::from(run.device)) {
                         work.begin(run, desk);
+                    }
+                }
+                Job::Keep(run, keeps) => {
+                    if let Some(work) = devices.get_mut(usize::from(run.device)) {
+                        work.falls_back = keeps;
                     }
                 }
                 Job::Outcome(run, outcome) => {
@@ -339,7 +353,7 @@ impl Work {
         let is_through = match &self.at {
             Some((_, Task::Look(look))) => look.under_way() == 0,
             Some((_, Task::Plan(_))) => self.sent.is_empty(),
-            None => false,
+            Some((_, Task::Try(_))) | None => false,
         };
         if is_through && let Some((place, task)) = self.at.take() {
             self.through(place, task, desk);
@@ -348,13 +362,14 @@ impl Work {
 
     fn through(&mut self, place: usize, task: Task, desk: &mut Desk) {
         let found = match task {
-            Task::Plan(Plan::Ask) => return self.set_out(place, Plan::Tell, desk),
-            Task::Plan(_) if self.axes[place].pdos.kept => {
+            Task::Plan(Plan::Ask) => return self.learn_modes(place, desk),
+            Task::Plan(_) if self.axes[place].pdos.kept || self.falls_back => {
                 self.at = Some((place, Task::Look(Look::new(self.axes[place].pdos))));
                 return self.go_on(desk);
             }
             Task::Plan(_) => None,
             Task::Look(look) => Some(look.found()),
+            Task::Try(trial) => return self.tried(place, trial, desk),
         };
         let axis = self.number(place);
         if !self.passed_over.is_empty() {
@@ -389,7 +404,44 @@ impl Work {
         }
     }
 
+    /// The drive has been asked everything. What it does not tell of its modes stands in the configuration, or is tried.
+    fn learn_modes(&mut self, place: usize, desk: &mut Desk) {
+        let needs = &self.axes[place].needs;
+        if let Some(words) = desk.mapping.cia402_modes_untold(needs, &mut self.facts) {
+            let mut trial = Trial::new(words);
+            if let Some(request) = trial.begin() {
+                self.at = Some((place, Task::Try(trial)));
+                desk.waiting.push_back(Done::Submit(self.run, request));
+                return;
+            }
+        }
+        self.set_out(place, Plan::Tell, desk);
+    }
+
+    fn tried(&mut self, place: usize, trial: Trial, desk: &mut Desk) {
+        let (axis, node, tried) = (self.number(place), self.node, trial.tried());
+        desk.mapping.cia402_has_modes(&mut self.facts, tried.codes());
+        desk.waiting.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
+        self.set_out(place, Plan::Tell, desk);
+    }
+
     fn handle(&mut self, outcome: &SdoOutcome, desk: &mut Desk) {
+        if let Some((place, Task::Try(trial))) = &mut self.at {
+            let place = *place;
+            match trial.handle(outcome) {
+                Ok(Some(request)) => desk.waiting.push_back(Done::Submit(self.run, request)),
+                Ok(None) => {
+                    if let Some((place, task)) = self.at.take() {
+                        self.through(place, task, desk);
+                    }
+                }
+                Err(failure) => {
+                    let object = Object { index: outcome.object.index, sub: outcome.object.sub };
+                    self.break_off(place, StepFailure { what: "trying", object, failure }, desk);
+                }
+            }
+            return;
+        }
         if let Some((place, Task::Look(look))) = &mut self.at {
             let place = *place;
             return match look.handle(outcome) {

@@ -10,11 +10,14 @@ use arrayvec::ArrayVec;
 use profile_cia402::drive::index::AXIS_OFFSET;
 use profile_cia402::eds::drive::Pdo;
 use profile_cia402::master::config::{Direction, MappingPolicy, PdoConfig};
-use profile_cia402::wire::pdo::{MappingEntry, PDO_LEN_MAX};
+use profile_cia402::wire::pdo::{MappingEntry, PDO_LEN_MAX, TransmissionType};
 use profile_cia402::wire::{CobId, Mux, NodeId, cob_id};
 use profile_generic::can::Id;
+use profile_generic::time::DurationNs;
 
 use crate::mapping::{Item, Object};
+
+const NANOS_IN_MS: i64 = 1_000_000;
 
 /// PDOs of an axis, each way.
 pub const PDOS_MAX: usize = 4;
@@ -66,7 +69,19 @@ pub struct AxisPdos {
     pub allowed_losses: u16,
     /// Whether they are used as the device has them.
     pub kept: bool,
+    /// Transmission types of RPDOs and TPDOs, where it is not left to the device.
+    pub types: [Option<TransmissionType>; 2],
+    /// From one SYNC to the next.
+    pub cycle: DurationNs,
 }
+
+/// What RPDOs are given when a device does not take 1. Other synchronous types are the same to one that receives.
+const RPDO_TYPES: &[TransmissionType] =
+    &[TransmissionType::SYNC_ON_EVENT, TransmissionType::EVENT_PROFILE, TransmissionType::EVENT_MANUFACTURER];
+
+/// What TPDOs are given. Those at every second SYNC and slower would leave cycles without values.
+const TPDO_TYPES: &[TransmissionType] =
+    &[TransmissionType::EVENT_PROFILE, TransmissionType::EVENT_MANUFACTURER];
 
 /// A PDO as a device has it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -171,7 +186,8 @@ impl AxisPdos {
             0 => None,
             _ => Some(spare.next()?),
         };
-        Some(Self { first: AXIS_STEP * axis + 1, ids, allowed_losses, kept: false })
+        let first = AXIS_STEP * axis + 1;
+        Some(Self { first, ids, allowed_losses, kept: false, types: [None; 2], cycle: DurationNs::ZERO })
     }
 
     /// Spreads values, with their lengths in bytes, over PDOs at every SYNC.
@@ -209,13 +225,33 @@ impl AxisPdos {
         for (number, (place, mapping)) in (self.first..).zip(pdos.into_iter().enumerate()) {
             spread.numbers.push(number);
             let id = ids.map(|ids| ids[place]);
-            configs.push(PdoConfig {
-                id,
-                allowed_losses: self.allowed_losses,
-                ..PdoConfig::cyclic(number, mapping)
-            });
+            configs.push(PdoConfig { id, ..self.config(direction, number, mapping) });
         }
         Ok((configs, spread))
+    }
+
+    /// A PDO that goes in every cycle, as far as the device lets it.
+    fn config(&self, direction: Direction, number: u16, mapping: Vec<MappingEntry>) -> PdoConfig {
+        let (place, others) = match direction {
+            Direction::Receive => (0, RPDO_TYPES),
+            Direction::Transmit => (1, TPDO_TYPES),
+        };
+        let (transmission, others) = match self.types[place] {
+            Some(wanted) => (wanted, &[][..]),
+            None => (TransmissionType::EVERY_SYNC, others),
+        };
+        // The event timer counts milliseconds; one that was sent late is not missing yet.
+        let every_ms = ((self.cycle.as_nanos() + NANOS_IN_MS - 1) / NANOS_IN_MS).max(1);
+        let every_ms = u16::try_from(every_ms).unwrap_or(u16::MAX);
+        let transmits = direction == Direction::Transmit;
+        PdoConfig {
+            transmission,
+            others,
+            event_timer_ms: if transmits { every_ms } else { 0 },
+            deadline_ms: if transmits { every_ms.saturating_mul(2) } else { 0 },
+            allowed_losses: self.allowed_losses,
+            ..PdoConfig::cyclic(number, mapping)
+        }
     }
 
     fn ids_of(&self, direction: Direction) -> Option<[Id; PDOS_MAX]> {
@@ -290,9 +326,8 @@ impl AxisPdos {
             }
             configs.push(PdoConfig {
                 id: pdo.id.or_else(|| Some(self.ids_of(direction)?[place])),
-                allowed_losses: self.allowed_losses,
                 policy: MappingPolicy::Keep,
-                ..PdoConfig::cyclic(pdo.number, pdo.mapping.clone())
+                ..self.config(direction, pdo.number, pdo.mapping.clone())
             });
         }
         Ok((configs, spread))

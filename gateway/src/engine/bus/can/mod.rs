@@ -11,12 +11,14 @@ pub mod layout;
 pub mod load;
 mod look;
 pub mod lss;
+mod trial;
 
 use arrayvec::ArrayVec;
 use profile_cia402::master::boot::{BootState, BootStatus};
 use profile_cia402::master::config::{ConfigError, MasterConfig};
 use profile_cia402::master::event::{Event, Output, Refusal as FrameRefusal, Ticket};
 use profile_cia402::master::pdo_set::PdoSet;
+use profile_cia402::master::report::ReportRow;
 use profile_cia402::master::{ConsumerState, Master, Priority};
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{AbortCode, Mux, NodeId};
@@ -88,6 +90,8 @@ struct Drive {
     /// Whether every value came in the last cycle, and whether none is lost.
     fresh: bool,
     alive: bool,
+    /// When they came, where a TPDO does not come at SYNC: the oldest of them.
+    at: Option<MonotonicTime>,
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
 }
 
@@ -99,6 +103,8 @@ struct Device {
     stage: Stage,
     runs: u32,
     backoff: Backoff,
+    /// It does not let its mapping be changed: the PDOs that it has are used.
+    keeps: bool,
 }
 
 /// The bus.
@@ -141,6 +147,7 @@ impl CanBus {
             feedback: Values::new(),
             fresh: false,
             alive: false,
+            at: None,
             accesses: ArrayVec::new(),
         };
         let device = |(node, axes): &(NodeId, Vec<AxisSetup>)| Device {
@@ -149,6 +156,7 @@ impl CanBus {
             stage: Stage::Absent,
             runs: 0,
             backoff: Backoff::NONE,
+            keeps: false,
         };
         let devices: Vec<_> = devices.iter().map(device).collect();
         let places = devices.iter().enumerate().flat_map(|(place, device)| {
@@ -194,6 +202,8 @@ impl CanBus {
                 let good = |state| matches!(state, ConsumerState::Good | ConsumerState::Missing);
                 drive.alive = all && consumers.iter().all(|consumer| good(consumer.state));
                 drive.fresh = all && consumers.iter().all(|consumer| consumer.fresh);
+                let own = consumers.iter().filter(|consumer| !consumer.cyclic);
+                drive.at = own.filter_map(|consumer| consumer.at).min();
                 for part in spread.parts() {
                     let bytes =
                         consumers.get(part.pdo).and_then(|pdo| pdo.data.get(part.at..part.at + part.len));
@@ -214,9 +224,9 @@ impl CanBus {
                     device.backoff = Backoff::NONE;
                 }
             }
-            Event::BootFailed { node, .. } => {
+            Event::BootFailed { node, step, .. } => {
                 self.lose(now, system, *node, axes);
-                self.try_later(now, *node);
+                self.fall_back(now, *node, *step);
             }
             Event::Rebooted { node, .. }
             | Event::HeartbeatLost { node }
@@ -300,6 +310,25 @@ impl CanBus {
         device.stage = Stage::Absent;
         let node = device.node;
         let _ = self.master.stop_node(now, node);
+        self.try_later(now, node);
+    }
+
+    /// A device did not come up. One that does not let its mapping be changed is tried at once with the PDOs that it has, any other one
+    /// after a pause.
+    fn fall_back(&mut self, now: MonotonicTime, node: NodeId, step: Option<ReportRow>) {
+        let fixed = step.is_some_and(|step| step.is_refused_mapping());
+        if let Some(place) = self.devices.iter().position(|device| device.node == node) {
+            let device = &mut self.devices[place];
+            let keeps = fixed && !device.keeps;
+            let changes = keeps != device.keeps;
+            let run = device.run(place);
+            if changes && self.commissioner.push(Job::Keep(run, keeps)) {
+                device.keeps = keeps;
+                if keeps && self.master.retry(now, node).is_ok() {
+                    return;
+                }
+            }
+        }
         self.try_later(now, node);
     }
 
@@ -510,7 +539,7 @@ impl Bus for CanBus {
         let device = self.devices.get(device).filter(|device| self.is_operational(device))?;
         let drive = device.drives.get(drive)?;
         let data = drive.feedback.row.get(..drive.feedback.spread.len())?;
-        Some(Received { data, fresh: drive.fresh, alive: drive.alive })
+        Some(Received { data, fresh: drive.fresh, at: drive.at, alive: drive.alive })
     }
 
     fn set_idle(&mut self, _idle: bool) {}

@@ -366,7 +366,7 @@ impl Bus for DevicenetBus {
         // The master gives a drive up that has missed too many answers.
         let alive = self.master.phase(drive.plan.mac) == Some(Phase::Exchange);
         let ready = drive.stage == Stage::Ready;
-        ready.then_some(Received { data: &drive.feedback, fresh: drive.fresh, alive })
+        ready.then_some(Received { data: &drive.feedback, fresh: drive.fresh, at: None, alive })
     }
 
     fn set_idle(&mut self, _idle: bool) {}

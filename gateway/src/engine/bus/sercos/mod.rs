@@ -643,6 +643,7 @@ impl Bus for SercosBus {
         Some(Received {
             data: consumer.data,
             fresh: consumer.fresh && self.master.cycle_complete(),
+            at: None,
             alive: matches!(consumer.state, ConsumerState::Consuming | ConsumerState::Warning),
         })
     }
