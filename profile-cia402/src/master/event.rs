@@ -3,6 +3,7 @@
 use core::fmt;
 
 use profile_generic::can::{Frame, Id};
+use profile_generic::time::DurationNs;
 
 use super::boot::BootStatus;
 use super::config::Direction;
@@ -135,6 +136,15 @@ pub enum Event {
         /// What it has.
         found: TransmissionType,
     },
+    /// A device falls out again and again: nothing is done with it for a while.
+    LeftAlone {
+        /// The device.
+        node: NodeId,
+        /// How often in a row.
+        times: u32,
+        /// How long.
+        pause: DurationNs,
+    },
     /// More TPDOs than permitted did not come.
     PdoLost {
         /// The device.
@@ -243,6 +253,10 @@ impl fmt::Display for Event {
                 write!(f, "node {node} has restarted while it was in operation")
             }
             Self::Rebooted { node, operational: false } => write!(f, "node {node} has restarted"),
+            Self::LeftAlone { node, times, pause } => write!(
+                f,
+                "node {node} has restarted or was lost {times} times without being in operation for 10 s; it is left alone for {pause}"
+            ),
             Self::ProgramDownload { node } => {
                 write!(f, "node {node} has another program and is given its own")
             }

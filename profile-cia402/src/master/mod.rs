@@ -30,6 +30,7 @@ mod plan;
 mod program;
 mod queue;
 mod receive;
+mod relapse;
 pub mod report;
 mod sequence;
 mod station;

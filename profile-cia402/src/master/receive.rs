@@ -214,7 +214,7 @@ impl Master {
             (BootState::Operational, NmtState::OPERATIONAL) => {}
             (BootState::Operational, _) => self.lose(now, index, Event::StateChanged { node, state }),
             // A device that was asked in vain is there.
-            (BootState::Retry, _) => {
+            (BootState::Retry, _) if station.relapse.until(now).is_none() => {
                 self.advance(now, index, BootEvent::Elapsed);
             }
             (BootState::Resetting, _) if self.config.nodes[index].keep_alive => {
@@ -237,6 +237,13 @@ impl Master {
         if self.stations[index].is_without_program() {
             return;
         }
+        let station = &mut self.stations[index];
+        if station.relapse.until(now).is_some() {
+            return;
+        }
+        use BootState as S;
+        let by_itself = !twice && !matches!(state, S::Off | S::Resetting | S::Retry | S::Lost);
+        let relapse = if by_itself { station.relapse.count(now) } else { None };
         if !self.advance(now, index, BootEvent::BootUp) {
             return;
         }
@@ -251,6 +258,10 @@ impl Master {
         );
         if set_up {
             self.emit(Event::Rebooted { node, operational: state == BootState::Operational });
+        }
+        if relapse.is_some() {
+            self.advance(now, index, BootEvent::NoAnswer);
+            self.tell_relapse(index, relapse);
         }
     }
 

@@ -33,7 +33,10 @@ impl Master {
             (station.guard_at, station.guard_toggle) = (None, None);
         }
         match next {
-            BootState::Off => (station.give_up, station.kept) = (None, false),
+            BootState::Off => {
+                (station.give_up, station.kept) = (None, false);
+                station.relapse.forget();
+            }
             BootState::Resetting => {
                 let keep = node.keep_alive && last == BootState::Off;
                 station.nmt = (!keep).then_some(NmtCommand::RESET_COMMUNICATION);
@@ -54,10 +57,17 @@ impl Master {
                     (station.kept, station.status) = (false, None);
                 }
             }
-            BootState::Retry => station.deadline = Some(now + config.retry_time),
+            BootState::Retry => {
+                let left_alone = station.relapse.until(now);
+                if left_alone.is_some() {
+                    station.give_up = None;
+                }
+                station.deadline = Some(left_alone.unwrap_or(now + config.retry_time));
+            }
             BootState::Lost => {
                 station.nmt = Some(NmtCommand::STOP);
-                station.deadline = Some(now + config.retry_time);
+                let retry = now + config.retry_time;
+                station.deadline = Some(station.relapse.until(now).map_or(retry, |until| until.max(retry)));
             }
             BootState::Configure => {
                 station.give_up = None;
@@ -92,6 +102,7 @@ impl Master {
             }
             BootState::Operational => {
                 station.tpdos.iter_mut().for_each(|end| end.start(now));
+                station.relapse.operational(now);
                 let node = station.node;
                 self.emit(Event::Operational { node });
             }
@@ -139,9 +150,19 @@ impl Master {
         }
         let status = if guarded { BootStatus::GUARDING } else { BootStatus::HEARTBEAT_LOST };
         self.stations[index].status = Some(status);
+        let relapse = self.stations[index].relapse.count(now);
         if self.advance(now, index, BootEvent::Lost) {
             self.emit(event);
+            self.tell_relapse(index, relapse);
             self.mandatory_error(now, index);
+        }
+    }
+
+    /// Tells that a device is left alone for a while.
+    pub(super) fn tell_relapse(&mut self, index: usize, relapse: Option<(u32, DurationNs)>) {
+        if let Some((times, pause)) = relapse {
+            let node = self.stations[index].node;
+            self.emit(Event::LeftAlone { node, times, pause });
         }
     }
 

@@ -10,6 +10,7 @@ use super::event::DuplicateSign;
 use super::plan::{Step, steps_max};
 use super::program::ProgramStep;
 use super::queue::Queue;
+use super::relapse::Relapse;
 use super::report::ReportRow;
 use crate::sdo::client::{Client, ClientConfig};
 use crate::wire::emcy::Emcy;
@@ -115,6 +116,7 @@ pub(super) struct Station {
     /// Node guarding: bit 7 of the next answer; `None` for any.
     pub guard_toggle: Option<bool>,
     pub boot_up_at: Option<MonotonicTime>,
+    pub relapse: Relapse,
     /// Command and object of the last answer that was asked for, unless one may still come that was given up.
     pub last_answer: Option<[u8; 4]>,
     /// Answers that came twice.
@@ -164,6 +166,7 @@ impl Station {
             guard_at: None,
             guard_toggle: None,
             boot_up_at: None,
+            relapse: Relapse::default(),
             last_answer: None,
             strays: 0,
             signs: ArrayVec::new(),

@@ -432,6 +432,49 @@ fn a_transmission_type_that_the_device_does_not_take_is_followed_by_the_next_one
     }
 }
 
+/// Each time that it comes into operation it restarts: it is set up less and less often, the other one goes on, and it comes
+/// back when it stays.
+#[test]
+fn a_device_that_restarts_again_and_again_is_left_alone_for_longer_and_longer() {
+    let mut rig = running(2);
+    rig.keep(&[2]);
+    let begin = rig.now;
+    let mut boot_ups = 0_u64;
+    while rig.now.since(begin) < DurationNs::from_secs(60) {
+        if rig.state(1) == BootState::Operational {
+            rig.run_ms(100);
+            let now = rig.now;
+            rig.device(1).reset(now);
+            boot_ups += 1;
+        }
+        rig.run_ms(50);
+    }
+    let pauses: Vec<_> = rig
+        .log
+        .iter()
+        .filter_map(|event| match event {
+            Event::LeftAlone { node, times, pause } if *node == id(1) => {
+                Some((*times, pause.0 / 1_000_000_000))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(pauses, [(3, 1), (4, 2), (5, 4), (6, 8), (7, 16), (8, 32)]);
+    assert_eq!(boot_ups, 8, "every 0.5 s these were more than 100");
+    rig.until("the other one again", |rig| rig.state(1) == BootState::Operational);
+    rig.run_ms(11_000);
+    rig.forget();
+    let now = rig.now;
+    rig.device(1).reset(now);
+    rig.until("operation", |rig| rig.saw(&Event::Operational { node: id(1) }));
+    assert_eq!(rig.count(|event| matches!(event, Event::LeftAlone { .. })), 0, "it was sound");
+    let text = Event::LeftAlone { node: id(1), times: 4, pause: DurationNs::from_secs(2) }.to_string();
+    assert_eq!(
+        text,
+        "node 1 has restarted or was lost 4 times without being in operation for 10 s; it is left alone for 2 s"
+    );
+}
+
 #[test]
 fn what_an_adopted_transmission_type_means_is_said() {
     let said = |direction, found| {
