@@ -14,6 +14,7 @@ mod tests;
 
 use std::collections::VecDeque;
 
+use profile_cia402::eds::plain;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{AddressPolicy, ConfigError, MasterConfig};
@@ -63,6 +64,14 @@ pub struct Found {
     pub lost: bool,
 }
 
+/// What a device calls itself: UTF-8, or else a character of Latin-1 for each byte, without what is no letter; `None` when nothing
+/// is left.
+fn readable(bytes: &[u8]) -> Option<String> {
+    let text = plain(bytes);
+    let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+    Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+}
+
 impl Found {
     /// The operation data of an IDN, if the slave gave it.
     #[must_use]
@@ -74,9 +83,7 @@ impl Found {
     /// A text without what is no character.
     #[must_use]
     pub fn text(&self, idn: Idn) -> Option<String> {
-        let text = String::from_utf8_lossy(self.data(idn)?);
-        let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
-        Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+        readable(self.data(idn)?)
     }
 
     /// A number of 1, 2, 4 or 8 bytes.

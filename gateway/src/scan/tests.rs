@@ -21,6 +21,21 @@ fn wire() -> Link {
     Link::Interface { name: "enp3s0".to_owned(), ring: None }
 }
 
+#[test]
+fn names_are_utf_8_or_latin_1_without_what_is_no_letter() {
+    let cases: [(&[u8], Option<&str>); 6] = [
+        (b" IndraDrive\0", Some("IndraDrive")),
+        ("Gerät".as_bytes(), Some("Gerät")),
+        (b"Ger\xE4t \xB5", Some("Gerät µ")),
+        (b"\x00\x85\xFF", Some("ÿ")),
+        (b"", None),
+        (b" \r\n", None),
+    ];
+    for (bytes, expected) in cases {
+        assert_eq!(readable(bytes).as_deref(), expected, "{bytes:?}");
+    }
+}
+
 /// Drives with these addresses in a line before the police.
 struct Judged {
     network: DriveNetwork,

@@ -17,7 +17,7 @@ use profile_cia402::drive::index::{AXIS_OFFSET, SUPPORTED_MODES};
 use profile_cia402::drive::modes::SupportedModes;
 use profile_cia402::master::foreign::LISTEN;
 use profile_cia402::sdo::client::{Client, ClientConfig};
-use profile_cia402::sdo::request::{SdoFailure, SdoRequest};
+use profile_cia402::sdo::request::{Method, SdoFailure, SdoRequest};
 use profile_cia402::wire::lss::LssAddress;
 use profile_cia402::wire::{Function, Mux, NodeId, cob_id};
 use profile_generic::can::{Frame, Id};
@@ -27,6 +27,7 @@ pub use report::{json, text};
 pub use starter::{hints, starter};
 
 use self::unassigned::Search;
+use super::readable;
 use crate::engine::port::{CanInput, CanPort, CanSent};
 
 /// How long a device may take for an answer: who is there answers within some milliseconds.
@@ -104,9 +105,7 @@ impl Found {
     /// A text without what is no character.
     #[must_use]
     pub fn text(&self, object: Mux) -> Option<String> {
-        let text = String::from_utf8_lossy(self.bytes(object)?);
-        let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
-        Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+        readable(self.bytes(object)?)
     }
 
     /// The axes that have modes of CiA 402.
@@ -146,8 +145,13 @@ impl Probe {
     }
 
     fn ask(&mut self, now: MonotonicTime, object: Mux) {
+        // Nearly all of it comes in the first answer. Blocks are for much more, and not every stack knows them well.
+        let request = SdoRequest {
+            method: Method::Segments,
+            ..SdoRequest::upload_into(object, Vec::with_capacity(TEXT_MAX))
+        };
         // It is free whenever it is asked something.
-        let _ = self.client.start(now, SdoRequest::upload_into(object, Vec::with_capacity(TEXT_MAX)));
+        let _ = self.client.start(now, request);
     }
 
     /// Takes what has come; `true` when everything is asked.

@@ -65,7 +65,7 @@ impl CanPort for Watched<'_> {
 fn scan_until(
     port: &mut InProcessCan<DriveNode>,
     begin: MonotonicTime,
-    enough: impl Fn(&[Frame]) -> bool,
+    mut enough: impl FnMut(&[Frame]) -> bool,
 ) -> (Bus, Vec<LssRequest>, MonotonicTime) {
     let mut now = begin;
     let mut scanner = Scanner::new();
@@ -120,6 +120,30 @@ fn drives_tell_who_they_are_and_the_rest_is_asked_in_vain() {
     assert!(took < DurationNs::from_millis(3_600), "{took}");
     insta::assert_snapshot!(text(&only(&found[..2])));
     insta::assert_snapshot!(format!("{:#}", json(&only(&found[1..2]))));
+}
+
+/// A number takes a question and an answer, and texts come in segments: blocks are for more, and not every stack knows them.
+#[test]
+fn devices_are_asked_without_blocks() {
+    let (mut port, begin) = bus(&[(9, 1)], &[]);
+    let mut commands = Vec::new();
+    let (found, ..) = scan_until(&mut port, begin, |sent| {
+        let asked = sent.iter().filter(|frame| frame.id() == Id::Standard(0x609));
+        commands = asked.map(|frame| (frame.data()[0] >> 5, frame.data()[1..4].to_vec())).collect();
+        false
+    });
+    assert_eq!(found.nodes.len(), 1);
+    // 2 asks for a value, 3 for a segment of it; 5 would ask for blocks.
+    assert!(commands.iter().all(|(command, _)| matches!(command, 2 | 3)), "{commands:?}");
+    let of = |object: [u8; 3]| {
+        commands.iter().filter(|(command, about)| *command == 2 && *about == object).count()
+    };
+    let after = |object: [u8; 3]| {
+        let place = commands.iter().position(|(command, about)| *command == 2 && *about == object).unwrap();
+        commands[place + 1..].iter().take_while(|(command, _)| *command == 3).count()
+    };
+    assert_eq!((of([0x00, 0x10, 0]), after([0x00, 0x10, 0])), (1, 0), "1000 in one answer");
+    assert!(after([0x08, 0x10, 0]) > 1, "the name in segments");
 }
 
 #[test]
