@@ -31,7 +31,7 @@ use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Re
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
-use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError};
+use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError, Step};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -46,7 +46,8 @@ const RESCAN_PAUSE: DurationNs = DurationNs::from_secs(10);
 /// Longest such pause.
 const RESCAN_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
 
-/// Pause before a failed phase-up is tried again.
+/// Pause before a failed phase-up is tried again; it doubles, up to [`RESCAN_PAUSE_MAX`], while a drive is refused that only another
+/// configuration can help.
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
@@ -88,6 +89,8 @@ struct Drive {
     connections: [u8; 2],
     stage: Stage,
     facts: DriveFacts,
+    /// It was refused for what it is: trying again does not help, and no command is executed in it.
+    unfit: bool,
     /// It may come later: nothing is missing without it.
     hot_plug: bool,
     /// How often it has come by hot plug.
@@ -105,6 +108,7 @@ pub struct SercosBus {
     /// The drive of each axis.
     places: Places<usize>,
     retry_at: Option<MonotonicTime>,
+    retry_pause: DurationNs,
     wanted: Option<Phase>,
     cycles_seen: u64,
     /// Slaves that stand in the way of the others; left out until the next scan.
@@ -151,6 +155,7 @@ impl SercosBus {
             connections: [COMMAND_CONNECTION, FEEDBACK_CONNECTION],
             stage: Stage::Absent,
             facts: DriveFacts::new(),
+            unfit: false,
             hot_plug: later.contains(&address),
             runs: 0,
             passed_over: Vec::new(),
@@ -162,6 +167,7 @@ impl SercosBus {
             places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.axis, place))),
             drives,
             retry_at: None,
+            retry_pause: RETRY_PAUSE,
             wanted: Some(Phase::CP4),
             cycles_seen: 0,
             refused: ArrayVec::new(),
@@ -248,6 +254,9 @@ impl SercosBus {
                 if self.is_joining(*slave) => {}
             Event::Phase(phase) if *phase == Phase::CP4 => {
                 self.planned = false;
+                self.retry_pause = RETRY_PAUSE;
+                let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
+                fit.for_each(|drive| drive.unfit = false);
                 if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
                     self.rescan_pause = RESCAN_PAUSE;
                 } else if self.rescan_pause > RESCAN_PAUSE {
@@ -387,6 +396,7 @@ impl SercosBus {
             };
             if !taken {
                 // The others go on without it.
+                drive.unfit = true;
                 let _ = self.refused.try_push(slave);
                 let _ = self.master.exclude(slave);
                 drive.lose();
@@ -733,9 +743,12 @@ impl Bus for SercosBus {
             }
         }
         if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
-            let due = *self.retry_at.get_or_insert(now + RETRY_PAUSE);
+            let due = *self.retry_at.get_or_insert(now + self.retry_pause);
             if now >= due {
                 self.retry_at = None;
+                if self.drives.iter().any(|drive| drive.unfit) {
+                    self.retry_pause = (self.retry_pause * 2).min(RESCAN_PAUSE_MAX);
+                }
                 notice(Notice::Retry);
                 self.master.set_target_phase(Phase::CP4);
             }
@@ -769,8 +782,14 @@ impl Drive {
 
     fn plan(&mut self, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
         match mapping.commissioning(&self.needs, phase, &self.facts) {
-            Ok(plan) => self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan))),
+            Ok(mut plan) => {
+                if self.unfit {
+                    plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
+                }
+                self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan)));
+            }
             Err(error) => {
+                self.unfit = true;
                 notice(Notice::Program { axis: index(self.axis), address: self.address, error });
                 self.lose();
             }
