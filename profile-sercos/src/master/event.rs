@@ -182,6 +182,8 @@ pub enum Event {
     },
     /// The telegrams of CP3 and CP4 cannot be laid out.
     LayoutRefused(LayoutError),
+    /// No slave is left that could take part in CP3: back to CP0.
+    NobodyLeft,
     /// Slaves did not stop or start within the time of a phase switch.
     SwitchFailed {
         /// The phase left.
@@ -340,6 +342,7 @@ impl fmt::Display for Event {
                 write!(f, "{slave} was left out after its check for CP3: back to CP0")
             }
             Event::LayoutRefused(error) => write!(f, "telegrams of CP3 and CP4: {error}"),
+            Event::NobodyLeft => f.write_str("no slave is left that can be used: back to CP0"),
             Event::SwitchFailed { from, to, slave: Some(slave) } => {
                 write!(f, "{from} to {to}: {slave} did not stop inserting data in time")
             }

@@ -252,6 +252,11 @@ impl Master {
             let slave = self.config.slaves.iter().find(|slave| slave.address == station.address);
             slave.filter(|_| station.hot_plug && station.presence != Presence::Excluded)?.hot_plug.as_ref()
         };
+        if !stations.iter().any(|station| station.is_active() || kept(station).is_some()) {
+            self.target = Some(Phase::CP0);
+            self.emit(Event::NobodyLeft);
+            return false;
+        }
         let needs = stations.iter().map(|station| match station.presence {
             Presence::Active => Some(&station.need),
             _ => kept(station),

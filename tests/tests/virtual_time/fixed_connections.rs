@@ -7,6 +7,7 @@ use axisbridge_tests::rig::{FIXED_BOX, Rig, Settings};
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, ControllerConfig, Step};
 use profile_cip::wire::motion::codes::ControlMode;
+use profile_generic::fault::FaultCause;
 use profile_generic::time::DurationNs;
 use profile_sercos::slave::communication::FixedConnection;
 use profile_sercos::slave::drive::Drive;
@@ -125,4 +126,32 @@ fn fixcfg_slave_whose_lists_do_not_serve_the_modes_is_refused_by_name() {
     let told: Vec<_> = cases.into_iter().map(|(connections, modes)| refusal(connections, modes)).collect();
     println!("{} rows", told.len());
     insta::assert_snapshot!(told.join("\n"));
+}
+
+/// Nothing but another configuration helps: the drive is looked at less and less often, no command is executed in it again, and no
+/// cycle runs without anybody in it.
+#[test]
+fn drive_that_is_refused_for_what_it_is_gets_left_alone_for_longer_and_longer() {
+    let connections = const { &[to(&[VELOCITY_COMMAND]), from(&[STATUS, POSITION, VELOCITY])] };
+    let mut rig = rig(connections, "");
+    let refusals = |rig: &Rig| rig.told().matches("SCP_FixCFG").count();
+    rig.run_until(DurationNs::from_secs(10), "a refusal", |rig| refusals(rig) == 1);
+    // An error that is gone: S-0-0099 would clear it.
+    let drive = rig.line.slaves_mut()[0].application_mut();
+    drive.raise_fault(FaultCause::OVER_CURRENT);
+    drive.clear_fault(FaultCause::OVER_CURRENT);
+    let begin = rig.now();
+    let mut at = Vec::new();
+    for known in 1..6 {
+        rig.run_until(DurationNs::from_secs(60), "the next refusal", |rig| refusals(rig) > known);
+        at.push(rig.now().since(begin).0 / 1_000_000_000);
+    }
+    let pauses: Vec<_> = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(
+        pauses.iter().zip([4, 8, 16, 32]).all(|(pause, least)| (least..least + 2).contains(pause)),
+        "{pauses:?}"
+    );
+    assert!(rig.line.slaves()[0].application().actual().fault.is_some(), "S-0-0099 was executed");
+    assert_eq!(rig.told().matches("no slave is left that can be used").count(), 5, "{}", rig.told());
+    assert!(!rig.told().contains("found none"), "{}", rig.told());
 }

@@ -382,6 +382,11 @@ impl CanBus {
                 Done::Pdos(run, set) => self.connect(now, place, run, set),
                 Done::Failed(_, failed) => {
                     notice(failed);
+                    // The PDOs that it has do not do either: the next try begins as the first one did.
+                    let device = &mut self.devices[place];
+                    if device.keeps && self.commissioner.push(Job::Keep(device.run(place), false)) {
+                        device.keeps = false;
+                    }
                     self.give_up(now, place);
                 }
                 Done::Told(_) => {}

@@ -346,7 +346,8 @@ impl SercosBus {
             drive.plan(mapping, Phase::CP2.0, notice);
         } else {
             drive.stage = Stage::Absent;
-            if !drive.hot_plug {
+            // One that was refused has been told with the reason.
+            if !drive.hot_plug && found.is_none() {
                 notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.address });
             }
         }
