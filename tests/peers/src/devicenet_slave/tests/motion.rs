@@ -1,0 +1,3 @@
+//! The CIP Motion drive.
+
+use super::*;

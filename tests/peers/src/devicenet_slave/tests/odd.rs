@@ -1,0 +1,3 @@
+//! Odd behaviour.
+
+use super::*;
