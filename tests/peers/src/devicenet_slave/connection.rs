@@ -40,6 +40,8 @@ pub struct Connection {
     pub watchdog_action: u8,
     /// The shift of the watchdog's factor of four.
     pub multiplier: u8,
+    /// The attribute transportClass_trigger.
+    pub transport: u8,
     /// The production inhibit time.
     pub inhibit: u16,
     /// The number of bytes it produces.
@@ -66,6 +68,7 @@ impl Connection {
             packet_rate: 0,
             watchdog_action: 0,
             multiplier: 0,
+            transport: 0x83,
             inhibit: 0,
             produced_size: 0,
             consumed_size: 0,
@@ -90,16 +93,13 @@ impl Connection {
         this
     }
 
-    /// The poll connection right after the allocation.
+    /// The poll connection right after the allocation. The sizes are produced and consumed.
     #[must_use]
-    pub fn poll(
-        produced_size: u16,
-        consumed_size: u16,
-        produced_path: Vec<u8>,
-        consumed_path: Vec<u8>,
-    ) -> Self {
+    pub fn poll(transport: u8, sizes: (u16, u16), produced_path: Vec<u8>, consumed_path: Vec<u8>) -> Self {
+        let (produced_size, consumed_size) = sizes;
         Self {
             state: CONFIGURING,
+            transport,
             produced_size,
             consumed_size,
             produced_path,
@@ -159,7 +159,7 @@ impl Connection {
         Ok(match attribute {
             1 => vec![self.state],
             2 => vec![u8::from(poll)],
-            3 => vec![if poll { 0x82 } else { 0x83 }],
+            3 => vec![self.transport],
             4 if poll => id(true, messages::POLL_ANSWER).to_le_bytes().to_vec(),
             4 => id(false, messages::EXPLICIT_ANSWER).to_le_bytes().to_vec(),
             5 if poll => id(false, messages::POLL_COMMAND).to_le_bytes().to_vec(),

@@ -1,4 +1,20 @@
 //! A DeviceNet slave with a drive in it: a group 2 only server, either a CIP Motion drive or an AC drive.
+//!
+//! It has the explicit and the poll connection of the predefined master/slave connection set. Where the standards leave
+//! something open, it does this:
+//!
+//! - An allocation with the poll choice, and a release of it, put the axis back to Initializing and all its attributes
+//!   to 0.
+//! - The fixed connection format has no Control Status and no Command Control by its table, so the axis leaves
+//!   Initializing with the first valid block, and Command Position is a DINT when there is no room for an LREAL. If
+//!   the two bytes are used as in the variable format, they are obeyed.
+//! - Actual and status data that do not fit in the fixed size are left out, with their bits; the rest is zero.
+//! - A disable request is acknowledged when the axis stands, not when it begins to stop.
+//! - A poll command of another length than the consumed size is neither taken nor answered. An empty one is answered,
+//!   and changes nothing.
+//! - A poll connection that has timed out can be allocated anew.
+//! - Run bits of the AC drive are edges: after a reset or with network control granted late, they must fall and rise.
+//! - Class 1 transport has no sequence count on this network.
 
 mod axis_object;
 mod axis_table;
@@ -54,6 +70,7 @@ pub struct DevicenetSlave {
     requests: u32,
     polls: u32,
     restart_asked: bool,
+    failing: Option<u16>,
     drive: Drive,
     sets: Vec<SetRecord>,
     refused: Vec<RefusedRecord>,
@@ -88,6 +105,7 @@ impl DevicenetSlave {
             requests: 0,
             polls: 0,
             restart_asked: false,
+            failing: None,
             drive,
             sets: Vec::new(),
             refused: Vec::new(),
@@ -170,12 +188,14 @@ impl DevicenetSlave {
     /// Makes a fault whose cause stays until `mend`. Motion: the bit number in Axis Faults. Speed: the fault code.
     pub fn fail(&mut self, code: u16) {
         self.write_log(&format!("fails with {code:04X}h"));
+        self.failing = Some(code);
         self.drive.fail(code);
     }
 
     /// Takes the cause of the fault away. The fault itself stays until the master resets it.
     pub fn mend(&mut self) {
         self.write_log("mended");
+        self.failing = None;
         self.drive.mend();
     }
 
@@ -220,7 +240,8 @@ impl DevicenetSlave {
         };
         let produced_size = settings.produced_size.unwrap_or(size);
         let consumed_size = settings.consumed_size.unwrap_or(size);
-        self.poll = Connection::poll(produced_size, consumed_size, produced, consumed);
+        self.poll =
+            Connection::poll(settings.poll_transport, (produced_size, consumed_size), produced, consumed);
         self.io_in.clear();
         self.drive.opened(&self.settings);
     }

@@ -31,6 +31,7 @@ const VELOCITY_MODE: u8 = 2;
 const ACCELERATION_MODE: u8 = 3;
 const TORQUE_MODE: u8 = 4;
 
+const UPDATE_FAULT: u8 = 1;
 const DATA_FORMAT_ERROR: u8 = 4;
 const CONNECTION_LOSS: u8 = 6;
 
@@ -84,6 +85,7 @@ pub struct MotionDrive {
     told: BTreeMap<u8, Vec<u8>>,
     polls: u32,
     update_id: u8,
+    last_update: Option<u8>,
     pub(super) configured: bool,
     pub(super) values: BTreeMap<u16, Vec<u8>>,
     pub(super) class_values: BTreeMap<u16, Vec<u8>>,
@@ -152,6 +154,7 @@ impl MotionDrive {
             told: BTreeMap::new(),
             polls: 0,
             update_id: 0,
+            last_update: None,
             configured: false,
             values: BTreeMap::new(),
             class_values: BTreeMap::new(),

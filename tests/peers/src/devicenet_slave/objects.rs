@@ -423,11 +423,15 @@ impl DevicenetSlave {
 
     /// Chooses another assembly for one direction of the poll connection.
     fn set_path(&mut self, produced: bool, data: &[u8]) -> Answer {
-        if self.settings.fixed_paths || self.settings.profile != Profile::Speed {
+        if self.settings.fixed_paths {
             return Err(Refusal::READ_ONLY);
         }
         if self.poll.state != CONFIGURING {
             return Err(Refusal::STATE);
+        }
+        if self.settings.profile == Profile::Motion {
+            let same = data == self.settings.motion_path;
+            return if same { Ok(Vec::new()) } else { Err(Refusal::BAD_VALUE) };
         }
         let Some((4, instance, None | Some(3))) = path(data) else { return Err(Refusal::BAD_VALUE) };
         let instance = u8::try_from(instance).map_err(|_| Refusal::BAD_VALUE)?;

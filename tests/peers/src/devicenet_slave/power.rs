@@ -38,6 +38,9 @@ impl DevicenetSlave {
         self.polls = 0;
         self.restart_asked = false;
         self.drive = Drive::new(&self.settings, self.now_us);
+        if let Some(code) = self.failing {
+            self.drive.fail(code);
+        }
         self.write_log("power on");
     }
 

@@ -162,6 +162,8 @@ pub struct Settings {
     pub told_produced_size: Option<u16>,
     /// Poll answers come this much later.
     pub poll_delay_ms: u32,
+    /// The attribute transportClass_trigger of the poll connection; 82h is a server of class 2.
+    pub poll_transport: u8,
     /// Every N-th poll is not answered; 0 is off.
     pub poll_missing_every: u32,
     /// So many bytes are missing at the end of poll answers.
@@ -188,6 +190,8 @@ pub struct Settings {
     pub motion_path: Vec<u8>,
     /// Motion: the type of Command Position.
     pub command_position: CommandPosition,
+    /// Motion: a block with the Update ID of the block before is taken all the same.
+    pub takes_stale_updates: bool,
     /// Motion: the axis leaves Initializing only when Configuration Complete is set.
     pub waits_for_complete: bool,
     /// Motion: the time in Pre-Charge.
@@ -279,6 +283,7 @@ impl Settings {
             told_consumed_size: None,
             told_produced_size: None,
             poll_delay_ms: 0,
+            poll_transport: 0x82,
             poll_missing_every: 0,
             poll_short_by: 0,
             poll_long_by: 0,
@@ -291,6 +296,7 @@ impl Settings {
             axes: 1,
             motion_path: vec![0x20, 0x42, 0x24, 0x01],
             command_position: CommandPosition::Auto,
+            takes_stale_updates: false,
             waits_for_complete: false,
             precharge_ms: 20,
             starting_ms: 10,

@@ -1,9 +1,11 @@
 //! The fixed format of the connection: the controller's block in, the drive's block out.
 
+use std::collections::BTreeMap;
+
 use super::super::settings::{CommandPosition, Settings, UpdateId};
 use super::{
-    ABORTING, DATA_FORMAT_ERROR, ILLEGAL_CONTROL_MODE, INITIALIZING, MotionDrive, PRE_CHARGE, STOPPING, dint,
-    dint_bytes, real, real_bytes,
+    ABORTING, DATA_FORMAT_ERROR, ILLEGAL_CONTROL_MODE, INITIALIZING, MotionDrive, PRE_CHARGE, STOPPING,
+    UPDATE_FAULT, dint, dint_bytes, real, real_bytes,
 };
 
 impl MotionDrive {
@@ -14,6 +16,9 @@ impl MotionDrive {
         if format & 0x0F != 2 || revision != 2 {
             self.node_fault = DATA_FORMAT_ERROR;
             self.fall();
+            return;
+        }
+        if !self.fresh(settings, update_id) {
             return;
         }
         let reset = node_control & 0x08 != 0 && self.node_control & 0x08 == 0;
@@ -64,6 +69,26 @@ impl MotionDrive {
             }
         }
         self.control(settings, control);
+    }
+
+    /// Whether the block is another than the one before. Skipped ones are counted as lost.
+    fn fresh(&mut self, settings: &Settings, update_id: u8) -> bool {
+        let Some(last) = self.last_update.replace(update_id) else { return true };
+        if last == update_id {
+            return settings.takes_stale_updates;
+        }
+        let lost = update_id.wrapping_sub(last).wrapping_sub(1);
+        let byte = |values: &BTreeMap<u16, Vec<u8>>, attribute: u16| {
+            values.get(&attribute).and_then(|bytes| bytes.first().copied()).unwrap_or(0)
+        };
+        let sum = byte(&self.class_values, 32).wrapping_add(lost);
+        self.class_values.insert(32, vec![sum]);
+        let limit = byte(&self.class_values, 21);
+        if limit > 0 && lost > limit {
+            self.node_fault = UPDATE_FAULT;
+            self.fall();
+        }
+        true
     }
 
     /// Takes the cyclic command data.

@@ -175,11 +175,11 @@ fn a_fault_is_told_and_reset() {
     assert_eq!(bus.ask_long(&[0x4B, 0x42, 1, 1, 0, 0, 0, 0x95, 2, 0, 1])[9..], [10, 0, 0, 0]);
     assert_eq!(bus.ask_long(&[0x03, 0x42, 1, 1, 0, 0x96, 2]), [0x83, 1, 0, 0x96, 2, 0, 0, 3]);
     assert_eq!(bus.ask_long(&[0x03, 0x42, 1, 1, 0, 0x91, 2])[7..], [0, 4, 0, 0, 0, 0, 0, 0]);
-    let answer = exchange(&mut bus, 6, Command { control: 6, ..VELOCITY });
+    let answer = exchange(&mut bus, 7, Command { control: 6, ..VELOCITY });
     assert_eq!((answer[6], answer[7], answer[11]), (6, 0, 8));
     bus.slave.mend();
-    exchange(&mut bus, 7, VELOCITY);
-    let answer = exchange(&mut bus, 8, Command { control: 6, ..VELOCITY });
+    exchange(&mut bus, 8, VELOCITY);
+    let answer = exchange(&mut bus, 9, Command { control: 6, ..VELOCITY });
     assert_eq!((answer[6], answer[7], answer[11]), (6, 0, 2));
 }
 
@@ -246,9 +246,27 @@ fn another_format_is_a_node_fault() {
     bus.wait(2);
     assert_eq!(bus.slave.state(), 8);
     block[1] = 2;
+    block[2] = 6;
     block[3] = 0x0D;
     assert_eq!(poll(&mut bus, &block)[3], 0x05);
     assert_eq!(bus.slave.state(), 2);
+}
+
+#[test]
+fn update_ids_are_watched() {
+    let mut bus = stopped();
+    exchange(&mut bus, 2, VELOCITY);
+    // The same Update ID again: nothing in it counts, but it is answered.
+    let answer = exchange(&mut bus, 2, Command { control: 1, ..VELOCITY });
+    assert_eq!((answer[2], answer[6], answer[11]), (2, 0, 2));
+    exchange(&mut bus, 6, VELOCITY);
+    assert_eq!(bus.ask(&[0x0E, 0x42, 0, 32]), [0x8E, 3]);
+    assert_eq!(bus.ask(&[0x10, 0x42, 0, 21, 2]), [0x90]);
+    exchange(&mut bus, 9, VELOCITY);
+    assert_eq!(bus.slave.state(), 2);
+    let answer = exchange(&mut bus, 13, VELOCITY);
+    assert_eq!((answer[3], answer[11]), (0x0D, 8));
+    assert_eq!(bus.ask(&[0x0E, 0x42, 0, 16]), [0x8E, 1]);
 }
 
 #[test]

@@ -200,6 +200,43 @@ fn it_restarts_itself() {
 }
 
 #[test]
+fn a_cause_outlives_a_restart() {
+    let mut bus = Bus::new(with(|_| {}));
+    bus.slave.fail(0x2310);
+    bus.connect(0);
+    bus.ask(&[0x05, 1, 1]);
+    bus.wait(2_002);
+    bus.connect(0);
+    assert_eq!(bus.poll(&[0, 0, 0, 0])[0], 1);
+}
+
+#[test]
+fn the_same_frames_give_the_same_answers() {
+    let run = || {
+        let mut bus = Bus::new(with(|settings| settings.poll_delay_ms = 3));
+        bus.connect(0);
+        let mut heard = Vec::new();
+        for speed in 0..50 {
+            heard.extend(bus.say(0x42D, &[u8::from(speed > 2), 0, speed, 1]));
+            heard.extend(bus.wait(5));
+        }
+        (heard, bus.slave.log().to_vec(), bus.slave.position().to_bits())
+    };
+    let first = run();
+    assert_eq!(first.0.len(), 50);
+    assert_eq!(first, run());
+}
+
+#[test]
+fn paths_of_a_motion_drive() {
+    let mut bus = Bus::new(Settings::motion());
+    bus.one(0x42E, &[1, 0x4B, 3, 1, 3, 1]);
+    assert_eq!(bus.ask_long(&[0x10, 5, 2, 14, 0x20, 0x42, 0x24, 1]), [0x90]);
+    assert_eq!(bus.ask_long(&[0x10, 5, 2, 16, 0x20, 0x42, 0x24, 2]), [0x94, 0x09, 0xFF]);
+    assert_eq!(bus.ask(&[0x0E, 5, 2, 3]), [0x8E, 0x82]);
+}
+
+#[test]
 fn the_speed_drive_that_will_not() {
     let extended = |change: fn(&mut Settings)| {
         let mut bus = Bus::new(with(|settings| {
