@@ -374,8 +374,9 @@ impl DevicenetSlave {
         if matches!(service, objects::ALLOCATE | objects::RELEASE) && message.get(1..3) == Some(&[3, 1][..]) {
             self.explicit_message(header, BodyFormat::EightEight, message);
         } else {
-            self.note_refused(service, 0, 0, None, objects::Refusal::NO_SERVICE);
-            let data = vec![0x94, 0x08, 0xFF];
+            let refusal = objects::Refusal::with(0x08, 0x03);
+            self.note_refused(service, 0, 0, None, refusal);
+            let data = vec![0x94, refusal.general, refusal.additional];
             self.put_later(self.settings.explicit_delay_ms, Later::Explicit { header, data });
         }
     }

@@ -234,10 +234,13 @@ impl DevicenetSlave {
             return Err(Refusal::with(0x09, 0x02));
         }
         if choice & !self.settings.choices != 0 {
-            return Err(Refusal::with(0x02, 0x04));
+            return Err(Refusal::with(0x02, 0x02));
         }
         let explicit = choice & 0x01 != 0;
         let poll = choice & 0x02 != 0;
+        if self.settings.io_needs_explicit && choice & 0x01 == 0 && !self.explicit.exists() {
+            return Err(Refusal::with(0x09, 0x02));
+        }
         let taken = |connection: &Connection| !matches!(connection.state, NON_EXISTENT | TIMED_OUT);
         if (explicit && taken(&self.explicit)) || (poll && taken(&self.poll)) {
             return Err(Refusal::with(0x0B, 0x02));
@@ -270,7 +273,7 @@ impl DevicenetSlave {
             return Err(Refusal::with(0x09, 0x02));
         }
         if choice & !self.settings.choices != 0 {
-            return Err(Refusal::with(0x02, 0x04));
+            return Err(Refusal::with(0x02, 0x02));
         }
         let (explicit, poll) = (choice & 0x01 != 0, choice & 0x02 != 0);
         if (explicit && !self.explicit.exists()) || (poll && !self.poll.exists()) {

@@ -112,6 +112,8 @@ pub struct Settings {
 
     /// Allocation choices the slave has, by bit: 0 explicit, 1 polled.
     pub choices: u8,
+    /// The poll connection alone is not allocated before there is an explicit one.
+    pub io_needs_explicit: bool,
     /// Every allocation is refused with this general and additional status.
     pub refuse_allocation: Option<(u8, u8)>,
     /// The set is allocated to this other master from the start.
@@ -259,6 +261,7 @@ impl Settings {
             ignores_dup_check: false,
             conflict_with: None,
             choices: 0x03,
+            io_needs_explicit: false,
             refuse_allocation: None,
             foreign_master: None,
             foreign_master_ms: 0,

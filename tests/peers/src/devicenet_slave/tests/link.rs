@@ -54,9 +54,9 @@ fn a_master_allocates_and_releases() {
 fn odd_choices_are_refused() {
     let mut bus = Bus::new(Settings::speed());
     assert_eq!(bus.one(0x42E, &[MASTER, 0x4B, 3, 1, 0x00, MASTER]).data, [MASTER, 0x94, 0x09, 0x02]);
-    assert_eq!(bus.one(0x42E, &[MASTER, 0x4B, 3, 1, 0x05, MASTER]).data, [MASTER, 0x94, 0x02, 0x04]);
+    assert_eq!(bus.one(0x42E, &[MASTER, 0x4B, 3, 1, 0x05, MASTER]).data, [MASTER, 0x94, 0x02, 0x02]);
     assert_eq!(bus.one(0x42E, &[MASTER, 0x4B, 3, 1, 0x01]).data, [MASTER, 0x94, 0x13, 0xFF]);
-    assert_eq!(bus.one(0x42E, &[MASTER, 0x0E, 1, 1, 1]).data, [MASTER, 0x94, 0x08, 0xFF]);
+    assert_eq!(bus.one(0x42E, &[MASTER, 0x0E, 1, 1, 1]).data, [MASTER, 0x94, 0x08, 0x03]);
     assert_eq!(bus.say(0x42C, &[MASTER, 0x0E, 1, 1, 1]), []);
 }
 

@@ -50,7 +50,12 @@ fn allocations() {
     bus.wait(1_000);
     assert_eq!(bus.one(0x42E, &[1, 0x4B, 3, 1, 1, 1]).data, [1, 0xCB, 0]);
     let mut bus = Bus::new(with(|settings| settings.choices = 0x01));
-    assert_eq!(bus.one(0x42E, &[1, 0x4B, 3, 1, 3, 1]).data, [1, 0x94, 0x02, 0x04]);
+    assert_eq!(bus.one(0x42E, &[1, 0x4B, 3, 1, 3, 1]).data, [1, 0x94, 0x02, 0x02]);
+    let mut bus = Bus::new(with(|settings| settings.io_needs_explicit = true));
+    assert_eq!(bus.one(0x42E, &[1, 0x4B, 3, 1, 2, 1]).data, [1, 0x94, 0x09, 0x02]);
+    bus.slave.settings().io_needs_explicit = false;
+    assert_eq!(bus.one(0x42E, &[1, 0x4B, 3, 1, 2, 1]).data, [1, 0xCB, 0]);
+    assert_eq!(bus.slave.allocated(), Some((1, 2)));
 }
 
 #[test]
