@@ -409,6 +409,10 @@ impl DeviceChannel {
             notice(Notice::Node { device: self.number, fault: node.0, alarm: node.1 });
         }
         for (place, member) in self.members.iter().enumerate() {
+            while let Some(refused) = self.device.poll_refused(place) {
+                let axis = u8::try_from(member.axis).unwrap_or(u8::MAX);
+                notice(Notice::Refused { axis, refused });
+            }
             while let Some(entry) = self.device.poll_fault_log(place) {
                 let axis = u8::try_from(member.axis).unwrap_or(u8::MAX);
                 let cause = axes[member.axis].north().cause_of(entry.kind, entry.code);

@@ -8,6 +8,7 @@ use profile_cia402::master::event::Event as CanEvent;
 use profile_cia402::wire::NodeId;
 use profile_cip::devicenet::master::event::Event as DevicenetEvent;
 use profile_cip::devicenet::wire::MacId;
+use profile_cip::target::axis_object::refused::RefusedRequest;
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::fault_log::{LogEntry, LogKind};
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
@@ -40,6 +41,13 @@ pub enum Severity {
 pub enum Notice {
     /// The SERCOS master.
     Sercos(Event),
+    /// A request of the controller was refused.
+    Refused {
+        /// The axis.
+        axis: u8,
+        /// Which, and why.
+        refused: RefusedRequest,
+    },
     /// The phase-up failed; it is tried again after a pause.
     Retry,
     /// The drive of an axis was not found on the bus.
@@ -303,6 +311,7 @@ impl Notice {
             | Self::NodeCommissioning { axis, .. }
             | Self::NodeProgram { axis, .. }
             | Self::ModesTried { axis, .. }
+            | Self::Refused { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
             | Self::Difference { axis, .. }
@@ -355,6 +364,7 @@ impl fmt::Display for Notice {
             Self::NodeProgram { node, error, .. } => {
                 write!(f, "node {node} cannot be used: {error}; it is left out")
             }
+            Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
             Self::PassedOver { failures, .. } => {
                 let all = failures.iter().map(|failure| (failure.what, failure.idn, failure.failure));

@@ -30,7 +30,7 @@ impl Axis {
             _ if !context.connected => Command::Withheld(Withheld::ConnectionLost),
             _ if context.node_fault => Command::Withheld(Withheld::NodeFault),
             _ if !context.remote => Command::Withheld(Withheld::LocalControl),
-            _ if self.state != AxisState::Running || self.config.kind != ControlKind::Active => {
+            _ if self.state != AxisState::Running || self.kind != ControlKind::Active => {
                 Command::Withheld(Withheld::NotRunning)
             }
             None => Command::Withheld(Withheld::NoSetPoint),
@@ -84,7 +84,7 @@ impl Axis {
                 | AxisStatus::POWER_STRUCTURE_ENABLED
                 | AxisStatus::SHUTDOWN;
         }
-        status & allowed(self.config.kind, self.state, powered)
+        status & allowed(self.kind, self.state, powered)
     }
 
     /// The cyclic actual block of D-to-C update `update_id`, whose time stamp is `stamp`, system time in ns; `None` for an
@@ -109,7 +109,7 @@ impl Axis {
     /// one that it has reported: state and faults of the axis say that it is not measured any more.
     fn actual_values(&self, lint: bool, stamp: Option<u64>) -> ActualValues {
         let asked = self.block.actual_data_set;
-        if self.config.kind == ControlKind::Converter {
+        if self.kind == ControlKind::Converter {
             return ActualValues::default();
         }
         let position = stamp.map_or(self.drive.position, |stamp| self.position_at(stamp));

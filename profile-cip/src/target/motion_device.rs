@@ -20,6 +20,7 @@ use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::attribute::{AttributeDefinition, AttributeStore, AttributeTable, Scope, TableError, id};
 use super::attribute_worker::{AttributeAccess, AttributeSpace};
+use super::axis_object::refused::RefusedRequest;
 use super::axis_object::{Axis, AxisConfig, Context, FaultWords, PositionView};
 use super::axis_state::AxisState;
 use super::cyclic_list::{CyclicLists, Direction};
@@ -287,6 +288,11 @@ impl MotionDevice {
     /// The next entry that came into the log of an axis or ended there.
     pub fn poll_fault_log(&mut self, axis: usize) -> Option<LogEntry> {
         self.slots.get_mut(axis).and_then(|slot| slot.axis.faults.log.poll())
+    }
+
+    /// The next request of an axis that was refused.
+    pub fn poll_refused(&mut self, axis: usize) -> Option<RefusedRequest> {
+        self.slots.get_mut(axis)?.axis.refused.pop_at(0)
     }
 
     /// Fault and alarm records of an axis that were lost because the controller did not take them.
@@ -668,7 +674,7 @@ impl MotionDevice {
         let context = self.context(system_time);
         for slot in &mut self.slots {
             // They are looked up only where there is something that they say anything about.
-            let nothing = slot.axis.drive().conditions.as_slice().is_empty();
+            let nothing = slot.axis.drive().conditions.as_slice().is_empty() && !slot.axis.has_found();
             let actions = match nothing {
                 true => ExceptionActions::NONE,
                 false => ExceptionActions::of(&self.axis_table, &slot.store),

@@ -109,7 +109,7 @@ fn condition(slot: &Slot) -> AxisCondition {
         types.into_iter().find_map(|one| lowest_bit(words.alarm(one)).map(|code| (one, code)))
     };
     AxisCondition {
-        kind: axis.config.kind,
+        kind: axis.kind,
         state: axis.state(),
         bus_up: axis.drive().bus_up,
         fault: faults

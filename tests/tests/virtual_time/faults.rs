@@ -432,6 +432,18 @@ fn a_lost_drive_is_major_faulted_when_nobody_waits_for_its_stop_any_longer_and_a
     assert!(silence.count() >= 1);
 }
 
+/// What the controller gets as a status, the log has as a sentence.
+#[test]
+fn a_refused_enable_is_logged_with_its_reason() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.drive_mut(0).set_main_power(false);
+    rig.connect(vec![Step::Enable(AxisSet::NONE.with(1))]);
+    rig.run_for(millis(3_000));
+    let text =
+        "axis 1: the request Enable (1) was refused with status 0x0c: the axis came to Major Faulted instead";
+    assert_eq!(rig.told().lines().filter(|line| *line == text).count(), 1, "{}\n{}", rig.told(), rig.log());
+}
+
 /// Nothing happens, and somebody stands before the machine: the log says what each axis waits for, and by which bit of which word.
 #[test]
 fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {

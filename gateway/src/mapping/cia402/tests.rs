@@ -236,7 +236,7 @@ fn the_first_mode_that_the_drive_has_is_taken() {
     let error = shipped().cia402_program(&axis(&ALL), &facts).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "position needs one of the modes csp, ip, the drive has none of them by 6502"
+        "position needs one of the modes csp, ip, the drive has none of them: 6502:00 is 0x00000004"
     );
     // A drive that does not say is believed to have what is wanted most.
     let mut unsaid = servo();

@@ -6,9 +6,11 @@ use super::super::exception::{DriveCondition, ExceptionAction, ExceptionActions,
 use super::super::fault_log::{FaultLog, LogEntry, LogKind};
 use super::super::status_report::RecordLog;
 use super::events::Sample;
+use super::refused::RefusalReason;
 use super::{Axis, RAMP_AND_DISABLE, STATE_CHANGE_SHUTDOWN, fault_code};
-use crate::wire::motion::codes::{AlarmType, ClearingEvent, FaultType};
+use crate::wire::motion::codes::{AlarmType, AxisControl, ClearingEvent, FaultType};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
+use crate::wire::status::GeneralStatus;
 
 /// Fault types with a word of bits: Initialization, Axis, APR and Axis Safety, each with one of the manufacturer.
 const FAULT_WORDS: usize = 8;
@@ -240,6 +242,7 @@ impl Faults {
     fn look(
         &mut self,
         image: &DriveImage,
+        found: &[DriveCondition],
         actions: &ExceptionActions<'_>,
         state: AxisState,
         system_time: u64,
@@ -249,7 +252,7 @@ impl Faults {
         let mut alarms = [0; ALARM_WORDS];
         alarms[0] = u64::from(image.start_inhibits);
         alarms[1] = u64::from(image.start_inhibits_mfg);
-        for condition in image.conditions.as_slice() {
+        for condition in image.conditions.as_slice().iter().chain(found) {
             let (condition, place, bit) = with_bit(*condition);
             let bank = place.checked_sub(usize::from(FaultType::AXIS.0 - 1)).filter(|bank| *bank < 2);
             if let Some(bank) = bank {
@@ -265,7 +268,7 @@ impl Faults {
         self.words.exceptions = exceptions;
         if alarms != self.words.alarms {
             let before = core::mem::replace(&mut self.words.alarms, alarms);
-            self.tell_alarms(&before, image, state, system_time);
+            self.tell_alarms(&before, image, found, state, system_time);
         }
     }
 
@@ -273,6 +276,7 @@ impl Faults {
         &mut self,
         before: &[u64; ALARM_WORDS],
         image: &DriveImage,
+        found: &[DriveCondition],
         state: AxisState,
         system_time: u64,
     ) {
@@ -292,7 +296,8 @@ impl Faults {
                 let of = |condition: &&DriveCondition| {
                     usize::from(condition.fault_type.0) == place + 1 && condition.code == code
                 };
-                let condition = image.conditions.as_slice().iter().find(of).copied().unwrap_or_default();
+                let condition =
+                    image.conditions.as_slice().iter().chain(found).find(of).copied().unwrap_or_default();
                 let time_stamp = if condition.at == 0 { system_time } else { condition.at };
                 let sub_code = condition.sub_code;
                 self.record_alarm(AlarmRecord { alarm_type, code, sub_code, state: 1, time_stamp });
@@ -348,9 +353,47 @@ impl Axis {
         self.follow_major_faults();
     }
 
+    /// The axis has found an exception, an event. What follows from it the controller has set.
+    pub(super) fn find(&mut self, code: u8, sub_code: u8, action: u8, system_time: u64) {
+        let condition = DriveCondition {
+            fault_type: FaultType::AXIS,
+            code,
+            sub_code,
+            detail: 0,
+            action,
+            least: ExceptionAction::IGNORE,
+            at: system_time,
+        };
+        // One of a kind is enough.
+        if !self.found.iter().any(|known| known.code == code) {
+            let _ = self.found.try_push(condition);
+        }
+    }
+
+    /// Whether exceptions wait to be looked at.
+    pub fn has_found(&self) -> bool {
+        !self.found.is_empty()
+    }
+
+    /// Answers an Abort Request that the controller wants no stop from.
+    fn end_abort(&mut self, found: &[DriveCondition], actions: &ExceptionActions<'_>) {
+        let abort = found.iter().find(|condition| condition.code == fault_code::CONTROLLER_INITIATED);
+        let Some(action) = abort.map(|abort| actions.action(abort)) else { return };
+        if self.handshake.executing() != Some(AxisControl::ABORT) {
+            return;
+        }
+        match action {
+            ExceptionAction::MAJOR_FAULT => {}
+            ExceptionAction::IGNORE => self.refuse(RefusalReason::Ignored),
+            _ => self.handshake.complete(GeneralStatus::SUCCESS),
+        }
+    }
+
     /// Takes the conditions of the drive into account.
     pub(super) fn look_at_conditions(&mut self, actions: &ExceptionActions<'_>, system_time: u64) {
-        self.faults.look(&self.drive, actions, self.state, system_time);
+        let found = core::mem::take(&mut self.found);
+        self.faults.look(&self.drive, &found, actions, self.state, system_time);
+        self.end_abort(&found, actions);
         if self.state == AxisState::Initializing {
             if self.faults.any_unrecoverable() {
                 self.fire(AxisEvent::InitializationFault);

@@ -3,8 +3,9 @@
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
 use super::super::drive_link::DriveAction;
 use super::super::exception::{DriveCondition, ExceptionActions};
+use super::refused::RefusalReason;
 use super::{Axis, COAST_AND_DISABLE, Context, fault_code, sub_code};
-use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlStatus};
+use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode, ControlStatus};
 use crate::wire::status::GeneralStatus;
 
 /// Most transitions in one step; more would be a circle.
@@ -41,11 +42,13 @@ impl Axis {
             let ready = context.connected && configured && (lost || self.drive.online && reset);
             if ready && !context.node_fault && !self.winding_down {
                 self.connection_reset = false;
+                self.follow_control_mode();
                 self.fire(AxisEvent::InitializationComplete);
             }
             return;
         }
         self.follow_reset(context);
+        self.follow_control_mode();
         self.look_at_conditions(actions, context.system_time);
         // One cause, one fault: an axis that already stops for a fault, perhaps for this one, does not get another for
         // going silent.
@@ -59,6 +62,30 @@ impl Axis {
         // First, because the drive leaves its test in the same cycle in which it reports the end.
         self.follow_test(context);
         self.follow_drive(context);
+    }
+
+    /// Control Mode 0 makes the axis of a drive a feedback device (Table 5-2.99), and another one makes it an axis again. Neither while
+    /// it is energized or holds, and never into motion.
+    fn follow_control_mode(&mut self) {
+        let passive = ControlMode(self.block.control_mode.0 & 0x0F) == ControlMode::NO_CONTROL;
+        let kind = match self.config.kind {
+            ControlKind::Active if passive => ControlKind::FeedbackOnly,
+            kind => kind,
+        };
+        let busy = self.kind == ControlKind::Active && (self.state.is_energized() || self.holding)
+            || self.winding_down
+            || self.drive.power_enabled
+            || self.test.is_some();
+        if kind == self.kind || busy {
+            return;
+        }
+        self.kind = kind;
+        use AxisState as S;
+        self.state = match (kind, self.state) {
+            (ControlKind::FeedbackOnly, S::PreCharge | S::Stopped | S::StartInhibited) => S::StartInhibited,
+            (ControlKind::Active, S::Running | S::StartInhibited) => S::PreCharge,
+            (_, state) => state,
+        };
     }
 
     /// Has the drive reset its faults after a connection began or ended, as soon as it is there and has stopped. Returns
@@ -85,15 +112,15 @@ impl Axis {
             (AxisEvent::FaultReset, ClearingEvent::FAULT_RESET)
         };
         self.faults.clear(cleared, context.system_time);
-        let status = if self.faults.any_unrecoverable() {
-            // Only a restart of the device clears an initialization fault (clause 5-2.6.3.6).
-            GeneralStatus::OBJECT_STATE_CONFLICT
-        } else {
+        // Only a restart of the device clears an initialization fault (clause 5-2.6.3.6).
+        let stands = self.faults.any_unrecoverable();
+        if !stands {
             self.fire(event);
-            GeneralStatus::SUCCESS
-        };
-        if self.handshake.executing() == Some(request) {
-            self.handshake.complete(status);
+        }
+        match self.handshake.executing() {
+            Some(executing) if executing == request && stands => self.refuse(RefusalReason::Unrecoverable),
+            Some(executing) if executing == request => self.handshake.complete(GeneralStatus::SUCCESS),
+            _ => {}
         }
     }
 
@@ -105,22 +132,22 @@ impl Axis {
             AxisState::Stopped if self.inhibited() => self.fire(AxisEvent::StartInhibit),
             AxisState::StartInhibited if !self.inhibited() => self.fire(AxisEvent::InhibitsCleared),
             AxisState::Starting | AxisState::Running | AxisState::Testing
-                if self.inhibited() || !context.remote =>
+                if self.kind == ControlKind::Active && !context.remote =>
             {
                 self.fire(AxisEvent::Disable)
             }
+            // A start inhibit keeps an axis from starting (clause 5-2.6.4). One that runs it does not stop.
+            AxisState::Starting if self.inhibited() => self.fire(AxisEvent::Disable),
             AxisState::Starting if self.answers() && self.drive.start_complete => {
                 self.fire(AxisEvent::StartComplete)
             }
             // A drive that no longer follows is no longer Running, and does not start again by itself.
             AxisState::Running | AxisState::Testing
-                if self.config.kind == ControlKind::Active
-                    && self.answers()
-                    && !self.drive.start_complete =>
+                if self.kind == ControlKind::Active && self.answers() && !self.drive.start_complete =>
             {
                 self.fire(AxisEvent::Disable)
             }
-            AxisState::Running if self.config.kind == ControlKind::Converter && !self.drive.bus_up => {
+            AxisState::Running if self.kind == ControlKind::Converter && !self.drive.bus_up => {
                 self.fire(AxisEvent::BusDown)
             }
             AxisState::Stopping | AxisState::Aborting if self.has_stopped() => {
@@ -138,8 +165,10 @@ impl Axis {
                 (self.answers() && self.drive.tracking).then_some(GeneralStatus::SUCCESS)
             }
             AxisControl::ENABLE if state == AxisState::Starting => None,
-            AxisControl::ENABLE => Some(GeneralStatus::OBJECT_STATE_CONFLICT),
-            AxisControl::DISABLE if !state.is_energized() => Some(GeneralStatus::SUCCESS),
+            AxisControl::ENABLE => return self.refuse(RefusalReason::EndedIn(state)),
+            AxisControl::DISABLE if !state.is_energized() || self.kind != ControlKind::Active => {
+                Some(GeneralStatus::SUCCESS)
+            }
             AxisControl::SHUTDOWN if matches!(state, AxisState::Shutdown | AxisState::MajorFaulted) => {
                 // Out of a hold the state is there before the torque has gone.
                 let powered = self.drive.online && self.drive.power_enabled;
@@ -164,7 +193,7 @@ impl Axis {
             AxisState::Stopped if self.holding => DriveAction::Disable,
             AxisState::PreCharge | AxisState::Stopped | AxisState::StartInhibited => DriveAction::PowerUp,
             // Only an axis that controls motion is energized by Running.
-            AxisState::Running if self.config.kind != ControlKind::Active => DriveAction::PowerUp,
+            AxisState::Running if self.kind != ControlKind::Active => DriveAction::PowerUp,
             AxisState::Testing => DriveAction::Test,
             AxisState::Starting if self.is_testing() => DriveAction::Test,
             AxisState::Starting | AxisState::Running => DriveAction::Enable,

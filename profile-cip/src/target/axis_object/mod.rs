@@ -8,6 +8,7 @@ mod events;
 mod fault;
 mod follow;
 mod reference;
+pub mod refused;
 mod request;
 mod test;
 
@@ -16,6 +17,7 @@ pub(super) use fault::Faults;
 pub use reference::PositionView;
 use reference::References;
 
+use self::refused::RefusedRequest;
 use super::axis_control::AxisControlHandshake;
 use super::axis_state::{AxisConditions, AxisEvent, AxisState, ControlKind};
 use super::drive_link::{DriveAction, DriveImage, SetPoints};
@@ -31,6 +33,7 @@ use crate::wire::motion::codes::{
 };
 use crate::wire::motion::test_service::HookupTestData;
 use crate::wire::motion::{CommandBlock, CommandValues};
+use arrayvec::ArrayVec;
 use profile_generic::time::MonotonicTime;
 
 /// Bit numbers of the axis faults that this module raises itself, Table 5-2.65.
@@ -53,6 +56,11 @@ mod sub_code {
     /// The drive went offline while energized.
     pub const DRIVE_LOST: u8 = 1;
 }
+
+/// Exceptions that an axis can find in one update.
+const FOUND_MAX: usize = 4;
+/// Refusals between two looks at them; the first ones count.
+const REFUSED_MAX: usize = 4;
 
 /// Axis Fault Action, attribute 668: ramped stop, then disable.
 const RAMP_AND_DISABLE: u8 = 0x22;
@@ -150,6 +158,12 @@ pub(super) struct Axis {
     test: Option<test::ActiveTest>,
     test_id: u32,
     hookup: Option<HookupTestData>,
+    /// The state table that it follows: of its kind, or that of a feedback device while Control Mode is 0.
+    pub(super) kind: ControlKind,
+    /// Exceptions that the axis has found itself and that are events: for the next look at the conditions.
+    found: ArrayVec<DriveCondition, FOUND_MAX>,
+    /// Requests that were refused and not told yet.
+    pub(super) refused: ArrayVec<RefusedRequest, REFUSED_MAX>,
 }
 
 /// Whether the command values hold the one that the mode needs.
@@ -194,6 +208,9 @@ impl Axis {
             test: None,
             test_id: 0,
             hookup: None,
+            kind: config.kind,
+            found: ArrayVec::new(),
+            refused: ArrayVec::new(),
         }
     }
 
@@ -263,12 +280,12 @@ impl Axis {
 
     /// Follows the state table. Returns whether the event had an effect.
     fn fire(&mut self, event: AxisEvent) -> bool {
-        let Some(next) = self.state.next(self.config.kind, event, &self.conditions()) else { return false };
+        let Some(next) = self.state.next(self.kind, event, &self.conditions()) else { return false };
         // Close and loss take an axis out of motion, and a new connection out of a hold, without a Stopping state of its own.
         let unconnected =
             matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss | AxisEvent::Reconnection);
         let energized = self.state.is_energized() || self.drive.power_enabled;
-        self.winding_down |= unconnected && energized && self.config.kind == ControlKind::Active;
+        self.winding_down |= unconnected && energized && self.kind == ControlKind::Active;
         // A category 2 stop ends with the power structure on, and the drive goes on doing what Disable asked for.
         self.holding =
             event == AxisEvent::StopComplete && next == AxisState::Stopped && self.drive.power_enabled;
@@ -319,6 +336,8 @@ impl Axis {
     }
 
     fn forget(&mut self, system_time: u64) {
+        self.found.clear();
+        self.kind = self.config.kind;
         self.test = None;
         self.hookup = None;
         self.shutdown = false;

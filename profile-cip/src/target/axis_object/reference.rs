@@ -14,9 +14,9 @@
 
 use super::Axis;
 use super::events::Sample;
+use super::refused::RefusalReason;
 use crate::wire::motion::codes::{AxisControl, ControlMode};
 use crate::wire::motion::{ActualPosition, CommandBlock};
-use crate::wire::status::GeneralStatus;
 
 use super::super::axis_state::AxisState;
 
@@ -138,13 +138,17 @@ impl Axis {
     }
 
     /// Carries out a change of reference. It is complete at once: there is nothing to cancel.
-    pub(super) fn change_reference(&mut self, request: AxisControl, block: &CommandBlock) -> GeneralStatus {
+    pub(super) fn change_reference(
+        &mut self,
+        request: AxisControl,
+        block: &CommandBlock,
+    ) -> Result<(), RefusalReason> {
         if self.state == AxisState::Initializing {
             // What a count is has not been said yet.
-            return GeneralStatus::OBJECT_STATE_CONFLICT;
+            return Err(RefusalReason::State(self.state));
         }
         let Some(displacement) = block.values.position_displacement else {
-            return GeneralStatus::NOT_ENOUGH_DATA;
+            return Err(RefusalReason::ValueMissing);
         };
         let references = &mut self.references;
         let reference = if request == AxisControl::CHANGE_ACTUAL_POSITION {
@@ -153,13 +157,13 @@ impl Axis {
             &mut references.command
         };
         let Some(moved) = reference.checked_add(i64::from(displacement)) else {
-            return GeneralStatus::INVALID_PARAMETER;
+            return Err(RefusalReason::ValueTooFar);
         };
         *reference = moved;
         if request == AxisControl::CHANGE_ACTUAL_POSITION {
             references.displacement = displacement;
         }
-        GeneralStatus::SUCCESS
+        Ok(())
     }
 
     /// Another scaling or another unwind is in use: positions of before mean nothing in it.

@@ -2,6 +2,7 @@
 
 use super::super::axis_state::{AxisEvent, AxisState, ControlKind};
 use super::super::drive_link::{SetPoints, Trims};
+use super::refused::{RefusalReason, RefusedRequest};
 use super::{Axis, Context, Held, RAMP_AND_DISABLE, UpdateTimes, fault_code, has_set_point, sub_code};
 use crate::wire::motion::CommandBlock;
 use crate::wire::motion::codes::{AxisControl, ClearingEvent, ControlMode, FeedbackMode};
@@ -19,9 +20,16 @@ impl Axis {
         context: &Context,
     ) {
         let before = ControlMode(self.block.control_mode.0 & 0x0F);
-        self.block = *block;
+        let known = core::mem::replace(&mut self.block, *block);
         let mode = ControlMode(block.control_mode.0 & 0x0F);
-        if has_set_point(mode, &block.values) {
+        let controls = matches!(self.state, AxisState::Starting | AxisState::Running)
+            && self.kind == ControlKind::Active;
+        let illegal = if controls { self.illegal_change(before, mode, block.feedback_mode) } else { None };
+        if let Some(sub_code) = illegal {
+            // Whatever follows from it, the axis does not go where an illegal mode says.
+            self.find_illegal_mode(sub_code, context);
+            (self.block.control_mode, self.block.feedback_mode) = (known.control_mode, known.feedback_mode);
+        } else if has_set_point(mode, &block.values) {
             self.sequence = self.sequence.wrapping_add(1);
             let ahead = times.period.saturating_mul(u64::from(block.target.0));
             let set_points = SetPoints {
@@ -38,15 +46,8 @@ impl Axis {
                 age_updates: 0,
             };
             self.held = Some(Held { set_points, at: now });
-        } else if self.state == AxisState::Running && self.config.kind == ControlKind::Active {
-            self.raise_illegal_mode(sub_code::SET_POINT_MISSING, context);
-        }
-        let controls = matches!(self.state, AxisState::Starting | AxisState::Running);
-        if controls
-            && self.config.kind == ControlKind::Active
-            && let Some(sub_code) = self.illegal_change(before, mode, block.feedback_mode)
-        {
-            self.raise_illegal_mode(sub_code, context);
+        } else if self.state == AxisState::Running && self.kind == ControlKind::Active {
+            self.find_illegal_mode(sub_code::SET_POINT_MISSING, context);
         }
         if let Some(request) = self.handshake.request(block.axis_control) {
             self.begin(request, block, context);
@@ -86,8 +87,8 @@ impl Axis {
         }
     }
 
-    pub(super) fn raise_illegal_mode(&mut self, sub_code: u8, context: &Context) {
-        self.raise(fault_code::ILLEGAL_CONTROL_MODE, sub_code, RAMP_AND_DISABLE, context.system_time);
+    fn find_illegal_mode(&mut self, sub_code: u8, context: &Context) {
+        self.find(fault_code::ILLEGAL_CONTROL_MODE, sub_code, RAMP_AND_DISABLE, context.system_time);
     }
 
     pub(super) fn begin(&mut self, request: AxisControl, block: &CommandBlock, context: &Context) {
@@ -95,73 +96,95 @@ impl Axis {
             AxisControl::ENABLE => self.begin_enable(context),
             AxisControl::DISABLE => {
                 self.fire(AxisEvent::Disable);
-                None
+                Ok(false)
             }
-            AxisControl::SHUTDOWN if self.state == AxisState::Initializing => {
-                Some(GeneralStatus::OBJECT_STATE_CONFLICT)
+            AxisControl::SHUTDOWN | AxisControl::ABORT if self.state == AxisState::Initializing => {
+                Err(RefusalReason::State(self.state))
             }
             AxisControl::SHUTDOWN => {
                 self.shutdown = true;
                 self.fire(AxisEvent::Shutdown);
-                None
+                Ok(false)
             }
             AxisControl::SHUTDOWN_RESET if self.state == AxisState::Shutdown => {
                 self.shutdown = false;
                 self.fire(AxisEvent::ShutdownReset);
                 self.faults.record_cleared(ClearingEvent::SHUTDOWN_RESET, context.system_time);
-                Some(GeneralStatus::SUCCESS)
+                Ok(true)
             }
-            AxisControl::SHUTDOWN_RESET if self.state != AxisState::MajorFaulted => {
-                Some(GeneralStatus::SUCCESS)
-            }
+            AxisControl::SHUTDOWN_RESET if self.state != AxisState::MajorFaulted => Ok(true),
             AxisControl::FAULT_RESET if !self.has_fault() => {
                 self.faults.record_cleared(ClearingEvent::FAULT_RESET, context.system_time);
-                Some(GeneralStatus::SUCCESS)
+                Ok(true)
             }
             AxisControl::SHUTDOWN_RESET | AxisControl::FAULT_RESET => {
                 self.reset_id = self.reset_id.wrapping_add(1);
                 self.reset = Some(request);
-                None
-            }
-            AxisControl::ABORT if self.state == AxisState::Initializing => {
-                Some(GeneralStatus::OBJECT_STATE_CONFLICT)
+                Ok(false)
             }
             AxisControl::ABORT => {
                 let stop = self.sequence_settings.abort;
-                self.raise(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
-                None
+                self.find(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
+                Ok(false)
             }
-            AxisControl::STOP_PROCESS => self.stop_process(),
+            AxisControl::STOP_PROCESS => Ok(self.stop_process()),
             AxisControl::CHANGE_ACTUAL_POSITION | AxisControl::CHANGE_COMMAND_POSITION => {
-                Some(self.change_reference(request, block))
+                self.change_reference(request, block).map(|()| true)
             }
-            _ => Some(GeneralStatus::SERVICE_NOT_SUPPORTED),
+            _ => Err(RefusalReason::Unknown),
         };
-        if let Some(status) = done {
-            self.handshake.complete(status);
+        match done {
+            Ok(true) => self.handshake.complete(GeneralStatus::SUCCESS),
+            Ok(false) => {}
+            Err(reason) => self.refuse(reason),
         }
     }
 
-    pub(super) fn begin_enable(&mut self, context: &Context) -> Option<GeneralStatus> {
+    /// Answers the request in progress with a refusal, and keeps why.
+    pub(super) fn refuse(&mut self, reason: RefusalReason) {
+        let Some(request) = self.handshake.executing() else { return };
+        let status = reason.status();
+        self.handshake.complete(status);
+        let _ = self.refused.try_push(RefusedRequest { request, status, reason });
+    }
+
+    /// Whether the axis is enabled already; not yet, or why not.
+    fn begin_enable(&mut self, context: &Context) -> Result<bool, RefusalReason> {
+        use RefusalReason as R;
         if self.config.kind != ControlKind::Active {
-            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+            return Err(R::ControlsNothing);
         }
         if self.is_testing() {
-            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+            return Err(R::Testing);
         }
-        if matches!(self.state, AxisState::Starting | AxisState::Running) {
-            return None;
+        if self.kind == ControlKind::Active && matches!(self.state, AxisState::Starting | AxisState::Running)
+        {
+            return Ok(false);
         }
-        let ready = context.remote && !context.node_fault && self.drive.online && !self.inhibited();
         let mode = ControlMode(self.block.control_mode.0 & 0x0F);
         let feedback = self.block.feedback_mode;
-        if !self.config.supports(mode) || !self.config.supports_feedback(feedback) {
-            return Some(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+        if mode == ControlMode::NO_CONTROL {
+            return Err(R::FeedbackOnly);
+        }
+        if !self.config.supports(mode) {
+            return Err(R::ControlMode(mode));
+        }
+        if !self.config.supports_feedback(feedback) {
+            return Err(R::FeedbackMode(feedback));
         }
         if !self.may_follow(mode) {
-            return Some(GeneralStatus::OBJECT_STATE_CONFLICT);
+            return Err(R::ReferenceChanging);
+        }
+        let reasons = [
+            (!context.remote, R::LocalControl),
+            (context.node_fault, R::NodeFault),
+            (!self.drive.online, R::DriveOffline),
+            (self.inhibited(), R::Inhibited(self.drive.start_inhibits, self.drive.start_inhibits_mfg)),
+        ];
+        if let Some((_, reason)) = reasons.into_iter().find(|(stands, _)| *stands) {
+            return Err(reason);
         }
         self.feedback_source = feedback.source();
-        if ready && self.fire(AxisEvent::Enable) { None } else { Some(GeneralStatus::OBJECT_STATE_CONFLICT) }
+        if self.fire(AxisEvent::Enable) { Ok(false) } else { Err(R::State(self.state)) }
     }
 }

@@ -106,15 +106,15 @@ impl Axis {
     }
 
     /// Stop Process: the axis stops as by a Disable. Returns the status when there is nothing to wait for.
-    pub(super) fn stop_process(&mut self) -> Option<GeneralStatus> {
+    pub(super) fn stop_process(&mut self) -> bool {
         let moves = self.is_testing();
         self.break_off_test(TestStatus::ABORTED);
         if moves {
             self.fire(AxisEvent::Disable);
-            return None;
+            return false;
         }
         self.test = None;
-        Some(GeneralStatus::SUCCESS)
+        true
     }
 
     /// Lets the test follow the drive and the state of the axis.

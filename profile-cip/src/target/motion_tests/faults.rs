@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::super::attribute::{DefaultValue, ElementRule, id};
+use super::super::attribute::id;
 use super::super::axis_state::AxisState;
 use super::super::fault_log::LogKind;
 use super::*;

@@ -2,8 +2,9 @@
 
 use super::super::axis_state::AxisState;
 use super::super::drive_link::{DriveAction, DriveConditions, Withheld};
+use super::super::fault_log::LogKind;
 use super::*;
-use crate::wire::motion::codes::{AxisStatus, ClearingEvent, FaultType};
+use crate::wire::motion::codes::{AxisStatus, ClearingEvent, FaultType, FeedbackMode};
 
 fn answer(rig: &Rig) -> (AxisControl, u8) {
     (rig.actual(0).axis_response, rig.actual(0).response_status)
@@ -239,6 +240,152 @@ fn abort_is_a_controller_initiated_exception() {
     assert_eq!(rig.state(0), AxisState::Stopped);
 }
 
+/// What follows from an Abort Request the controller sets, action 0 to 3: the state, the answer, and what is latched.
+#[test]
+fn an_abort_does_what_its_exception_action_says() {
+    let rows = [
+        (0_u8, AxisState::Running, 0x0C, 0, 0),
+        (1, AxisState::Running, 0, 0, 1),
+        (2, AxisState::Running, 0, 1 << 62, 0),
+        (3, AxisState::Aborting, 0, 1 << 62, 0),
+    ];
+    for (action, state, status, faults, alarms) in rows {
+        let mut rig = Rig::running();
+        rig.blocks[0].status_data_set |= StatusDataSet::ALARM;
+        rig.cycles(3);
+        let mut actions = [0; 64];
+        actions[62] = action;
+        rig.device.put_attribute(0, 672, &actions).expect("the array");
+        assert_eq!(ask(&mut rig, AxisControl::ABORT, 1), (AxisControl::ABORT, status), "action {action}");
+        assert_eq!((rig.state(0), rig.device.axis_faults(0)), (state, Some(faults)), "action {action}");
+        let log = rig.device.fault_log(0).expect("the log");
+        let came = log.entries().filter(|entry| matches!(entry.kind, LogKind::Alarm(_)) && entry.code == 62);
+        assert_eq!(came.count(), alarms, "action {action}");
+        let refused = rig.device.poll_refused(0).map(|refused| refused.to_string());
+        let text = "the request Abort (5) was refused with status 0x0c: its Axis Exception Action is Ignore";
+        assert_eq!(refused.as_deref(), (action == 0).then_some(text));
+        if action < 3 {
+            assert!(rig.follow(0).age_updates <= 1, "it goes on");
+        }
+    }
+}
+
+/// A mode that the axis cannot go on in is not followed, whatever the controller wants from that.
+#[test]
+fn an_illegal_mode_is_followed_by_nobody() {
+    for (action, state, faults) in
+        [(0_u8, AxisState::Running, 0), (2, AxisState::Running, 1 << 60), (3, AxisState::Aborting, 1 << 60)]
+    {
+        let mut rig = Rig::running();
+        let mut actions = [0; 64];
+        actions[60] = action;
+        rig.device.put_attribute(0, 672, &actions).expect("the array");
+        let known = rig.follow(0);
+        rig.blocks[0].control_mode = ControlMode::TORQUE;
+        rig.blocks[0].values = CommandValues { torque: Some(50.0), ..CommandValues::default() };
+        rig.cycle();
+        assert_eq!((rig.state(0), rig.device.axis_faults(0)), (state, Some(faults)), "action {action}");
+        if action < 3 {
+            let follow = rig.follow(0);
+            assert_eq!((follow.control_mode, follow.values), (known.control_mode, known.values));
+            // What it follows grows old, and is not followed for ever.
+            rig.cycles(12);
+            assert_eq!(rig.withheld(0), Some(Withheld::Stale), "action {action}");
+        }
+    }
+}
+
+/// With Control Mode 0 the axis of a drive tells its feedback: Running, without torque. It becomes an axis again by another mode,
+/// and does not start by that.
+#[test]
+fn control_mode_0_is_feedback_only() {
+    let mut rig = Rig::new();
+    rig.open();
+    let idle = rig.blocks[0];
+    rig.blocks[0].control_mode = ControlMode::NO_CONTROL;
+    rig.blocks[0].values = CommandValues::default();
+    rig.configure();
+    rig.cycles(3);
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Running, DriveAction::PowerUp));
+    assert_eq!(rig.withheld(0), Some(Withheld::NotRunning));
+    assert_eq!(rig.device.axis_faults(0), Some(0));
+    rig.drives[0].image.bus_up = false;
+    rig.cycles(2);
+    assert_eq!(rig.state(0), AxisState::Running, "the bus does not count");
+    rig.drives[0].image.bus_up = true;
+    assert_eq!(ask(&mut rig, AxisControl::ENABLE, 1), (AxisControl::ENABLE, 0x0C));
+    let refused = rig.device.poll_refused(0).expect("the refusal").to_string();
+    assert_eq!(
+        refused,
+        "the request Enable (1) was refused with status 0x0c: Control Mode is 0: the axis tells its feedback and follows nothing"
+    );
+    rig.blocks[0].axis_control = AxisControl::NONE;
+    rig.cycle();
+    assert_eq!(ask(&mut rig, AxisControl::DISABLE, 1), (AxisControl::DISABLE, 0));
+    rig.blocks[0] = idle;
+    rig.cycles(2);
+    assert_eq!((rig.state(0), rig.command(0).action), (AxisState::Stopped, DriveAction::PowerUp));
+    assert_eq!(ask(&mut rig, AxisControl::ENABLE, 6), (AxisControl::ENABLE, 0));
+    // An axis that follows does not become one by a word.
+    rig.blocks[0].control_mode = ControlMode::NO_CONTROL;
+    rig.cycle();
+    assert_eq!((rig.state(0), rig.device.axis_faults(0)), (AxisState::Aborting, Some(1 << 60)));
+}
+
+/// Every reason for which an Enable is refused, by its text.
+#[test]
+fn every_refused_enable_says_why() {
+    type Case = (fn(&mut Rig), &'static str);
+    let cases: [Case; 9] = [
+        (
+            |rig| rig.blocks[0].control_mode = ControlMode::TORQUE,
+            "0x09: the axis does not have Control Mode 4 (Torque Control)",
+        ),
+        (
+            |rig| rig.blocks[0].feedback_mode = FeedbackMode(1),
+            "0x09: the axis does not have Feedback Mode 1 in this Control Mode",
+        ),
+        (
+            |rig| rig.drives[0].image.online = false,
+            "0x0c: the drive is not on its bus, or not commissioned yet",
+        ),
+        (
+            |rig| rig.drives[0].image.start_inhibits = 0x22,
+            "0x0c: start inhibits stand: 0x0022, of the manufacturer 0x0000",
+        ),
+        (
+            |rig| rig.drives[0].image.start_inhibits_mfg = 4,
+            "0x0c: start inhibits stand: 0x0000, of the manufacturer 0x0004",
+        ),
+        (|rig| rig.drives[0].image.bus_up = false, "0x0c: the axis is Pre-Charge"),
+        (|rig| rig.raise(0, 9, 0x24), "0x0c: the axis is Major Faulted"),
+        (
+            |rig| {
+                ask(rig, AxisControl::SHUTDOWN, 1);
+            },
+            "0x0c: the axis is Shutdown",
+        ),
+        (
+            |rig| {
+                rig.blocks[0].values.position_displacement = Some(5);
+                ask(rig, AxisControl::CHANGE_COMMAND_POSITION, 1);
+            },
+            "0x0c: only one of the two position references was changed",
+        ),
+    ];
+    for (prepare, text) in cases {
+        let mut rig = Rig::stopped();
+        prepare(&mut rig);
+        rig.cycles(2);
+        rig.blocks[0].axis_control = AxisControl::NONE;
+        rig.cycle();
+        ask(&mut rig, AxisControl::ENABLE, 1);
+        let refused: Vec<_> =
+            std::iter::from_fn(|| rig.device.poll_refused(0)).map(|r| r.to_string()).collect();
+        assert_eq!(refused, [format!("the request Enable (1) was refused with status {text}")]);
+    }
+}
+
 #[test]
 fn cancel_frees_the_handshake_and_the_enable_goes_on() {
     let mut rig = Rig::stopped();
@@ -308,10 +455,26 @@ fn a_drive_that_stops_following_is_not_running_any_more() {
     rig.cycles(5);
     assert_eq!(rig.state(0), AxisState::Stopped);
 
+    // A start inhibit keeps an axis from starting; it stops none.
     let mut rig = Rig::running();
     rig.drives[0].image.start_inhibits = 1 << 5;
     rig.cycles(4);
+    assert_eq!(rig.state(0), AxisState::Running);
+    assert_eq!(rig.follow(0).control_mode, ControlMode::POSITION);
+    rig.request_all(AxisControl::DISABLE);
+    rig.cycles(4);
     assert_eq!(rig.state(0), AxisState::StartInhibited, "by way of Stopping");
+    rig.request_all(AxisControl::NONE);
+    rig.cycle();
+    assert_eq!(ask(&mut rig, AxisControl::ENABLE, 1), (AxisControl::ENABLE, 0x0C));
+
+    let mut rig = Rig::stopped();
+    rig.drives[0].stuck = true;
+    ask(&mut rig, AxisControl::ENABLE, 2);
+    assert_eq!(rig.state(0), AxisState::Starting);
+    rig.drives[0].image.start_inhibits = 1 << 5;
+    rig.cycle();
+    assert_eq!((rig.state(0), answer(&rig)), (AxisState::Stopping, (AxisControl::ENABLE, 0x0C)));
 
     let mut rig = Rig::running();
     rig.drives[0].image.online = false;

@@ -170,13 +170,12 @@ fn a_test_begins_only_where_the_standard_allows_it() {
 fn whatever_ends_the_motion_ends_the_test_at_once() {
     /// Name, what ends the test, the state it leads to and the Test Status.
     type Ender = (&'static str, fn(&mut Rig), AxisState, u8);
-    let enders: [Ender; 6] = [
+    let enders: [Ender; 5] = [
         ("disable", |rig| rig.request_all(AxisControl::DISABLE), AxisState::Stopping, 2),
         ("abort", |rig| rig.request_all(AxisControl::ABORT), AxisState::Aborting, 4),
         ("shutdown", |rig| rig.request_all(AxisControl::SHUTDOWN), AxisState::Stopping, 2),
         ("stop process", |rig| rig.request_all(AxisControl::STOP_PROCESS), AxisState::Stopping, 2),
         ("fault", |rig| rig.raise(0, 7, 0x22), AxisState::Aborting, 4),
-        ("inhibit", |rig| rig.drives[0].image.start_inhibits = 2, AxisState::Stopping, 2),
     ];
     for (name, end, state, status) in enders {
         let mut rig = Rig::testing();

@@ -21,7 +21,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::AxisConfig;
-use super::attribute::{Access, AttributeDefinition, Backing, DataType, Scope};
+use super::attribute::{Access, AttributeDefinition, Backing, DataType, DefaultValue, ElementRule, Scope};
 use super::axis_state::{AxisState, ControlKind};
 use super::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
@@ -122,12 +122,25 @@ pub(super) struct Rig {
     token: u64,
 }
 
+/// The exceptions that an axis finds itself stop it, as long as the controller says nothing else; others are ignored.
+fn exception_rules() -> Vec<ElementRule> {
+    let rule = |code| ElementRule {
+        default: DefaultValue::Integer(if matches!(code, 60 | 62) { 3 } else { 0 }),
+        range: (0.0, 255.0),
+    };
+    (0..64).map(rule).collect()
+}
+
 pub(super) fn definitions() -> Vec<AttributeDefinition> {
     let new =
         |id, data_type| AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, "an attribute");
     vec![
         AttributeDefinition { settable_in_running: true, ..new(461, DataType::Real) },
-        AttributeDefinition { elements: Some(64), ..new(672, DataType::Usint) },
+        AttributeDefinition {
+            elements: Some(64),
+            element_rules: exception_rules(),
+            ..new(672, DataType::Usint)
+        },
         AttributeDefinition { elements: Some(64), ..new(673, DataType::Usint) },
         AttributeDefinition { backing: Backing::Drive, ..new(1316, DataType::Udint) },
         AttributeDefinition { range: Some((0.0, 4.0)), ..new(610, DataType::Usint) },
