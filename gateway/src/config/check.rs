@@ -10,7 +10,7 @@ use crate::finding::{Problem, Spanned};
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::time::DurationNs;
-use profile_sercos::master::config::AddressPolicy;
+use profile_sercos::master::config::{AddressPolicy, MasterConfig};
 
 use super::duration;
 use super::file::{
@@ -718,6 +718,11 @@ impl Checker {
     fn sercos(&mut self, table: &SercosTable) -> Option<Sercos> {
         let link = self.link(&table.interface, table.ring_interface.as_ref());
         let cycle_time = self.cycle_time(&table.cycle_time);
+        let least = MasterConfig::setup_cycle_least(Sercos::slaves_max(table.drive.len()));
+        let setup_cycle = match &table.setup_cycle {
+            Some(text) => self.setup_cycle(text, DurationNs(i64::from(least))).map(Some),
+            None => Some(None),
+        };
         let master_mac = match &table.master_mac {
             Some(text) => self.mac(text).map(Some),
             None => Some(None),
@@ -750,6 +755,7 @@ impl Checker {
         Some(Sercos {
             link: link?,
             cycle_time: cycle_time?,
+            setup_cycle: setup_cycle?,
             master_mac: master_mac?,
             jitter: jitter?,
             cp0_stable_cycles: cp0_stable_cycles?,
@@ -837,6 +843,18 @@ impl Checker {
             text.span(),
             format_args!("{} is not a SERCOS III cycle time", duration::show(time)),
             "expected 31.25 us, 62.5 us, 125 us, 250 us, or a multiple of 250 us up to 65 ms",
+        )
+    }
+
+    fn setup_cycle(&mut self, text: &Spanned<String>, least: DurationNs) -> Option<DurationNs> {
+        let time = self.time_span(text)?;
+        if (least.0..=CYCLE_MAX_NS).contains(&time.0) && time.0 % CYCLE_STEP_NS == 0 {
+            return Some(time);
+        }
+        self.report(
+            text.span(),
+            format_args!("{} cannot be the cycle of phases 0 to 2", duration::show(time)),
+            format_args!("expected a multiple of 250 us from {} to 65 ms", duration::show(least)),
         )
     }
 

@@ -230,6 +230,9 @@ pub struct SercosTable {
     /// Communication cycle: `31.25 us`, `62.5 us`, `125 us`, `250 us`, or a multiple of `250 us` up to `65
     /// ms`.
     pub cycle_time: Spanned<String>,
+    /// Cycle of phases 0 to 2, in which slaves are found and set up: a multiple of `250 us` from `1 ms` to `65 ms`, `2 ms` at least with more
+    /// than 239 drives. Default: `"1 ms"`, or `"2 ms"`.
+    pub setup_cycle: Option<Spanned<String>>,
     /// Ethernet address the master sends from, such as `"02:00:00:00:00:01"`. Default: the interface's own.
     pub master_mac: Option<Spanned<String>>,
     /// How far the start of a cycle may lie off its time, `1 us` to a quarter of the cycle; declared to the

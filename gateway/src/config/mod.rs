@@ -451,6 +451,8 @@ pub struct Sercos {
     pub link: Link,
     /// Communication cycle in phases 3 and 4 (S-0-1002).
     pub cycle_time: DurationNs,
+    /// Cycle of phases 0 to 2; `None` for the shortest one.
+    pub setup_cycle: Option<DurationNs>,
     /// The master's Ethernet address; `None` takes the interface's.
     pub master_mac: Option<[u8; 6]>,
     /// How far the start of a cycle may lie off its time, declared to the slaves (S-0-1023).
@@ -463,6 +465,21 @@ pub struct Sercos {
     pub addresses: AddressPolicy,
     /// The drives on it.
     pub drives: Vec<Drive>,
+}
+
+impl Sercos {
+    /// Most slaves of a SERCOS III network.
+    const SLAVES_MAX: u16 = 511;
+
+    /// Slaves that may be on the bus without being configured: they are told of instead of keeping the bus down.
+    const SPARE_SLAVES: u16 = 16;
+
+    /// Slaves that a bus with so many drives has room for.
+    #[must_use]
+    pub fn slaves_max(drives: usize) -> u16 {
+        let drives = u16::try_from(drives).unwrap_or(Self::SLAVES_MAX);
+        drives.saturating_add(Self::SPARE_SLAVES).min(Self::SLAVES_MAX)
+    }
 }
 
 /// A drive on the bus.

@@ -105,6 +105,7 @@ fn defaults_are_those_of_the_documentation() {
         config.sercos,
         Some(Sercos {
             link: Link::InProcess { ring: false },
+            setup_cycle: None,
             cycle_time: DurationNs(2_000_000),
             master_mac: None,
             jitter: DurationNs(50_000),

@@ -15,8 +15,11 @@ use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
-use profile_sercos::master::event::Event;
+use profile_sercos::master::event::{Event, SlaveId};
+use profile_sercos::master::svc::request::SvcOperation;
 use profile_sercos::master::topology::Topology;
+use profile_sercos::wire::header::Phase;
+use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
 use super::axis::{Loss, OwnWords, Trip, Waiting};
@@ -29,6 +32,8 @@ use crate::mapping::{Difference, SercosError};
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
+    /// Of use to those who look for something only: a state that comes with every lost telegram.
+    Detail,
     /// The normal course.
     Info,
     /// Something to look at.
@@ -47,6 +52,15 @@ pub enum Notice {
         axis: u8,
         /// Which, and why.
         refused: RefusedRequest,
+    },
+    /// A phase of the SERCOS bus takes long.
+    Progress {
+        /// Which.
+        phase: Phase,
+        /// For how long it goes on, whole seconds.
+        seconds: u16,
+        /// What the master waits for: slave, parameter, and what is done with it.
+        with: Option<(SlaveId, Idn, SvcOperation)>,
     },
     /// The phase-up failed; it is tried again after a pause.
     Retry,
@@ -251,7 +265,9 @@ impl Notice {
     #[must_use]
     pub fn severity(&self) -> Severity {
         match self {
-            Self::State { .. }
+            Self::Sercos(Event::Connection { .. }) => Severity::Detail,
+            Self::Progress { .. }
+            | Self::State { .. }
             | Self::AxisState { .. }
             | Self::Waiting { .. }
             | Self::PassedOver { .. }
@@ -269,7 +285,6 @@ impl Notice {
                 | Event::HotPlugged { .. }
                 | Event::Measured { .. }
                 | Event::AwaitingApplication { .. }
-                | Event::Connection { .. }
                 | Event::Svc { .. },
             )
             | Self::Can {
@@ -301,6 +316,7 @@ impl Notice {
             | Self::Lss { .. }
             | Self::Devicenet { .. }
             | Self::Retry
+            | Self::Progress { .. }
             | Self::TimeStep { .. }
             | Self::Strangers { .. }
             | Self::Node { .. } => None,
@@ -364,6 +380,10 @@ impl fmt::Display for Notice {
             Self::NodeProgram { node, error, .. } => {
                 write!(f, "node {node} cannot be used: {error}; it is left out")
             }
+            Self::Progress { phase, seconds, with: Some((slave, idn, operation)) } => {
+                write!(f, "{phase} since {seconds} s: {slave}, {operation} {idn}")
+            }
+            Self::Progress { phase, seconds, with: None } => write!(f, "{phase} since {seconds} s"),
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
             Self::PassedOver { failures, .. } => {

@@ -28,7 +28,7 @@ use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
 use profile_generic::time_base::TimeSample;
-use tracing::{info, warn};
+use tracing::{debug, info, warn};
 
 use self::can_watch::CanWatch;
 use self::cycle::{CycleThread, Ended, Setup};
@@ -408,6 +408,8 @@ async fn log_notices(mut notices: rtrb::Consumer<Notice>, axes: Vec<String>, sto
         while let Ok(notice) = notices.pop() {
             let axis = notice.axis().and_then(|axis| axes.get(usize::from(axis))).map(String::as_str);
             match (notice.severity(), axis) {
+                (Severity::Detail, Some(axis)) => debug!(axis, "{notice}"),
+                (Severity::Detail, None) => debug!("{notice}"),
                 (Severity::Info, Some(axis)) => info!(axis, "{notice}"),
                 (Severity::Info, None) => info!("{notice}"),
                 (Severity::Warning, Some(axis)) => warn!(axis, "{notice}"),

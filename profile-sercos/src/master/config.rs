@@ -134,8 +134,7 @@ pub struct MasterConfig {
     /// 65 ms.
     pub cycle_ns: u32,
     /// Cycle time of CP0, CP1 and CP2 in nanoseconds: a multiple of 250000, 1 ms (2 ms with more than 255
-    /// slaves) to 65 ms. A network that does not hold a shorter cycle in CP4 does not hold it here either: `cycle_ns` by
-    /// default, where that is longer.
+    /// slaves) to 65 ms. By default `cycle_ns`, where that is longer: a network may not hold a shorter one.
     pub setup_cycle_ns: u32,
     /// Deviation of the master's own cycle start in nanoseconds, S-0-1023 follows from it. Above 1000 the master
     /// declares itself a soft master in S-0-1032.
@@ -176,6 +175,11 @@ pub struct MasterConfig {
     pub list_capacity: usize,
 }
 
+/// MDTs, and ATs, in CP1 and CP2.
+fn setup_telegrams(slaves_max: u16) -> u8 {
+    if slaves_max > 255 { 4 } else { 2 }
+}
+
 impl MasterConfig {
     /// A configuration for a line on port 1 with the usual times: in CP0 to CP2 the cycle time, and 1 ms at least,
     /// 120 ms pauses, 200 ms waits, 100 stable
@@ -211,13 +215,19 @@ impl MasterConfig {
     /// MDTs, and ATs, in CP1 and CP2: 2, or 4 for more than 255 slaves.
     #[must_use]
     pub fn setup_telegrams(&self) -> u8 {
-        if self.slaves_max > 255 { 4 } else { 2 }
+        setup_telegrams(self.slaves_max)
     }
 
     /// The shortest cycle of CP0 to CP2 in nanoseconds: 1 ms, or 2 ms for more than 255 slaves.
     #[must_use]
     pub fn setup_cycle_min_ns(&self) -> u32 {
-        if self.setup_telegrams() == 4 { 2 * SETUP_CYCLE_NS_MIN } else { SETUP_CYCLE_NS_MIN }
+        Self::setup_cycle_least(self.slaves_max)
+    }
+
+    /// The same for a network with room for so many slaves.
+    #[must_use]
+    pub fn setup_cycle_least(slaves_max: u16) -> u32 {
+        if setup_telegrams(slaves_max) == 4 { 2 * SETUP_CYCLE_NS_MIN } else { SETUP_CYCLE_NS_MIN }
     }
 
     /// Checks every value against its range.

@@ -54,6 +54,7 @@ use self::redundancy::Redundancy;
 use self::report::ReportRow;
 use self::scan::Scan;
 use self::station::{End, Facts, Presence, Station};
+use self::svc::request::SvcOperation;
 use self::svc::request::SvcRequest;
 use self::topology::Topology;
 use crate::wire::data_status::DataStatus;
@@ -524,6 +525,18 @@ impl Master {
     #[must_use]
     pub fn topology(&self) -> Topology {
         self.redundancy.topology()
+    }
+
+    /// What the master waits for: the first slave with a request on its service channel, and which one.
+    #[must_use]
+    pub fn waits_for(&self) -> Option<(SlaveId, Idn, SvcOperation)> {
+        let stations =
+            self.stations[..self.found].iter().enumerate().filter(|(_, station)| station.is_active());
+        let mut busy = stations.filter_map(|(index, station)| {
+            let (idn, operation) = station.channel.request()?;
+            Some((SlaveId::from_index(index), idn, operation))
+        });
+        busy.next()
     }
 
     /// Counters.

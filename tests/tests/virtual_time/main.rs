@@ -26,6 +26,7 @@ mod modes;
 mod motion_checker;
 mod network;
 mod owner;
+mod phase_up;
 mod planes;
 mod programs;
 mod reconnect;

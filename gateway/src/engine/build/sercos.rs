@@ -10,12 +10,6 @@ use crate::engine::bus::sercos::commissioner::Commissioner;
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
 use crate::mapping::{AxisUnits, Mapping, Reference, SercosAxis};
 
-/// Most slaves of a SERCOS III network.
-const SLAVES_MAX: u16 = 511;
-
-/// Slaves that may be on the bus without being configured: they are told of instead of keeping the bus down.
-const SPARE_SLAVES: u16 = 16;
-
 /// The SERCOS III master of a configuration.
 #[must_use]
 pub fn master_config(sercos: &Sercos, host: Host) -> MasterConfig {
@@ -35,9 +29,9 @@ pub fn master_config(sercos: &Sercos, host: Host) -> MasterConfig {
         hot_plug: None,
     };
     master.slaves = sercos.drives.iter().map(slave).collect();
-    master.slaves_max =
-        u16::try_from(sercos.drives.len()).unwrap_or(SLAVES_MAX).saturating_add(SPARE_SLAVES).min(SLAVES_MAX);
-    master.setup_cycle_ns = master.setup_cycle_ns.max(master.setup_cycle_min_ns());
+    master.slaves_max = Sercos::slaves_max(sercos.drives.len());
+    // Nothing moves yet, and the service channel takes a step in a cycle: the shorter the better.
+    master.setup_cycle_ns = sercos.setup_cycle.map_or(master.setup_cycle_min_ns(), ns);
     master
 }
 

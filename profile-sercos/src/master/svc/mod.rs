@@ -16,6 +16,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use self::request::{SvcFailure, SvcOutcome, SvcReply, SvcRequest};
 use self::transfer::{Flow, Transfer};
 use crate::wire::data_status::DataStatus;
+use crate::wire::idn::Idn;
 use crate::wire::svc::{AtSvc, Element, MdtSvc, SvcControl, SvcStatus};
 use crate::wire::svc_error::SvcError;
 
@@ -154,6 +155,14 @@ impl ServiceChannel {
     pub fn is_running(&self) -> bool {
         let parked = |slot: &Slot| matches!(slot.place, Place::Parked(..));
         self.active.is_some() || (self.pending > 0 && self.slots.iter().any(parked))
+    }
+
+    /// The request on the wire, else a procedure command in process.
+    pub fn request(&self) -> Option<(Idn, request::SvcOperation)> {
+        let parked = |slot: &&Slot| matches!(slot.place, Place::Parked(..));
+        let active = self.active.as_ref().map(|(index, ..)| &self.slots[*index]);
+        let slot = active.or_else(|| self.slots.iter().find(parked).filter(|_| self.pending > 0))?;
+        Some((slot.request.idn, slot.request.operation))
     }
 
     /// Whether nothing is on the wire and nothing waits.

@@ -124,6 +124,22 @@ pub enum SvcOperation {
     Command,
 }
 
+impl fmt::Display for SvcOperation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Status => f.write_str("opening"),
+            Self::Read(Element::Data) => f.write_str("reading"),
+            Self::Write(Element::Data) => f.write_str("writing"),
+            Self::Length(Element::Data) => f.write_str("reading the length of"),
+            Self::Read(element) => write!(f, "reading the {element} of"),
+            Self::Write(element) => write!(f, "writing the {element} of"),
+            Self::Length(element) => write!(f, "reading the length of the {element} of"),
+            Self::Execute | Self::Command => f.write_str("executing"),
+            Self::Cancel => f.write_str("cancelling"),
+        }
+    }
+}
+
 /// Which of several waiting requests goes first. A running request is never interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum Priority {

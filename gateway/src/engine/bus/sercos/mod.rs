@@ -50,6 +50,9 @@ const RESCAN_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
 /// configuration can help.
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
+/// How often is said what a long phase waits for.
+const PROGRESS: DurationNs = DurationNs::from_secs(5);
+
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
 const REFUSED_MAX: usize = 64;
 
@@ -100,6 +103,32 @@ struct Drive {
     accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
 }
 
+/// What is said of a phase before CP4 that takes long.
+#[derive(Debug, Default)]
+struct Telling {
+    phase: Option<Phase>,
+    since: MonotonicTime,
+    told: i64,
+}
+
+impl Telling {
+    /// What is to be said: every [`PROGRESS`] that the bus is in the same phase on its way up.
+    fn tell(&mut self, now: MonotonicTime, master: &Master) -> Option<Notice> {
+        let phase = master.phase();
+        if phase != self.phase {
+            *self = Self { phase, since: now, told: 0 };
+        }
+        let phase = phase.filter(|phase| *phase < Phase::CP4)?;
+        let times = now.since(self.since).0 / PROGRESS.0;
+        if times <= self.told {
+            return None;
+        }
+        self.told = times;
+        let seconds = u16::try_from(now.since(self.since).0 / 1_000_000_000).unwrap_or(u16::MAX);
+        Some(Notice::Progress { phase, seconds, with: master.waits_for() })
+    }
+}
+
 /// The bus.
 #[derive(Debug)]
 pub struct SercosBus {
@@ -109,6 +138,7 @@ pub struct SercosBus {
     places: Places<usize>,
     retry_at: Option<MonotonicTime>,
     retry_pause: DurationNs,
+    progress: Telling,
     wanted: Option<Phase>,
     cycles_seen: u64,
     /// Slaves that stand in the way of the others; left out until the next scan.
@@ -168,6 +198,7 @@ impl SercosBus {
             drives,
             retry_at: None,
             retry_pause: RETRY_PAUSE,
+            progress: Telling::default(),
             wanted: Some(Phase::CP4),
             cycles_seen: 0,
             refused: ArrayVec::new(),
@@ -742,6 +773,9 @@ impl Bus for SercosBus {
             if self.master.consumer(slave, feedback).is_some_and(failed) {
                 self.master.reset_consumer(slave, feedback);
             }
+        }
+        if let Some(progress) = self.progress.tell(now, &self.master) {
+            notice(progress);
         }
         if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
             let due = *self.retry_at.get_or_insert(now + self.retry_pause);
