@@ -25,6 +25,7 @@ use super::admission::Refused;
 use super::axis::{Loss, OwnWords, Trip, Waiting};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
 use super::bus::can::lss::LssNotice;
+use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Difference, SercosError};
@@ -52,6 +53,15 @@ pub enum Notice {
         axis: u8,
         /// Which, and why.
         refused: RefusedRequest,
+    },
+    /// A drive on DeviceNet answers, and its answers do not count.
+    SlaveAnswers {
+        /// The axis.
+        axis: u8,
+        /// Its MAC ID.
+        mac: MacId,
+        /// Why.
+        error: MessageError,
     },
     /// A phase of the SERCOS bus takes long.
     Progress {
@@ -328,6 +338,7 @@ impl Notice {
             | Self::NodeProgram { axis, .. }
             | Self::ModesTried { axis, .. }
             | Self::Refused { axis, .. }
+            | Self::SlaveAnswers { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
             | Self::Difference { axis, .. }
@@ -384,6 +395,9 @@ impl fmt::Display for Notice {
                 write!(f, "{phase} since {seconds} s: {slave}, {operation} {idn}")
             }
             Self::Progress { phase, seconds, with: None } => write!(f, "{phase} since {seconds} s"),
+            Self::SlaveAnswers { mac, error, .. } => {
+                write!(f, "the answers of the drive with MAC ID {mac} do not count: {error}")
+            }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
             Self::PassedOver { failures, .. } => {

@@ -378,7 +378,7 @@ impl Many {
         let (now, system) = (self.now, SystemTime(self.now.0 + SYSTEM_OFFSET));
         self.engine.feed_time(&TimeSample { at: now, system, rate_ppb: 0 });
         let Self { engine, engine_due, seats, south, can, devicenet, config, .. } = self;
-        let mut ports: ArrayVec<SouthPort<'_>, BUSES_MAX> = ports_of(config, south, can, devicenet);
+        let mut ports: ArrayVec<SouthPort<'_>, BUSES_MAX> = ports_of(config, south, can, devicenet, None);
         let mut north: Vec<&mut dyn NorthPort> =
             seats.iter_mut().map(|seat| &mut seat.north as &mut dyn NorthPort).collect();
         let result = around(&mut || *engine_due = engine.cycle(now, &mut north, &mut ports));

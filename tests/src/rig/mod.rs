@@ -14,6 +14,7 @@
 
 pub mod clocks;
 pub mod explicit;
+pub mod foreign;
 pub mod generic;
 pub mod many;
 pub mod motion;
@@ -46,6 +47,7 @@ use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
 };
+use profile_cip::devicenet::wire::{Identifier, MacId};
 use profile_cip::target::adapter::{Adapter, SessionSlot};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::motion_device::SyncState;
@@ -61,6 +63,7 @@ use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
 
 use self::clocks::Clock;
+use self::foreign::Foreign;
 use self::motion_checker::MotionChecker;
 use self::network::{Knobs, Pipe};
 use self::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
@@ -160,6 +163,8 @@ pub struct Rig {
     pub can: Vec<CanWire>,
     /// The DeviceNet networks with their drives.
     pub devicenet: Vec<CanWire<DevicenetNode>>,
+    /// Drives of somebody else in place of those of the first CAN bus, or of the first DeviceNet where there is none.
+    pub foreign: Option<CanWire<Foreign>>,
     /// The police over the line.
     pub court: Court,
     /// The checker of every set-point.
@@ -240,6 +245,7 @@ impl Rig {
             line,
             can,
             devicenet: devicenet.collect(),
+            foreign: None,
             court: Court::new(START),
             motion_checker: MotionChecker::new(&config, settings.seed),
             knobs: settings.knobs,
@@ -272,6 +278,29 @@ impl Rig {
             commands: Pipe::new(settings.seed),
             actuals: Pipe::new(!settings.seed),
         }
+    }
+
+    /// A box whose first CAN bus, or DeviceNet, has these drives and no others.
+    ///
+    /// # Panics
+    /// When the configuration makes no box, or has no such bus.
+    #[must_use]
+    pub fn among(settings: Settings, stations: Vec<foreign::Shared>) -> Self {
+        let mut rig = Self::new(settings);
+        let duplicates = (0..).map_while(MacId::new).map(|mac| Identifier::DuplicateMacCheck(mac).can());
+        let (rate, shared) = match (rig.config.can.first(), rig.config.devicenet.first()) {
+            (Some(bus), _) => (bus.bit_rate, Vec::new()),
+            (None, Some(network)) => (network.bit_rate(), duplicates.collect()),
+            (None, None) => panic!("no CAN bus"),
+        };
+        // The motion checker looks at drives that the rig knows the inside of.
+        if rig.can.is_empty() {
+            rig.devicenet.remove(0);
+        } else {
+            rig.can.remove(0);
+        }
+        rig.foreign = Some(foreign::wire(rate, stations, &shared));
+        rig
     }
 
     /// A box with its bus in CP4.
@@ -586,8 +615,8 @@ impl Rig {
         self.deliver();
         self.before_cycle();
         let (now, mut due) = (self.now, self.now);
-        let Self { engine, north, south, can, devicenet, config, .. } = self;
-        let mut ports = ports_of(config, south, can, devicenet);
+        let Self { engine, north, south, can, devicenet, foreign, config, .. } = self;
+        let mut ports = ports_of(config, south, can, devicenet, foreign.as_mut());
         let result = around(&mut || due = engine.cycle(now, &mut [north], &mut ports));
         drop(ports);
         self.set_due(due);
@@ -658,8 +687,9 @@ impl Rig {
     fn cycle(&mut self) {
         self.before_cycle();
         let now = self.now;
-        let Self { engine, north, south, can, devicenet, config, .. } = self;
-        let due = engine.cycle(now, &mut [north], &mut ports_of(config, south, can, devicenet));
+        let Self { engine, north, south, can, devicenet, foreign, config, .. } = self;
+        let due =
+            engine.cycle(now, &mut [north], &mut ports_of(config, south, can, devicenet, foreign.as_mut()));
         self.set_due(due);
         self.after_cycle();
     }
@@ -669,6 +699,7 @@ impl Rig {
         self.line.handle_time(self.now);
         self.can.iter_mut().for_each(|wire| wire.bus.advance(self.now));
         self.devicenet.iter_mut().for_each(|wire| wire.bus.advance(self.now));
+        self.foreign.iter_mut().for_each(|wire| wire.bus.advance(self.now));
         self.check_motion(|checker, rig| checker.observe(rig));
     }
 
@@ -870,11 +901,14 @@ fn ports_of<'a>(
     south: &'a mut SouthQueue,
     can: &'a mut [CanWire],
     devicenet: &'a mut [CanWire<DevicenetNode>],
+    foreign: Option<&'a mut CanWire<Foreign>>,
 ) -> ArrayVec<SouthPort<'a>, BUSES_MAX> {
     let mut ports = ArrayVec::new();
     if config.sercos.is_some() {
         ports.push(SouthPort::Ethernet(south));
     }
+    // It stands in the place of the first one.
+    ports.extend(foreign.map(|bus| SouthPort::Can(bus)));
     ports.extend(can.iter_mut().map(|bus| SouthPort::Can(bus)));
     ports.extend(devicenet.iter_mut().map(|network| SouthPort::Can(network)));
     ports

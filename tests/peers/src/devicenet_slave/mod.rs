@@ -25,7 +25,7 @@ mod motion_drive;
 mod objects;
 mod power;
 mod request;
-mod settings;
+pub mod settings;
 mod speed_drive;
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use profile_cip::devicenet::master::station::Phase;
 use profile_cip::devicenet::wire::MacId;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
-use self::end::{End, Row};
+use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::backoff::Backoff;
 use super::bus_return::BusReturn;
@@ -79,11 +79,18 @@ struct Drive {
     command: Row,
     feedback: Row,
     fresh: bool,
+    /// Cycles in a row without an answer that counts.
+    vain: u16,
+    /// Why the first one of them did not, and whether that has been told.
+    error: Option<(MessageError, bool)>,
     /// It has been tried: nobody waits for it any longer.
     tried: bool,
     backoff: Backoff,
     accesses: ArrayVec<(Ticket, Purpose, Item), ACCESSES_MAX>,
 }
+
+/// Cycles in which a drive that was taken may have nothing valid to tell.
+const BEGINNING: u16 = 100;
 
 /// The bus.
 #[derive(Debug)]
@@ -106,6 +113,8 @@ pub struct DevicenetBus {
     back: BusReturn,
     up: bool,
     stopped: bool,
+    /// Answers of a drive in a row that may be missing.
+    allowed_losses: u16,
 }
 
 impl DevicenetBus {
@@ -120,11 +129,14 @@ impl DevicenetBus {
             command: [0; ROW_LEN],
             feedback: [0; ROW_LEN],
             fresh: false,
+            vain: 0,
+            error: None,
             tried: false,
             backoff: Backoff::NONE,
             accesses: ArrayVec::new(),
         };
         let cycle = config.cycle;
+        let allowed_losses = config.slaves.iter().map(|slave| slave.missed_max).max().map_or(0, u16::from);
         let drives: Vec<_> = drives.into_iter().map(drive).collect();
         Ok(Self {
             number,
@@ -140,6 +152,7 @@ impl DevicenetBus {
             back: BusReturn::NEVER_LOST,
             up: false,
             stopped: false,
+            allowed_losses,
         })
     }
 
@@ -154,11 +167,31 @@ impl DevicenetBus {
         let cycle = self.master.statistics().cycles;
         for drive in &mut self.drives {
             drive.fresh = false;
-            let consumer = self.master.consumer(drive.plan.mac, POLL);
-            let Some(consumer) = consumer.filter(|consumer| consumer.fresh) else { continue };
-            match drive.plan.end.handle(cycle, consumer.data, &mut drive.feedback) {
-                Ok(()) => drive.fresh = true,
-                Err(_) => self.refused += 1,
+            let consumer = self.master.consumer(drive.plan.mac, POLL).filter(|consumer| consumer.fresh);
+            let handled =
+                consumer.map(|consumer| drive.plan.end.handle(cycle, consumer.data, &mut drive.feedback));
+            match handled {
+                Some(Ok(())) => (drive.fresh, drive.vain, drive.error) = (true, 0, None),
+                Some(Err(error)) => {
+                    self.refused += 1;
+                    drive.vain = drive.vain.saturating_add(1);
+                    // It is told once, until one counts again.
+                    drive.error = drive.error.or(Some((error, false)));
+                }
+                None => drive.vain = drive.vain.saturating_add(1),
+            }
+        }
+    }
+
+    /// Tells of drives that answer, and whose answers do not count.
+    fn tell_errors(&mut self, notice: &mut dyn FnMut(Notice)) {
+        for drive in &mut self.drives {
+            if let Some((error, told @ false)) = &mut drive.error
+                && drive.vain > if drive.stage == Stage::Ready { self.allowed_losses } else { BEGINNING }
+            {
+                *told = true;
+                let axis = u8::try_from(drive.plan.axis).unwrap_or(u8::MAX);
+                notice(Notice::SlaveAnswers { axis, mac: drive.plan.mac, error: *error });
             }
         }
     }
@@ -363,8 +396,9 @@ impl Bus for DevicenetBus {
 
     fn feedback(&self, axis: usize) -> Option<Received<'_>> {
         let drive = self.drives.get(self.places.of(axis)?)?;
-        // The master gives a drive up that has missed too many answers.
-        let alive = self.master.phase(drive.plan.mac) == Some(Phase::Exchange);
+        // The master gives a drive up that has missed too many answers. Those that do not count are none.
+        let exchanges = self.master.phase(drive.plan.mac) == Some(Phase::Exchange);
+        let alive = exchanges && drive.vain <= self.allowed_losses;
         let ready = drive.stage == Stage::Ready;
         ready.then_some(Received { data: &drive.feedback, fresh: drive.fresh, at: None, alive })
     }
@@ -398,6 +432,7 @@ impl Bus for DevicenetBus {
             }
         }
         self.lead_on(now, system, axes);
+        self.tell_errors(notice);
         for place in 0..self.drives.len() {
             let axis = self.drives[place].plan.axis;
             if self.drives[place].stage == Stage::Ready {
