@@ -137,10 +137,11 @@ fn pdos(od: &mut Dictionary, s: &Settings) {
             if transmit {
                 number(od, index, 6, U8, Rw, No, 0);
             }
-            let count = i64::try_from(pdo.map.len()).unwrap_or(0);
+            let map: Vec<u32> = pdo.map.iter().copied().filter(|entry| !gone(*entry, s)).collect();
+            let count = i64::try_from(map.len()).unwrap_or(0);
             number(od, at, 0, U8, map_access, No, count);
             for (sub, entry) in
-                (1..=s.max_entries.max(1)).zip(pdo.map.iter().copied().chain(std::iter::repeat(0)))
+                (1..=s.max_entries.max(1)).zip(map.iter().copied().chain(std::iter::repeat(0)))
             {
                 // The axis objects of the default maps move with the axis.
                 let placed = od.place(super::dictionary::word(i64::from(entry >> 16)));
@@ -149,6 +150,14 @@ fn pdos(od: &mut Dictionary, s: &Settings) {
             }
         }
     }
+}
+
+/// Whether the drive does not have the object of a mapping entry, or does not map it.
+fn gone(entry: u32, s: &Settings) -> bool {
+    let index = super::dictionary::word(i64::from(entry >> 16));
+    let [_, sub, ..] = entry.to_le_bytes();
+    let missing = |(at, part): &(u16, Option<u8>)| *at == index && part.is_none_or(|part| part == sub);
+    s.missing.iter().any(missing) || s.not_mappable.contains(&index)
 }
 
 fn cob_id(pdo: &PdoDefault, node_id: u8) -> i64 {
