@@ -159,7 +159,7 @@ impl CanDrive {
         self.node.od.wire(index, sub).ok().map(|entry| entry.data.as_slice())
     }
 
-    /// A fault comes up. Its cause stays until `mend`.
+    /// A fault comes up. With `reset_needs_mend` it cannot be reset until `mend`.
     pub fn fail(&mut self, code: u16) {
         let node = &mut self.node;
         node.motion.fail(code, &mut node.od, &node.s);
