@@ -8,6 +8,8 @@ use axisbridge_peers::devicenet_slave::settings::{RefusedSet, Settings as Odditi
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
 
+use profile_cip::wire::motion::codes::ControlMode;
+
 use super::{AXIS, Outcome, does, said, table};
 
 const HEAD: &str = r#"
@@ -66,7 +68,8 @@ fn run(oddities: Oddities, keys: &str, speed: bool) -> Outcome {
         ],
     };
     let (mut was_enabled, mut fastest) = (false, 0.0_f64);
-    let done = does(&mut rig, steps, 20_000, || {
+    let mode = if speed { ControlMode::VELOCITY } else { ControlMode::POSITION };
+    let done = does(&mut rig, mode, steps, 20_000, |_| {
         let slave = slave.borrow();
         was_enabled |= slave.enabled();
         fastest = fastest.max(slave.velocity());
@@ -80,8 +83,14 @@ fn run(oddities: Oddities, keys: &str, speed: bool) -> Outcome {
         true => (fastest - 120.0).abs() < 2.0,
         false => (slave.position() - 65_536.0).abs() < 200.0,
     };
-    let of_drive =
-        ["DeviceNet 1: slave", "DeviceNet 1: frame", "cannot be used", "Axis Fault", "was refused"];
+    let of_drive = [
+        "DeviceNet 1: slave",
+        "DeviceNet 1: frame",
+        "cannot be used",
+        "do not count",
+        "Axis Fault",
+        "was refused",
+    ];
     Outcome { works: done && was_enabled && went, said: said(&rig, &of_drive) }
 }
 

@@ -4,11 +4,14 @@
 //! A row works when the controller has the axis enabled, moved and disabled, and the drive itself says that it went. A row is
 //! refused when the drive never was enabled and the box named it. The tables are snapshots, texts included.
 
+mod canopen;
 mod devicenet;
 
 use axisbridge_tests::rig::Rig;
 use axisbridge_tests::rig::motion::millis;
+use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, Step};
+use profile_cip::wire::motion::codes::ControlMode;
 
 /// What became of a row.
 pub struct Outcome {
@@ -22,14 +25,23 @@ pub struct Outcome {
 pub const AXIS: AxisSet = AxisSet::one(1);
 
 /// Has the controller do this, and says whether all of it was done within so many milliseconds. `look` sees it go on.
-pub fn does(rig: &mut Rig, program: Vec<Step>, within: i64, mut look: impl FnMut()) -> bool {
+pub fn does(
+    rig: &mut Rig,
+    mode: ControlMode,
+    program: Vec<Step>,
+    within: i64,
+    mut look: impl FnMut(&Rig),
+) -> bool {
     let steps = program.len();
-    rig.connect(program);
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = mode;
+    config.axes[0].sets = DataSets::fixed(mode);
+    rig.connect_with(config, program);
     let mut left = within;
     while left > 0 && !(rig.report().failure.is_some() || rig.report().steps_finished >= steps) {
         rig.run_for(millis(10));
         left -= 10;
-        look();
+        look(rig);
     }
     rig.report().failure.is_none() && rig.report().steps_finished >= steps
 }

@@ -1,6 +1,7 @@
 //! The DeviceNet networks of a configuration.
 
 use profile_cip::devicenet::master::config::{MasterConfig, SlaveConfig};
+use profile_cip::target::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::mode::OperatingMode;
 use profile_generic::ratio::Ratio;
@@ -30,12 +31,17 @@ pub fn master(config: &Config, place: usize) -> MasterConfig {
             continue;
         }
         let (output, input) = lengths(drive);
-        let slave = SlaveConfig::polled(drive.mac, output, input, drive.packet_rate_ms);
-        master.slaves.push(SlaveConfig {
-            identity: drive.identity,
-            missed_max: network.allowed_losses,
-            ..slave
-        });
+        let mut slave = SlaveConfig::polled(drive.mac, output, input, drive.packet_rate_ms);
+        slave.identity = drive.identity;
+        match drive.kind {
+            // The poll connection of another device could carry anything.
+            DevicenetKind::Motion { .. } => slave.identity.device_type = Some(DEVICE_TYPE_CIP_MOTION_DRIVE),
+            DevicenetKind::Speed { assembly, .. } => {
+                let assemblies = assembly.status().map(|status| [assembly.0, status.0]);
+                slave.connections.iter_mut().for_each(|poll| poll.assemblies = assemblies);
+            }
+        }
+        master.slaves.push(SlaveConfig { missed_max: network.allowed_losses, ..slave });
     }
     master
 }

@@ -76,6 +76,8 @@ pub struct IoConfig {
     pub rate_ms: u16,
     /// The slave is asked in every so many cycles, 1 or more.
     pub every: u16,
+    /// Assemblies that the messages to the slave and from it have to be; `None` where the profile has no other.
+    pub assemblies: Option<[u8; 2]>,
 }
 
 impl IoConfig {
@@ -83,7 +85,7 @@ impl IoConfig {
     #[must_use]
     pub const fn poll(output: usize, input: usize, rate_ms: u16) -> Self {
         let kind = ConnectionKind::Poll;
-        Self { kind, cyclic: false, acknowledged: true, output, input, rate_ms, every: 1 }
+        Self { kind, cyclic: false, acknowledged: true, output, input, rate_ms, every: 1, assemblies: None }
     }
 
     /// Its bit of the allocation choice.

@@ -133,6 +133,19 @@ pub enum LossReason {
         /// Bytes that the slave says.
         found: usize,
     },
+    /// A connection carries another assembly, and does not let it be changed.
+    Assembly {
+        /// The connection.
+        kind: ConnectionKind,
+        /// Of what the slave produces, or what it consumes.
+        produced: bool,
+        /// The one that is expected.
+        expected: u8,
+        /// The one that it has; `None` where it has none that can be told.
+        found: Option<u8>,
+        /// What it says to another one.
+        status: GeneralStatus,
+    },
     /// Too many answers in a row have stayed away.
     Missed {
         /// The connection.
@@ -166,6 +179,15 @@ impl fmt::Display for LossReason {
             Self::Size { kind, produced, expected, found } => {
                 let what = if *produced { "produced" } else { "consumed" };
                 write!(f, "{kind}: expected {expected} bytes {what}, found {found}")
+            }
+            Self::Assembly { kind, produced, expected, found, status } => {
+                let what = if *produced { "produced" } else { "consumed" };
+                write!(f, "{kind}: expected assembly {expected} {what}, found ")?;
+                match found {
+                    Some(found) => write!(f, "{found}")?,
+                    None => f.write_str("none that could be told")?,
+                }
+                write!(f, ", and it cannot be set: {status}")
             }
             Self::Missed { kind, count } => write!(f, "{kind}: {count} answers in a row are missing"),
             Self::Restarted => f.write_str("it has started anew"),

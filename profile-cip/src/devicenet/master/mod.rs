@@ -113,6 +113,8 @@ pub struct Facts {
     pub serial: Option<u32>,
     /// Status word of the Identity object, read again and again.
     pub status: Option<u16>,
+    /// The assembly that the path leads to which was read last.
+    pub(super) assembly: Option<u8>,
 }
 
 #[derive(Debug, Clone)]

@@ -23,6 +23,26 @@ const SIZES: [u8; 2] = [7, 8];
 /// Expected packet rate.
 const RATE: u8 = 9;
 
+/// Consumed and produced connection path, in the order of [`IoConfig::assemblies`](super::config::IoConfig::assemblies).
+const PATHS: [u8; 2] = [16, 14];
+
+/// Questions about a path: what it is, and another one for it.
+const PER_PATH: usize = 2;
+
+/// The path of the data of an assembly: class 4, instance, attribute 3.
+const fn path_of(assembly: u8) -> [u8; 6] {
+    [0x20, 0x04, 0x24, assembly, 0x30, 3]
+}
+
+/// The assembly that a path leads to.
+fn assembly_of(path: &[u8]) -> Option<u8> {
+    match path {
+        [0x20, 0x04, 0x24, assembly, ..] => Some(*assembly),
+        [0x20, 0x04, 0x25, 0, assembly, 0, ..] => Some(*assembly),
+        _ => None,
+    }
+}
+
 fn devicenet(service: u8, data: &[u8]) -> Option<ExplicitRequest> {
     ExplicitRequest::new(Service(service), u16::from(CLASS_DEVICENET), 1, data)
 }
@@ -42,6 +62,22 @@ impl Station {
                 let attribute = *IDENTITY.get(self.step)?;
                 Some((true, ExplicitRequest::get(CLASS_IDENTITY, 1, attribute)))
             }
+            Phase::Paths => {
+                // Of all connections with assemblies: consumed, produced.
+                let (place, way, sets) = self.path_step();
+                let one = io(place)?;
+                let (instance, attribute) = (u16::from(one.kind.instance()), PATHS[way]);
+                Some((
+                    true,
+                    match one.assemblies {
+                        None => return None,
+                        Some(assemblies) if sets => {
+                            ExplicitRequest::set(connection, instance, attribute, &path_of(assemblies[way]))?
+                        }
+                        Some(_) => ExplicitRequest::get(connection, instance, attribute),
+                    },
+                ))
+            }
             Phase::Sizes => {
                 let instance = u16::from(io(self.step / 2)?.kind.instance());
                 Some((true, ExplicitRequest::get(connection, instance, SIZES[self.step % 2])))
@@ -55,9 +91,55 @@ impl Station {
         }
     }
 
+    /// The connection that a step with the paths is about, which way, and whether it sets the path.
+    const fn path_step(&self) -> (usize, usize, bool) {
+        let path = self.step / PER_PATH;
+        (path / PATHS.len(), path % PATHS.len(), !self.step.is_multiple_of(PER_PATH))
+    }
+
+    /// What is made of the answer about a path.
+    fn judge_path(&mut self, outcome: &Outcome) -> Result<(), (PhaseEvent, LossReason)> {
+        let (place, way, sets) = self.path_step();
+        let Some((kind, assemblies)) =
+            self.config.connections.get(place).and_then(|one| Some((one.kind, one.assemblies?)))
+        else {
+            return Ok(());
+        };
+        match outcome {
+            Outcome::Done(_) if sets => self.facts.assembly = None,
+            Outcome::Done(path) => {
+                self.facts.assembly = assembly_of(path);
+                // What is right already is not set.
+                self.step += usize::from(self.facts.assembly == Some(assemblies[way]));
+            }
+            Outcome::Refused { status, .. } if sets => {
+                let reason = LossReason::Assembly {
+                    kind,
+                    produced: way == 1,
+                    expected: assemblies[way],
+                    found: self.facts.assembly,
+                    status: *status,
+                };
+                return Err((PhaseEvent::Refused, reason));
+            }
+            // One that does not tell its paths has no others: its data say what it is.
+            Outcome::Refused { .. } => self.step += 1,
+            Outcome::NoAnswer | Outcome::NotTaken(_) | Outcome::Lost => {
+                return Err((PhaseEvent::NoAnswer, LossReason::NoAnswer(Phase::Paths)));
+            }
+            Outcome::Malformed(_) => {
+                return Err((PhaseEvent::Refused, LossReason::Malformed(Phase::Paths)));
+            }
+        }
+        Ok(())
+    }
+
     /// What the answer to a question makes of the phase.
     fn judge(&mut self, outcome: &Outcome) -> Result<(), (PhaseEvent, LossReason)> {
         let phase = self.phase;
+        if phase == Phase::Paths {
+            return self.judge_path(outcome);
+        }
         let data = match outcome {
             Outcome::Done(data) => data,
             Outcome::Refused { status, additional } => {

@@ -6,7 +6,8 @@
 //! | allocate | identify | release | waiting | waiting |
 //! | release, then allocate anew | allocate again | allocate again | waiting | allocate again (refused), waiting (no answer) |
 //! | allocate again | identify | waiting | waiting | waiting |
-//! | identify | sizes | | | waiting |
+//! | identify | paths | | | waiting |
+//! | paths | sizes | | | waiting |
 //! | sizes | rates | | | waiting |
 //! | rates | exchange | | | waiting |
 //! | exchange | | | | waiting |
@@ -29,6 +30,8 @@ pub enum Phase {
     AllocateAgain,
     /// Being asked who it is.
     Identify,
+    /// Being asked which assemblies its connections carry, and given the right ones.
+    Paths,
     /// Being asked how long its messages are.
     Sizes,
     /// Being given its expected packet rates, which establishes the connections.
@@ -56,12 +59,13 @@ pub enum PhaseEvent {
 
 impl Phase {
     /// Every phase.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Waiting,
         Self::Allocate,
         Self::Release,
         Self::AllocateAgain,
         Self::Identify,
+        Self::Paths,
         Self::Sizes,
         Self::Rates,
         Self::Exchange,
@@ -76,7 +80,8 @@ impl Phase {
             (Self::Allocate | Self::AllocateAgain, E::Done) => Self::Identify,
             (Self::Allocate, E::Already) => Self::Release,
             (Self::Release, E::Done | E::Already | E::Refused) => Self::AllocateAgain,
-            (Self::Identify, E::Done) => Self::Sizes,
+            (Self::Identify, E::Done) => Self::Paths,
+            (Self::Paths, E::Done) => Self::Sizes,
             (Self::Sizes, E::Done) => Self::Rates,
             (Self::Rates | Self::Exchange, E::Done) => Self::Exchange,
             _ => Self::Waiting,
@@ -86,7 +91,7 @@ impl Phase {
     /// Whether the slave is the master's in this phase, as far as the master knows.
     #[must_use]
     pub const fn is_allocated(self) -> bool {
-        matches!(self, Self::Identify | Self::Sizes | Self::Rates | Self::Exchange)
+        matches!(self, Self::Identify | Self::Paths | Self::Sizes | Self::Rates | Self::Exchange)
     }
 }
 
@@ -98,6 +103,7 @@ impl fmt::Display for Phase {
             Self::Release => "release",
             Self::AllocateAgain => "allocate again",
             Self::Identify => "identify",
+            Self::Paths => "assemblies",
             Self::Sizes => "sizes",
             Self::Rates => "expected packet rates",
             Self::Exchange => "exchange",
