@@ -166,8 +166,8 @@ impl Checker {
         let node = self.number(&table.node, "the node-id", NODES);
         let axis = self.number_or(table.axis.as_ref(), "the axis of the device", AXES, 0);
         let modes = match &table.modes {
-            None => Some(MODES.iter().map(|(_, mode)| *mode).collect()),
-            Some(names) => self.words(names, "mode", &MODES),
+            None => Some(None),
+            Some(names) => self.words(names, "mode", &MODES).map(Some),
         };
         if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
             self.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");

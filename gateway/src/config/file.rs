@@ -329,8 +329,8 @@ pub struct CanDriveTable {
     pub node: Spanned<i64>,
     /// Which axis of the device it is, 0 to 7; unique in the device. Default: 0.
     pub axis: Option<Spanned<i64>>,
-    /// What the axis is to be used for: `"position"`, `"velocity"`, `"torque"`; set-points of others are not sent.
-    /// Default: all three.
+    /// What the axis is to be used for: `"position"`, `"velocity"`, `"torque"`; set-points of others are not sent, and a drive that lacks
+    /// one of them is not led. Default: all three, as far as the drive has them.
     pub modes: Option<Spanned<Vec<Spanned<String>>>>,
     /// Which actual values beside the position are sent in every cycle, each of which makes the bus fuller: `"velocity"`, `"torque"`,
     /// `"following-error"` (60F4), which the box works out otherwise, and `"inputs"` (60FD): limit switches and home switch. Default:

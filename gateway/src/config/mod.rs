@@ -629,8 +629,8 @@ pub struct CanDrive {
     pub node: NodeId,
     /// Which axis of the device, from 0.
     pub axis: u16,
-    /// What it is used for, the mode at start first.
-    pub modes: Vec<OperatingMode>,
+    /// What it is used for, the mode at start first; `None`: all that it has.
+    pub modes: Option<Vec<OperatingMode>>,
     /// Actual values that are not sent in every cycle.
     pub left_out: Vec<Signal>,
     /// Offsets that the drive adds to its set-points.

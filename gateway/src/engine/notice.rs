@@ -13,6 +13,7 @@ use profile_cip::target::axis_state::AxisState;
 use profile_cip::target::fault_log::{LogEntry, LogKind};
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
 use profile_generic::fault::{Fault, FaultCause};
+use profile_generic::mode::ModeSelection;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::event::{Event, SlaveId};
@@ -175,6 +176,15 @@ pub enum Notice {
         /// What came out.
         tried: Tried,
     },
+    /// The drive of a CANopen device lacks operating modes that nobody asked for.
+    ModesLeftOut {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// Which.
+        modes: Vec<ModeSelection>,
+    },
     /// Steps failed that may fail, at a CANopen drive.
     ObjectsPassedOver {
         /// The axis.
@@ -282,6 +292,7 @@ impl Notice {
             | Self::Waiting { .. }
             | Self::PassedOver { .. }
             | Self::ObjectsPassedOver { .. }
+            | Self::ModesLeftOut { .. }
             | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
             | Self::Node { fault: NodeFault::NONE, alarm: NodeAlarm::NONE, .. }
             | Self::Sercos(
@@ -338,6 +349,7 @@ impl Notice {
             | Self::NodeProgram { axis, .. }
             | Self::ModesTried { axis, .. }
             | Self::Refused { axis, .. }
+            | Self::ModesLeftOut { axis, .. }
             | Self::SlaveAnswers { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
@@ -397,6 +409,10 @@ impl fmt::Display for Notice {
             Self::Progress { phase, seconds, with: None } => write!(f, "{phase} since {seconds} s"),
             Self::SlaveAnswers { mac, error, .. } => {
                 write!(f, "the answers of the drive with MAC ID {mac} do not count: {error}")
+            }
+            Self::ModesLeftOut { node, modes, .. } => {
+                let all: Vec<_> = modes.iter().map(ToString::to_string).collect();
+                write!(f, "node {node} has no mode of operation for {}: the axis does without", all.join(" and "))
             }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),

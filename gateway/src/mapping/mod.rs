@@ -325,6 +325,12 @@ impl Mapping {
         self.cia402.modes_untold(axis, facts)
     }
 
+    /// Operating modes that an axis does without, because its CiA 402 drive lacks them.
+    #[must_use]
+    pub fn cia402_modes_left_out(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Vec<ModeSelection> {
+        self.cia402.modes_left_out(axis, facts)
+    }
+
     /// Notes that a CiA 402 drive has these modes of operation and no others.
     pub fn cia402_has_modes(&self, facts: &mut ObjectFacts, codes: impl Iterator<Item = i8>) {
         self.cia402.has_modes(facts, codes);

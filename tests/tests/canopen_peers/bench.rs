@@ -91,6 +91,7 @@ fn network() -> MasterConfig {
             product: Some(0x402),
             revision: Some(0x1_0000),
             serial: Some(0x1000 + u32::from(NODE)),
+            ..Expected::default()
         },
         writes: vec![
             write(index::PROFILE_VELOCITY, PROFILE_VELOCITY),

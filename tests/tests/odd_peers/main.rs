@@ -9,7 +9,6 @@ mod devicenet;
 
 use axisbridge_tests::rig::Rig;
 use axisbridge_tests::rig::motion::millis;
-use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, Step};
 use profile_cip::wire::motion::codes::ControlMode;
 
@@ -35,7 +34,6 @@ pub fn does(
     let steps = program.len();
     let mut config = rig.controller_config();
     config.axes[0].control_mode = mode;
-    config.axes[0].sets = DataSets::fixed(mode);
     rig.connect_with(config, program);
     let mut left = within;
     while left > 0 && !(rig.report().failure.is_some() || rig.report().steps_finished >= steps) {
@@ -49,7 +47,12 @@ pub fn does(
 /// The lines of the box that name the drive, each once, in their order.
 pub fn said(rig: &Rig, names: &[&str]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for line in rig.told().lines().filter(|line| names.iter().any(|name| line.contains(name))) {
+    let ordinary = ["is the right one", "is in operation", "goes on without reading", ": exchanging"];
+    let told = rig.told();
+    let matters = |line: &&str| {
+        names.iter().any(|name| line.contains(name)) && !ordinary.iter().any(|word| line.contains(word))
+    };
+    for line in told.lines().filter(matters) {
         if !lines.iter().any(|known| known == line) {
             lines.push(line.to_owned());
         }

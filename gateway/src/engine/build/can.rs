@@ -147,8 +147,9 @@ pub(super) fn bus(
 /// What the commissioning has to achieve.
 #[must_use]
 pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
+    let all = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
     let modes: &[OperatingMode] = match axis.function {
-        AxisFunction::Drive => &drive.modes,
+        AxisFunction::Drive => drive.modes.as_deref().unwrap_or(&all),
         // What is only looked at has its position looked at.
         AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
     };
@@ -163,6 +164,7 @@ pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
         acknowledges: drive.acknowledges,
         tells_voltage: drive.tells_voltage,
         drive_modes: drive.drive_modes.clone(),
+        any_mode: drive.modes.is_none() && axis.function == AxisFunction::Drive,
         left_out: drive.left_out.clone(),
         offsets: drive.offsets.clone(),
         captures: axis.events,

@@ -32,8 +32,10 @@ pub struct Cia402Axis {
     pub units: AxisUnits,
     /// The axis of the device, from 0.
     pub axis: u16,
-    /// Modes; the first is active at start.
+    /// Modes; the first that it has is active at start.
     pub modes: ArrayVec<ModeSelection, MAX_MODES>,
+    /// Nobody has asked for these modes: those that the drive lacks are left out, as long as one is left.
+    pub any_mode: bool,
     /// Nanounits of a linear axis in a nanoturn.
     pub way_of_a_turn: Option<Ratio>,
     /// Generic units in one count, where the drive's factor group is not to be asked.
@@ -169,6 +171,7 @@ impl Cia402Tables {
         facts: &ObjectFacts,
     ) -> Result<Vec<(&ModeRule, &DriveMode)>, Cia402Error> {
         let mut chosen = Vec::with_capacity(axis.modes.len());
+        let mut first_lack = None;
         for selection in &axis.modes {
             let mut rules = self.modes.iter().filter(|rule| rule.selection == *selection).peekable();
             match rules.peek() {
@@ -179,7 +182,8 @@ impl Cia402Tables {
             let has = |mode: &&DriveMode| self.has_mode(mode, facts);
             let found = rules.clone().find_map(|rule| Some((rule, rule.modes.iter().find(has)?)));
             match found {
-                Some((rule, mode)) if rule.optional && self.lacks_any(rule, mode, facts) => {}
+                Some((rule, mode))
+                    if (rule.optional || axis.any_mode) && self.lacks_any(rule, mode, facts) => {}
                 Some(found) => chosen.push(found),
                 None if rules.clone().all(|rule| rule.optional) => {}
                 None => {
@@ -187,14 +191,31 @@ impl Cia402Tables {
                         rules.flat_map(|rule| &rule.modes).map(|mode| mode.name.as_str()).collect();
                     let told = self.modes_told(facts).unwrap_or_default();
                     let wanted = names.join(", ");
-                    return Err(Cia402Error::NotSupported { mode: *selection, told, wanted });
+                    let lack = Cia402Error::NotSupported { mode: *selection, told, wanted };
+                    if !axis.any_mode {
+                        return Err(lack);
+                    }
+                    first_lack = first_lack.or(Some(lack));
                 }
             }
         }
         if chosen.is_empty() {
-            return Err(Cia402Error::NoMode);
+            return Err(first_lack.unwrap_or(Cia402Error::NoMode));
         }
         Ok(chosen)
+    }
+
+    /// Modes of an axis that the drive lacks, and that the axis does without.
+    pub(in crate::mapping) fn modes_left_out(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Vec<ModeSelection> {
+        let Ok(chosen) = self.chosen(axis, facts) else { return Vec::new() };
+        let led =
+            |mode: &&ModeSelection| self.modes.iter().any(|rule| rule.selection == **mode && !rule.optional);
+        let has = |mode: &&ModeSelection| chosen.iter().any(|(rule, _)| rule.selection == **mode);
+        axis.modes.iter().filter(|mode| axis.any_mode && led(mode) && !has(mode)).copied().collect()
     }
 
     /// The modes of an axis that its drive carries out by itself, with what they are in the drive; one that it lacks the axis

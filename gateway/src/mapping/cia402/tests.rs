@@ -25,6 +25,7 @@ fn axis(modes: &[OperatingMode]) -> Cia402Axis {
         acknowledges: true,
         tells_voltage: true,
         drive_modes: None,
+        any_mode: false,
         ..Cia402Axis::default()
     }
 }

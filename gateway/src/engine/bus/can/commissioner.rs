@@ -376,6 +376,14 @@ impl Work {
             let failures = std::mem::take(&mut self.passed_over);
             desk.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
         }
+        let left_out = desk.mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
+        if !left_out.is_empty() {
+            desk.waiting.push_back(Done::Told(Notice::ModesLeftOut {
+                axis,
+                node: self.node,
+                modes: left_out,
+            }));
+        }
         let setup = &self.axes[place];
         let made = desk
             .mapping

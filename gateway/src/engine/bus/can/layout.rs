@@ -290,7 +290,13 @@ impl AxisPdos {
             froms.push(row);
             row += usize::from(*len);
         }
+        let has_id = |pdo: &FoundPdo| {
+            pdo.id.is_some() || self.ids_of(direction).is_some() || pdo.number <= DEFAULT_PDOS
+        };
         let usable = |pdo: &&FoundPdo| {
+            if !has_id(pdo) {
+                return false;
+            }
             // Every bit is that of a value, or of a gap: nothing is sent that nobody has set.
             let brought = values.iter().filter(|value| carries(pdo, value).is_some());
             let brought: usize = brought.map(|(_, len)| usize::from(*len) * 8).sum();
