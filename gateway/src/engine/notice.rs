@@ -29,7 +29,7 @@ use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
-use crate::mapping::{Difference, SercosError};
+use crate::mapping::{Cia402Error, Difference, SercosError};
 
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -182,8 +182,8 @@ pub enum Notice {
         axis: u8,
         /// Its device.
         node: NodeId,
-        /// Which.
-        modes: Vec<ModeSelection>,
+        /// Which, and why.
+        modes: Vec<(ModeSelection, Cia402Error)>,
     },
     /// Steps failed that may fail, at a CANopen drive.
     ObjectsPassedOver {
@@ -411,8 +411,8 @@ impl fmt::Display for Notice {
                 write!(f, "the answers of the drive with MAC ID {mac} do not count: {error}")
             }
             Self::ModesLeftOut { node, modes, .. } => {
-                let all: Vec<_> = modes.iter().map(ToString::to_string).collect();
-                write!(f, "node {node} has no mode of operation for {}: the axis does without", all.join(" and "))
+                let all: Vec<_> = modes.iter().map(|(mode, why)| format!("{mode} ({why})")).collect();
+                write!(f, "node {node}: the axis does without {}", all.join(" and "))
             }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),

@@ -325,9 +325,13 @@ impl Mapping {
         self.cia402.modes_untold(axis, facts)
     }
 
-    /// Operating modes that an axis does without, because its CiA 402 drive lacks them.
+    /// Operating modes that an axis does without, because its CiA 402 drive lacks something, and what.
     #[must_use]
-    pub fn cia402_modes_left_out(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Vec<ModeSelection> {
+    pub fn cia402_modes_left_out(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Vec<(ModeSelection, Cia402Error)> {
         self.cia402.modes_left_out(axis, facts)
     }
 

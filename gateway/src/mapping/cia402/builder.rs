@@ -217,7 +217,11 @@ impl<'a> Builder<'a> {
             names.iter().filter_map(|name| self.value(key, name)).map(|(value, _)| value).collect()
         };
         let (times, over) = (values("times", &method.times), values("over", &method.over));
-        Some(Method { base, times, over })
+        let when = match &method.when {
+            Some((name, number)) => Some((self.value("when", name)?.0, *number)),
+            None => None,
+        };
+        Some(Method { when, base, times, over })
     }
 
     fn words(&mut self, rows: &GenericCia402File) {

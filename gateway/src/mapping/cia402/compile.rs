@@ -130,7 +130,7 @@ pub enum Cia402Error {
     },
     /// The drive has told nothing that a unit follows from, and the configuration does not say it either.
     #[error(
-        "nobody says what a count of {0} is: expected a factor group in the drive, or the unit in the configuration"
+        "nobody says what a count of {0} is: expected a factor group in the drive, or `counts` in the configuration"
     )]
     NoScaling(String),
     /// A linear axis whose way in a turn is not known.
@@ -170,8 +170,22 @@ impl Cia402Tables {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Vec<(&ModeRule, &DriveMode)>, Cia402Error> {
+        let (chosen, mut lacks) = self.choose(axis, facts)?;
+        if chosen.is_empty() {
+            return Err(if lacks.is_empty() { Cia402Error::NoMode } else { lacks.remove(0).1 });
+        }
+        Ok(chosen)
+    }
+
+    /// The same, and which modes the axis does without, and why.
+    #[allow(clippy::type_complexity, reason = "chosen and left out, each with what belongs to it")]
+    fn choose(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<(Vec<(&ModeRule, &DriveMode)>, Vec<(ModeSelection, Cia402Error)>), Cia402Error> {
         let mut chosen = Vec::with_capacity(axis.modes.len());
-        let mut first_lack = None;
+        let mut lacks = Vec::new();
         for selection in &axis.modes {
             let mut rules = self.modes.iter().filter(|rule| rule.selection == *selection).peekable();
             match rules.peek() {
@@ -182,9 +196,11 @@ impl Cia402Tables {
             let has = |mode: &&DriveMode| self.has_mode(mode, facts);
             let found = rules.clone().find_map(|rule| Some((rule, rule.modes.iter().find(has)?)));
             match found {
-                Some((rule, mode))
-                    if (rule.optional || axis.any_mode) && self.lacks_any(rule, mode, facts) => {}
-                Some(found) => chosen.push(found),
+                Some((rule, mode)) => match self.lacks_any(rule, mode, axis, facts) {
+                    Some(_) if rule.optional => {}
+                    Some(lack) if axis.any_mode => lacks.push((*selection, lack)),
+                    _ => chosen.push((rule, mode)),
+                },
                 None if rules.clone().all(|rule| rule.optional) => {}
                 None => {
                     let names: Vec<_> =
@@ -195,27 +211,20 @@ impl Cia402Tables {
                     if !axis.any_mode {
                         return Err(lack);
                     }
-                    first_lack = first_lack.or(Some(lack));
+                    lacks.push((*selection, lack));
                 }
             }
         }
-        if chosen.is_empty() {
-            return Err(first_lack.unwrap_or(Cia402Error::NoMode));
-        }
-        Ok(chosen)
+        Ok((chosen, lacks))
     }
 
-    /// Modes of an axis that the drive lacks, and that the axis does without.
+    /// Modes of an axis that it does without, and why.
     pub(in crate::mapping) fn modes_left_out(
         &self,
         axis: &Cia402Axis,
         facts: &ObjectFacts,
-    ) -> Vec<ModeSelection> {
-        let Ok(chosen) = self.chosen(axis, facts) else { return Vec::new() };
-        let led =
-            |mode: &&ModeSelection| self.modes.iter().any(|rule| rule.selection == **mode && !rule.optional);
-        let has = |mode: &&ModeSelection| chosen.iter().any(|(rule, _)| rule.selection == **mode);
-        axis.modes.iter().filter(|mode| axis.any_mode && led(mode) && !has(mode)).copied().collect()
+    ) -> Vec<(ModeSelection, Cia402Error)> {
+        self.choose(axis, facts).map(|(_, lacks)| lacks).unwrap_or_default()
     }
 
     /// The modes of an axis that its drive carries out by itself, with what they are in the drive; one that it lacks the axis
@@ -288,12 +297,28 @@ impl Cia402Tables {
         self.modes.iter().flat_map(|rule| &rule.modes).chain(own)
     }
 
-    /// Whether the drive lacks a value without which a mode does not work.
-    fn lacks_any(&self, rule: &ModeRule, mode: &DriveMode, facts: &ObjectFacts) -> bool {
+    /// Why a signal cannot be used: the drive does not have it, or nobody says what it counts.
+    fn lacks(&self, rule: &SignalRule, axis: &Cia402Axis, facts: &ObjectFacts) -> Option<Cia402Error> {
+        let (object, signal) = (rule.value.object, rule.signal);
+        if facts.is_missing(object) {
+            return Some(Cia402Error::Missing { object, signal });
+        }
+        let unscaled = self.is_unscaled(&rule.value, signal.quantity(), axis, facts);
+        unscaled.then(|| Cia402Error::NoScaling(rule.value.unit.clone()))
+    }
+
+    /// What the drive lacks without which a mode does not work.
+    fn lacks_any(
+        &self,
+        rule: &ModeRule,
+        mode: &DriveMode,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Option<Cia402Error> {
         let mut signals = rule.command.iter().chain(&rule.actual);
-        signals.any(|signal| {
-            let rule = self.signal(*signal, mode.code);
-            rule.is_some_and(|rule| rule.refuse && facts.is_missing(rule.value.object))
+        signals.find_map(|signal| {
+            let rule = self.signal(*signal, mode.code).filter(|rule| rule.refuse)?;
+            self.lacks(rule, axis, facts)
         })
     }
 
@@ -427,12 +452,10 @@ impl Cia402Tables {
             if !axis.wants(rule) || rules.iter().any(|known| known.signal == *signal) {
                 continue;
             }
-            match facts.is_missing(rule.value.object) {
-                true if rule.refuse => {
-                    return Err(Cia402Error::Missing { object: rule.value.object, signal: *signal });
-                }
-                true => {}
-                false => rules.push(rule),
+            match self.lacks(rule, axis, facts) {
+                Some(lack) if rule.refuse => return Err(lack),
+                Some(_) => {}
+                None => rules.push(rule),
             }
         }
         Ok(rules)

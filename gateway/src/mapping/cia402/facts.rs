@@ -25,6 +25,11 @@ impl ObjectFacts {
         Self::default()
     }
 
+    /// Whether nothing is known, as before the drive was asked.
+    pub(super) fn is_empty(&self) -> bool {
+        self.facts.is_empty()
+    }
+
     /// The drive has given the value of an object, or has taken these bytes for it.
     pub fn note_data(&mut self, object: Object, data: &[u8]) {
         *self.facts.entry(object).or_default() = Fact { data: Some(data.to_vec()), missing: false };

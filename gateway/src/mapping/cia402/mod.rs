@@ -60,6 +60,8 @@ pub(super) struct ScalingRule {
 
 #[derive(Debug, Clone)]
 pub(super) struct Method {
+    /// What an object has to say.
+    pub when: Option<(Value, i64)>,
     pub base: Base,
     pub times: Vec<Value>,
     pub over: Vec<Value>,

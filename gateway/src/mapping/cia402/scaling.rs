@@ -36,6 +36,18 @@ impl Cia402Tables {
         }
     }
 
+    /// Whether nobody says what a count of a value is, of a drive that has been asked.
+    pub(super) fn is_unscaled(
+        &self,
+        value: &Value,
+        quantity: Quantity,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> bool {
+        !facts.is_empty()
+            && matches!(self.count(value, quantity, axis, facts), Err(Cia402Error::NoScaling(_)))
+    }
+
     fn linear(&self, ratio: Ratio, axis: &Cia402Axis, value: &Value) -> Result<Ratio, Cia402Error> {
         let way = axis.way_of_a_turn.ok_or(Cia402Error::Way)?;
         ratio.then(way).ok_or(Cia402Error::Overflow(value.object))
@@ -63,6 +75,9 @@ impl Cia402Tables {
         facts: &ObjectFacts,
     ) -> Result<Option<Ratio>, Cia402Error> {
         let number = |value: &Value| facts.number(value).filter(|number| *number > 0);
+        if method.when.as_ref().is_some_and(|(value, wanted)| facts.number(value) != Some(*wanted)) {
+            return Ok(None);
+        }
         if method.times.iter().chain(&method.over).any(|value| number(value).is_none()) {
             return Ok(None);
         }
@@ -91,7 +106,8 @@ impl Cia402Tables {
     pub(super) fn scaling_values(&self) -> Vec<Value> {
         let mut values: Vec<Value> = Vec::new();
         for method in self.scalings.iter().flat_map(|rule| &rule.methods) {
-            for value in method.times.iter().chain(&method.over) {
+            let when = method.when.as_ref().map(|(value, _)| value);
+            for value in when.into_iter().chain(&method.times).chain(&method.over) {
                 if !values.contains(value) {
                     values.push(value.clone());
                 }

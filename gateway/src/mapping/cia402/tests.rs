@@ -34,12 +34,14 @@ fn object(index: u16, sub: u8) -> Object {
     Object { index, sub }
 }
 
-/// A drive with csp, csv and cst, with this feed constant.
+/// A drive with csp, csv and cst, with this feed constant, that counts velocities by its positions.
 fn with_feed(feed: u32, shaft: u32) -> ObjectFacts {
     let mut facts = ObjectFacts::new();
     facts.note_data(object(0x6502, 0), &0x380_u32.to_le_bytes());
     facts.note_data(object(0x6092, 1), &feed.to_le_bytes());
     facts.note_data(object(0x6092, 2), &shaft.to_le_bytes());
+    facts.note_data(object(0x6096, 1), &1_u32.to_le_bytes());
+    facts.note_data(object(0x6096, 2), &1_u32.to_le_bytes());
     facts
 }
 

@@ -82,6 +82,8 @@ pub struct Cia402MethodRow {
     pub name: String,
     /// Generic units of a rotary axis to begin with.
     pub base: Option<RatioRow>,
+    /// An object and the value that it has to have.
+    pub when: Option<(Name, i64)>,
     /// Unit whose count to begin with instead; of a row above.
     pub like: Option<Name>,
     /// Objects that multiply it.
