@@ -29,7 +29,7 @@ use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
-use crate::mapping::{Cia402Error, Difference, SercosError};
+use crate::mapping::{Cia402Error, Difference, Object, SercosError};
 
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -184,6 +184,15 @@ pub enum Notice {
         node: NodeId,
         /// Which, and why.
         modes: Vec<(ModeSelection, Cia402Error)>,
+    },
+    /// Values are in none of the PDOs that a CANopen device keeps, and the axis can do without.
+    NotMapped {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// Which.
+        objects: Vec<Object>,
     },
     /// Steps failed that may fail, at a CANopen drive.
     ObjectsPassedOver {
@@ -349,6 +358,7 @@ impl Notice {
             | Self::NodeProgram { axis, .. }
             | Self::ModesTried { axis, .. }
             | Self::Refused { axis, .. }
+            | Self::NotMapped { axis, .. }
             | Self::ModesLeftOut { axis, .. }
             | Self::SlaveAnswers { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
@@ -413,6 +423,10 @@ impl fmt::Display for Notice {
             Self::ModesLeftOut { node, modes, .. } => {
                 let all: Vec<_> = modes.iter().map(|(mode, why)| format!("{mode} ({why})")).collect();
                 write!(f, "node {node}: the axis does without {}", all.join(" and "))
+            }
+            Self::NotMapped { node, objects, .. } => {
+                let all: Vec<_> = objects.iter().map(ToString::to_string).collect();
+                write!(f, "node {node} keeps its PDOs, and {} is in none that can be used: the axis does without", all.join(", "))
             }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use axisbridge::status::BoxState;
 use axisbridge_peers::can_drive::CanDrive;
 use axisbridge_peers::can_drive::settings::Settings as Oddities;
 use axisbridge_tests::rig::motion::millis;
@@ -55,7 +56,11 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
     let settings =
         Settings { configuration: format!("{HEAD}{keys}\n"), drives: Vec::new(), ..Settings::default() };
     let mut rig = Rig::among(settings, vec![drive.clone()]);
-    rig.run_for(millis(5_000));
+    let mut left = 90;
+    while left > 0 && rig.status().state != BoxState::READY || left > 85 {
+        rig.run_for(millis(1_000));
+        left -= 1;
+    }
     let start = drive.borrow().position();
     let velocity = mode == ControlMode::VELOCITY;
     let steps = match velocity {

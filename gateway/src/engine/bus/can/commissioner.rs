@@ -24,12 +24,17 @@ use super::look::Look;
 use super::trial::Trial;
 pub use super::trial::Tried;
 use crate::engine::notice::Notice;
+
 use crate::mapping::{
-    Cia402Axis, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep, Plan,
+    Cia402Axis, Cia402Dictionary, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep,
+    Plan,
 };
 
 /// Messages under way in each direction.
 const QUEUE: usize = 128;
+
+/// Values of an axis that may be in none of the PDOs of a device.
+const UNMAPPED_MAX: usize = 16;
 
 /// Requests to one device that wait for their answers.
 pub const WINDOW: usize = 8;
@@ -185,6 +190,8 @@ struct Work {
     steps: VecDeque<ObjectStep>,
     sent: VecDeque<ObjectStep>,
     passed_over: Vec<StepFailure>,
+    /// The last question got no answer, and is asked once more.
+    asked_again: bool,
     /// The PDOs that the device has are used, because it does not let them be changed.
     falls_back: bool,
     pdos: [Vec<PdoConfig>; 2],
@@ -228,6 +235,7 @@ impl Commissioner {
             steps: VecDeque::new(),
             sent: VecDeque::new(),
             passed_over: Vec::new(),
+            asked_again: false,
             falls_back: false,
             pdos: [Vec::new(), Vec::new()],
         };
@@ -376,6 +384,34 @@ impl Work {
             let failures = std::mem::take(&mut self.passed_over);
             desk.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
         }
+        let mut unmapped = Vec::new();
+        let made = loop {
+            let setup = &self.axes[place];
+            let made = desk.mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
+            let made = made
+                .and_then(|program| Ok((spread(&desk.mapping, setup, &program, found.as_ref())?, program)));
+            match made {
+                // What is in none of the PDOs that it keeps it does not have for the box: perhaps the axis can do without.
+                Err(Misfit::Mapped(lack))
+                    if unmapped.len() < UNMAPPED_MAX
+                        && !unmapped.iter().any(|known: &NotMapped| known.object == lack.object) =>
+                {
+                    let index = Cia402Dictionary::on_first_axis(lack.object.index);
+                    let object = Object { index, ..lack.object };
+                    unmapped.push(lack);
+                    self.facts.note_missing(object);
+                }
+                // It cannot, and the first one of them says it best.
+                Err(Misfit::Program(_) | Misfit::Mapped(_)) if !unmapped.is_empty() => {
+                    break Err(Misfit::Mapped(unmapped.remove(0)));
+                }
+                made => break made,
+            }
+        };
+        if made.is_ok() && !unmapped.is_empty() {
+            let objects = unmapped.iter().map(|lack| lack.object).collect();
+            desk.waiting.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
+        }
         let left_out = desk.mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
         if !left_out.is_empty() {
             desk.waiting.push_back(Done::Told(Notice::ModesLeftOut {
@@ -384,12 +420,6 @@ impl Work {
                 modes: left_out,
             }));
         }
-        let setup = &self.axes[place];
-        let made = desk
-            .mapping
-            .cia402_program(&setup.needs, &self.facts)
-            .map_err(Misfit::from)
-            .and_then(|program| Ok((spread(&desk.mapping, setup, &program, found.as_ref())?, program)));
         let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
             Ok(made) => made,
             Err(error) => return self.fail(place, error, desk),
@@ -467,7 +497,17 @@ impl Work {
             ObjectStep::Write { object, fail, .. } => (*object, "writing", *fail),
         };
         match outcome.result {
-            Ok(()) => self.facts.note_data(object, outcome.data.as_slice()),
+            Ok(()) => {
+                self.facts.note_data(object, outcome.data.as_slice());
+                self.asked_again = false;
+            }
+            // A frame was lost, or the drive was busy: it is asked once more.
+            Err(SdoFailure::Timeout { .. })
+                if matches!(step, ObjectStep::Read { .. }) && !self.asked_again =>
+            {
+                self.asked_again = true;
+                self.steps.push_front(step);
+            }
             Err(failure) => {
                 if failure.is_absent() {
                     self.facts.note_missing(object);
