@@ -159,13 +159,19 @@ fn a_drive_that_keeps_its_mapping_is_led_by_the_pdos_that_it_has() {
     goes(&mut rig);
 }
 
-/// The torque is in none of its PDOs: told by name, with what there is, and the drive is not led.
+/// The torque is in none of its PDOs: told by name. An axis that needs it is not led, and told what there is; another one does
+/// without.
 #[test]
 fn what_a_kept_mapping_lacks_is_named() {
-    let mut rig = Rig::new(settings("pdo_mapping = \"keep\"", "modes = [\"position\"]"));
+    let mut rig = Rig::ready(settings("pdo_mapping = \"keep\"", "modes = [\"position\", \"velocity\"]"));
+    let text =
+        "axis 1: node 1 keeps its PDOs, and 6077:00 is in none that can be used: the axis does without";
+    assert_eq!(told(&rig, text), 1, "{}", rig.told());
+    goes(&mut rig);
+    let mut rig = Rig::new(settings("pdo_mapping = \"keep\"", "modes = [\"position\", \"torque\"]"));
     rig.run_for(millis(5_000));
-    let text = "6077:00 is in no TPDO that can be used, and the mapping is kept: expected one, got \
-                1: 6041:00, 2: 6041:00 6061:00, 3: 6041:00 6064:00, 4: 6041:00 606C:00";
+    let text = "6071:00 is in no RPDO that can be used, and the mapping is kept: expected one with nothing but what the axis is told, \
+                got 1: 6040:00, 2: 6040:00 6060:00, 3: 6040:00 607A:00, 4: 6040:00 60FF:00; it is left out";
     assert!(told(&rig, text) > 0, "{}", rig.told());
     assert_eq!(node(&mut rig, 0).statistics().rpdos, 0);
 }
@@ -205,7 +211,8 @@ fn modes_that_the_drive_does_not_tell_are_tried() {
 /// What 6502 does not name is not used, and what it is told with its value.
 #[test]
 fn a_mode_that_the_drive_lacks_is_told_with_what_it_has() {
-    let mut rig = Rig::new(settings("", ""));
+    let all = "modes = [\"position\", \"velocity\", \"torque\"]";
+    let mut rig = Rig::new(settings("", all));
     node(&mut rig, 0).dictionary_mut().set(0x6502, 0, 0x2D);
     rig.run_for(millis(5_000));
     let text = "node 1 cannot be used: position needs one of the modes csp, ip, the drive has none of them: 6502:00 is 0x0000002d; it is left out";

@@ -250,7 +250,8 @@ fn a_second_device_with_the_same_node_id_stops_the_axis_until_it_is_gone() {
     assert!(slowest > SLIDE_SPEED * 9 / 10, "{slowest}");
     told(&rig, "CAN bus 1: node 1 has restarted while it was in operation");
     silent(&rig);
-    BUS.go_for(&mut rig, 600);
+    // It is asked a second time.
+    BUS.go_for(&mut rig, 1_200);
     let left_out = |line: &str| {
         line.starts_with("axis 1: commissioning of node 1 failed: ")
             && line.ends_with(": no answer within 500 ms; it is left out")
@@ -390,8 +391,13 @@ fn without_turntable(seconds: f64, tamper: impl FnMut(&mut Frame) -> bool + 'sta
 #[test]
 fn a_drive_that_refuses_its_mapping_is_left_out_and_tried_again() {
     let mut rig = without_turntable(12.0, |frame| {
+        // It takes no mapping, and does not tell which one it has.
+        let mut abort = [0x80, 0x00, 0x16, 0x01, 0x41, 0, 0x04, 0x06];
         if frame.id() == SDO_ANSWER && frame.data()[..4] == [0x60, 0x00, 0x16, 0x01] {
-            let abort = [0x80, 0x00, 0x16, 0x01, 0x41, 0, 0x04, 0x06];
+            *frame = Frame::new(SDO_ANSWER, &abort).expect("a frame");
+        }
+        if frame.id() == SDO_ANSWER && frame.data()[..4] == [0x43, 0x00, 0x16, 0x01] {
+            abort[4..].copy_from_slice(&0x0800_0022_u32.to_le_bytes());
             *frame = Frame::new(SDO_ANSWER, &abort).expect("a frame");
         }
         true
@@ -400,6 +406,12 @@ fn a_drive_that_refuses_its_mapping_is_left_out_and_tried_again() {
         &rig,
         "CAN bus 1: node 1 does not come up: J: configuration download failed: map write 1600:01: refused with 06040041: \
          object cannot be mapped to a PDO",
+    );
+    BUS.go_for(&mut rig, 1_000);
+    told(
+        &rig,
+        "axis 1: commissioning of node 1 failed: reading 1600:01: refused with 08000022: data cannot be transferred or stored: device \
+         state; it is left out",
     );
     BUS.go_for(&mut rig, 1_000);
     assert_eq!(position(&rig, 0), 0);
