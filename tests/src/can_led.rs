@@ -83,7 +83,8 @@ fn line(text: &mut String, what: std::fmt::Arguments<'_>) {
 
 fn program(mapping: &Mapping, modes: u32, captures: CaptureMode) -> Result<DriveProgram, Cia402Error> {
     let mut facts = ObjectFacts::new();
-    let objects = [(0x6502, 0, modes), (0x608F, 1, ENCODER), (0x608F, 2, 1), (0x6091, 1, 1), (0x6091, 2, 1)];
+    let factors = [(0x6091, 1, 1), (0x6091, 2, 1), (0x6096, 1, 1), (0x6096, 2, 1)];
+    let objects = [(0x6502, 0, modes), (0x608F, 1, ENCODER), (0x608F, 2, 1)].into_iter().chain(factors);
     for (index, sub, value) in objects {
         facts.note_data(Object { index, sub }, &value.to_le_bytes());
     }

@@ -40,7 +40,9 @@ const PAIRS: [(Signal, Signal); 3] = [
 /// A drive with this factor group: increments in turns of the encoder, turns of the motor for those of the load.
 fn program(encoder: (u32, u32), gear: (u32, u32)) -> DriveProgram {
     let mut facts = ObjectFacts::new();
-    let objects = [(0x608F, 1, encoder.0), (0x608F, 2, encoder.1), (0x6091, 1, gear.0), (0x6091, 2, gear.1)];
+    let encoder = [(0x608F, 1, encoder.0), (0x608F, 2, encoder.1)];
+    let factors = [(0x6091, 1, gear.0), (0x6091, 2, gear.1), (0x6096, 1, 1), (0x6096, 2, 1)];
+    let objects = encoder.into_iter().chain(factors);
     for (index, sub, value) in objects {
         facts.note_data(Object { index, sub }, &value.to_le_bytes());
     }
