@@ -103,6 +103,20 @@ fn runs_in(test: &str, kernel: Kernel) {
     in_real_time(test, || assert!(!kernel.inside(test)));
 }
 
+/// Drives of somebody else, after what three makers' manuals say of theirs: enabled, moved, faulted, reset, and moved again.
+#[test]
+fn drives_like_those_of_three_makers_are_led_over_a_kernels_bus() {
+    let test = "drives_like_those_of_three_makers_are_led_over_a_kernels_bus";
+    if !can_kernel_or_skip(test) {
+        return;
+    }
+    if can_kernel::is_inside() {
+        lead_three_makers();
+        return;
+    }
+    outside(test);
+}
+
 /// The same over the driver of a real controller, which the box sets up, loses and restarts.
 #[test]
 fn a_controller_that_is_bus_off_is_restarted_by_the_box() {
@@ -258,6 +272,215 @@ fn run_the_program_on_devicenet() {
     let result = guest.moves_two_axes();
     guest.end(gateway);
     println!("{result}");
+}
+
+/// A box for an EPOS-like drive in position control, and an Oriental-like and a Faulhaber-like one in velocity control.
+const MAKERS: &str = r#"
+[box]
+name = "three makers"
+
+[[device]]
+name = "front"
+listen = "127.0.0.2"
+axes = ["epos", "oriental", "faulhaber"]
+update_period = { min = "20 ms", max = "80 ms" }
+
+[device.identity]
+vendor_id = 1
+product_code = 1003
+serial_number = 0x0001_E242
+product_name = "Axisbridge CAN"
+
+[[axis]]
+name = "epos"
+instance = 1
+drive = "epos"
+unit = "revolution"
+motion_resolution = 1_000_000
+
+[[axis]]
+name = "oriental"
+instance = 2
+drive = "oriental"
+unit = "revolution"
+motion_resolution = 1_000_000
+
+[[axis]]
+name = "faulhaber"
+instance = 3
+drive = "faulhaber"
+unit = "revolution"
+motion_resolution = 1_000_000
+
+[[south.can]]
+interface = "vcan0"
+cycle_time = "20 ms"
+heartbeat = "500 ms"
+allowed_losses = 100
+
+[[south.can.drive]]
+name = "epos"
+node = 1
+modes = ["position"]
+actual_values = []
+
+[[south.can.drive]]
+name = "oriental"
+node = 2
+actual_values = ["velocity"]
+
+[[south.can.drive]]
+name = "faulhaber"
+node = 3
+actual_values = ["velocity"]
+"#;
+
+/// What the controller does: each axis moves, its drive has an error (2310, 8611, 3210), and it moves again.
+const MAKERS_SCRIPT: &str = r#"
+title = "three makers"
+
+[connection]
+target = "127.0.0.2"
+bind = "127.0.0.3"
+update_period = "80 ms"
+
+[axis.1]
+counts_per_unit = 1_000_000
+motion = { velocity = 0.5, acceleration = 5.0 }
+
+[axis.2]
+counts_per_unit = 1_000_000
+mode = "velocity"
+motion = { velocity = 0.5, acceleration = 5.0 }
+
+[axis.3]
+counts_per_unit = 1_000_000
+mode = "velocity"
+motion = { velocity = 0.5, acceleration = 5.0 }
+
+[[step]]
+enable = "all"
+within = "30 s"
+
+[[step]]
+move = { axis = 1, by = 0.25 }
+
+[[step]]
+in_window = { axis = 1, window = 0.01, wait = "10 s" }
+
+[[step]]
+velocity = { axis = 2, velocity = 0.5 }
+
+[[step]]
+velocity = { axis = 3, velocity = 0.5 }
+
+[[step]]
+dwell = "1 s"
+
+[[step]]
+expect = { axis = 2, velocity = 0.5, tolerance = 0.1 }
+
+[[step]]
+title = "errors of the drives"
+expect = { axis = 3, velocity = 0.5, tolerance = 0.1 }
+
+[[step]]
+expect = { axis = 1, state = "Major Faulted" }
+within = "30 s"
+
+[[step]]
+expect = { axis = 2, state = "Major Faulted" }
+within = "30 s"
+
+[[step]]
+title = "all are faulted"
+expect = { axis = 3, state = "Major Faulted" }
+within = "30 s"
+
+[[step]]
+dwell = "3 s"
+
+[[step]]
+fault_reset = "all"
+within = "20 s"
+
+[[step]]
+enable = "all"
+within = "30 s"
+
+[[step]]
+move = { axis = 1, by = 0.25 }
+
+[[step]]
+in_window = { axis = 1, window = 0.01, wait = "10 s" }
+
+[[step]]
+velocity = { axis = 2, velocity = -0.5 }
+
+[[step]]
+dwell = "1 s"
+
+[[step]]
+expect = { axis = 2, velocity = -0.5, tolerance = 0.1 }
+
+[[step]]
+disable = "all"
+"#;
+
+fn lead_three_makers() {
+    let guest = Guest::new();
+    let peer = Path::new(env!("CARGO_BIN_EXE_peer-can-drive"));
+    let orders = |name: &str| guest.folder.join(format!("{name}.orders"));
+    let makers = [("epos", 1, "2310"), ("oriental", 2, "2310"), ("faulhaber", 3, "3210")];
+    let _drives = makers.map(|(name, node, _)| {
+        let words = format!("{name} {node} vcan0 {}", orders(name).display());
+        start(name, peer, &guest.log(name), &words)
+    });
+    let path = guest.folder.join("box.toml");
+    std::fs::write(&path, MAKERS).expect("the guest's temporary folder can be written");
+    let words = format!("run --config {}", path.display());
+    let gateway = start("the box", &guest.binary, &guest.log("box"), &words);
+    wait_for(
+        &guest.log("box"),
+        &["node 1 is in operation", "node 2 is in operation", "node 3 is in operation"],
+    );
+    let script = guest.folder.join("makers.toml");
+    std::fs::write(&script, format!("unexpected_faults = \"ignore\"\n{MAKERS_SCRIPT}"))
+        .expect("the guest's temporary folder can be written");
+    let words = format!("simulate controller --script {}", script.display());
+    let mut controller = start("the controller", &guest.binary, &guest.log("controller"), &words);
+    let told = || {
+        let logs = ["controller", "box", "epos", "oriental", "faulhaber"];
+        logs.map(|name| format!("-- {name}\n{}", read(&guest.log(name)))).concat()
+    };
+    let order = |word: &dyn Fn(&str) -> String| {
+        for (name, _, code) in makers {
+            let mut text = read(&orders(name));
+            text.push_str(&word(code));
+            std::fs::write(orders(name), text).expect("the guest's temporary folder can be written");
+        }
+    };
+    wait_for(&guest.log("controller"), &["errors of the drives"]);
+    order(&|code| format!("fail {code}\n"));
+    wait_for(&guest.log("controller"), &["all are faulted"]);
+    order(&|_| "mend\n".to_owned());
+    let end = Instant::now() + PATIENCE;
+    let status = loop {
+        if let Some(status) = controller.ended() {
+            break status;
+        }
+        assert!(Instant::now() < end, "{}", told());
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert!(status.success(), "{}", told());
+    // What the drives themselves say: each was enabled, faulted, and enabled again.
+    for (name, ..) in makers {
+        let log = read(&guest.log(name));
+        let enabled = log.matches("-> OperationEnabled").count();
+        assert!(enabled >= 2 && log.contains("Fault"), "{name}\n{}", told());
+    }
+    guest.end(gateway);
+    println!("{}", read(&guest.log("controller")));
 }
 
 fn lose_the_bus(python: &Path) {
