@@ -97,8 +97,15 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
         true => (fastest - 2 * turn).abs() < turn / 50,
         false => (drive.position() - turn).abs() < turn / 50,
     };
-    let of_drive =
-        ["node 3", "cannot be used", "Axis Fault", "was refused", "goes on without", "commissioning of"];
+    let of_drive = [
+        "node 3",
+        "cannot be used",
+        "Axis Fault",
+        "was refused",
+        "goes on without",
+        "commissioning of",
+        "waits since 10 s",
+    ];
     Outcome { works: done && was_enabled && went, said: said(&rig, &of_drive) }
 }
 
@@ -110,10 +117,42 @@ fn sound() -> Oddities {
 #[test]
 fn families() {
     type Row = (&'static str, fn() -> Oddities, &'static str, ControlMode);
-    let rows: [Row; 12] = [
+    let rows: [Row; 15] = [
         ("the standard's", Oddities::default, "", ControlMode::POSITION),
         ("maxon EPOS4", Oddities::epos_like, "", ControlMode::POSITION),
         ("Oriental BLVD", Oddities::oriental_like, "", ControlMode::VELOCITY),
+        (
+            "Oriental BLVD without 60A9",
+            || {
+                let mut it = Oddities::oriental_like();
+                it.missing.push((0x60A9, None));
+                it
+            },
+            "",
+            ControlMode::VELOCITY,
+        ),
+        (
+            "of a maker that nobody knows, the same",
+            || {
+                let mut it = Oddities::oriental_like();
+                it.vendor = 0x7FFF;
+                it.missing.push((0x60A9, None));
+                it
+            },
+            "",
+            ControlMode::VELOCITY,
+        ),
+        (
+            "the same, told",
+            || {
+                let mut it = Oddities::oriental_like();
+                it.vendor = 0x7FFF;
+                it.missing.push((0x60A9, None));
+                it
+            },
+            "counts = { velocity = 60 }",
+            ControlMode::VELOCITY,
+        ),
         ("Faulhaber CO", Oddities::faulhaber_like, "", ControlMode::VELOCITY),
         ("Faulhaber CF", Oddities::faulhaber_cf_like, "", ControlMode::VELOCITY),
         ("Kollmorgen AKD", Oddities::akd_like, "", ControlMode::POSITION),
@@ -146,7 +185,7 @@ fn drives_with_one_thing_odd() {
     };
     type Row = (&'static str, fn(&mut Oddities), &'static str);
     const DEVICE: &str = "[[south.can.device]]\nnode = 3\n";
-    let rows: [Row; 46] = [
+    let rows: [Row; 47] = [
         ("6502 is not there", |it| it.missing.push((0x6502, None)), ""),
         ("6502 is 0", |it| it.modes_shown = Some(0), ""),
         (
@@ -201,6 +240,7 @@ fn drives_with_one_thing_odd() {
         ("four entries in a PDO", |it| it.max_entries = 4, ""),
         ("two entries in a PDO", |it| it.max_entries = 2, ""),
         ("a short PDO is a fault", |it| it.short_pdo = ShortPdo::Fault, ""),
+        ("nobody tells what velocities are", |it| it.missing.extend([(0x60A9, None), (0x6096, None)]), ""),
         ("6077 is not there", |it| it.missing.push((0x6077, None)), ""),
         ("boots in 4 s", |it| it.boot_ms = 4_000, ""),
         ("no boot-up message", |it| it.silent_boot = true, ""),

@@ -102,6 +102,9 @@ pub enum Cia402Error {
     /// No operating mode at all.
     #[error("expected at least one operating mode, got none")]
     NoMode,
+    /// The drive lacks something for every mode that an axis could have.
+    #[error("the axis would have to do without all its modes: {0}")]
+    NoneLeft(String),
     /// The drive has no mode of operation that an operating mode can be.
     #[error("{mode} needs one of the modes {wanted}, the drive has none of them: 6502:00 is {told:#010x}")]
     NotSupported {
@@ -172,7 +175,14 @@ impl Cia402Tables {
     ) -> Result<Vec<(&ModeRule, &DriveMode)>, Cia402Error> {
         let (chosen, mut lacks) = self.choose(axis, facts)?;
         if chosen.is_empty() {
-            return Err(if lacks.is_empty() { Cia402Error::NoMode } else { lacks.remove(0).1 });
+            return Err(match lacks.len() {
+                0 => Cia402Error::NoMode,
+                1 => lacks.remove(0).1,
+                _ => {
+                    let all: Vec<_> = lacks.iter().map(|(mode, why)| format!("{mode} ({why})")).collect();
+                    Cia402Error::NoneLeft(all.join(", "))
+                }
+            });
         }
         Ok(chosen)
     }
