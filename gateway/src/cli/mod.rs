@@ -390,6 +390,10 @@ struct SercosDriveArguments {
     /// They can be plugged in while the bus runs (SCP_HP).
     #[arg(long)]
     hot_plug: bool,
+    /// Their telegrams are fixed (SCP_FixCFG): parameters that are sent to each of them, and that each sends, separated by commas, such as
+    /// S-0-0134,S-0-0036 S-0-0135,S-0-0051,S-0-0040
+    #[arg(long, value_names = ["TO", "FROM"], num_args = 2, conflicts_with = "hot_plug")]
+    fixed_lists: Vec<String>,
     /// Events to play, one a line; the same can be typed while the drives run ("help" lists them).
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,

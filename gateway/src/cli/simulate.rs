@@ -14,6 +14,7 @@ use profile_cip::devicenet::wire::MacId;
 use profile_cip::devicenet::wire::speed::Assembly;
 use profile_generic::mode::OperatingMode;
 use profile_generic::scaling::UnitKind;
+use profile_sercos::wire::idn::Idn;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
@@ -30,7 +31,7 @@ use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::devicenet_drive;
 use crate::simulate::drive_events::console::{Director, say, typed_lines};
 use crate::simulate::drive_events::{Names, Script};
-use crate::simulate::drives::{self, DriveLine};
+use crate::simulate::drives::{self, DriveLine, LineKind};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 use crate::sys::can_interface;
@@ -74,7 +75,17 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         |address: &u16| if arguments.linear.contains(address) { UnitKind::Linear } else { UnitKind::Rotary };
     let addresses = (arguments.address..=last).map(|address| (address, kind(&address)));
     let ring = arguments.ring.is_some();
-    let mut drives = DriveLine::new(addresses, ring, arguments.hot_plug, &script.setup)?;
+    let idns = |list: &String| -> Result<Vec<Idn>, CliError> {
+        let idn =
+            |text: &str| text.trim().parse::<Idn>().map_err(|error| format!("--fixed-lists {list}: {error}"));
+        Ok(list.split(',').map(idn).collect::<Result<_, _>>()?)
+    };
+    let line = match arguments.fixed_lists.as_slice() {
+        [to, from] => LineKind::Fixed([idns(to)?, idns(from)?]),
+        _ if arguments.hot_plug => LineKind::HotPlug,
+        _ => LineKind::Plain,
+    };
+    let mut drives = DriveLine::new(addresses, ring, &line, &script.setup)?;
     let stop = stop_after(arguments.seconds)?;
     let mut sockets = ArrayVec::new();
     for interface in std::iter::once(&arguments.interface).chain(&arguments.ring) {

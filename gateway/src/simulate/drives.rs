@@ -10,11 +10,13 @@ use profile_generic::servo::{ServoError, ServoParameters};
 use profile_generic::state::Report;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
+use profile_sercos::slave::communication::FixedConnection;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::drive::scaling;
 use profile_sercos::slave::phase::State;
 use profile_sercos::slave::{Config as SlaveConfig, Network, Slave, communication};
-use profile_sercos::wire::scp::ScpEntry;
+use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::scp::{ScpClass, ScpEntry};
 
 use super::drive_events::console::Director;
 use super::drive_events::setup::Setup;
@@ -77,7 +79,7 @@ pub fn linear() -> ServoParameters {
 /// Never with the servos of this module; a test builds both.
 #[must_use]
 pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    let network = built(drives, ring, communication::CLASSES, &Setup::default());
+    let network = built(drives, ring, communication::CLASSES, &[], &Setup::default());
     network.expect("the servos of this module work")
 }
 
@@ -87,7 +89,7 @@ pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> 
 /// Never with the servos of this module.
 #[must_use]
 pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &Setup::default());
+    let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &[], &Setup::default());
     network.expect("the servos of this module work")
 }
 
@@ -95,6 +97,7 @@ fn built(
     drives: impl IntoIterator<Item = (u16, UnitKind)>,
     ring: bool,
     classes: &'static [ScpEntry],
+    fixed: &'static [FixedConnection],
     setup: &Setup,
 ) -> Result<DriveNetwork, DriveError> {
     let slaves = drives.into_iter().map(|(address, kind)| {
@@ -106,8 +109,14 @@ fn built(
         let drive = Drive::new(servo).map_err(|error| DriveError { address, error })?;
         let [low, high] = address.to_le_bytes();
         let mac = [0x02, 0x41, 0x42, 0x01, high, low];
-        let config =
-            SlaveConfig { address, mac, serial: u32::from(address), classes, ..SlaveConfig::default() };
+        let config = SlaveConfig {
+            address,
+            mac,
+            serial: u32::from(address),
+            classes,
+            fixed,
+            ..SlaveConfig::default()
+        };
         let mut slave = Slave::new(&config, drive);
         if let Some((motor, load)) = setup.gear(address) {
             slave.preset(scaling::idn::GEAR_INPUT, i64::from(motor));
@@ -132,6 +141,20 @@ pub struct DriveError {
 /// What is shown of a SERCOS drive: its communication phase and its state.
 pub type DriveShown = Shown<State, Report>;
 
+/// What drives of a line can do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LineKind {
+    /// Their telegrams are configured by the master (SCP_VarCFG).
+    Plain,
+    /// They can be plugged in while the bus runs as well (SCP_HP).
+    HotPlug,
+    /// Their telegrams are what they are (SCP_FixCFG): what is sent to them, and what they send.
+    Fixed([Vec<Idn>; 2]),
+}
+
+const FIXED_CLASSES: &[ScpEntry] =
+    &[ScpEntry { class: ScpClass::FIX_CFG, version: 1 }, ScpEntry { class: ScpClass::SYNC, version: 1 }];
+
 /// Drives with SERCOS addresses that count up, for events.
 #[derive(Debug)]
 pub struct DriveLine {
@@ -147,13 +170,22 @@ impl DriveLine {
     pub fn new(
         drives: impl IntoIterator<Item = (u16, UnitKind)>,
         ring: bool,
-        hot_plug: bool,
+        kind: &LineKind,
         setup: &Setup,
     ) -> Result<Self, DriveError> {
         let mut drives = drives.into_iter().peekable();
         let first = drives.peek().map_or(1, |(address, _)| *address);
-        let classes = if hot_plug { communication::CLASSES_WITH_HOT_PLUG } else { communication::CLASSES };
-        Ok(Self { network: built(drives, ring, classes, setup)?, first })
+        let (classes, fixed): (_, &'static [FixedConnection]) = match kind {
+            LineKind::Plain => (communication::CLASSES, &[]),
+            LineKind::HotPlug => (communication::CLASSES_WITH_HOT_PLUG, &[]),
+            LineKind::Fixed([to, from]) => {
+                // As long as the process: it is one line of drives.
+                let list =
+                    |produces, idns: &Vec<Idn>| FixedConnection { produces, idns: idns.clone().leak() };
+                (FIXED_CLASSES, vec![list(false, to), list(true, from)].leak())
+            }
+        };
+        Ok(Self { network: built(drives, ring, classes, fixed, setup)?, first })
     }
 
     /// The drives and their cables.

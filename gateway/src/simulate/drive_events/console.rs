@@ -123,14 +123,15 @@ mod tests {
 
     use super::*;
     use crate::simulate::drive_events::setup::Setup;
-    use crate::simulate::drives::DriveLine;
+    use crate::simulate::drives::{DriveLine, LineKind};
 
     #[test]
     fn every_typed_line_is_answered_and_none_ends_the_drives() {
         let (sender, lines) = sync_channel(LINES_MAX);
         let names = Names { what: "drive", numbers: 1..=1 };
         let mut director = Director::new(names, Script::default(), MonotonicTime::ZERO, lines);
-        let mut drives = DriveLine::new([(1, UnitKind::Rotary)], false, false, &Setup::default()).unwrap();
+        let mut drives =
+            DriveLine::new([(1, UnitKind::Rotary)], false, &LineKind::Plain, &Setup::default()).unwrap();
         let mut said = String::new();
         let typed = ["silence 1 for 1 s\n", "\n", "silenz\n", "help\n", "status\n", "causes\n"];
         for (second, line) in (1..).zip(typed) {

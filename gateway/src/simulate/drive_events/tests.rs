@@ -31,7 +31,7 @@ use crate::simulate::can_actor::{ActingNode, Actor};
 use crate::simulate::can_bus::CanNode;
 use crate::simulate::can_drive::{self, DriveNode};
 use crate::simulate::devicenet_drive::{self, DevicenetNode};
-use crate::simulate::drives::{DriveLine, SIMULATED_MAC};
+use crate::simulate::drives::{DriveLine, LineKind, SIMULATED_MAC};
 
 fn names() -> Names {
     Names { what: "drive", numbers: 1..=3 }
@@ -199,7 +199,7 @@ at 90 ms warning 1 off
 }
 
 fn sercos(setup: &Setup) -> DriveLine {
-    DriveLine::new([(1, UnitKind::Rotary), (2, UnitKind::Linear)], false, false, setup).unwrap()
+    DriveLine::new([(1, UnitKind::Rotary), (2, UnitKind::Linear)], false, &LineKind::Plain, setup).unwrap()
 }
 
 #[test]

@@ -118,7 +118,8 @@ impl Telling {
         if phase != self.phase {
             *self = Self { phase, since: now, told: 0 };
         }
-        let phase = phase.filter(|phase| *phase < Phase::CP4)?;
+        // On the way down, and in a pause before the next try, nobody waits for anything.
+        let phase = phase.filter(|phase| *phase < Phase::CP4 && master.target_phase() == Some(Phase::CP4))?;
         let times = now.since(self.since).0 / PROGRESS.0;
         if times <= self.told {
             return None;
