@@ -551,6 +551,25 @@ mod tests {
     }
 
     /// S-0-0146, 0171, 0172, 0191: the master moves the axis over switch and marker, stops, and takes the displacement over.
+    /// The marker is a place of the machine: when the drive counts from another place, it has another number, and what the
+    /// positions are off by it is less by as much.
+    #[test]
+    fn a_marker_moves_with_the_positions() {
+        let rig = Rig::following();
+        let scales =
+            Scales::read(&rig.store, &ServoParameters::default()).expect("the scaling of a sound drive");
+        let off = |homing: &Homing| homing.displacement(&rig.store, &scales);
+        let mut homing = Homing { marker: Some(2 * NANO), ..Homing::default() };
+        let before = off(&homing).expect("a marker was registered");
+        homing.shifted(NANO / 4);
+        assert_eq!((homing.marker, off(&homing)), (Some(2 * NANO + NANO / 4), Some(before - NANO / 4)));
+        homing.shifted(-NANO);
+        assert_eq!((homing.marker, off(&homing)), (Some(NANO + NANO / 4), Some(before + 3 * NANO / 4)));
+        let mut none = Homing::default();
+        none.shifted(NANO);
+        assert_eq!((none.marker, off(&none)), (None, None));
+    }
+
     #[test]
     fn a_master_homes_with_displacement() {
         let mut rig = Rig::following();
