@@ -370,7 +370,14 @@ impl Engine {
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
             channel.transmit(now, &self.time, &mut **port);
         }
+        let was_over = self.ending.over;
         if self.stopping && self.may_go_down(now) {
+            if !was_over {
+                // That these drives are not heard any more is no fault.
+                let system = self.time.system_at(now);
+                let free = self.axes.iter_mut().filter(|axis| !axis.may_have_torque());
+                free.for_each(|axis| axis.leave_south(now, system));
+            }
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
         let told = self.tell_changes();

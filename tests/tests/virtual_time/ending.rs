@@ -110,6 +110,35 @@ fn a_drive_that_is_lost_while_it_stops_is_not_known_to_stand() {
     };
 }
 
+/// Drives that are not heard any more because the box takes its buses down are nothing to be told of.
+#[test]
+fn an_end_without_faults_tells_of_none() {
+    let can = include_str!("can.toml");
+    let devicenet = include_str!("devicenet.toml");
+    for (name, mut rig) in [
+        ("SERCOS", Rig::ready(Settings::default())),
+        (
+            "CANopen",
+            Rig::ready(Settings { configuration: can.to_owned(), drives: Vec::new(), ..Settings::default() }),
+        ),
+        (
+            "DeviceNet",
+            Rig::ready(Settings {
+                configuration: devicenet.to_owned(),
+                drives: Vec::new(),
+                ..Settings::default()
+            }),
+        ),
+    ] {
+        rig.run_for(millis(500));
+        stop(&mut rig);
+        rig.run_until(millis(5_000), "the end", |rig| rig.engine.is_stopped());
+        rig.run_for(millis(20));
+        let told = rig.told();
+        assert!(!told.contains("south_silence") && !told.contains("Fault"), "{name}: {told}");
+    }
+}
+
 #[test]
 fn an_axis_that_was_not_switched_on_is_not_waited_for() {
     let mut rig = Rig::ready(Settings::default());
