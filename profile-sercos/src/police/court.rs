@@ -59,7 +59,7 @@ impl Court {
 
     /// The master sends a frame from one of its ports through `stations`. Each passage is judged, behind what
     /// `misdeed` makes of it; `arrived` gets what comes to a port of the master.
-    pub fn send<S: Stations>(
+    pub fn send<S: Stations + ?Sized>(
         &mut self,
         now: MonotonicTime,
         port: Port,

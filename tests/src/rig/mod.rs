@@ -57,13 +57,14 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
+use profile_sercos::police::bus::Stations;
 use profile_sercos::police::court::{Court, Tried};
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
 
 use self::clocks::Clock;
-use self::foreign::Foreign;
+use self::foreign::{Foreign, ForeignLine};
 use self::motion_checker::MotionChecker;
 use self::network::{Knobs, Pipe};
 use self::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
@@ -165,6 +166,8 @@ pub struct Rig {
     pub devicenet: Vec<CanWire<DevicenetNode>>,
     /// Drives of somebody else in place of those of the first CAN bus, or of the first DeviceNet where there is none.
     pub foreign: Option<CanWire<Foreign>>,
+    /// SERCOS slaves of somebody else in place of the line.
+    pub foreign_line: Option<ForeignLine>,
     /// The police over the line.
     pub court: Court,
     /// The checker of every set-point.
@@ -246,6 +249,7 @@ impl Rig {
             can,
             devicenet: devicenet.collect(),
             foreign: None,
+            foreign_line: None,
             court: Court::new(START),
             motion_checker: MotionChecker::new(&config, settings.seed),
             knobs: settings.knobs,
@@ -300,6 +304,17 @@ impl Rig {
             rig.can.remove(0);
         }
         rig.foreign = Some(foreign::wire(rate, stations, &shared));
+        rig
+    }
+
+    /// A box whose SERCOS line has these slaves and no others, nearest to the master first.
+    ///
+    /// # Panics
+    /// When the configuration makes no box.
+    #[must_use]
+    pub fn on_line(settings: Settings, slaves: Vec<foreign::SharedSlave>) -> Self {
+        let mut rig = Self::new(Settings { drives: Vec::new(), ..settings });
+        rig.foreign_line = Some(ForeignLine::new(slaves));
         rig
     }
 
@@ -697,6 +712,7 @@ impl Rig {
     /// The engine is late: buses and drives go on.
     fn go_on_without_engine(&mut self) {
         self.line.handle_time(self.now);
+        self.foreign_line.iter_mut().for_each(|line| line.handle_time(self.now));
         self.can.iter_mut().for_each(|wire| wire.bus.advance(self.now));
         self.devicenet.iter_mut().for_each(|wire| wire.bus.advance(self.now));
         self.foreign.iter_mut().for_each(|wire| wire.bus.advance(self.now));
@@ -726,8 +742,12 @@ impl Rig {
     /// The line answers, the network takes the device's datagrams, and the watchers look.
     fn after_cycle(&mut self) {
         self.commissioners.poll();
-        self.line.handle_time(self.now);
-        let line = self.cable.then_some(&mut self.line);
+        let line: &mut dyn Stations = match &mut self.foreign_line {
+            Some(line) => line,
+            None => &mut self.line,
+        };
+        line.handle_time(self.now);
+        let line = self.cable.then_some(line);
         let tamper = &mut self.tamper_frame;
         let mut back = |frame: &mut Bytes| tamper.as_mut().is_none_or(|tamper| tamper(frame));
         self.south.exchange(self.now, &mut self.court, line, &mut back);

@@ -6,10 +6,10 @@ use std::net::SocketAddrV4;
 use axisbridge::engine::port::{CanInput, CanPort, CanSent, Datagram, EthernetPort, FRAME_MAX, NorthPort};
 use axisbridge::simulate::can_bus::{CanNode, InProcessCan};
 use axisbridge::simulate::can_drive::DriveNode;
-use axisbridge::simulate::drives::DriveNetwork;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
+use profile_sercos::police::bus::Stations;
 use profile_sercos::police::court::Court;
 
 /// Frames or datagrams that a queue holds; more are lost.
@@ -173,7 +173,7 @@ impl SouthQueue {
         &mut self,
         now: MonotonicTime,
         court: &mut Court,
-        mut line: Option<&mut DriveNetwork>,
+        mut line: Option<&mut dyn Stations>,
         back: &mut dyn FnMut(&mut Bytes) -> bool,
     ) {
         while let Some((mut frame, ())) = self.outbound.pop() {

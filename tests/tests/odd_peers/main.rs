@@ -6,6 +6,7 @@
 
 mod canopen;
 mod devicenet;
+mod sercos;
 
 use axisbridge_tests::rig::Rig;
 use axisbridge_tests::rig::motion::millis;

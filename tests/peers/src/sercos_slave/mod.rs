@@ -178,6 +178,7 @@ impl SercosSlave {
         (self.phases.ready_for_3, self.phases.ready_for_4) = (self.device.checked_3, self.device.checked_4);
         let event = self.phases.mst(now, header, &self.device.settings);
         self.event(event, before);
+        self.warn();
         self.mst = Some(header.phase_byte);
         self.topology.new_cycle();
         let cycle = u64::from(self.device.table.unsigned(Idn::s(1002)).max(1));
@@ -257,8 +258,14 @@ impl SercosSlave {
             let counted = self.device.table.word(Idn::s(1028)).saturating_add(more);
             self.device.table.set(Idn::s(1028), &counted.to_le_bytes());
         }
-        self.device.warning = self.phases.phase() >= Some(3) && self.phases.lost() > allowed / 2;
+        self.warn();
         self.event(event, before);
+    }
+
+    /// More than half of the allowed MST are lost: a warning, until one comes.
+    fn warn(&mut self) {
+        let allowed = self.device.table.unsigned(Idn::s(1003));
+        self.device.warning = self.phases.phase() >= Some(3) && self.phases.lost() > allowed / 2;
     }
 
     fn slot(&self) -> Option<FixedSlot> {
