@@ -384,10 +384,10 @@ impl FineInterpolator {
             for missing in (1..periods).rev() {
                 let at = self.limit_time(segment, target - length * missing);
                 let place = segment.place(at);
-                channels.0.fill(segment.position.map(|curve| segment.motion(&curve, &place, at).0));
-                channels.1.fill(segment.velocity.map(|curve| curve.value(&place)));
-                channels.2.fill(segment.acceleration.map(|curve| curve.value(&place)));
-                channels.3.fill(segment.torque.map(|curve| curve.value(&place)));
+                channels.0.lose(segment.position.map(|curve| segment.motion(&curve, &place, at).0));
+                channels.1.lose(segment.velocity.map(|curve| curve.value(&place)));
+                channels.2.lose(segment.acceleration.map(|curve| curve.value(&place)));
+                channels.3.lose(segment.torque.map(|curve| curve.value(&place)));
             }
         }
         let segment = Segment {

@@ -10,6 +10,9 @@ use crate::time::DurationNs;
 /// Binary places of the part of the segment that has passed.
 const TIME_PLACES: u32 = 40;
 
+/// The end of the segment.
+const ONE: i128 = 1 << TIME_PLACES;
+
 /// Binary places of intermediate results.
 const VALUE_PLACES: u32 = 20;
 
@@ -26,22 +29,25 @@ pub(super) struct Polynomial {
     first: i128,
     second: i128,
     third: i128,
+    /// What an estimate for an update that was lost is away from the curve at the start. It is taken back evenly over the
+    /// segment; behind its end the curve is that of the values that were sent.
+    away: i64,
 }
 
 impl Polynomial {
     const fn constant(base: i64) -> Self {
-        Self { base, first: 0, second: 0, third: 0 }
+        Self { base, first: 0, second: 0, third: 0, away: 0 }
     }
 
     const fn new(base: i64, d1: i128, d2: i128, d3: i128) -> Self {
-        Self { base, first: 6 * d1 - 3 * d2 - d3, second: 3 * d2, third: d3 }
+        Self { base, first: 6 * d1 - 3 * d2 - d3, second: 3 * d2, third: d3, away: 0 }
     }
 
     /// From `base` with a way of `velocity` in the length of the segment, which `acceleration` makes longer by half of
     /// itself.
     pub(super) fn moving(base: i64, velocity: i64, acceleration: i64) -> Self {
         let within = |value: i64| i128::from(value.clamp(-MAX_STEP, MAX_STEP));
-        Self { base, first: 6 * within(velocity), second: 3 * within(acceleration), third: 0 }
+        Self { base, first: 6 * within(velocity), second: 3 * within(acceleration), third: 0, away: 0 }
     }
 
     /// The value at a place, saturated.
@@ -51,14 +57,16 @@ impl Polynomial {
         // step.
         let sum = times(self.third << VALUE_PLACES, part) + (self.second << VALUE_PLACES);
         let sum = times(sum, part) + (self.first << VALUE_PLACES);
-        saturate(i128::from(self.base) + rounded_value(times(sum, part), 6))
+        let away = if self.away == 0 { 0 } else { times(i128::from(self.away), (ONE - part).max(0)) };
+        saturate(i128::from(self.base) + away + rounded_value(times(sum, part), 6))
     }
 
     /// The derivative at a place, per second, saturated.
     pub(super) fn slope_per_second(&self, at: &Place) -> i64 {
         let Place { part, length } = *at;
         let sum = times((3 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
-        let per_segment = times(sum, part) + (self.first << VALUE_PLACES);
+        let back = if part < ONE { 6 * i128::from(self.away) << VALUE_PLACES } else { 0 };
+        let per_segment = times(sum, part) + (self.first << VALUE_PLACES) - back;
         // Below 2^90 with 20 places; a second is below 2^30 nanoseconds.
         let per_second = per_segment.saturating_mul(1_000_000_000);
         saturate(rounded_value(per_second, 6 * i128::from(length.0)))
@@ -127,9 +135,11 @@ fn saturate(value: i128) -> i64 {
 /// The last values of one kind of set-point; makes polynomials of at most `ORDER`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Channel<const ORDER: usize> {
-    /// The newest first.
+    /// The newest first. Values of updates that were lost are those of the curve through the ones that were sent.
     values: [i64; 4],
     known: usize,
+    /// Updates that were lost since the newest value, and where the set-point was led to for the last of them.
+    lost: Option<(i64, i64)>,
 }
 
 impl<const ORDER: usize> Channel<ORDER> {
@@ -140,16 +150,44 @@ impl<const ORDER: usize> Channel<ORDER> {
         channel
     }
 
-    /// Takes a value that nobody sent: the start, or an estimate for an update that was lost. An estimate is
-    /// held within the largest step, so that the bounds of the polynomials hold whatever is lost.
+    /// Takes a value that nobody sent: the start, or those of the motion that is gone on from. It is held within the largest
+    /// step, so that the bounds of the polynomials hold whatever it is.
     pub(super) fn fill(&mut self, value: Option<i64>) {
         if let Some(value) = value {
-            let last = self.values[0];
-            let nearest = last.saturating_sub(MAX_STEP)..=last.saturating_add(MAX_STEP);
-            let value = if self.known > 0 { value.clamp(*nearest.start(), *nearest.end()) } else { value };
-            self.values.rotate_right(1);
-            self.values[0] = value;
-            self.known = (self.known + 1).min(self.values.len());
+            let value = if self.known > 0 { near(value, self.values[0]) } else { value };
+            self.shift(value);
+        }
+    }
+
+    /// An update was lost; the set-point was led to `estimate` in its place. Estimates are held within the largest step too.
+    pub(super) fn lose(&mut self, estimate: Option<i64>) {
+        if let Some(estimate) = estimate.filter(|_| self.known > 0) {
+            let (count, before) = self.lost.unwrap_or((0, self.values[0]));
+            self.lost = Some((count + 1, near(estimate, before)));
+        }
+    }
+
+    fn shift(&mut self, value: i64) {
+        self.values.rotate_right(1);
+        self.values[0] = value;
+        self.known = (self.known + 1).min(self.values.len());
+    }
+
+    /// Puts the values between the newest and `value` in place of the `lost` ones: those of the parabola through the last two
+    /// and `value`, or of the straight line where only one is known.
+    fn mend(&mut self, lost: i64, value: i64) {
+        let [newest, before, ..] = self.values;
+        // Periods since `newest` until `value`, and the differences from `newest`.
+        let all = i128::from(lost) + 1;
+        let rise = i128::from(value) - i128::from(newest);
+        let fall = if self.known > 1 { i128::from(newest) - i128::from(before) } else { 0 };
+        // Behind `newest` by k: k/all of the rise, and what the bend of the parabola puts in between.
+        let bend = if self.known > 1 { rise - all * fall } else { 0 };
+        for passed in 1..all {
+            let straight = rounded(rise * passed, all);
+            let bent = rounded(bend * passed * (passed - all), all * (all + 1));
+            let mended = saturate(i128::from(newest) + straight + bent);
+            self.shift(near(mended, self.values[0]));
         }
     }
 
@@ -164,16 +202,30 @@ impl<const ORDER: usize> Channel<ORDER> {
             *self = Self::default();
             return Ok(None);
         };
-        if self.known > 0 && self.values[0].abs_diff(value) > MAX_STEP.unsigned_abs() {
+        let lost = self.lost.take();
+        let start = lost.map_or(self.values[0], |(_, estimate)| estimate);
+        if self.known > 0 && start.abs_diff(value) > MAX_STEP.unsigned_abs() {
             return Err(UpdateError::Jump);
         }
-        self.fill(Some(value));
+        if let Some((lost, _)) = lost {
+            self.mend(lost, value);
+        }
+        self.shift(value);
         let order = if immediate { 0 } else { ORDER.min(self.known - 1) };
         let [v0, v1, v2, v3] = self.values.map(i128::from);
         let d1 = v0 - v1;
         let d2 = if order >= 2 { v0 - 2 * v1 + v2 } else { 0 };
         let d3 = if order >= 3 { v0 - 3 * v1 + 3 * v2 - v3 } else { 0 };
         let [newest, before, ..] = self.values;
-        Ok(Some(if order == 0 { Polynomial::constant(newest) } else { Polynomial::new(before, d1, d2, d3) }))
+        if order == 0 {
+            return Ok(Some(Polynomial::constant(newest)));
+        }
+        let away = if lost.is_some() { start.saturating_sub(before) } else { 0 };
+        Ok(Some(Polynomial { away, ..Polynomial::new(before, d1, d2, d3) }))
     }
+}
+
+/// The value nearest to `value` that is no further than the largest step from `from`.
+fn near(value: i64, from: i64) -> i64 {
+    value.clamp(from.saturating_sub(MAX_STEP), from.saturating_add(MAX_STEP))
 }

@@ -222,6 +222,47 @@ fn a_lost_update_is_bridged() {
     }
 }
 
+/// Updates are lost again and again while an axis accelerates: what an estimate was wrong by is taken back with the next
+/// update, and is no part of the curve from there on. The velocity is wrong by what the acceleration makes of the periods
+/// without an update, and never by more because others were lost before.
+#[test]
+fn errors_of_estimates_do_not_add_up() {
+    // Nanounits per period squared, and which updates of a row that comes round again are lost.
+    const ACCELERATION: i64 = 2_000_000;
+    let rows: [&[bool]; 6] = [
+        &[false, true],
+        &[false, true, true],
+        &[false, true, false, true, true],
+        &[false, true, true, false, true],
+        &[false, false, true, false, true, true, false, true],
+        &[false, true, true, true, false, true],
+    ];
+    for row in rows {
+        let longest = row.split(|lost| !lost).map(<[bool]>::len).max().unwrap_or(0);
+        let longest = i64::try_from(longest).unwrap();
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, 4);
+        interpolator.start(Some(Position(0)));
+        let curve = |periods: i64| ACCELERATION * periods * periods / 2;
+        let (mut before, mut worst) = (0, 0);
+        for period in 1..80_i64 {
+            let lost = period > 8 && row[usize::try_from(period).unwrap() % row.len()];
+            if !lost {
+                interpolator.update(time(period, 0), &position(curve(period))).unwrap();
+            }
+            for part in [250, 500, 750, 1_000] {
+                let now = position_at(&mut interpolator, time(period - 1, part));
+                // Nanounits in a period, less what the controller does.
+                let velocity = (now - before) * 4;
+                let meant = ACCELERATION * (8 * (period - 1) + part / 125 - 1) / 8;
+                worst = worst.max((velocity - meant).abs());
+                before = now;
+            }
+        }
+        let bound = ACCELERATION * (longest + 1) * (longest + 2) / 2;
+        assert!(worst <= bound, "{row:?}: the velocity is wrong by {worst}, expected {bound} at most");
+    }
+}
+
 #[test]
 fn stamps_that_cannot_be_right_are_refused_and_leave_no_trace() {
     let mut interpolator = fed(&[1_000, 2_000, 3_000]);

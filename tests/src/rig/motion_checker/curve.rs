@@ -276,11 +276,10 @@ impl Curve {
         let mut velocity = (s + 0.5) * d2 + f64::max(1.0 / 3.0, (3.0 * s * s + 6.0 * s + 2.0) / 6.0) * d3;
         if beyond > 0.0 {
             // The curve goes on to where the controller does not go: what slows down goes on slowing down, and positions
-            // that were not sent are wrong by up to `away`. Where they are followed by one that was sent, ∇ is wrong by as
-            // much, ∇² by twice and ∇³ by four times that.
+            // that were not sent are wrong by up to `away`, which is taken back over a period.
             let n = beyond.ceil();
             let away = (n + 1.0) * (n + 2.0) / 2.0 * d2;
-            velocity += (n + 1.0) * d2 + (1.0 + 0.5 * 2.0 + 4.0 / 3.0) * away;
+            velocity += (n + 1.0) * d2 + away;
         }
         let fastest = low.abs().max(high.abs());
         let mut part = skew.drift;
