@@ -176,8 +176,24 @@ pub enum Notice {
         /// What came out.
         tried: Tried,
     },
-    /// The drive of a CANopen device lacks operating modes that nobody asked for.
+    /// A SERCOS drive takes a telegram only without the values that the axis can do without, if at all.
+    Bare {
+        /// The axis.
+        axis: u8,
+        /// SERCOS address of the drive.
+        address: u16,
+    },
+    /// A SERCOS drive lacks operating modes that nobody asked for.
     ModesLeftOut {
+        /// The axis.
+        axis: u8,
+        /// SERCOS address of the drive.
+        address: u16,
+        /// Which, and why.
+        modes: Vec<(ModeSelection, SercosError)>,
+    },
+    /// The drive of a CANopen device lacks operating modes that nobody asked for.
+    NodeModesLeftOut {
         /// The axis.
         axis: u8,
         /// Its device.
@@ -302,6 +318,8 @@ impl Notice {
             | Self::PassedOver { .. }
             | Self::ObjectsPassedOver { .. }
             | Self::ModesLeftOut { .. }
+            | Self::Bare { .. }
+            | Self::NodeModesLeftOut { .. }
             | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
             | Self::Node { fault: NodeFault::NONE, alarm: NodeAlarm::NONE, .. }
             | Self::Sercos(
@@ -360,6 +378,8 @@ impl Notice {
             | Self::Refused { axis, .. }
             | Self::NotMapped { axis, .. }
             | Self::ModesLeftOut { axis, .. }
+            | Self::Bare { axis, .. }
+            | Self::NodeModesLeftOut { axis, .. }
             | Self::SlaveAnswers { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
@@ -420,9 +440,16 @@ impl fmt::Display for Notice {
             Self::SlaveAnswers { mac, error, .. } => {
                 write!(f, "the answers of the drive with MAC ID {mac} do not count: {error}")
             }
-            Self::ModesLeftOut { node, modes, .. } => {
-                let all: Vec<_> = modes.iter().map(|(mode, why)| format!("{mode} ({why})")).collect();
-                write!(f, "node {node}: the axis does without {}", all.join(" and "))
+            Self::Bare { address, .. } => write!(
+                f,
+                "the drive with SERCOS address {address} refuses the values of its telegram and does not say by S-0-0187 and S-0-0188 which: \
+                 tried next without those that the axis can do without"
+            ),
+            Self::ModesLeftOut { address, modes, .. } => {
+                write!(f, "the drive with SERCOS address {address}: the axis does without {}", left_out(modes))
+            }
+            Self::NodeModesLeftOut { node, modes, .. } => {
+                write!(f, "node {node}: the axis does without {}", left_out(modes))
             }
             Self::NotMapped { node, objects, .. } => {
                 let all: Vec<_> = objects.iter().map(ToString::to_string).collect();
@@ -466,6 +493,12 @@ impl fmt::Display for Notice {
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }
     }
+}
+
+/// Modes that an axis does without, each with the reason.
+fn left_out(modes: &[(ModeSelection, impl fmt::Display)]) -> String {
+    let all: Vec<_> = modes.iter().map(|(mode, why)| format!("{mode} ({why})")).collect();
+    all.join(" and ")
 }
 
 /// `commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; writing S-0-0079: ...`: what failed

@@ -121,7 +121,7 @@ pub(super) fn extend(
     axis: &SercosAxis,
     facts: &DriveFacts,
 ) {
-    if axis.captures != CaptureMode::Cyclic {
+    if axis.captures != CaptureMode::Cyclic || axis.bare {
         return;
     }
     let [producer, consumer] = tables.configurable;

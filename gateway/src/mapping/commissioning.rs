@@ -6,13 +6,13 @@ use profile_sercos::wire::svc::Element;
 
 use super::capture_program::CaptureMode;
 use super::captures;
-use super::compile_sercos::{Compiler, SercosAxis, SercosError, mode_rules};
+use super::compile_sercos::{Compiler, SercosAxis, SercosError};
 use super::dictionary::SercosDictionary;
 use super::drive_facts::DriveFacts;
 use super::drive_program::Telegram;
-use super::fixed_connections::{Survey, survey};
 use super::item::Item;
 use super::sercos_tables::{Elements, SercosTables, StepKind, StepRule};
+use super::survey::{Survey, survey};
 
 /// Elements that say what a value means.
 const DESCRIPTION: [Element; 4] = [Element::Attribute, Element::Unit, Element::Minimum, Element::Maximum];
@@ -82,7 +82,7 @@ impl CommissioningPlan {
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
         let mut plan = Self::default();
-        if let Some(survey) = survey(facts) {
+        if let Some(survey) = survey(tables, facts) {
             plan.survey(survey);
             return Ok(plan);
         }
@@ -110,6 +110,11 @@ impl CommissioningPlan {
             Survey::Values(idns) => {
                 for idn in idns {
                     read(idn, &DESCRIPTION, Refused::Fail);
+                }
+            }
+            Survey::Modes(idns) => {
+                for idn in idns {
+                    read(idn, &[Element::Data], Refused::Continue);
                 }
             }
         }
@@ -158,10 +163,9 @@ impl Compiler<'_> {
                 }
             }
             StepKind::WriteModes => {
-                for (mode, slot) in
-                    mode_rules(self.tables, self.axis, self.facts)?.iter().zip(&self.tables.slots)
-                {
-                    let candidates = mode.codes.iter().map(|code| code.to_le_bytes().to_vec()).collect();
+                for (mode, slot) in self.listed_modes()?.0.into_iter().zip(&self.tables.slots) {
+                    let codes = self.codes(mode);
+                    let candidates = codes.iter().map(|code| code.to_le_bytes().to_vec()).collect();
                     let optional = mode.optional || self.axis.any_mode;
                     let refused = if optional { Refused::Continue } else { refused };
                     steps.push(Step::Write { idn: slot.idn, candidates, refused });

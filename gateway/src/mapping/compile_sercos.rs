@@ -21,7 +21,7 @@ use super::drive_program::{
 use super::fixed_connections::FixedConnections;
 use super::item::Item;
 use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
-use super::sercos_tables::{ModeRule, ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
+use super::sercos_tables::{ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
 
 /// Wraps of a position that does not work modulo: the range of its 32 bits.
 const FULL_RANGE: i64 = 1 << 32;
@@ -35,6 +35,8 @@ pub struct SercosAxis {
     pub modes: ArrayVec<ModeSelection, { MAX_MODES + PROCEDURES_MAX }>,
     /// One of the modes is enough: those that the drive does not have are left out.
     pub any_mode: bool,
+    /// The drive has refused the values of a telegram and does not tell which: those that the axis can do without stay out.
+    pub bare: bool,
     /// Whether positions wrap.
     pub modulo: bool,
     /// Whether commissioning sets the scaling of the drive; it is left alone otherwise.
@@ -61,6 +63,9 @@ pub enum SercosError {
         /// The mode.
         led_in: ModeSelection,
     },
+    /// A slave that says that it is no drive.
+    #[error("S-0-1302.0.1 says that it is {0}, and no drive")]
+    Profile(&'static str),
     /// No operation mode at all.
     #[error(
         "expected at least one operation mode, got none: the drive has none of those that the axis is configured for"
@@ -82,6 +87,46 @@ pub enum SercosError {
         /// The signal.
         signal: Signal,
     },
+    /// The drive lists what its telegrams can carry, and a value that the mode needs is not in it.
+    #[error(
+        "{list}, the list of what may stand in a telegram of the drive, has no {idn}, which carries {signal}"
+    )]
+    NotConfigurable {
+        /// S-0-0187 or S-0-0188.
+        list: Idn,
+        /// The IDN.
+        idn: Idn,
+        /// The signal.
+        signal: Signal,
+    },
+    /// The drive lists its operation modes, and the one that is wanted is not in it.
+    #[error("{mode} needs one of the operation modes {wanted}, and {list} is [{found}]")]
+    NotSupported {
+        /// S-0-0292.
+        list: Idn,
+        /// The mode.
+        mode: ModeSelection,
+        /// Codes that would do.
+        wanted: String,
+        /// Codes that the drive has.
+        found: String,
+    },
+    /// The drive does not list its operation modes, and none of those that it is set to is the one that is wanted.
+    #[error(
+        "{mode} needs one of the operation modes {wanted}; the drive does not tell what it has, and is set to {found}: name its `modes` \
+         in the configuration, if it has it"
+    )]
+    NotSelected {
+        /// The mode.
+        mode: ModeSelection,
+        /// Codes that would do.
+        wanted: String,
+        /// The parameters of the modes, with their codes.
+        found: String,
+    },
+    /// The drive has refused the operation mode.
+    #[error("the drive takes no code of it for {0}")]
+    SlotRefused(Idn),
     /// A fixed configuration list lacks a value that a mode needs.
     #[error(
         "{list}: expected {idn} in the list of this slave of class SCP_FixCFG, which carries {signal} for {mode}, and it is not there; \
@@ -186,7 +231,7 @@ impl Telegram {
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
         let mut telegram = Telegram::default();
-        let (command, actual) = signals(tables, axis, facts)?;
+        let (command, actual) = Compiler { tables, dictionary, axis, facts }.signals()?;
         if let Some(fixed) = FixedConnections::of(tables, facts)? {
             let unfilled =
                 |idn: &&Idn| **idn != tables.control && !command.iter().any(|(_, known)| known == *idn);
@@ -219,7 +264,7 @@ impl Telegram {
         }
         for idn in tables.added_words() {
             let width = facts.width(idn, dictionary).and_then(|width| u16::try_from(width.bytes()).ok());
-            let listed = captures::is_listed(tables.configurable[0], idn, facts);
+            let listed = !axis.bare && captures::is_listed(tables.configurable[0], idn, facts);
             if let Some(width) = width.filter(|_| listed && !telegram.feedback.contains(&idn.into())) {
                 telegram.feedback.push(idn.into());
                 telegram.feedback_bytes += width;
@@ -272,105 +317,6 @@ impl Telegram {
         });
         (command, feedback)
     }
-}
-
-type Signals = Vec<(Signal, Idn)>;
-
-/// The signals of all modes, each once, in the order of the modes.
-fn signals(
-    tables: &SercosTables,
-    axis: &SercosAxis,
-    facts: &DriveFacts,
-) -> Result<(Signals, Signals), SercosError> {
-    let (mut command, mut actual) = (Signals::new(), Signals::new());
-    let fixed = FixedConnections::of(tables, facts)?;
-    let mut available = false;
-    for (rule, slot) in mode_rules(tables, axis, facts)?.iter().zip(&tables.slots) {
-        if !is_available(tables, axis, rule, slot, facts) {
-            continue;
-        }
-        available = true;
-        for (wanted, list) in [(&rule.command, &mut command), (&rule.actual, &mut actual)] {
-            for &signal in wanted {
-                let Some(row) = tables.signal(signal) else { continue };
-                if list.iter().any(|(known, _)| *known == signal) {
-                    continue;
-                }
-                if row.refuse && facts.is_missing(row.idn) {
-                    return Err(SercosError::Missing { idn: row.idn, signal });
-                }
-                if let Some(fixed) = &fixed {
-                    if fixed.of_signal(signal).idns.contains(&row.idn) {
-                        list.push((signal, row.idn));
-                    }
-                } else if row.refuse || captures::may_be_cyclic(tables, facts, row.idn, signal.is_command()) {
-                    list.push((signal, row.idn));
-                }
-            }
-        }
-    }
-    if !available {
-        return Err(SercosError::NoMode);
-    }
-    Ok((command, actual))
-}
-
-/// Whether the drive has an operation mode: one that the axis can do without may have been refused.
-fn is_available(
-    tables: &SercosTables,
-    axis: &SercosAxis,
-    rule: &ModeRule,
-    slot: &SlotRule,
-    facts: &DriveFacts,
-) -> bool {
-    let lacks =
-        |signal: &Signal| tables.signal(*signal).is_some_and(|row| row.refuse && facts.is_missing(row.idn));
-    let signals = || rule.command.iter().chain(&rule.actual);
-    !(rule.optional || axis.any_mode)
-        || !(facts.is_refused(slot.idn) || facts.is_missing(slot.idn) || signals().any(lacks))
-}
-
-/// A value that a mode needs and that the fixed connections of a drive do not carry.
-fn lacking(tables: &SercosTables, rule: &ModeRule, fixed: &FixedConnections) -> Option<SercosError> {
-    let signals = rule.command.iter().chain(&rule.actual);
-    signals.filter_map(|signal| Some((*signal, tables.signal(*signal)?))).find_map(|(signal, row)| {
-        let connection = fixed.of_signal(signal);
-        let lacks = row.refuse && !connection.idns.contains(&row.idn);
-        let (list, idn, mode) = (connection.list(), row.idn, rule.selection);
-        lacks.then_some(SercosError::FixedMissing { list, idn, signal, mode })
-    })
-}
-
-/// The rows of the operation modes of an axis, in the order of their slots. A mode that fixed connections do not serve takes
-/// no slot where the axis can do without it.
-pub(super) fn mode_rules<'t>(
-    tables: &'t SercosTables,
-    axis: &SercosAxis,
-    facts: &DriveFacts,
-) -> Result<Vec<&'t ModeRule>, SercosError> {
-    let fixed = FixedConnections::of(tables, facts)?;
-    let mut rules = Vec::with_capacity(axis.modes.len());
-    let mut first_lack = None;
-    for selection in &axis.modes {
-        let rule = tables.modes.iter().find(|rule| rule.selection == *selection);
-        match (rule, tables.procedure(*selection)) {
-            (Some(rule), _) => match fixed.as_ref().and_then(|fixed| lacking(tables, rule, fixed)) {
-                None => rules.push(rule),
-                Some(_) if rule.optional => {}
-                Some(error) if axis.any_mode => first_lack = first_lack.or(Some(error)),
-                Some(error) => return Err(error),
-            },
-            (None, Some(_)) => {}
-            (None, None) => return Err(SercosError::Mode(*selection)),
-        }
-    }
-    if rules.is_empty() {
-        return Err(first_lack.unwrap_or(SercosError::NoMode));
-    }
-    if rules.len() > tables.slots.len() {
-        return Err(SercosError::Slots { slots: tables.slots.len(), modes: rules.len() });
-    }
-    Ok(rules)
 }
 
 /// What the values of an IDN measure, and generic units in one count.
@@ -457,11 +403,13 @@ impl DriveProgram {
         axis: &SercosAxis,
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
-        let (command_signals, actual_signals) = signals(tables, axis, facts)?;
+        let compiler = Compiler { tables, dictionary, axis, facts };
+        let (command_signals, actual_signals) = compiler.signals()?;
         let telegram = Telegram::compile(tables, dictionary, axis, facts)?;
         let mut program = Self::new(telegram, !axis.silent);
-        let compiler = Compiler { tables, dictionary, axis, facts };
-        program.position_step = compiler.position_step()?;
+        if command_signals.iter().any(|(signal, _)| *signal == Signal::PositionCommand) {
+            program.position_step = compiler.position_step()?;
+        }
         program.words_at = [
             compiler.offset(tables.control, &program.telegram.command)?,
             compiler.offset(tables.status_word, &program.telegram.feedback)?,
@@ -490,25 +438,23 @@ impl DriveProgram {
                 return Err(SercosError::Full("the table of reports"));
             }
         }
-        for (rule, slot) in mode_rules(tables, axis, facts)?.iter().zip(&tables.slots) {
-            if is_available(tables, axis, rule, slot, facts) {
-                let SlotRule { control, status, .. } = *slot;
-                let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
-                let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
-                let fields = || program.command.fields().map(|field| field.signal);
-                let there = |signal: &&Signal| fields().any(|known| known == **signal);
-                let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
-                let entry = ModeEntry {
-                    selection: rule.selection,
-                    control,
-                    status,
-                    bits: BitPattern::default(),
-                    handover: None,
-                    needs,
-                    carried,
-                };
-                program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
-            }
+        for (rule, slot) in compiler.modes()?.chosen {
+            let SlotRule { control, status, .. } = *slot;
+            let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
+            let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
+            let fields = || program.command.fields().map(|field| field.signal);
+            let there = |signal: &&Signal| fields().any(|known| known == **signal);
+            let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
+            let entry = ModeEntry {
+                selection: rule.selection,
+                control,
+                status,
+                bits: BitPattern::default(),
+                handover: None,
+                needs,
+                carried,
+            };
+            program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
         }
         for rule in axis.modes.iter().filter_map(|mode| tables.procedure(*mode)) {
             if let Some(led_in) = rule.led_in

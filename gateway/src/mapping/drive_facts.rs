@@ -26,6 +26,8 @@ struct Fact {
     missing: bool,
     /// The drive has refused what was written to it last.
     refused: bool,
+    /// The drive has not given element 7, though it has the IDN.
+    unread: bool,
 }
 
 /// Something that a drive says of an IDN and the dictionary says otherwise. The drive is followed.
@@ -98,6 +100,22 @@ impl DriveFacts {
     /// Whether the drive has refused what was written to an IDN last.
     pub fn is_refused(&self, idn: Idn) -> bool {
         self.facts.get(&idn).is_some_and(|fact| fact.refused)
+    }
+
+    /// The drive has not given element 7 of an IDN.
+    pub fn note_unread(&mut self, idn: Idn) {
+        self.facts.entry(idn).or_default().unread = true;
+    }
+
+    /// Whether the drive was asked for element 7 of an IDN, whatever it has said.
+    pub fn is_told(&self, idn: Idn) -> bool {
+        self.facts.get(&idn).is_some_and(|fact| fact.data.is_some() || fact.missing || fact.unread)
+    }
+
+    /// Element 7 of a list, or of a value, as words of two bytes, if the drive has given it.
+    pub fn words(&self, idn: Idn) -> Option<Vec<u16>> {
+        let data = self.data(idn)?;
+        Some(data.chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect())
     }
 
     /// The drive has no such IDN.

@@ -12,6 +12,7 @@ use profile_sercos::wire::idn::Idn;
 use super::compile_sercos::SercosError;
 use super::drive_facts::DriveFacts;
 use super::sercos_tables::SercosTables;
+use super::survey::Survey;
 
 /// Connections of a slave with SCP_FixCFG, x of S-0-1050.x.
 const INSTANCES: [u8; 2] = [0, 1];
@@ -104,15 +105,7 @@ fn show(connections: &[FixedConnection]) -> String {
     connections.iter().map(list).collect::<Vec<_>>().join(" and ")
 }
 
-/// What has to be asked before anything can be planned for a drive with fixed connections.
-pub(super) enum Survey {
-    /// S-0-1050.x.1, which may be missing, and S-0-1050.x.6.
-    Lists(Vec<(Idn, Idn)>),
-    /// What the values of the lists are.
-    Values(Vec<Idn>),
-}
-
-/// The next thing to ask; `None` when all is known, or nothing is fixed.
+/// What has to be asked next of the fixed connections of a drive; `None` when all is known, or nothing is fixed.
 pub(super) fn survey(facts: &DriveFacts) -> Option<Survey> {
     if !facts.has_fixed_connections() {
         return None;

@@ -39,7 +39,9 @@ mod overlay;
 mod resolver;
 mod rows;
 mod scaling;
+mod sercos_modes;
 mod sercos_tables;
+mod survey;
 
 #[cfg(test)]
 mod tests;
@@ -66,6 +68,7 @@ pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     CyclicValues, ELEMENTS, MissingValue,
 };
+use compile_sercos::Compiler;
 pub use compile_sercos::{SercosAxis, SercosError};
 pub use device_link::Told;
 pub use dictionary::{
@@ -323,6 +326,17 @@ impl Mapping {
     #[must_use]
     pub fn cia402_modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
         self.cia402.modes_untold(axis, facts)
+    }
+
+    /// Operating modes that an axis does without, because its SERCOS drive lacks something, and what.
+    #[must_use]
+    pub fn sercos_modes_left_out(
+        &self,
+        axis: &SercosAxis,
+        facts: &DriveFacts,
+    ) -> Vec<(ModeSelection, SercosError)> {
+        let compiler = Compiler { tables: &self.sercos, dictionary: &self.dictionaries.sercos, axis, facts };
+        compiler.modes().map(|modes| modes.left_out).unwrap_or_default()
     }
 
     /// Operating modes that an axis does without, because its CiA 402 drive lacks something, and what.

@@ -75,16 +75,20 @@ struct North {
 }
 
 impl Mapping {
-    /// What a drive holds that has taken every value that commissioning writes in CP2, and shows no polarity.
+    /// What a drive holds that has every mode, has taken every value that commissioning writes in CP2, and shows no polarity.
     ///
     /// # Errors
     /// As [`Mapping::commissioning`].
     pub fn facts_of_obedient(&self, axis: &SercosAxis) -> Result<DriveFacts, SercosError> {
         let mut facts = DriveFacts::new();
+        let codes = self.sercos.modes.iter().flat_map(|rule| &rule.codes);
+        let listed: Vec<u8> = codes.flat_map(|code| code.to_le_bytes()).collect();
+        facts.note_data(self.sercos.supported_modes, &listed);
+        let plan = self.commissioning(axis, 2, &facts)?;
         for idn in self.sercos.polarity_idns() {
             facts.note_data(idn, &[0, 0]);
         }
-        for step in self.commissioning(axis, 2, &DriveFacts::new())?.steps {
+        for step in plan.steps {
             if let Step::Write { idn, candidates, .. } = step
                 && let Some(first) = candidates.first()
             {

@@ -295,6 +295,10 @@ impl ScalingRule {
         if data == generic {
             return Ok(unit);
         }
+        // A drive that has neither knows of no gear.
+        if source.facts.is_missing(gear.motor) && source.facts.is_missing(gear.load) {
+            return Ok(unit);
+        }
         let motor = above_zero(gear.motor, source.read(gear.motor)?)?;
         let load = above_zero(gear.load, source.read(gear.load)?)?;
         // One turn of the motor is load/motor turns of the load.

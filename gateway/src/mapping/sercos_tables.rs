@@ -156,6 +156,8 @@ pub struct SercosTables {
     pub(super) signals: Vec<SignalRule>,
     pub(super) modes: Vec<ModeRule>,
     pub(super) slots: Vec<SlotRule>,
+    /// The drive's list of its operation modes.
+    pub(super) supported_modes: Idn,
     pub(super) procedures: Vec<ProcedureRule>,
     pub(super) actions: Vec<(Action, BitPattern)>,
     pub(super) commands: Vec<(Action, Idn)>,

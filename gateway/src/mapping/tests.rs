@@ -65,6 +65,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
             .collect(),
         modulo,
         any_mode: false,
+        bare: false,
         set_scaling: true,
         parameters: Vec::new(),
         captures: CaptureMode::Off,
@@ -74,14 +75,5 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
 
 /// What a drive tells that has taken every value of the plan for CP2.
 fn obedient(mapping: &Mapping, axis: &SercosAxis) -> DriveFacts {
-    let mut facts = DriveFacts::new();
-    for polarity in [43, 55, 85] {
-        facts.note_data(Idn::standard(polarity), &[0, 0]);
-    }
-    for step in mapping.commissioning(axis, 2, &DriveFacts::new()).unwrap().steps {
-        if let Step::Write { idn, candidates, .. } = step {
-            facts.note_data(idn, &candidates[0]);
-        }
-    }
-    facts
+    mapping.facts_of_obedient(axis).unwrap()
 }

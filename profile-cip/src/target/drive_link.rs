@@ -211,6 +211,9 @@ pub struct DriveImage {
     pub action_id: u32,
     /// The last [`AxisCommandImage::reset_id`] that was carried out.
     pub reset_id: u32,
+    /// The Control Modes that the drive has, by their numbers; `None` while nobody knows. What it lacks is refused as if
+    /// the axis did not have it.
+    pub control_modes: Option<u16>,
     /// The DC bus is up.
     pub bus_up: bool,
     /// The start asked for by `action_id` has ended: the drive follows set-points.
@@ -275,6 +278,7 @@ impl DriveImage {
             online,
             action_id,
             reset_id,
+            control_modes,
             bus_up,
             start_complete,
             stop_complete,
@@ -303,7 +307,7 @@ impl DriveImage {
         (*online, *bus_up, *start_complete, *stop_complete) = (false, false, false, false);
         (*power_enabled, *tracking) = (false, false);
         (*action_id, *reset_id, *scaling_id) = (0, 0, 0);
-        *test = None;
+        (*test, *control_modes) = (None, None);
         conditions.clear();
         (*start_inhibits, *start_inhibits_mfg) = (0, 0);
         (*position, *position_rate, *unwind) = (0, 0, None);
@@ -326,6 +330,7 @@ mod tests {
             online: true,
             action_id: 1,
             reset_id: 2,
+            control_modes: Some(0b10),
             bus_up: true,
             start_complete: true,
             stop_complete: true,

@@ -65,7 +65,7 @@ impl Polynomial {
     pub(super) fn slope_per_second(&self, at: &Place) -> i64 {
         let Place { part, length } = *at;
         let sum = times((3 * self.third) << VALUE_PLACES, part) + ((2 * self.second) << VALUE_PLACES);
-        let back = if part < ONE { 6 * i128::from(self.away) << VALUE_PLACES } else { 0 };
+        let back = if part < ONE { (6 * i128::from(self.away)) << VALUE_PLACES } else { 0 };
         let per_segment = times(sum, part) + (self.first << VALUE_PLACES) - back;
         // Below 2^90 with 20 places; a second is below 2^30 nanoseconds.
         let per_second = per_segment.saturating_mul(1_000_000_000);

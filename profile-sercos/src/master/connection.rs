@@ -164,10 +164,10 @@ impl ConsumerEnd {
         }
     }
 
-    /// Starts again from `Prepare`; the data stays.
+    /// Starts again from `Prepare`; the data stays. So does the last C-CON: a producer that stands still has nothing new to
+    /// say after a reset either.
     pub fn reset(&mut self) {
         self.state = self.state.next(ConsumerEvent::Reset);
-        self.control = ConnectionControl::empty();
         self.counting = false;
         self.fresh = false;
         self.losses = 0;
@@ -207,8 +207,8 @@ impl ConsumerEnd {
         }
         self.counting |= control.counter() != 0;
         let changed = if self.state == ConsumerState::Prepare {
-            // The toggle says nothing before it has been seen once; the counter does.
-            control.counter() != 0
+            // The toggle says nothing before it has been seen once; the counter does, and one that was seen has to go on.
+            control.counter() != 0 && control.counter() != last.counter()
         } else if self.counting {
             control.counter() != last.counter()
         } else {
@@ -353,6 +353,22 @@ mod tests {
         assert_eq!(consumer.view().data, [0x03, 0x00]);
         consumer.reset();
         assert_eq!(run(&mut consumer, &[Some(1), Some(3)]), "waiting consuming*");
+    }
+
+    #[test]
+    fn a_producer_that_stands_still_has_nothing_new_after_a_reset() {
+        for word in [0x5003, 0x0003, 0x0001] {
+            let mut consumer = ConsumerEnd::new(4, 1, 1);
+            run(&mut consumer, &[Some(0x3003), Some(0x4001), Some(0x5003), Some(word)]);
+            let still = [Some(word); 4];
+            assert!(run(&mut consumer, &still).ends_with("error"), "{word:04x}");
+            for _ in 0..3 {
+                consumer.reset();
+                let line = run(&mut consumer, &still);
+                assert!(!line.contains('*') && line.ends_with("waiting waiting"), "{word:04x}: {line}");
+            }
+            assert!(run(&mut consumer, &[Some(0x6001)]).ends_with("consuming*"), "and goes on when it does");
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use arrayvec::ArrayVec;
+
 use super::connection::ConsumerState;
 use super::foreign::OtherMaster;
 pub use super::hot_plug::HotPlugRefusal;
@@ -72,6 +74,42 @@ pub struct Ticket {
     pub(crate) place: usize,
     /// Serial number at the slave.
     pub(crate) serial: u64,
+}
+
+/// Parameters that are told with [`Event::CheckFailed`]; of more the number is told.
+const INVALID_TOLD: usize = 8;
+
+/// What a slave finds wrong when a phase is to be left.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Invalid {
+    /// The first parameters of its list.
+    idns: ArrayVec<Idn, INVALID_TOLD>,
+    /// How many there are.
+    count: usize,
+}
+
+impl Invalid {
+    /// A slave's list.
+    #[must_use]
+    pub fn new(list: &[Idn]) -> Self {
+        Self { idns: list.iter().copied().take(INVALID_TOLD).collect(), count: list.len() }
+    }
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.idns.is_empty() {
+            return f.write_str("the slave does not tell which parameter is invalid");
+        }
+        f.write_str("the slave finds invalid")?;
+        for (place, idn) in self.idns.iter().enumerate() {
+            write!(f, "{} {idn}", if place > 0 { "," } else { "" })?;
+        }
+        match self.count - self.idns.len() {
+            0 => Ok(()),
+            more => write!(f, " and {more} more"),
+        }
+    }
 }
 
 /// What happened.
@@ -167,12 +205,14 @@ pub enum Event {
         /// Connections which the slave has, numbered from 0.
         available: u16,
     },
-    /// S-0-0127 or S-0-0128 failed; `invalid_parameters` lists what the slave finds wrong.
+    /// S-0-0127 or S-0-0128 failed.
     CheckFailed {
         /// The slave.
         slave: SlaveId,
         /// The phase that cannot be left: CP2 or CP3.
         phase: Phase,
+        /// What the slave finds wrong: S-0-0021 or S-0-0022.
+        invalid: Invalid,
     },
     /// The slave has been checked for CP3 and takes no part any more. It would write where it was told to, over what
     /// others have there in a new layout: the master goes back to CP0.
@@ -335,8 +375,8 @@ impl fmt::Display for Event {
             Event::NoConnection { slave, instance, available } => {
                 write!(f, "{slave} has {available} connections, connection {instance} is not one of them")
             }
-            Event::CheckFailed { slave, phase } => {
-                write!(f, "{slave}: the check to leave {phase} failed, parameters are invalid")
+            Event::CheckFailed { slave, phase, invalid } => {
+                write!(f, "{slave}: the check to leave {phase} failed: {invalid}")
             }
             Event::Stale { slave } => {
                 write!(f, "{slave} was left out after its check for CP3: back to CP0")

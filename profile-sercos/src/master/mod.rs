@@ -508,13 +508,6 @@ impl Master {
             .unwrap_or_default()
     }
 
-    /// S-0-0021 or S-0-0022 of the slave after [`Event::CheckFailed`].
-    #[must_use]
-    pub fn invalid_parameters(&self, slave: SlaveId) -> &[Idn] {
-        let station = self.stations[..self.found].get(slave.index());
-        station.map(|station| station.invalid.as_slice()).unwrap_or_default()
-    }
-
     /// Telegrams and times of CP3 and CP4, once computed.
     #[must_use]
     pub fn layout(&self) -> &CyclicLayout {

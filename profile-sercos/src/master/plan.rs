@@ -30,6 +30,7 @@ pub(super) enum Step {
     GapPresence,
     ConnectionImage,
     Setup,
+    FixedSetup,
     ConfigurationList,
     FixedList,
     Length,
@@ -80,6 +81,7 @@ pub(super) const READ: &[Step] = &[
 /// Connections and what they need.
 pub(super) const CONNECT: &[Step] = &[
     Step::Setup,
+    Step::FixedSetup,
     Step::ConfigurationList,
     Step::FixedList,
     Step::Length,
@@ -173,6 +175,7 @@ impl Step {
         matches!(
             self,
             Step::Setup
+                | Step::FixedSetup
                 | Step::ConfigurationList
                 | Step::FixedList
                 | Step::Length
@@ -189,6 +192,7 @@ impl Step {
             self,
             Step::Address
                 | Step::ScpClasses
+                | Step::FixedSetup
                 | Step::ConfigurationList
                 | Step::FixedList
                 | Step::Length
@@ -231,6 +235,7 @@ impl Step {
             // A connection that is not wanted is switched off. Slaves with a fixed configuration may lack the setup.
             (Step::Setup, None) => facts.has_setup() && u16::from(instance) < facts.connections,
             (Step::Setup, Some(_)) => facts.has_setup(),
+            (Step::FixedSetup, _) => instance < 32 && station.fixed_setups >> instance & 1 != 0,
             (_, None) => false,
             (Step::ConfigurationList, Some(connection)) => {
                 variable && connection.configuration == ConfigurationType::IdnList
@@ -252,7 +257,7 @@ impl Step {
             Step::ActivateClasses => Idn::SCP_ACTIVE,
             Step::GapPresence | Step::Gap => Idn::INTER_FRAME_GAP,
             Step::ConnectionImage => Idn::CONNECTION_IMAGE,
-            Step::Setup => Idn::connection(instance, 1),
+            Step::Setup | Step::FixedSetup => Idn::connection(instance, 1),
             Step::Number => Idn::connection(instance, 2),
             Step::Assignment => Idn::connection(instance, 3),
             Step::Length => Idn::connection(instance, 5),
@@ -311,7 +316,7 @@ impl Step {
                 SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))
             }
             Step::ActivateClasses => list(idn, station.facts.active_classes()),
-            Step::GapPresence | Step::SlaveJitter | Step::MtuEffective | Step::Length => {
+            Step::GapPresence | Step::SlaveJitter | Step::MtuEffective | Step::Length | Step::FixedSetup => {
                 SvcRequest::read(idn).with_shape(Shape::Fixed(2))
             }
             Step::FeedbackTime | Step::ConsumerTime => SvcRequest::read(idn).with_shape(Shape::Fixed(4)),

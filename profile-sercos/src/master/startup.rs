@@ -1,19 +1,20 @@
 //! The work of the phase-up: each list of steps for all slaves at the same time.
 
 use super::Master;
-use super::config::{AddressPolicy, CONNECTION_LEN_MAX};
+use super::config::{AddressPolicy, CONNECTION_LEN_MAX, ConnectionConfig};
 use super::connection::{ConsumerEnd, ProducerEnd};
-use super::event::{Event, SlaveId};
+use super::event::{Event, Invalid, SlaveId};
 use super::layout::{ConnectionNeed, Timing};
 use super::phase::{PhaseEvent, State};
 use super::plan::{self, Cursor, Step, Values};
 use super::report::{ReportRow, RowOutcome};
 use super::station::{End, Presence, Station, Work};
 use super::svc::request::{SvcData, SvcFailure, SvcOutcome};
-use crate::wire::connection::CONNECTION_CONTROL_LEN;
+use crate::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionSetup};
 use crate::wire::header::{Kind, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
+use crate::wire::svc_error::SvcError;
 
 /// Largest SERCOS address.
 const ADDRESS_MAX: u16 = 511;
@@ -60,6 +61,7 @@ impl Master {
     pub(super) fn begin_connections(&mut self, index: usize) {
         let station = &mut self.stations[index];
         station.need = super::layout::SlaveNeed::default();
+        station.fixed_setups = 0;
         station.ends.clear();
         station.report.truncate(station.read_rows);
         if !station.is_served() || station.connections.is_empty() {
@@ -166,8 +168,8 @@ impl Master {
         let Some((step, instance)) = next else {
             station.work = if station.check_failed { Work::Failed } else { Work::Done };
             if station.check_failed {
-                let slave = SlaveId::from_index(index);
-                self.emit(Event::CheckFailed { slave, phase });
+                let invalid = Invalid::new(&station.invalid);
+                self.emit(Event::CheckFailed { slave: SlaveId::from_index(index), phase, invalid });
             }
             return;
         };
@@ -200,6 +202,15 @@ impl Master {
             RowOutcome::Failed(SvcFailure::CommandFailed(_)) if step == Step::CheckExecute => {
                 station.check_failed = true;
                 station.invalid.clear();
+                None
+            }
+            // It cannot be written: then it has to be what it would have been.
+            RowOutcome::Failed(SvcFailure::Refused { code: SvcError::DATA_READ_ONLY, .. })
+                if step == Step::Setup
+                    && station.facts.version(ScpClass::VAR_CFG).is_none()
+                    && instance < 32 =>
+            {
+                station.fixed_setups |= 1 << instance;
                 None
             }
             // The check has failed anyway; without its list there is less to show.
@@ -372,6 +383,15 @@ fn learn(
                 slave_produces,
                 len: len.saturating_add(len % 2),
             });
+        }
+        Step::FixedSetup => {
+            let expected =
+                station.connection(instance).map_or(ConnectionSetup::empty(), ConnectionConfig::setup);
+            let found = ConnectionSetup::from_bits_retain(u16::try_from(number.unwrap_or(0)).unwrap_or(0));
+            let counts = ConnectionSetup::ACTIVE | ConnectionSetup::PRODUCER;
+            if found & counts != expected & counts {
+                return Err(SvcFailure::FixedSetup { expected: expected.bits(), found: found.bits() });
+            }
         }
         Step::FixedList => {
             let wanted = station.connection(instance).map_or(&[][..], |connection| &connection.idns);

@@ -129,6 +129,8 @@ pub(super) struct Station {
     pub work: Work,
     pub cursor: Cursor,
     pub check_failed: bool,
+    /// Connections, by their instance, whose setup the slave does not let anybody write.
+    pub fixed_setups: u32,
     /// S-0-0127 went through since the last scan: the slave will enter CP3 with the places it was told.
     pub checked: bool,
     /// Rows of the report that come from the first reading; a new attempt keeps them.
@@ -165,6 +167,7 @@ impl Station {
             work: Work::Done,
             cursor: Cursor::default(),
             check_failed: false,
+            fixed_setups: 0,
             checked: false,
             read_rows: 0,
             report: Vec::with_capacity(REPORT_MAX),
@@ -197,6 +200,7 @@ impl Station {
         self.valid_cycles = 0;
         self.work = Work::Done;
         self.check_failed = false;
+        self.fixed_setups = 0;
         self.checked = false;
         self.read_rows = 0;
         self.report.clear();

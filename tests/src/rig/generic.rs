@@ -192,6 +192,7 @@ impl GenericRig {
             modes: modes.into_iter().collect(),
             modulo: false,
             any_mode: false,
+            bare: false,
             set_scaling: true,
             parameters: Vec::new(),
             captures: CaptureMode::Off,

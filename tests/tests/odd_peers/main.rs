@@ -48,7 +48,14 @@ pub fn does(
 /// The lines of the box that name the drive, each once, in their order.
 pub fn said(rig: &Rig, names: &[&str]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    let ordinary = ["is the right one", "is in operation", "goes on without reading", ": exchanging"];
+    let ordinary = [
+        "is the right one",
+        "is in operation",
+        "goes on without reading",
+        ": exchanging",
+        "slaves found",
+        "is in state consuming",
+    ];
     let told = rig.told();
     let matters = |line: &&str| {
         names.iter().any(|name| line.contains(name)) && !ordinary.iter().any(|word| line.contains(word))

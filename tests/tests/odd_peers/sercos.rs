@@ -9,9 +9,10 @@ use axisbridge_peers::sercos_slave::{Connection, Idn, SercosSlave, Settings as O
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
+use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::motion::codes::ControlMode;
-use profile_sercos::police::court::Tried;
 use profile_sercos::police::Offender;
+use profile_sercos::police::court::Tried;
 
 use super::{AXIS, Outcome, does, said, table};
 
@@ -89,7 +90,10 @@ fn wordy(rig: &Rig, slave: &SercosSlave) {
         println!("{:#?}", slave.log());
         for refused in slave.refused() {
             let way = if refused.write { "write" } else { "read" };
-            println!("{way} of {}.{} {:02x?}: {:04x}", refused.idn, refused.element, refused.bytes, refused.code);
+            println!(
+                "{way} of {}.{} {:02x?}: {:04x}",
+                refused.idn, refused.element, refused.bytes, refused.code
+            );
         }
         for breach in rig.court.police.breaches() {
             println!("the police: {breach}");
@@ -113,7 +117,9 @@ fn run(oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
 
 fn drive(rig: &mut Rig, slave: &RefCell<SercosSlave>, mode: ControlMode) -> Outcome {
     let scaling = slave.borrow_mut().settings_mut().scaling;
-    let gear = f64::from(scaling.gear_input) / f64::from(scaling.gear_output);
+    // The axis goes the way of the position that the drive shows.
+    let way = if scaling.position_polarity & 1 == 0 { 1.0 } else { -1.0 };
+    let gear = way * f64::from(scaling.gear_input) / f64::from(scaling.gear_output);
     let start = slave.borrow().position();
     let velocity = mode == ControlMode::VELOCITY;
     let steps = match velocity {
@@ -190,12 +196,27 @@ fn telegrams_and_classes() {
         ("SCP_FixCFG, velocity", Oddities::fixcfg(), VELOCITY, V),
         ("SCP_FixCFG, velocity, nothing told", Oddities::fixcfg(), "", V),
         ("SCP_FixCFG, position", fixed(&[134, 47], &[135, 51]), "modes = [\"position\"]", P),
-        ("SCP_FixCFG, position asked of a list for velocity", Oddities::fixcfg(), "modes = [\"position\"]", P),
+        (
+            "SCP_FixCFG, position asked of a list for velocity",
+            Oddities::fixcfg(),
+            "modes = [\"position\"]",
+            P,
+        ),
         ("SCP_FixCFG, control word last", fixed(&[36, 134], &[40, 51, 135]), VELOCITY, V),
         ("SCP_FixCFG, producer first, a third connection", Oddities::odd_order(), VELOCITY, V),
-        ("SCP_FixCFG, its setup fixed as well", Oddities { fixed_setup: true, ..Oddities::fixcfg() }, VELOCITY, V),
+        (
+            "SCP_FixCFG, its setup fixed as well",
+            Oddities { fixed_setup: true, ..Oddities::fixcfg() },
+            VELOCITY,
+            V,
+        ),
         ("SCP_FixCFG, a torque command beside", fixed(&[134, 36, 80], &[135, 51, 40]), VELOCITY, V),
-        ("SCP_FixCFG, both commands, both modes", fixed(&[134, 36, 47], &[135, 51, 40]), "modes = [\"velocity\", \"position\"]", V),
+        (
+            "SCP_FixCFG, both commands, both modes",
+            fixed(&[134, 36, 47], &[135, 51, 40]),
+            "modes = [\"velocity\", \"position\"]",
+            V,
+        ),
         ("SCP_FixCFG, without the control word", fixed(&[36], &[135, 51, 40]), VELOCITY, V),
         ("SCP_FixCFG, without the status word", fixed(&[134, 36], &[51, 40]), VELOCITY, V),
         ("SCP_FixCFG, without a position", fixed(&[134, 36], &[135, 40]), VELOCITY, V),
@@ -216,6 +237,20 @@ fn telegrams_and_classes() {
         ("both configuration classes", with(|it| it.classes = vec![0x0101, 0x0201, 0x0301]), "", P),
         ("one connection", with(|it| it.connections.truncate(1)), "", P),
         ("eight connections", with(|it| it.connections.resize(8, Connection::default())), "", P),
+        ("does not tell what goes into telegrams", without(&[187, 188]), "", P),
+        (
+            "the same, and shows no torque there",
+            Oddities {
+                producible: Oddities::default()
+                    .producible
+                    .into_iter()
+                    .filter(|idn| *idn != Idn::s(84))
+                    .collect(),
+                ..without(&[187, 188])
+            },
+            "",
+            P,
+        ),
         ("takes no velocity in a telegram", with(|it| it.consumable.retain(|idn| *idn != Idn::s(36))), "", P),
         ("takes no position in a telegram", with(|it| it.consumable.retain(|idn| *idn != Idn::s(47))), "", P),
         ("shows no velocity in a telegram", with(|it| it.producible.retain(|idn| *idn != Idn::s(40))), "", P),
@@ -234,9 +269,36 @@ fn parameters_and_the_service_channel() {
     const V: ControlMode = ControlMode::VELOCITY;
     let rows = vec![
         ("a small drive, velocity only", Oddities::sparse(), "", V),
+        ("a small drive, told", Oddities::sparse(), VELOCITY, V),
         ("a small drive, asked for position", Oddities::sparse(), "modes = [\"position\"]", P),
-        ("velocity only, modes not told", with(|it| (it.modes, it.absent) = (vec![2], vec![Idn::s(292)])), "", V),
-        ("position mode of another number", with(|it| it.modes = vec![4, 2]), "", P),
+        ("velocity only", with(|it| (it.modes, it.selected_modes) = (vec![2], [2, 0, 0, 0])), "", V),
+        (
+            "modes not told, set to velocity",
+            with(|it| {
+                (it.modes, it.absent) = (vec![2], vec![Idn::s(292)]);
+                it.selected_modes = [2, 0, 0, 0];
+            }),
+            "",
+            V,
+        ),
+        (
+            "modes not told, set to what it does not have",
+            with(|it| (it.modes, it.absent) = (vec![2], vec![Idn::s(292)])),
+            "",
+            V,
+        ),
+        (
+            "modes not told, set to nothing",
+            with(|it| (it.absent, it.selected_modes) = (vec![Idn::s(292)], [0; 4])),
+            "",
+            P,
+        ),
+        (
+            "no position mode of a number that is known",
+            with(|it| (it.modes, it.selected_modes) = (vec![4, 2], [4, 2, 0, 0])),
+            "",
+            P,
+        ),
         ("modes of SERCOS II's bits", with(|it| it.old_mode_bits = true), "", P),
         ("without class 1 diagnostic", without(&[11]), "", P),
         ("without a diagnostic number", without(&[390]), "", P),
@@ -265,7 +327,7 @@ fn parameters_and_the_service_channel() {
             "scaling read only, a thousandth of a degree",
             with(|it| {
                 (it.scaling.read_only, it.scaling.resolution) = (true, 360_000);
-                it.scaling.modulo = 360_000;
+                (it.scaling.position_type, it.scaling.modulo) = (0x0A, 360_000);
             }),
             "",
             P,
@@ -274,8 +336,14 @@ fn parameters_and_the_service_channel() {
             "scaling read only, increments of 16 bits",
             with(|it| {
                 (it.scaling.read_only, it.scaling.resolution) = (true, 65_536);
-                it.scaling.modulo = 65_536;
+                (it.scaling.position_type, it.scaling.modulo) = (0x0A, 65_536);
             }),
+            "",
+            P,
+        ),
+        (
+            "scaling read only, a preferred one that is not",
+            with(|it| (it.scaling.read_only, it.scaling.resolution) = (true, 65_536)),
             "",
             P,
         ),
@@ -311,7 +379,8 @@ fn parameters_and_the_service_channel() {
             "scaling read only, linear",
             with(|it| {
                 it.scaling.read_only = true;
-                (it.scaling.position_type, it.scaling.velocity_type, it.scaling.acceleration_type) = (1, 1, 1);
+                (it.scaling.position_type, it.scaling.velocity_type, it.scaling.acceleration_type) =
+                    (1, 1, 1);
             }),
             "",
             P,
@@ -328,7 +397,7 @@ fn parameters_and_the_service_channel() {
             "",
             P,
         ),
-        ("a wrap on the way", with(|it| it.start_position = 596.0), "", P),
+        ("at the end of the range", with(|it| it.start_position = 596.0), "", P),
     ];
     insta::assert_snapshot!(table(&outcomes(rows)));
 }
@@ -350,7 +419,12 @@ fn phases_and_states() {
             P,
         ),
         ("S-0-0128 fails with a list", with(|it| it.refuse_cp4 = vec![Idn::s(100)]), "", P),
-        ("S-0-0128 fails, and is not busy", with(|it| (it.refuse_cp4, it.error_without_busy) = (vec![Idn::s(100)], true)), "", P),
+        (
+            "S-0-0128 fails, and is not busy",
+            with(|it| (it.refuse_cp4, it.error_without_busy) = (vec![Idn::s(100)], true)),
+            "",
+            P,
+        ),
         ("S-0-0127 fails without a reason", failing(127), "", P),
         ("ignores the switch to CP1", with(|it| it.ignore_switch_to = Some(1)), "", P),
         ("ignores the switch to CP2", with(|it| it.ignore_switch_to = Some(2)), "", P),
@@ -386,4 +460,85 @@ fn phases_and_states() {
         ("half the velocity", with(|it| it.max_velocity = 0.5), "", P),
     ];
     insta::assert_snapshot!(table(&outcomes(rows)));
+}
+
+/// What a slave does wrong while its axis turns.
+type Harm = fn(&mut SercosSlave, u64);
+
+/// Lets the axis turn, does the harm, and says what the controller and the drive had of it.
+fn harmed(oddities: Oddities, harm: Harm) -> String {
+    let (mut rig, slave) = rig(oddities, "");
+    rig.tolerating(
+        |breach| breach.offender != Offender::Master,
+        |rig| {
+            come_up(rig);
+            let steps = vec![
+                Step::Enable(AXIS),
+                Step::RunAt { axis: 1, velocity: 2.0, acceleration: 10.0, jerk: 1_000.0 },
+                Step::Dwell { seconds: 60.0 },
+            ];
+            let mut config = rig.controller_config();
+            config.axes[0].control_mode = ControlMode::VELOCITY;
+            rig.connect_with(config, steps);
+            rig.run_for(millis(2_500));
+            let velocity = slave.borrow().velocity();
+            assert!((velocity - 2.0).abs() < 0.01, "{velocity}\n{}", rig.told());
+            let known = rig.notices.len();
+            let (now, begin) = (rig.now().0, rig.now());
+            harm(&mut slave.borrow_mut(), now);
+            let mut left = None;
+            while rig.now().since(begin) < millis(3_000) {
+                rig.run_for(millis(1));
+                if left.is_none() && rig.axis_states(0).last() != Some(&AxisState::Running) {
+                    left = Some(rig.now().since(begin).0 / 1_000_000);
+                }
+            }
+            let slave = slave.borrow();
+            wordy(rig, &slave);
+            let state = left.map_or("goes on".to_owned(), |ms| format!("no longer Running after {ms} ms"));
+            let torque = if slave.enabled() { "with torque" } else { "without torque" };
+            let turns = if slave.velocity().abs() < 0.01 { "stands" } else { "turns" };
+            let mut text = format!("{state}; in the end the drive {turns} {torque}\n");
+            for notice in rig.notices.iter().skip(known) {
+                let line = notice.to_string();
+                if OF_SLAVE.iter().any(|word| line.contains(word)) && !line.contains("is in state consuming")
+                {
+                    text.push_str(&format!("    {line}\n"));
+                }
+            }
+            text
+        },
+    )
+}
+
+#[test]
+fn slaves_that_fail_on_the_way() {
+    let plain = Oddities::default;
+    let rows: Vec<(&str, Oddities, Harm)> = vec![
+        ("nothing", plain(), |_, _| {}),
+        ("hung, frames pass", plain(), |it, now| it.settings_mut().hung_from_ns = Some(now)),
+        ("dead, frames vanish", plain(), |it, now| it.settings_mut().dead_from_ns = Some(now)),
+        ("service channel dead", plain(), |it, now| it.settings_mut().stuck_handshake_from_ns = Some(now)),
+        ("its data stand still", plain(), |it, now| it.settings_mut().stuck_new_data_from_ns = Some(now)),
+        ("over-current for one telegram", plain(), |it, now| {
+            it.settings_mut().flash_error = Some((now, 0x0080))
+        }),
+        ("over-current", plain(), |it, _| it.raise(0x0080)),
+        ("over-current without a number", Oddities { no_diagnostic_number: true, ..plain() }, |it, _| {
+            it.raise(0x0080)
+        }),
+        ("a bit of S-0-0011 that nobody knows", plain(), |it, _| it.raise(0x4000)),
+        ("the shaft is blocked", plain(), |it, _| it.settings_mut().blocked = true),
+    ];
+    let mut text = String::new();
+    let mut count = 0;
+    for (name, oddities, harm) in rows {
+        if super::left_out(name) {
+            continue;
+        }
+        text.push_str(&format!("{name}: {}", harmed(oddities, harm)));
+        count += 1;
+    }
+    println!("{count} rows");
+    insta::assert_snapshot!(text);
 }

@@ -52,10 +52,12 @@ fn four_slaves_are_in_cp4_within_two_seconds() {
 fn a_phase_that_takes_long_says_which_slave_and_which_parameter() {
     let mut rig = Rig::new(four("4 ms", ""));
     rig.run_until(millis(5_000), "CP2", |rig| rig.told().contains("CP2: the application"));
-    // The second slave is busy from now on: bit 1 of its S-SVC.
-    rig.tamper_frame = Some(Box::new(|frame| {
+    // The second slave is busy for 690 of each 700 ms from now on: bit 1 of its S-SVC.
+    let clock = rig.clock();
+    rig.tamper_frame = Some(Box::new(move |frame| {
         let bytes = frame.as_mut_slice();
-        if bytes.get(14).is_some_and(|kind| kind & 0x40 != 0) && bytes[15] & 0x0F == 2 {
+        let busy = clock.get().0 / 1_000_000 % 700 < 690;
+        if busy && bytes.get(14).is_some_and(|kind| kind & 0x40 != 0) && bytes[15] & 0x0F == 2 {
             bytes[32] |= 2;
         }
         true

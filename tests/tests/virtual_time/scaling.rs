@@ -153,13 +153,9 @@ fn polarities_lead_no_axis_astray() {
 /// What cannot be converted, or is only half understood, keeps its axis out, says why, and leaves the other one running.
 #[test]
 fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
-    let cases: [(Preset, &str); 6] = [
+    let cases: [(Preset, &str); 5] = [
         (&[(76, 0x00)], "S-0-0076: expected a scaling type that can be converted, got 0x0000"),
         (&[(44, 0x00)], "S-0-0044: expected a scaling type that can be converted, got 0x0000"),
-        (
-            &[(86, 0x02)],
-            "S-0-0086 = 0x0002: the drive gives torque in absolute units, and the axis has no rated torque",
-        ),
         (
             &[(79, 1_000_000)],
             "S-0-0079: expected 3600000, which the scaling type S-0-0076 = 0x0002 fixes, got 1000000",
@@ -179,6 +175,28 @@ fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
         assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
         assert_ne!(rig.engine.axes()[1].state(), DriveState::NotReady, "{told}");
     }
+}
+
+/// Torque that cannot be converted keeps the axis out of torque control and of nothing else, where nobody has asked for it.
+#[test]
+fn a_torque_that_cannot_be_converted_is_done_without() {
+    let why = "S-0-0086 = 0x0002: the drive gives torque in absolute units, and the axis has no rated torque";
+    let preset_and_run = |configuration: String| {
+        let mut rig = Rig::new(Settings { configuration, ..Settings::default() });
+        preset(&mut rig, 0, &[(86, 0x02)]);
+        rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig.run_for(millis(100));
+        rig
+    };
+    let rig = preset_and_run(BOX.to_owned());
+    let line = format!("the drive with SERCOS address 1: the axis does without torque ({why})");
+    assert!(rig.told().contains(&line), "{}", rig.told());
+    assert_ne!(rig.engine.axes()[0].state(), DriveState::NotReady, "{}", rig.told());
+    let first = "name = \"drive-a\"\naddress = 1\n";
+    let modes = format!("{first}modes = [\"position\", \"torque\"]\n");
+    let rig = preset_and_run(BOX.replace(first, &modes));
+    let line = format!("the drive with SERCOS address 1 cannot be used: {why}; it is left out");
+    assert!(rig.told().contains(&line), "{}", rig.told());
 }
 
 /// Half of a modulo range is the longest way that a command can lead in a cycle: a longer one would lead the drive the

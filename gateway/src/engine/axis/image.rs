@@ -17,6 +17,7 @@ impl AxisChannel {
         image.reset_id = self.reset_id;
         image.test = self.test_report();
         image.scaling_id = self.scaling_id;
+        image.control_modes = self.control_modes;
         let mut feedback = self.feedback;
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);

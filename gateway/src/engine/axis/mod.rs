@@ -143,6 +143,8 @@ pub struct AxisChannel {
     north: CipProgram,
     /// Counts the programs that were taken.
     scaling_id: u32,
+    /// The Control Modes that the drive has, by their numbers.
+    control_modes: Option<u16>,
     /// Counts the programs of either side that were taken or given up.
     programs: u64,
     trackers: CipTrackers,
@@ -246,6 +248,7 @@ impl AxisChannel {
         Self {
             north,
             scaling_id: 0,
+            control_modes: None,
             programs: 0,
             trackers,
             said: Told::default(),
@@ -367,6 +370,7 @@ impl AxisChannel {
         self.trackers = program.trackers();
         self.said = Told::default();
         self.north = program;
+        self.control_modes = self.modes_of_drive();
         self.programs += 1;
         self.scaling_id = self.scaling_id.wrapping_add(1);
         true
@@ -377,10 +381,18 @@ impl AxisChannel {
         let hearing = program.hearing();
         self.procedure.restart(program.procedures());
         self.south = Some((program, hearing));
+        self.control_modes = self.modes_of_drive();
         self.programs += 1;
         self.captures.restart();
         self.action = Action::TorqueOff;
         (self.control, self.status, self.reset_cycles) = (0, 0, 0);
+    }
+
+    /// The Control Modes whose operating mode the drive has, by their numbers.
+    fn modes_of_drive(&self) -> Option<u16> {
+        let program = self.south()?;
+        let has = |number: &u8| self.north.mode(*number).is_some_and(|mode| program.has_mode(mode));
+        Some((0..16).filter(has).map(|number| 1 << number).sum())
     }
 
     /// The drive is gone: until it is commissioned again there is nobody to speak to.
@@ -400,6 +412,7 @@ impl AxisChannel {
         self.velocimeter.restart();
         self.report(now, system, report);
         self.south = None;
+        self.control_modes = None;
         self.programs += 1;
         self.captures.restart();
         self.procedure.restart(&[]);

@@ -83,6 +83,7 @@ pub fn needs(axis: &Axis, drive: &Drive) -> SercosAxis {
             }
         },
         any_mode: drive.modes.is_none(),
+        bare: false,
         // Positions of a linear drive reach for hundreds of kilometres.
         modulo: axis.kind == AxisKind::Rotary && axis.unwind_counts.is_some(),
         set_scaling: drive.set_scaling,

@@ -29,6 +29,8 @@ pub struct GenericSercosFile {
     pub mode: Vec<SercosModeRow>,
     /// Places where the drive keeps its operation modes.
     pub mode_slot: Vec<ModeSlotRow>,
+    /// The drive's list of its operation modes.
+    pub supported_modes: SupportedModesRow,
     /// Modes that a drive has as procedure commands.
     pub procedure: Vec<ProcedureRow>,
     /// Control word of each action.
@@ -61,6 +63,16 @@ pub struct UnboundRow {
     pub reason: Name,
     /// The IDNs.
     pub idns: Vec<Name>,
+}
+
+/// The drive's list of its operation modes.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportedModesRow {
+    /// The list.
+    pub list: Name,
+    /// Where it comes from.
+    pub source: Source,
 }
 
 /// The drive's lists of the values that it takes in telegrams.

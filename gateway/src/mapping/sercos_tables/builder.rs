@@ -73,6 +73,7 @@ impl SercosTables {
         for row in &rows.parameter {
             builder.parameter(row);
         }
+        builder.supported_modes(rows);
         builder.captures(rows);
         for row in &rows.commission {
             builder.step(row);
@@ -527,6 +528,17 @@ impl<'a> Builder<'a> {
             self.resolver.error(code::OUT_OF_RANGE, row.number.span(), "number", message);
         }
         self.tables.diagnosis = number.zip(text).map(|(number, text)| [number.idn, text.idn]);
+    }
+
+    fn supported_modes(&mut self, rows: &GenericSercosFile) {
+        let name = &rows.supported_modes.list;
+        let Some(row) = self.idn("list", name) else { return };
+        let (idn, list) = (row.idn, row.list);
+        if !list {
+            let message = format!("expected a list, {idn} is none");
+            self.resolver.error(code::OUT_OF_RANGE, name.span(), "list", message);
+        }
+        self.tables.supported_modes = idn;
     }
 
     fn captures(&mut self, rows: &GenericSercosFile) {

@@ -585,7 +585,7 @@ fn errors_of_the_sercos_dictionary_carry_their_exact_place() {
             "idn",
         ),
         (|t| &mut t.sercos_idns, "unit = \"us\"", "unit = \"uS\"", "\"uS\"", "unit"),
-        (|t| &mut t.sercos_idns, "format = \"hexadecimal\"", "format = \"hex\"", "\"hex\"", "format"),
+        (|t| &mut t.sercos_idns, "format = \"idn\"", "format = \"in\"", "\"in\"", "format"),
         (|t| &mut t.sercos_bits, "bits = [24, 29]", "bits = [24, 30]", "[24, 30]", "bits"),
         (
             |t| &mut t.sercos_codes,

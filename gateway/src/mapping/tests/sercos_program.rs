@@ -328,7 +328,7 @@ fn modes_and_slots() {
         let mut modes = vec![ModeSelection::from(OperatingMode::Position); slots - 1];
         modes.push(ModeSelection::by_drive(OperatingMode::Position));
         let axis = SercosAxis { modes: modes.into_iter().collect(), ..rotary_axis(false) };
-        let steps = mapping.commissioning(&axis, 2, &DriveFacts::new()).unwrap().steps;
+        let steps = mapping.commissioning(&axis, 2, &obedient(mapping, &axis)).unwrap().steps;
         let codes = |candidates: &[Vec<u8>]| candidates == [vec![0x1B, 0], vec![0x13, 0]];
         let written = steps.iter().find_map(|step| match step {
             Step::Write { idn, candidates, refused } if codes(candidates) => Some((*idn, *refused)),
@@ -397,7 +397,7 @@ fn class_3_bits_become_status() {
     let mapping = shipped();
     let axis = rotary_axis(false);
     let mut facts = obedient(mapping, &axis);
-    facts.note_data(Idn::standard(187), &[13, 0, 0, 0, 84, 0, 0, 0]);
+    facts.note_data(Idn::standard(187), &[13, 0, 0, 0, 84, 0, 0, 0, 51, 0, 0, 0, 40, 0, 0, 0]);
     let program = mapping.sercos_program(&axis, &facts).unwrap();
     assert_eq!(program.telegram.feedback.last(), Some(&Idn::standard(13).into()));
     let (mut hearing, mut report) = (program.hearing(), ConversionReport::default());
@@ -442,4 +442,97 @@ proptest! {
             None => prop_assert_eq!(program.mode(after), Some(modes[mode])),
         }
     }
+}
+
+/// What an axis without `modes` does of a drive that lacks something, and why it does without the rest.
+#[test]
+fn modes_that_the_drive_does_not_have_are_left_out_with_the_reason() {
+    let mapping = shipped();
+    let axis = SercosAxis { any_mode: true, ..rotary_axis(false) };
+    let position = Idn::standard(47).0.to_le_bytes();
+    let cases: [(&str, &dyn Fn(&mut DriveFacts)); 8] = [
+        ("all", &|_| {}),
+        ("S-0-0292 is [2]", &|facts| facts.note_data(Idn::standard(292), &[2, 0])),
+        ("no S-0-0292, S-0-0032 = 2", &|facts| {
+            *facts = untold(&[(32, 2), (33, 0)]);
+        }),
+        ("no S-0-0292, nothing set", &|facts| *facts = untold(&[(32, 0)])),
+        ("S-0-0034 refused", &|facts| facts.note_refused(Idn::standard(34))),
+        ("no S-0-0080", &|facts| facts.note_missing(Idn::standard(80))),
+        ("S-0-0188 is [S-0-0047]", &|facts| facts.note_data(Idn::standard(188), &position)),
+        ("S-0-0086 = 0x0002", &|facts| facts.note_data(Idn::standard(86), &[2, 0])),
+    ];
+    let mut text = String::new();
+    for (name, change) in cases {
+        let mut facts = mapping.facts_of_obedient(&axis).unwrap();
+        change(&mut facts);
+        let program = mapping.sercos_program(&axis, &facts).unwrap();
+        let all = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
+        let has: Vec<_> =
+            all.iter().filter(|mode| program.has_mode(**mode)).map(ToString::to_string).collect();
+        writeln!(text, "{name}: {}", has.join(", ")).unwrap();
+        for (mode, why) in mapping.sercos_modes_left_out(&axis, &facts) {
+            writeln!(text, "  {mode}: {why}").unwrap();
+        }
+    }
+    insta::assert_snapshot!(text);
+}
+
+/// A drive that has no S-0-0292, is set to these modes and has told its scaling.
+fn untold(slots: &[(u16, u16)]) -> DriveFacts {
+    let mapping = shipped();
+    let told = mapping.facts_of_obedient(&rotary_axis(false)).unwrap();
+    let scaling = [76, 77, 78, 79, 44, 45, 46, 86, 93, 94, 121, 122, 43, 55, 85].map(Idn::standard);
+    let mut facts = DriveFacts::new();
+    for (idn, data) in scaling.iter().filter_map(|idn| Some((*idn, told.data(*idn)?))) {
+        facts.note_data(idn, data);
+    }
+    facts.note_missing(Idn::standard(292));
+    for (block, code) in slots {
+        facts.note_data(Idn::standard(*block), &code.to_le_bytes());
+    }
+    facts
+}
+
+/// Before anything else the drive is asked for its modes, and one that does not list them for what it is set to. What it does
+/// not give is not asked for again.
+#[test]
+fn a_drive_is_asked_for_its_modes_first() {
+    let mapping = shipped();
+    let axis = SercosAxis { any_mode: true, ..rotary_axis(false) };
+    let asked = |facts: &DriveFacts| {
+        let plan = mapping.commissioning(&axis, 2, facts).unwrap();
+        let idns = plan.steps.iter().filter_map(|step| match step {
+            Step::Read { idn, .. } => Some(idn.to_string()),
+            _ => None,
+        });
+        (plan.more, idns.take(3).collect::<Vec<_>>())
+    };
+    let mut facts = DriveFacts::new();
+    assert_eq!(asked(&facts), (true, vec!["S-0-0292".to_owned()]));
+    facts.note_missing(Idn::standard(292));
+    let (more, slots) = asked(&facts);
+    assert!(more && slots == ["S-0-0032", "S-0-0033", "S-0-0034"], "{slots:?}");
+    facts.note_data(Idn::standard(32), &[2, 0]);
+    for block in [33, 34, 35, 284, 285, 286, 287] {
+        facts.note_unread(Idn::standard(block));
+    }
+    assert!(!asked(&facts).0, "everything is told");
+    let plan = mapping.commissioning(&axis, 2, &facts).unwrap();
+    let written = plan.steps.iter().find_map(|step| match step {
+        Step::Write { idn, candidates, .. } if *idn == Idn::standard(32) => Some(candidates.clone()),
+        _ => None,
+    });
+    assert_eq!(written, Some(vec![vec![2, 0]]), "velocity takes the first place");
+}
+
+/// Values that an axis can do without stay out of the telegrams of a drive that has refused a list with them.
+#[test]
+fn a_bare_telegram_has_what_the_modes_need_and_nothing_else() {
+    let mapping = shipped();
+    let axis = SercosAxis { bare: true, ..rotary_axis(false) };
+    let telegram = mapping.telegram(&axis, &obedient(mapping, &axis)).unwrap();
+    let idns = |list: &[Item]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0036 S-0-0080");
+    assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040");
 }

@@ -183,7 +183,7 @@ fn every_idn_of_the_profile_is_bound_or_has_a_reason() {
             neither.push(format!("{} {}", row.idn, row.name));
         }
     }
-    assert_eq!((all, unbound.len()), (395, 295));
+    assert_eq!((all, unbound.len()), (395, 294));
     assert_eq!(neither, Vec::<String>::new());
 }
 

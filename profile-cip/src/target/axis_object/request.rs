@@ -69,10 +69,16 @@ impl Axis {
         self.safety.acknowledge(received);
     }
 
+    /// Whether the axis, and the drive that it has now, have a Control Mode.
+    fn supports(&self, mode: ControlMode) -> bool {
+        let has = |modes: u16| mode.0 < 16 && modes & (1 << mode.0) != 0;
+        self.config.supports(mode) && self.drive.control_modes.is_none_or(has)
+    }
+
     /// Why an axis that is energized cannot go on with these modes (clause 6-2.7.1.2.2 and exception 60, Illegal Control
     /// Mode, which stands for both modes).
     fn illegal_change(&self, before: ControlMode, mode: ControlMode, feedback: FeedbackMode) -> Option<u8> {
-        if !self.config.supports(mode) {
+        if !self.supports(mode) {
             Some(sub_code::MODE_NOT_SUPPORTED)
         } else if self.is_testing() {
             // A test follows no set-points and was started without an Enable.
@@ -166,7 +172,7 @@ impl Axis {
         if mode == ControlMode::NO_CONTROL {
             return Err(R::FeedbackOnly);
         }
-        if !self.config.supports(mode) {
+        if !self.supports(mode) {
             return Err(R::ControlMode(mode));
         }
         if !self.config.supports_feedback(feedback) {

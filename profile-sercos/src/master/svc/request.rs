@@ -268,6 +268,14 @@ pub enum SvcFailure {
         /// The largest possible value.
         max: u32,
     },
+    /// The slave's connection setup cannot be written, and is another one.
+    #[error("the setup of the connection cannot be changed and is {found:#06x}, expected {expected:#06x}")]
+    FixedSetup {
+        /// What is wanted.
+        expected: u16,
+        /// What the slave has.
+        found: u16,
+    },
     /// The slave's fixed configuration list is not the one that the telegram was laid out for.
     #[error(
         "the list of a slave with SCP_FixCFG is {found} at place {place}, the telegram was laid out for {expected}"

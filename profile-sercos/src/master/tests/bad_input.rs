@@ -1,5 +1,6 @@
 //! Slaves that do what they must not, one at a time: each is named, and the others keep running.
 
+use crate::master::event::Invalid;
 use std::collections::VecDeque;
 
 use super::full_slaves::{FullRig, full_rig};
@@ -279,12 +280,11 @@ fn a_slave_that_refuses_s_0_0127_is_named_and_left_out() {
     rig.master.set_target_phase(Phase::CP4);
     rig.state(State::Await2);
     rig.master.proceed().unwrap();
-    let refused = Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2 };
+    let refused = Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2, invalid: Invalid::new(&[MODE]) };
     rig.run_until("refused", |rig| rig.saw(&refused));
-    let said = "slave at position 2: the check to leave CP2 failed, parameters are invalid";
+    let said = "slave at position 2: the check to leave CP2 failed: the slave finds invalid S-0-0032";
     assert_eq!(refused.to_string(), said);
     rig.state(State::Await2);
-    assert_eq!(rig.master.invalid_parameters(BAD_ID), [MODE]);
     let report: Vec<_> = rig.master.report(BAD_ID).iter().map(ToString::to_string).collect();
     let said = "CP2 execute S-0-0127: procedure command";
     assert!(report.iter().any(|row| row.starts_with(said)), "{report:?}");

@@ -1,5 +1,6 @@
 use super::peer::Faults;
 use super::*;
+use crate::master::event::Invalid;
 use crate::police::court::Tried;
 use crate::police::{Breach, Offender, Rule};
 use crate::wire::svc::Element;
@@ -245,12 +246,11 @@ fn refused_checks_show_what_is_wrong() {
         let mut rig = Rig::of(&[1, 2]);
         rig.line.peers[1].faults.invalid = Some((check, wrong.clone()));
         rig.master.set_target_phase(Phase::CP4);
-        let failed = Event::CheckFailed { slave: SlaveId(1), phase };
+        let invalid = Invalid::new(&wrong);
+        let failed = Event::CheckFailed { slave: SlaveId(1), phase, invalid };
         rig.run_until("refused", |rig| rig.log.contains(&failed));
         rig.auto_proceed = false;
         rig.state(state);
-        assert_eq!(rig.master.invalid_parameters(SlaveId(1)), wrong);
-        assert!(rig.master.invalid_parameters(SlaveId(0)).is_empty());
         // The command is cancelled, the application is asked again, and a second attempt succeeds.
         let steps = &rig.line.peers[1].steps;
         let last = steps.iter().rfind(|step| step.idn == check && step.element == Element::Data).unwrap();

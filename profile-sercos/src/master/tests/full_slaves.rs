@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::master::config::Connections;
+use crate::master::event::Invalid;
 use crate::police::light::{COMMAND, FEEDBACK, MODE, Mirror};
 use crate::slave::{self, Network, Slave};
 
@@ -82,11 +83,11 @@ fn checks_of_the_slave_are_shown_by_name() {
         let mut rig = full_rig(2);
         rig.line.slaves_mut()[1].application_mut().refuses = Some(phase);
         rig.master.set_target_phase(Phase::CP4);
-        let failed = Event::CheckFailed { slave: SlaveId(1), phase: refused };
+        let invalid = Invalid::new(&[MODE]);
+        let failed = Event::CheckFailed { slave: SlaveId(1), phase: refused, invalid };
         rig.run_until("there", |rig| rig.log.contains(&failed));
         rig.auto_proceed = false;
         rig.state(state);
-        assert_eq!(rig.master.invalid_parameters(SlaveId(1)), [MODE]);
         rig.line.slaves_mut()[1].application_mut().refuses = None;
         rig.auto_proceed = true;
         let _ = rig.master.proceed();

@@ -4,7 +4,7 @@ use super::full_slaves::{configured, mirror};
 use super::ring::{RingRig, ring_config};
 use super::*;
 use crate::master::config::Ports;
-use crate::master::event::HotPlugRefusal;
+use crate::master::event::{HotPlugRefusal, Invalid};
 use crate::master::layout::{ConnectionNeed, SlaveNeed};
 use crate::master::topology::Topology;
 use crate::police::court::Tried as _;
@@ -489,10 +489,9 @@ fn a_slave_that_cannot_be_set_up() {
     for phase in [Phase::CP3, Phase::CP4] {
         let before = Phase(phase.0 - 1);
         let rig = refused("a check", checked(phase), nothing(), (Some(7), R::SetUp), 0);
-        let failed = Event::CheckFailed { slave: SlaveId(2), phase: before };
+        let invalid = Invalid::new(&[crate::police::light::MODE]);
+        let failed = Event::CheckFailed { slave: SlaveId(2), phase: before, invalid };
         assert!(rig.before.contains(&failed), "{:?}", rig.before);
-        let invalid = rig.master.invalid_parameters(SlaveId(2));
-        assert_eq!(invalid, [crate::police::light::MODE]);
     }
     // Its service channel falls silent in the middle of HP2.
     let harm: Harm = Box::new(|rig| {

@@ -66,9 +66,8 @@ fn connection(table: &Table, number: u32, used: &mut Vec<(bool, Place, usize)>, 
     let (mdt, place) = Place::from_assignment(table.word(assignment));
     let written = table.get(assignment).is_some_and(|p| p.valid);
     let producer = setup & 0x4000 != 0;
-    if !written || producer && mdt || !fits(table, mdt, place, size) {
-        wrong.push(assignment);
-    } else if producer && overlaps(used, mdt, place, size) {
+    let displaced = !fits(table, mdt, place, size) || producer && overlaps(used, mdt, place, size);
+    if !written || producer && mdt || displaced {
         wrong.push(assignment);
     }
     used.push((mdt, place, size));

@@ -252,7 +252,7 @@ pub fn number(bytes: &[u8], signed: bool) -> i128 {
     for byte in bytes.iter().take(8).rev() {
         value = value << 8 | i128::from(*byte);
     }
-    let negative = bytes.iter().take(8).last().is_some_and(|top| top & 0x80 != 0);
+    let negative = bytes.iter().take(8).next_back().is_some_and(|top| top & 0x80 != 0);
     if signed && negative {
         value -= 1 << (8 * bytes.len().min(8));
     }

@@ -37,7 +37,7 @@ pub fn table(settings: &Settings) -> Table {
             parameter.unit = Some(unit.clone());
         }
     }
-    lists(&mut table);
+    lists(&mut table, settings);
     for idn in &settings.absent {
         table.remove(*idn);
     }
@@ -306,12 +306,14 @@ fn limits(table: &mut Table, settings: &Settings) {
     table.add(plain(50, "Negative position limit value", INT4, i64::from(i32::MIN)));
 }
 
-fn lists(table: &mut Table) {
+fn lists(table: &mut Table, settings: &Settings) {
     for (block, name) in [
         (17, "IDN-list of all operation data"),
         (21, "IDN-list of invalid operation data for CP2"),
         (22, "IDN-list of invalid operation data for CP3"),
         (25, "IDN-list of all procedure commands"),
+        (187, "List of configurable data in the AT"),
+        (188, "List of configurable data in the MDT"),
     ] {
         table.add(list(Idn::s(block), name, IDN_LIST | READ_ONLY, &[], 65532));
     }
@@ -319,4 +321,6 @@ fn lists(table: &mut Table) {
     table.set_idns(Idn::s(17), &all);
     let commands: Vec<Idn> = table.all().filter(|p| p.is_command()).map(|p| p.idn).collect();
     table.set_idns(Idn::s(25), &commands);
+    table.set_idns(Idn::s(187), &settings.producible);
+    table.set_idns(Idn::s(188), &settings.consumable);
 }

@@ -302,7 +302,7 @@ impl Rig {
     }
 
     /// NRT to CP2 with the handshake of CP1.
-    pub fn to_cp2(&mut self) {
+    pub fn up_to_cp2(&mut self) {
         self.cycles(5);
         self.switch();
         for s in &mut self.stations {
@@ -351,8 +351,8 @@ impl Rig {
     }
 
     /// All the way to CP4.
-    pub fn to_cp4(&mut self, variable: bool) {
-        self.to_cp2();
+    pub fn up_to_cp4(&mut self, variable: bool) {
+        self.up_to_cp2();
         for i in 0..self.slaves.len() {
             self.configure(i, variable, false);
             assert_eq!(self.command(i, Idn::s(127)), Ok(3));

@@ -139,7 +139,7 @@ mod tests {
         let s = scaling(|_| {});
         assert!((s.position - 3_600_000.0).abs() < 1e-6);
         assert!((s.velocity - 600_000.0).abs() < 1e-6);
-        assert!((s.acceleration - 6283.185_307).abs() < 1e-3);
+        assert!((s.acceleration - 6_283.185_307).abs() < 1e-3);
     }
 
     #[test]

@@ -41,7 +41,7 @@ fn a_ring_is_scanned_from_both_ends() {
     rig.cycles(3);
     assert_eq!(rig.ats[0][20..28], [4, 0, 1, 0, 2, 0, 3, 0]);
     assert_eq!(rig.secondary[0][20..28], [4, 0x80, 3, 0, 2, 0, 1, 0]);
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     assert_eq!(rig.ats[0][20..], rig.secondary[0][20..]);
     assert_eq!(rig.slaves[2].consumer(0), Some(Consumer::Consuming));
 }
@@ -88,7 +88,7 @@ fn a_switch_takes_the_insertions_away() {
 #[test]
 fn the_recorded_steps_of_cp2_get_their_answers() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp2();
+    rig.up_to_cp2();
     // Control words and INFO as the foreign master sent them; the answers by the sheet.
     let steps: [(u16, u32, u16, u32); 14] = [
         (0x000E, 0x0001_0516, 0x08, 0),
@@ -121,7 +121,7 @@ fn the_recorded_steps_of_cp2_get_their_answers() {
 #[test]
 fn a_variable_slave_goes_to_cp4_and_turns() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     assert_eq!(rig.slaves[0].phase(), Some(4));
     assert_eq!(rig.s_dev(0) & 0x0100, 0x0100);
     assert_eq!(rig.slaves[0].data(Idn::se(1050, 1, 5)), Some(&[12, 0][..]));
@@ -141,7 +141,7 @@ fn a_variable_slave_goes_to_cp4_and_turns() {
 #[test]
 fn a_fixed_slave_refuses_lists_and_works_as_it_is() {
     let mut rig = Rig::new(vec![Settings::fixcfg(), Settings::default()]);
-    rig.to_cp2();
+    rig.up_to_cp2();
     assert_eq!(rig.write_list(0, Idn::se(1050, 0, 6), &[0x86, 0, 0, 0]), Err(0x7004));
     assert_eq!(rig.read(0, Idn::se(1050, 0, 5), 7), Ok(8));
     assert_eq!(rig.read(0, Idn::se(1050, 1, 5), 7), Ok(12));
@@ -167,7 +167,7 @@ fn a_fixed_slave_refuses_lists_and_works_as_it_is() {
 #[test]
 fn the_producer_may_come_first_and_a_third_stay_unused() {
     let mut rig = Rig::one(Settings::odd_order());
-    rig.to_cp2();
+    rig.up_to_cp2();
     assert_eq!(rig.write(0, Idn::se(1050, 0, 1), 0x8000), Err(0x7008));
     rig.configure(0, false, true);
     assert_eq!(rig.write(0, Idn::se(1050, 2, 1), 0), Ok(()));
@@ -184,7 +184,7 @@ fn a_declared_length_may_contradict_the_list() {
     let mut settings = Settings::fixcfg();
     settings.connections[1].declared_length = Some(10);
     let mut rig = Rig::one(settings);
-    rig.to_cp2();
+    rig.up_to_cp2();
     assert_eq!(rig.read(0, Idn::se(1050, 1, 5), 7), Ok(10));
     assert_eq!(rig.read_list(0, Idn::se(1050, 1, 6), 7).map(|list| list.len()), Ok(12));
 }
@@ -194,7 +194,7 @@ fn a_refused_transition_names_its_parameters() {
     let settings =
         Settings { refuse_cp3: vec![Idn::p(7)], command_ms: vec![(Idn::s(127), 30)], ..Settings::default() };
     let mut rig = Rig::one(settings);
-    rig.to_cp2();
+    rig.up_to_cp2();
     rig.configure(0, true, false);
     rig.write(0, Idn::s(127), 3).unwrap();
     assert_eq!(rig.open(0, Idn::s(127)), Ok(7));
@@ -215,7 +215,7 @@ fn a_refused_transition_names_its_parameters() {
 fn a_refused_cp4_lists_what_is_wrong() {
     let settings = Settings { refuse_cp4: vec![Idn::s(100)], ..Settings::default() };
     let mut rig = Rig::one(settings);
-    rig.to_cp2();
+    rig.up_to_cp2();
     rig.configure(0, true, false);
     assert_eq!(rig.command(0, Idn::s(127)), Ok(3));
     rig.switch();
@@ -227,7 +227,7 @@ fn a_refused_cp4_lists_what_is_wrong() {
 #[test]
 fn lost_mst_lead_to_nrt() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     rig.drop_mdt = true;
     rig.cycles(2);
     assert_eq!(rig.s_dev(0), 0, "without an MST nothing is inserted");
@@ -245,7 +245,7 @@ fn lost_mst_lead_to_nrt() {
 #[test]
 fn frozen_data_put_the_drive_into_error() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     rig.drive(0, 0xE000, 600_000);
     rig.cycles(20);
     rig.freeze = true;
@@ -260,7 +260,7 @@ fn frozen_data_put_the_drive_into_error() {
 #[test]
 fn a_hung_slave_lets_frames_through() {
     let mut rig = Rig::new(vec![Settings::default(), Settings::default()]);
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     let now = rig.now;
     rig.slaves[0].settings_mut().hung_from_ns = Some(now);
     rig.cycles(2);
@@ -274,7 +274,7 @@ fn a_hung_slave_lets_frames_through() {
 #[test]
 fn an_error_may_last_for_one_telegram() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     let from = rig.now + 2_500_000;
     rig.slaves[0].settings_mut().flash_error = Some((from, 0x0080));
     let mut seen = Vec::new();
@@ -290,7 +290,7 @@ fn an_error_may_last_for_one_telegram() {
 fn an_error_may_have_no_number_and_may_not_go() {
     let settings = Settings { no_diagnostic_number: true, lasting_errors: 0x0200, ..Settings::default() };
     let mut rig = Rig::one(settings);
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     rig.slaves[0].raise(0x0202);
     assert_eq!(rig.read(0, Idn::s(390), 7), Ok(0xC30A_0040));
     assert_eq!(rig.command(0, Idn::s(99)), Ok(0xF));
@@ -314,7 +314,7 @@ fn busy_and_chosen_error_codes() {
         ..Settings::default()
     };
     let mut rig = Rig::one(settings);
-    rig.to_cp2();
+    rig.up_to_cp2();
     let before = rig.now;
     assert_eq!(rig.read(0, Idn::s(32), 7), Ok(2));
     assert_eq!((rig.now - before) / rig.cycle_ns, 12);
@@ -326,7 +326,7 @@ fn busy_and_chosen_error_codes() {
 #[test]
 fn a_handshake_that_sticks_is_never_answered() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp2();
+    rig.up_to_cp2();
     rig.slaves[0].settings_mut().stuck_handshake_from_ns = Some(0);
     assert_eq!(rig.open(0, Idn::s(32)), Err(0));
 }
@@ -334,7 +334,7 @@ fn a_handshake_that_sticks_is_never_answered() {
 #[test]
 fn new_data_that_stick_do_not_count() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     rig.cycle();
     let before = rig.produced(0);
     rig.cycle();
@@ -349,7 +349,7 @@ fn new_data_that_stick_do_not_count() {
 #[test]
 fn odd_names_are_read_byte_for_byte() {
     let mut rig = Rig::one(Settings::odd_names());
-    rig.to_cp2();
+    rig.up_to_cp2();
     let name = rig.read_list(0, Idn::s(36), 2).unwrap();
     assert_eq!(name.last(), Some(&0xB5));
     assert_eq!(rig.read_list(0, Idn::s(40), 2), Ok(vec![]));
@@ -361,7 +361,7 @@ fn odd_names_are_read_byte_for_byte() {
 #[test]
 fn long_lists_and_absent_parameters() {
     let mut rig = Rig::one(Settings { long_list: 1000, ..Settings::sparse() });
-    rig.to_cp2();
+    rig.up_to_cp2();
     let list = rig.read_list(0, Idn::p(100), 7).unwrap();
     assert_eq!((list.len(), &list[3996..]), (4000, &[0xE7, 3, 0, 0][..]));
     for block in [33, 34, 35, 292, 95] {
@@ -375,7 +375,7 @@ fn long_lists_and_absent_parameters() {
 #[test]
 fn protection_follows_the_phase() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp2();
+    rig.up_to_cp2();
     assert_eq!(rig.write(0, Idn::s(32), 3), Ok(()));
     assert_eq!(rig.write(0, Idn::s(148), 3), Err(0x7005));
     assert_eq!(rig.write(0, Idn::s(51), 3), Err(0x7004));
@@ -396,7 +396,7 @@ fn protection_follows_the_phase() {
 #[test]
 fn homing_by_command() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     assert_eq!(rig.command(0, Idn::s(148)), Ok(0xF));
     rig.drive(0, 0xE000, 0);
     rig.cycles(5);
@@ -410,18 +410,18 @@ fn homing_by_command() {
 #[test]
 fn a_way_back_to_cp0_and_up_again() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     rig.switch();
     assert_eq!(rig.slaves[0].phase(), Some(0));
     rig.stations[0] = super::rig::Station { c_dev: 0x0100, command: vec![0; 6], ..Default::default() };
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     assert_eq!(rig.slaves[0].phase(), Some(4));
 }
 
 #[test]
 fn a_slave_may_ignore_a_switch() {
     let mut rig = Rig::one(Settings { ignore_switch_to: Some(3), ..Settings::default() });
-    rig.to_cp2();
+    rig.up_to_cp2();
     rig.cps = true;
     rig.cycles(3);
     assert_eq!(rig.s_dev(0) & 0x0100, 0x0100);
@@ -430,7 +430,7 @@ fn a_slave_may_ignore_a_switch() {
 #[test]
 fn every_truncation_and_every_byte_is_harmless() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     let slave = rig.slaves[0].clone();
     for type_byte in [0x20u8, 0x21, 0x60, 0x63, 0xA0, 0xE0, 0xFF] {
         for phase_byte in [0x00u8, 0x01, 0x02, 0x03, 0x04, 0x80, 0x83, 0xFF] {
@@ -459,7 +459,7 @@ fn every_truncation_and_every_byte_is_harmless() {
 #[test]
 fn a_frame_with_a_wrong_crc_is_only_forwarded() {
     let mut rig = Rig::one(Settings::default());
-    rig.to_cp4(true);
+    rig.up_to_cp4(true);
     let mut frame = build([2; 6], 0x20, 0x04, &[0; 40]);
     frame[16] ^= 1;
     let before = frame.clone();
@@ -472,7 +472,7 @@ fn a_frame_with_a_wrong_crc_is_only_forwarded() {
 fn the_same_input_gives_the_same_output() {
     let run = || {
         let mut rig = Rig::one(Settings::default());
-        rig.to_cp4(true);
+        rig.up_to_cp4(true);
         rig.drive(0, 0xE000, 1_234_567);
         rig.cycles(50);
         (rig.ats, rig.slaves[0].position().to_bits(), rig.slaves[0].log().to_vec())

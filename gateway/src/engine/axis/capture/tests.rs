@@ -32,8 +32,9 @@ fn program(words: &[u16], places: &[u16], listed: bool) -> DriveProgram {
     for (block, value) in [(76, 0x42_u16), (44, 0x42), (160, 0x42), (86, 0)] {
         facts.note_data(Idn::standard(block), &value.to_le_bytes());
     }
-    // The torque, beside what is to be captured.
-    let mut list = Idn::standard(84).0.to_le_bytes().to_vec();
+    // The words and values of position control, beside what is to be captured.
+    let cyclic = [134, 47, 135, 51, 40, 84].map(Idn::standard);
+    let mut list: Vec<u8> = cyclic.iter().flat_map(|idn| idn.0.to_le_bytes()).collect();
     for (blocks, attribute) in [(words, WORD), (places, PLACE)] {
         for block in blocks {
             facts.note_attribute(Idn::standard(*block), attribute);

@@ -414,7 +414,7 @@ impl Work {
         }
         let left_out = desk.mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
         if !left_out.is_empty() {
-            desk.waiting.push_back(Done::Told(Notice::ModesLeftOut {
+            desk.waiting.push_back(Done::Told(Notice::NodeModesLeftOut {
                 axis,
                 node: self.node,
                 modes: left_out,

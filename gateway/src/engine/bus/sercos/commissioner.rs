@@ -249,6 +249,10 @@ impl Commissioner {
                     waiting.push_back(Done::Told(Notice::Difference { axis, difference }));
                 }
                 mapping.sercos_program(&work.needs, &work.facts).map(|program| {
+                    let modes = mapping.sercos_modes_left_out(&work.needs, &work.facts);
+                    if !modes.is_empty() {
+                        waiting.push_back(Done::Told(Notice::ModesLeftOut { axis, address, modes }));
+                    }
                     if work.needs.modulo && program.position_step().is_none() {
                         waiting.push_back(Done::Told(Notice::Ends { axis }));
                     }

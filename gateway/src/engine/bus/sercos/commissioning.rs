@@ -43,13 +43,27 @@ pub struct Commissioning<T = Ticket> {
     failure: Option<StepFailure>,
     /// Steps that failed and were allowed to.
     passed_over: Vec<StepFailure>,
+    /// Requests one after the other to which the drive has not said a word, and the first of them.
+    unanswered: (u8, Option<StepFailure>),
 }
+
+/// So many requests without a word, and the drive is given up.
+const UNANSWERED_MAX: u8 = 5;
 
 impl<T: Copy + PartialEq> Commissioning<T> {
     /// Starts a plan.
     #[must_use]
     pub fn new(plan: CommissioningPlan) -> Self {
-        Self { plan, at: 0, part: 0, shape: None, ticket: None, failure: None, passed_over: Vec::new() }
+        Self {
+            plan,
+            at: 0,
+            part: 0,
+            shape: None,
+            ticket: None,
+            failure: None,
+            passed_over: Vec::new(),
+            unanswered: (0, None),
+        }
     }
 
     /// Whether every step is through, or one failed that must not.
@@ -97,6 +111,11 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             return false;
         }
         self.ticket = None;
+        let silent = matches!(
+            outcome.result,
+            Err(SvcFailure::HandshakeTimeout { .. } | SvcFailure::BusyTimeout { .. })
+        );
+        self.unanswered = if silent { (self.unanswered.0 + 1, self.unanswered.1) } else { (0, None) };
         match &outcome.result {
             Ok(reply) => {
                 let (idn, bytes) = (outcome.idn, outcome.data.as_slice());
@@ -134,6 +153,8 @@ impl<T: Copy + PartialEq> Commissioning<T> {
                     facts.note_missing(outcome.idn);
                 } else if outcome.operation == SvcOperation::Write(Element::Data) {
                     facts.note_refused(outcome.idn);
+                } else if outcome.operation == SvcOperation::Read(Element::Data) {
+                    facts.note_unread(outcome.idn);
                 }
                 self.failed(outcome.idn, *failure);
             }
@@ -201,7 +222,10 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             return;
         }
         let failure = StepFailure { what, idn, failure };
+        let first = (self.unanswered.0 > 0).then(|| *self.unanswered.1.get_or_insert(failure));
         match refused {
+            // Whatever it is asked now, it would not answer either.
+            _ if self.unanswered.0 >= UNANSWERED_MAX => self.failure = first,
             Refused::Fail => self.failure = Some(failure),
             Refused::Continue => {
                 self.passed_over.push(failure);

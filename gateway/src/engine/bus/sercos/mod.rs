@@ -36,6 +36,9 @@ use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError, Step};
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
 
+/// y of S-0-1050.x.y, the configuration list.
+const CONFIGURATION_LIST: u8 = 6;
+
 /// The connection in the AT.
 pub const FEEDBACK_CONNECTION: u8 = 1;
 
@@ -282,6 +285,7 @@ impl SercosBus {
             // What it was that failed; that the slave does not come in follows.
             Event::StepFailed { slave, .. }
             | Event::ClassMismatch { slave }
+            | Event::NoConnection { slave, .. }
             | Event::CheckFailed { slave, .. }
                 if self.is_joining(*slave) => {}
             Event::Phase(phase) if *phase == Phase::CP4 => {
@@ -310,22 +314,42 @@ impl SercosBus {
                     self.lose_slave(now, system, *slave, axes);
                 }
             }
+            Event::StepFailed { slave, idn, failure: SvcFailure::Refused { .. } }
+                if self.may_be_bare(*slave, *idn) =>
+            {
+                for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(*slave)) {
+                    drive.needs.bare = true;
+                    notice(Notice::Bare { axis: index(drive.axis), address: drive.address });
+                }
+                self.refuse(now, system, *slave, axes);
+            }
             // The master waits again for its application: the others go on without the slave that stands in the way.
             Event::StepFailed { slave, .. }
             | Event::ClassMismatch { slave }
+            | Event::NoConnection { slave, .. }
             | Event::CheckFailed { slave, .. }
-            | Event::AddressConflict { slave } => {
-                // Left out when the master waits for its application again, which may be only after others are done.
-                let _ = self.refused.try_push(*slave);
-                self.exclude_refused();
-                self.lose_slave(now, system, *slave, axes);
-            }
+            | Event::AddressConflict { slave } => self.refuse(now, system, *slave, axes),
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
             Event::Phase(phase) if *phase < Phase::CP2 => self.lose_all(now, system, axes),
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
+    }
+
+    /// Goes on without a slave.
+    fn refuse(&mut self, now: MonotonicTime, system: SystemTime, slave: SlaveId, axes: &mut [AxisChannel]) {
+        // Left out when the master waits for its application again, which may be only after others are done.
+        let _ = self.refused.try_push(slave);
+        self.exclude_refused();
+        self.lose_slave(now, system, slave, axes);
+    }
+
+    /// Whether a slave has refused a configuration list that can do with less.
+    fn may_be_bare(&self, slave: SlaveId, idn: Idn) -> bool {
+        let list = |instance| idn == Idn::connection(instance, CONFIGURATION_LIST);
+        let full = |drive: &Drive| drive.slave == Some(slave) && !drive.needs.bare;
+        [COMMAND_CONNECTION, FEEDBACK_CONNECTION].into_iter().any(list) && self.drives.iter().any(full)
     }
 
     /// Whether the master has lost the slave of a drive, and keeps its place.
@@ -374,7 +398,14 @@ impl SercosBus {
         drive.facts = DriveFacts::new();
         drive.facts.note_fixed_connections(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
         drive.passed_over.clear();
-        if drive.slave.is_some() {
+        let other = drive.slave.and_then(|slave| self.master.slave(slave)?.facts.fsp_type).and_then(no_drive);
+        if let (Some(what), Some(slave)) = (other, drive.slave) {
+            let error = SercosError::Profile(what);
+            notice(Notice::Program { axis: index(drive.axis), address: drive.address, error });
+            drive.lose();
+            let _ = self.refused.try_push(slave);
+            let _ = self.master.exclude(slave);
+        } else if drive.slave.is_some() {
             drive.plan(mapping, Phase::CP2.0, notice);
         } else {
             drive.stage = Stage::Absent;
@@ -797,6 +828,10 @@ impl Drive {
     fn take(&self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
         match mapping.sercos_program(&self.needs, &self.facts) {
             Ok(program) => {
+                let modes = mapping.sercos_modes_left_out(&self.needs, &self.facts);
+                if !modes.is_empty() {
+                    notice(Notice::ModesLeftOut { axis: index(self.axis), address: self.address, modes });
+                }
                 // A drive that works modulo has a longest step from one position command to the next.
                 if self.needs.modulo && program.position_step().is_none() {
                     notice(Notice::Ends { axis: index(self.axis) });
@@ -897,6 +932,15 @@ fn numbers(connections: &Connections) -> [u8; 2] {
     let of = |produced| connections.iter().find(|connection| connection.slave_produces == produced);
     let number = |produced, usual| of(produced).map_or(usual, |connection| connection.instance);
     [number(false, COMMAND_CONNECTION), number(true, FEEDBACK_CONNECTION)]
+}
+
+/// What a slave is by S-0-1302.0.1 when it is known to be no drive.
+const fn no_drive(fsp_type: u32) -> Option<&'static str> {
+    match fsp_type {
+        1 => Some("an I/O device (1)"),
+        3 => Some("an encoder (3)"),
+        _ => None,
+    }
 }
 
 /// Whether the connections of a slave cannot be configured.
