@@ -204,6 +204,10 @@ impl Master {
         let ats = Route::ALL.map(|route| self.frames.at(route, 0).and_then(|data| AtRepr::parse(data).ok()));
         let survey = Survey::of(&ats, self.scan.start_two());
         match self.state {
+            // Counted from the first cycle on; what comes out is looked at when the slaves have had their time.
+            State::Settle => {
+                let _ = self.scan.update(survey);
+            }
             State::Scan => match self.scan.update(survey) {
                 ScanResult::Going => {}
                 ScanResult::Nobody => self.emit(Event::NoSlaves),
@@ -445,9 +449,12 @@ impl Master {
             State::Settle => {
                 self.redundancy.start();
                 self.start_phase(Phase::CP0);
+                self.scan.start();
             }
             State::Scan => {
-                self.scan.start();
+                if last != State::Settle {
+                    self.scan.start();
+                }
                 self.scan_ready = None;
             }
             State::Cp0 => self.take_scan(),

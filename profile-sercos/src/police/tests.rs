@@ -250,8 +250,11 @@ fn every_rule_of_the_telegrams_is_seen_broken() {
             });
         }),
     );
-    case("sequence counter", slave_two(State::Scan, Kind::At, 0, |frame| frame[HEADER_LEN] += 1));
-    case("topology field of another", slave_two(State::Scan, Kind::At, 0, |frame| frame[HEADER_LEN + 2] = 9));
+    case("sequence counter", slave_two(State::Settle, Kind::At, 0, |frame| frame[HEADER_LEN] += 1));
+    case(
+        "topology field of another",
+        slave_two(State::Settle, Kind::At, 0, |frame| frame[HEADER_LEN + 2] = 9),
+    );
     case("AHS flips", slave_two(State::Await2, Kind::At, 0, |frame| frame[SVC_2] ^= frame[15] >> 4 & 1));
     case("busy again", slave_two(State::Await2, Kind::At, 0, |frame| frame[SVC_2] |= frame[15] >> 3 & 2));
     case("C-CON counter", {

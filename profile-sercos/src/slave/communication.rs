@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::parameter::{Definition, IDN_LIST_READ_ONLY, Store};
 use crate::wire::connection::ConnectionSetup;
-use crate::wire::header::{DATA_LEN_MAX, DATA_LEN_MIN};
+use crate::wire::header::{DATA_LEN_MAX, DATA_LEN_MIN, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 use crate::wire::svc_error::SvcError;
@@ -39,6 +39,12 @@ pub mod idn {
     pub const INTERFACE_STATUS: Idn = Idn::standard(14);
     /// IDNs of all parameters.
     pub const ALL: Idn = Idn::standard(17);
+    /// IDNs of all procedure commands.
+    pub const COMMANDS: Idn = Idn::standard(25);
+    /// IDNs of what a backup keeps.
+    pub const BACKUP: Idn = Idn::standard(192);
+    /// SERCOS addresses of the device.
+    pub const ADDRESSES: Idn = Idn::standard(1046);
     /// Diagnosis as text.
     pub const DIAGNOSIS_TEXT: Idn = Idn::standard(95);
     /// Diagnosis as number.
@@ -132,6 +138,7 @@ mod attribute {
     pub const TIME_LIST_CP2: u32 = 0x6016_0001;
     pub const IDN_LIST_CP2: u32 = 0x6056_0001;
     pub const U16_LIST_ANY: u32 = 0x0015_0001;
+    pub const TEXT_ANY: u32 = 0x0044_0001;
     pub const COMMAND_ANY: u32 = 0x0009_0001;
     pub const COMMAND_CP2: u32 = 0x6009_0001;
     pub const COMMAND_CP3: u32 = 0x5009_0001;
@@ -166,6 +173,8 @@ pub fn define(store: &mut Store, config: &super::Config) {
         Definition::command(Idn::RESET_C1D, a::COMMAND_ANY, "Reset class 1 diagnostics"),
         Definition::command(Idn::CP3_CHECK, a::COMMAND_CP2, "CP3 transition check"),
         Definition::command(Idn::CP4_CHECK, a::COMMAND_CP3, "CP4 transition check"),
+        Definition::text(s(140), "Controller type", identity.device_name, 40),
+        Definition::list(s(142), a::TEXT_ANY, "Application type", &[], 40),
         number(idn::DIAGNOSIS_NUMBER, a::HEX32, "Diagnostic number", 0),
         Definition::list(Idn::SCP_CLASSES, a::U16_LIST, "SCP classes and versions", &classes, 64),
         Definition::list(Idn::SCP_ACTIVE, a::U16_LIST_CP2, "Active SCP classes and versions", &classes, 64),
@@ -198,6 +207,13 @@ pub fn define(store: &mut Store, config: &super::Config) {
         time(Idn::SLAVE_JITTER, 0x7011_0001, "Slave jitter", 80),
         number(Idn::ADDRESS, a::U16_CP2, "SERCOS address", i64::from(address)).range(0, 511),
         number(Idn::DEVICE_CONTROL, a::BITS, "Device control", 0),
+        Definition::list(
+            idn::ADDRESSES,
+            a::U16_LIST,
+            "SERCOS addresses of the device",
+            &address.to_le_bytes(),
+            2,
+        ),
         number(Idn::DEVICE_STATUS, a::BITS, "Device status", 0),
         time(Idn::CONSUMER_TIME, a::TIME, "Maximum consumer activation time (t11)", 0),
         Definition::text(s(1300).with_structure(0, 1), "Component name", identity.device_name, 64),
@@ -261,25 +277,34 @@ fn define_connection(store: &mut Store, index: u8, fixed: Option<&FixedConnectio
     }
 }
 
-/// Fills what follows from other parameters: S-0-0017, S-0-0187, S-0-0188 and the lengths of connections. Call when all
-/// are defined.
+/// Fills what follows from other parameters: S-0-0017, S-0-0025, S-0-0187, S-0-0188, S-0-0192 and the lengths of connections.
+/// Call when all are defined.
 pub fn define_lists(store: &mut Store) {
-    use super::parameter::Cyclic;
+    use super::parameter::{Cyclic, Parameter};
     for index in 0..u8::try_from(CONNECTIONS_MAX).unwrap_or(u8::MAX) {
         set_length(store, index);
     }
-    let list = |filter: &dyn Fn(Cyclic) -> bool, own: &[Idn]| -> Vec<u8> {
-        let mut idns: Vec<Idn> = store.iter().filter(|p| filter(p.cyclic())).map(|p| p.idn()).collect();
+    let list = |filter: &dyn Fn(&Parameter) -> bool, own: &[Idn]| -> Vec<u8> {
+        let mut idns: Vec<Idn> = store.iter().filter(|p| filter(p)).map(|p| p.idn()).collect();
         idns.extend(own);
         idns.sort_unstable();
         idns.iter().flat_map(|idn| idn.0.to_le_bytes()).collect()
     };
-    let lists = [idn::ALL, idn::PRODUCIBLE, idn::CONSUMABLE];
+    let lists = [idn::ALL, idn::COMMANDS, idn::PRODUCIBLE, idn::CONSUMABLE, idn::BACKUP];
     let all = list(&|_| true, &lists);
-    let producible = list(&|cyclic| matches!(cyclic, Cyclic::Feedback | Cyclic::Both), &[]);
-    let consumable = list(&|cyclic| matches!(cyclic, Cyclic::Command | Cyclic::Both), &[]);
+    let producible = list(&|p| matches!(p.cyclic(), Cyclic::Feedback | Cyclic::Both), &[]);
+    let consumable = list(&|p| matches!(p.cyclic(), Cyclic::Command | Cyclic::Both), &[]);
+    let commands = list(&|p| p.attribute().is_command(), &[]);
+    // What somebody sets and the drive keeps: not what a master writes for its telegrams, nor what comes in them.
+    let kept = |p: &Parameter| {
+        let set = p.write_protection(Phase::CP2).is_none() && !p.attribute().is_command();
+        set && p.cyclic() == Cyclic::No && p.idn().block() < 1000
+    };
+    let backup = list(&kept, &[]);
     for (idn, name, data) in [
         (idn::ALL, "IDN list of all operation data", all),
+        (idn::COMMANDS, "IDN list of all procedure commands", commands),
+        (idn::BACKUP, "IDN list of all backup operation data", backup),
         (idn::PRODUCIBLE, "IDN list of configurable data in the producer", producible),
         (idn::CONSUMABLE, "IDN list of configurable data in the consumer", consumable),
     ] {
@@ -318,7 +343,7 @@ pub fn check(store: &Store, idn: Idn, data: &[u8]) -> Result<(), SvcError> {
 
 /// Bytes of a parameter in a connection, or `None` if it cannot be in one.
 pub fn value_len(store: &Store, idn: Idn) -> Option<usize> {
-    use super::parameter::Cyclic;
+    use super::parameter::{Cyclic, Parameter};
     let parameter = store.get(store.find(idn)?);
     let fixed = !parameter.attribute().is_list();
     (fixed && parameter.cyclic() != Cyclic::No).then_some(parameter.capacity())
@@ -337,9 +362,16 @@ fn set_length(store: &mut Store, index: u8) {
 /// What follows from a new communication parameter: lengths and images.
 pub fn written(store: &mut Store, idn: Idn) {
     if idn.block() != Idn::CONNECTION_BLOCK || idn.is_product() {
-        if idn == Idn::MTU_REQUESTED {
-            let mtu = store.number_of(idn);
-            store.set_number_of(Idn::MTU_EFFECTIVE, mtu);
+        match idn {
+            Idn::MTU_REQUESTED => {
+                let mtu = store.number_of(idn);
+                store.set_number_of(Idn::MTU_EFFECTIVE, mtu);
+            }
+            Idn::ADDRESS => {
+                let [low, high, ..] = store.number_of(idn).to_le_bytes();
+                store.set_data_of(idn::ADDRESSES, &[low, high]);
+            }
+            _ => {}
         }
         return;
     }
@@ -415,6 +447,19 @@ mod tests {
         assert!(all.is_sorted());
         assert_eq!(store.idns(idn::PRODUCIBLE).collect::<Vec<_>>(), [Idn::standard(135)]);
         assert_eq!(store.idns(idn::CONSUMABLE).collect::<Vec<_>>(), [Idn::standard(36)]);
+        let commands = [99, 127, 128, 1024].map(Idn::standard);
+        assert_eq!(store.idns(idn::COMMANDS).collect::<Vec<_>>(), commands);
+        assert_eq!(store.idns(idn::BACKUP).collect::<Vec<_>>(), [Idn::standard(142)]);
+    }
+
+    #[test]
+    fn the_list_of_addresses_follows_the_address() {
+        let mut store = store();
+        let addresses = |store: &Store| store.get(store.find(idn::ADDRESSES).unwrap()).data().to_vec();
+        assert_eq!(addresses(&store), [5, 0]);
+        store.set_number_of(Idn::ADDRESS, 0x0102);
+        written(&mut store, Idn::ADDRESS);
+        assert_eq!(addresses(&store), [2, 1]);
     }
 
     #[test]

@@ -30,15 +30,13 @@ fn four(cycle: &str, more: &str) -> Settings {
 #[test]
 fn four_slaves_are_in_cp4_within_two_seconds() {
     let mut table = String::new();
-    for (cycle, most) in
-        [("500 us", 2_000), ("1 ms", 2_000), ("2 ms", 2_000), ("4 ms", 2_000), ("10 ms", 2_200)]
-    {
+    for cycle in ["500 us", "1 ms", "2 ms", "4 ms", "10 ms"] {
         let mut rig = Rig::new(four(cycle, ""));
         let begin = rig.now();
         rig.until_ready();
         let took = rig.now().since(begin);
         let _ = writeln!(table, "{cycle}: {took}");
-        assert!(took < millis(most), "{table}");
+        assert!(took < millis(2_000), "{table}");
     }
     println!("{table}");
     let mut rig = Rig::new(four("4 ms", "setup_cycle = \"4 ms\""));
