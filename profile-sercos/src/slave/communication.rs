@@ -343,7 +343,7 @@ pub fn check(store: &Store, idn: Idn, data: &[u8]) -> Result<(), SvcError> {
 
 /// Bytes of a parameter in a connection, or `None` if it cannot be in one.
 pub fn value_len(store: &Store, idn: Idn) -> Option<usize> {
-    use super::parameter::{Cyclic, Parameter};
+    use super::parameter::Cyclic;
     let parameter = store.get(store.find(idn)?);
     let fixed = !parameter.attribute().is_list();
     (fixed && parameter.cyclic() != Cyclic::No).then_some(parameter.capacity())

@@ -450,7 +450,8 @@ fn modes_that_the_drive_does_not_have_are_left_out_with_the_reason() {
     let mapping = shipped();
     let axis = SercosAxis { any_mode: true, ..rotary_axis(false) };
     let position = Idn::standard(47).0.to_le_bytes();
-    let cases: [(&str, &dyn Fn(&mut DriveFacts)); 8] = [
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut DriveFacts));
+    let cases: [Case<'_>; 8] = [
         ("all", &|_| {}),
         ("S-0-0292 is [2]", &|facts| facts.note_data(Idn::standard(292), &[2, 0])),
         ("no S-0-0292, S-0-0032 = 2", &|facts| {
