@@ -29,7 +29,7 @@ use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
-use crate::mapping::{Cia402Error, Difference, Object, SercosError};
+use crate::mapping::{Cia402Error, Difference, InterpolationPeriod, Object, SercosError};
 
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -200,6 +200,17 @@ pub enum Notice {
         node: NodeId,
         /// Which, and why.
         modes: Vec<(ModeSelection, Cia402Error)>,
+    },
+    /// The drive of a CANopen device expects set-points in another time than the cycle.
+    Period {
+        /// The axis.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// The cycle.
+        expected: DurationNs,
+        /// What it expects.
+        found: InterpolationPeriod,
     },
     /// Values are in none of the PDOs that a CANopen device keeps, and the axis can do without.
     NotMapped {
@@ -377,6 +388,7 @@ impl Notice {
             | Self::ModesTried { axis, .. }
             | Self::Refused { axis, .. }
             | Self::NotMapped { axis, .. }
+            | Self::Period { axis, .. }
             | Self::ModesLeftOut { axis, .. }
             | Self::Bare { axis, .. }
             | Self::NodeModesLeftOut { axis, .. }
@@ -451,6 +463,11 @@ impl fmt::Display for Notice {
             Self::NodeModesLeftOut { node, modes, .. } => {
                 write!(f, "node {node}: the axis does without {}", left_out(modes))
             }
+            Self::Period { node, expected, found, .. } => write!(
+                f,
+                "node {node} expects set-points every {found} (60C2), and they come every {expected}: it may move in steps; set its \
+                 interpolation time, or cycle_time"
+            ),
             Self::NotMapped { node, objects, .. } => {
                 let all: Vec<_> = objects.iter().map(ToString::to_string).collect();
                 write!(f, "node {node} keeps its PDOs, and {} is in none that can be used: the axis does without", all.join(", "))

@@ -56,7 +56,9 @@ pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
-pub use cia402::{Cia402Axis, Cia402Error, Cia402Tables, ModeWords, ObjectFacts, ObjectStep, Plan};
+pub use cia402::{
+    Cia402Axis, Cia402Error, Cia402Tables, InterpolationPeriod, ModeWords, ObjectFacts, ObjectStep, Plan,
+};
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
@@ -347,6 +349,12 @@ impl Mapping {
         facts: &ObjectFacts,
     ) -> Vec<(ModeSelection, Cia402Error)> {
         self.cia402.modes_left_out(axis, facts)
+    }
+
+    /// The time between set-points that a CiA 402 drive expects, where it is another one than the cycle.
+    #[must_use]
+    pub fn cia402_other_period(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Option<InterpolationPeriod> {
+        self.cia402.other_period(axis, facts)
     }
 
     /// Notes that a CiA 402 drive has these modes of operation and no others.

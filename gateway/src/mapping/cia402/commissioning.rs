@@ -1,5 +1,7 @@
 //! What is written to and read from a drive before it takes part in the cycle.
 
+use std::fmt;
+
 use profile_generic::time::DurationNs;
 
 use super::compile::{Cia402Axis, Cia402Error};
@@ -110,6 +112,9 @@ impl Cia402Tables {
                         let bytes = bytes(value, number)?;
                         steps.push(ObjectStep::Write { object: value.object, bytes, fail });
                     }
+                    // A drive may answer success and keep what it had.
+                    let back = [value, exponent].map(|value| ObjectStep::Read { object: value.object, fail });
+                    steps.extend(back);
                 }
                 (Plan::Tell, StepKind::WriteMode) => {
                     if let Some(mode) = self.chosen(axis, facts)?.first() {
@@ -121,6 +126,22 @@ impl Cia402Tables {
             }
         }
         Ok(steps)
+    }
+
+    /// The time between set-points that a drive expects, where it is another one than the cycle.
+    pub(in crate::mapping) fn other_period(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Option<InterpolationPeriod> {
+        let (value, exponent) = self.steps.iter().find_map(|rule| match &rule.kind {
+            StepKind::WriteCycle(value, exponent) => Some((value, exponent)),
+            _ => None,
+        })?;
+        let number = facts.integer(value.object, value.width)?;
+        let exponent = facts.integer(exponent.object, exponent.width)?;
+        let found = InterpolationPeriod { number, exponent };
+        (found.nanoseconds() != Some(axis.cycle.as_nanos())).then_some(found)
     }
 
     /// The objects of the signals that the modes of an axis can have. What is only there in a mode of operation, which 6502 tells,
@@ -201,10 +222,37 @@ fn bytes(value: &Value, number: i64) -> Result<Vec<u8>, Cia402Error> {
     Ok(number.to_le_bytes()[..value.width.bytes()].to_vec())
 }
 
-/// A time as a whole number of 1 to 255 and a power of ten in seconds; `None` when there is none.
+/// What a drive shows in 60C2: so many times ten to the exponent, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InterpolationPeriod {
+    /// 60C2:01.
+    pub number: i64,
+    /// 60C2:02.
+    pub exponent: i64,
+}
+
+impl InterpolationPeriod {
+    fn nanoseconds(self) -> Option<i64> {
+        let power = u32::try_from(self.exponent + 9).ok()?;
+        self.number.checked_mul(10_i64.checked_pow(power)?)
+    }
+}
+
+impl fmt::Display for InterpolationPeriod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.nanoseconds() {
+            Some(0) | None => write!(f, "{} * 10^{} s", self.number, self.exponent),
+            Some(time) => write!(f, "{}", DurationNs(time)),
+        }
+    }
+}
+
+/// A time as a whole number of 1 to 255 and a power of ten in seconds, milliseconds where they do: many drives take no other
+/// exponent. `None` when there is none.
 fn cycle(time: DurationNs) -> Option<(i64, i64)> {
     let (mut number, mut power) = (time.as_nanos(), -9);
-    while number % 10 == 0 && number > 0 && power < 0 {
+    let fits = |number| number <= i64::from(u8::MAX);
+    while number % 10 == 0 && number > 0 && power < 0 && !(power >= -3 && fits(number)) {
         (number, power) = (number / 10, power + 1);
     }
     (1..=i64::from(u8::MAX)).contains(&number).then_some((number, power))
@@ -218,11 +266,22 @@ mod tests {
     fn a_cycle_is_a_number_and_a_power_of_ten() {
         let of = |ns| cycle(DurationNs(ns));
         assert_eq!(of(1_000_000), Some((1, -3)));
-        assert_eq!(of(10_000_000), Some((1, -2)));
+        assert_eq!(of(10_000_000), Some((10, -3)));
+        assert_eq!(of(255_000_000), Some((255, -3)));
+        assert_eq!(of(260_000_000), Some((26, -2)));
         assert_eq!(of(2_500_000), Some((25, -4)));
         assert_eq!(of(125_000), Some((125, -6)));
-        assert_eq!(of(1_000_000_000), Some((1, 0)));
+        assert_eq!(of(1_000_000_000), Some((100, -2)));
         assert_eq!(of(31_250), None, "3125 does not fit an octet");
         assert_eq!((of(0), of(-1)), (None, None));
+    }
+
+    #[test]
+    fn a_period_is_shown_as_a_time_where_it_is_one() {
+        let show = |number, exponent| InterpolationPeriod { number, exponent }.to_string();
+        assert_eq!(
+            [show(1, -3), show(25, -4), show(0, -3), show(1, -12)].join(", "),
+            "1 ms, 2.500000 ms, 0 * 10^-3 s, 1 * 10^-12 s"
+        );
     }
 }

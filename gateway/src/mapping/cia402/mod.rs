@@ -23,7 +23,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::{Action, Report};
 use profile_generic::time::DurationNs;
 
-pub use self::commissioning::{ObjectStep, Plan};
+pub use self::commissioning::{InterpolationPeriod, ObjectStep, Plan};
 pub use self::compile::{Cia402Axis, Cia402Error, ModeWords};
 pub use self::facts::ObjectFacts;
 

@@ -424,6 +424,11 @@ impl Work {
             Ok(made) => made,
             Err(error) => return self.fail(place, error, desk),
         };
+        let needs = &self.axes[place].needs;
+        if let Some(found) = desk.mapping.cia402_other_period(needs, &self.facts) {
+            let (node, expected) = (self.node, needs.cycle);
+            desk.waiting.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
+        }
         self.pdos[0].extend(receive);
         self.pdos[1].extend(transmit);
         let which = u8::try_from(place).unwrap_or(u8::MAX);
@@ -501,10 +506,8 @@ impl Work {
                 self.facts.note_data(object, outcome.data.as_slice());
                 self.asked_again = false;
             }
-            // A frame was lost, or the drive was busy: it is asked once more.
-            Err(SdoFailure::Timeout { .. })
-                if matches!(step, ObjectStep::Read { .. }) && !self.asked_again =>
-            {
+            // A frame was lost, or the drive was busy: once more. What is written here is the same the second time.
+            Err(SdoFailure::Timeout { .. }) if !self.asked_again => {
                 self.asked_again = true;
                 self.steps.push_front(step);
             }
