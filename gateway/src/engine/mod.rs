@@ -566,8 +566,8 @@ impl Engine {
             }
             // Once more when it is known which one the drive has.
             if let Some(fault) = axis.fault().filter(|fault| before.1 != Some(fault.cause)) {
-                let (loss, trip) = (axis.loss(), axis.tripped());
-                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip });
+                let (loss, trip, jump) = (axis.loss(), axis.tripped(), axis.jump());
+                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip, jump });
             }
         }
         changed

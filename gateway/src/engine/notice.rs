@@ -23,7 +23,7 @@ use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
-use super::axis::{Loss, OwnWords, Trip};
+use super::axis::{Loss, OwnWords, PositionJump, Trip};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
@@ -230,6 +230,8 @@ pub enum Notice {
         loss: Option<Loss>,
         /// The limit that a set-point has exceeded, when that is the fault.
         trip: Option<Trip>,
+        /// The jump of the actual position, when that is the fault.
+        jump: Option<PositionJump>,
     },
     /// An axis has waited for longer than a second.
     Waiting {
@@ -447,6 +449,7 @@ impl fmt::Display for Notice {
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
             Self::Fault { fault, trip: Some(trip), .. } => write!(f, "{fault}: {trip}"),
+            Self::Fault { fault, jump: Some(jump), .. } => write!(f, "{fault}: {jump}"),
             Self::Fault { fault, .. } => write!(f, "{fault}"),
             Self::TimeStep { step } => {
                 write!(f, "system time stepped by {step}; it is reported to controllers, and no axis follows it")

@@ -131,6 +131,8 @@ pub(crate) struct ConsumerEnd {
     counting: bool,
     fresh: bool,
     losses: u32,
+    /// C-CON as it came last before a reset. As long as it stays the same there is no new value, whatever its counter is.
+    stood: Option<ConnectionControl>,
     /// Cycles since the last new value.
     idle_cycles: u32,
     producer_cycles: u32,
@@ -148,6 +150,7 @@ impl ConsumerEnd {
             counting: false,
             fresh: false,
             losses: 0,
+            stood: None,
             idle_cycles: 0,
             producer_cycles: u32::from(producer_cycles).max(1),
             allowed_losses: u32::from(allowed_losses),
@@ -167,6 +170,7 @@ impl ConsumerEnd {
     /// Starts again from `Prepare`; the data stays.
     pub fn reset(&mut self) {
         self.state = self.state.next(ConsumerEvent::Reset);
+        self.stood = Some(self.control);
         self.control = ConnectionControl::empty();
         self.counting = false;
         self.fresh = false;
@@ -207,8 +211,8 @@ impl ConsumerEnd {
         }
         self.counting |= control.counter() != 0;
         let changed = if self.state == ConsumerState::Prepare {
-            // The toggle says nothing before it has been seen once; the counter does.
-            control.counter() != 0
+            // The toggle says nothing before it has been seen once; the counter does, where it is not that of before.
+            control.counter() != 0 && self.stood != Some(control)
         } else if self.counting {
             control.counter() != last.counter()
         } else {
@@ -353,6 +357,23 @@ mod tests {
         assert_eq!(consumer.view().data, [0x03, 0x00]);
         consumer.reset();
         assert_eq!(run(&mut consumer, &[Some(1), Some(3)]), "waiting consuming*");
+    }
+
+    /// A drive that hangs sends its last telegram for ever: a reset makes no new value of it.
+    #[test]
+    fn a_word_that_stood_before_a_reset_is_no_new_value_after_it() {
+        let mut consumer = ConsumerEnd::new(4, 1, 1);
+        let words = [Some(0x1003), Some(0x2001), Some(0x2001), Some(0x2001)];
+        assert_eq!(run(&mut consumer, &words), "consuming* consuming* warning error");
+        consumer.reset();
+        assert_eq!(
+            run(&mut consumer, &[Some(0x2001), Some(0x2001), None, Some(0x2001)]),
+            "waiting waiting waiting waiting"
+        );
+        assert_eq!(run(&mut consumer, &[Some(0x3003), Some(0x4001)]), "consuming* consuming*");
+        // One that went on meanwhile is taken from its first value.
+        consumer.reset();
+        assert_eq!(run(&mut consumer, &[Some(0x9001)]), "consuming*");
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod image;
 mod north;
 mod overtravel;
 mod own_words;
+mod position_jump;
 pub mod procedure;
 pub mod rest;
 mod sequence;
@@ -31,6 +32,7 @@ mod waiting;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
+pub use self::position_jump::PositionJump;
 pub use self::waiting::{Awaited, Waiting};
 
 use self::hookup::TestRun;
@@ -202,6 +204,9 @@ pub struct AxisChannel {
     own_words: own_words::Reading,
     /// For a drive that tells positions and no velocity.
     velocimeter: velocimeter::Velocimeter,
+    plausibility: position_jump::Plausibility,
+    /// The jump that the fault of this instant is about.
+    jump: Option<(SystemTime, PositionJump)>,
     loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
@@ -285,6 +290,8 @@ impl AxisChannel {
             diagnosis: diagnosis::Diagnosis::default(),
             own_words: own_words::Reading::default(),
             velocimeter: velocimeter::Velocimeter::default(),
+            plausibility: position_jump::Plausibility::default(),
+            jump: None,
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
@@ -398,6 +405,7 @@ impl AxisChannel {
         self.feedback.present = FeedbackSet::empty();
         self.end_diagnosis();
         self.velocimeter.restart();
+        self.plausibility.restart();
         self.report(now, system, report);
         self.south = None;
         self.programs += 1;
@@ -468,6 +476,7 @@ impl AxisChannel {
         if self.procedure.answer(program.procedures(), access, generation, result, now) {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
             hearing.restart();
+            self.plausibility.restart();
         }
     }
 
