@@ -175,7 +175,7 @@ fn stopping_torque_is_kept_where_the_drive_never_uses_more_and_refused_otherwise
         });
         let client = Client::connect(&mut rig, CONTROLLER);
         let (positive, negative) = (504, 505);
-        let mut get = |rig: &mut Rig, id| {
+        let get = |rig: &mut Rig, id| {
             let (status, value) = client.ask(rig, GET, 1, Some(id), &[]);
             assert_eq!(status, OK, "{bus} {id}");
             f32::from_le_bytes(value.try_into().expect("a REAL"))
@@ -198,6 +198,8 @@ fn stopping_torque_is_kept_where_the_drive_never_uses_more_and_refused_otherwise
         assert_eq!(set(&mut rig, positive, 61.0), INVALID_VALUE, "{bus}");
         assert_eq!(set(&mut rig, negative, -61.0), INVALID_VALUE, "{bus}");
         assert_eq!([positive, negative].map(|id| get(&mut rig, id)), [60.0, -60.0], "{bus}");
+        assert_eq!(set(&mut rig, negative, -50.0), OK, "{bus}");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, 55.0), INVALID_VALUE, "{bus}: the positive direction");
         assert_eq!(set(&mut rig, STOPPING_TORQUE, 61.0), OK, "{bus}");
         assert_eq!(set(&mut rig, positive, 61.0), OK, "{bus}");
     }
