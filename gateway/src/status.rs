@@ -1,5 +1,7 @@
 //! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
 
+mod wait;
+
 use profile_cip::target::identity::ModuleState;
 use profile_cip::target::visualization::Indication;
 use profile_cip::target::visualization::display::{LINE_MAX, Line, LineText};
@@ -12,11 +14,14 @@ use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 
+pub use self::wait::AxisWait;
+
+use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
 use crate::latest::Words;
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 11;
+const AXIS_WORDS: usize = 11 + WAIT_WORDS;
 
 /// Words of the box itself.
 const BOX_WORDS: usize = 9;
@@ -76,8 +81,10 @@ pub struct AxisStatus {
     pub mode: OperatingMode,
     /// Status bits of the drive.
     pub status: StatusBits,
-    /// Why the axis cannot be enabled.
+    /// Why the axis cannot be enabled: also [`Inhibits::NO_POWER`] and [`Inhibits::NO_DRIVE`] while it waits for either.
     pub inhibits: Inhibits,
+    /// What the axis waits for, when it has waited for longer than a second.
+    pub wait: Option<AxisWait>,
     /// The fault present, if any.
     pub fault: Option<FaultCause>,
     /// The drive's own code for the fault, 0 when it gave none.
@@ -176,6 +183,7 @@ impl AxisStatus {
         mode: OperatingMode::None,
         status: StatusBits::empty(),
         inhibits: Inhibits::empty(),
+        wait: None,
         fault: None,
         fault_vendor_code: 0,
         position: Position(0),
@@ -297,6 +305,7 @@ impl AxisStatus {
             cause_high,
             cause_low,
         ];
+        let [wait_0, wait_1, wait_2] = AxisWait::to_words(self.wait);
         [
             u64::from_be_bytes(head),
             pair(self.status.bits(), self.inhibits.bits()),
@@ -309,12 +318,27 @@ impl AxisStatus {
             pair(self.lost_updates, self.lost_telegrams),
             pair(self.saturated, self.faults),
             self.indicators.to_word(),
+            wait_0,
+            wait_1,
+            wait_2,
         ]
     }
 
     fn from_words(words: &[u64; AXIS_WORDS]) -> Self {
-        let [head, bits, codes, position, velocity, torque, error, commands, lost, other, indicators] =
-            *words;
+        let [
+            head,
+            bits,
+            codes,
+            position,
+            velocity,
+            torque,
+            error,
+            commands,
+            lost,
+            other,
+            indicators,
+            wait @ ..,
+        ] = *words;
         let [instance, device, state, cip_axis_state, mode, faulted, cause_high, cause_low] =
             head.to_be_bytes();
         let (status, inhibits) = split(bits);
@@ -331,6 +355,7 @@ impl AxisStatus {
             mode: mode.unwrap_or_default(),
             status: StatusBits::from_bits_retain(status),
             inhibits: Inhibits::from_bits_retain(inhibits),
+            wait: AxisWait::from_words(&wait),
             fault: (faulted != 0).then(|| FaultCause(u16::from_be_bytes([cause_high, cause_low]))),
             fault_vendor_code,
             position: Position(position.cast_signed()),
@@ -407,8 +432,12 @@ impl Words for BoxStatus {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use profile_generic::program::BitPattern;
+
     use super::*;
+    use crate::engine::axis::{Awaited, Waiting};
     use crate::latest::latest;
+    use crate::mapping::Item;
 
     /// A status in which no two values are the same.
     pub(crate) fn distinct() -> BoxStatus {
@@ -438,6 +467,7 @@ pub(crate) mod tests {
             mode: OperatingMode::Position,
             status: StatusBits::READY | StatusBits::TRACKING,
             inhibits: Inhibits::empty(),
+            wait: None,
             fault: None,
             fault_vendor_code: 0,
             position: Position(-1_234_567_890_123),
@@ -466,6 +496,13 @@ pub(crate) mod tests {
             cip_axis_state: 8,
             mode: OperatingMode::Homing,
             inhibits: Inhibits::SAFETY,
+            wait: Some(AxisWait {
+                waiting: Waiting {
+                    awaited: Awaited::Following,
+                    shown: Some((Item::object(0x6041, 0), 0x8_0237, BitPattern::new(0x1040, 0x1000))),
+                },
+                seconds: 0x0001_0002,
+            }),
             fault: Some(FaultCause(0x0905)),
             fault_vendor_code: 0xC30A_0040,
             position_counts: i32::MAX,

@@ -25,6 +25,7 @@ const FILES: &[&str] = &[
     "empty.eds",
     "every_type.eds",
     "fixed_mapping.eds",
+    "hash_and_time.dcf",
     "huge.eds",
     "latin1.eds",
     "lists_that_lie.eds",
@@ -209,6 +210,7 @@ fn good_files_have_no_diagnostics() {
     for name in [
         "every_type.eds",
         "fixed_mapping.eds",
+        "hash_and_time.dcf",
         "huge.eds",
         "little_room.eds",
         "plain_servo.eds",
@@ -270,6 +272,88 @@ fn odd_files_say_what_plain_ones_do() {
     assert_eq!(odd.value(0x2001, 0, NODE), Some(Value::Bytes(vec![0xDE, 0xAD, 0xBE, 0xEF])));
     assert_eq!(odd.sub(0x2002, 0).unwrap().data_type, DataType::DOMAIN);
     assert_eq!(description("latin1.eds").device.vendor_name, "Müller & Söhne");
+}
+
+/// A hash begins no comment within a line, and the two types of time are numbers of 48 bits: kept, transferred and written back.
+#[test]
+fn hashes_are_characters_and_times_are_numbers_of_48_bits() {
+    let before = description("hash_and_time.dcf");
+    let set = before.commissioning.as_ref().expect("a configuration");
+    assert_eq!(
+        (before.device.product_name.as_str(), before.device.order_code.as_str()),
+        ("Servo #2", "#4711-A")
+    );
+    assert_eq!(set.node_name, "Press #3");
+    assert_eq!(before.comments, ["# is a character like any other here", "Two # in # a line"]);
+    assert_eq!(before.object(0x2001).expect("there").name, "# of starts");
+    let text = before.to_text(Form::Configuration);
+    let after = read(text.as_bytes()).expect("not refused");
+    assert_eq!(after.diagnostics.to_string(), "");
+    for description in [&before, &after.description] {
+        for (index, data_type, default, parameter) in [
+            (0x2000, DataType::VISIBLE_STRING, Some("#1"), Some("Axis #3, press # 2")),
+            (0x2002, DataType::UNICODE_STRING, Some("#FF8000"), Some("a#b")),
+            (0x2010, DataType::TIME_OF_DAY, Some("0"), Some("0x3C8A0499A7C0")),
+            (0x2011, DataType::TIME_OF_DAY, Some("0x5265BFF"), Some("0x100000000")),
+            (0x2012, DataType::TIME_OF_DAY, None, None),
+            (0x2013, DataType::TIME_DIFFERENCE, Some("0xFFFF0FFFFFFF"), Some("1")),
+            (0x2014, DataType::TIME_DIFFERENCE, Some("0xEA60"), None),
+            (0x2015, DataType::TIME_DIFFERENCE, None, None),
+        ] {
+            let value = description.sub(index, 0).expect("there");
+            let shown = |setting: &Option<Setting>| setting.as_ref().map(ToString::to_string);
+            let found = (value.data_type, shown(&value.default), shown(&value.parameter));
+            assert_eq!(
+                found,
+                (data_type, default.map(str::to_owned), parameter.map(str::to_owned)),
+                "{index:04X}"
+            );
+        }
+        let high = description.sub(0x2011, 0).and_then(|value| value.high.clone());
+        assert_eq!(high, Some(Setting::plain(Value::Unsigned(0xFFFF_FFFF_FFFF))));
+    }
+    // 28 bits of milliseconds, 4 reserved ones, 16 of days, little endian (CiA 301).
+    let writes = before.configuration(NODE).writes;
+    let lines: Vec<String> = writes.iter().map(|write| write.entry().to_string()).collect();
+    assert!(lines.contains(&"2010:0 = C0 A7 99 04 8A 3C".to_owned()), "{lines:?}");
+    assert!(lines.contains(&"2011:0 = 00 00 00 00 01 00".to_owned()), "{lines:?}");
+    assert!(lines.contains(&"2013:0 = 01 00 00 00 00 00".to_owned()), "{lines:?}");
+}
+
+/// What is no time of 48 bits, and no number because of what a hash begins, is named by line, section and key.
+#[test]
+fn wrong_times_and_numbers_with_a_hash_are_named_by_line_and_key() {
+    let object = |index: u16, data_type: &str, value: &str| {
+        format!(
+            "[{index:04X}]\nParameterName=x\nObjectType=7\nDataType={data_type}\nAccessType=rw\n{value}\n"
+        )
+    };
+    let text = [
+        object(0x2000, "0x000C", "DefaultValue=0x1000000000000"),
+        object(0x2001, "0x000D", "ParameterValue=-1"),
+        object(0x2002, "0x000C", "ParameterValue=12:00:00"),
+        object(0x2003, "0x0007", "DefaultValue=0x10 # sixteen"),
+        object(0x2004, "0x0007", "# DefaultValue=5"),
+    ]
+    .concat();
+    let Reading { description, diagnostics } = read(text.as_bytes()).expect("not refused");
+    let errors: Vec<String> = diagnostics
+        .list()
+        .iter()
+        .filter(|diagnostic| diagnostic.severity() == Severity::Error)
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(
+        errors,
+        [
+            "6:14: error[range]: [2000] DefaultValue: expected 0 to 281474976710655, as TIME_OF_DAY has, got 0x1000000000000",
+            "12:16: error[range]: [2001] ParameterValue: expected 0 to 281474976710655, as TIME_DIFFERENCE has, got -1",
+            "18:16: error[value]: [2002] ParameterValue: expected a number (0x hexadecimal, 0 octal, decimal), got 12:00:00",
+            "24:14: error[value]: [2003] DefaultValue: expected a number (0x hexadecimal, 0 octal, decimal), got 0x10 # sixteen",
+        ]
+    );
+    let values = description.objects.iter().map(|object| object.subs[0].setting());
+    assert!(values.into_iter().all(|setting| setting.is_none()), "a value that is wrong is none");
 }
 
 #[test]

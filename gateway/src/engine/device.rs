@@ -1,5 +1,7 @@
 //! The CIP Motion side of the engine: one motion device with its axes, its I/O connection and its attributes.
 
+mod stopping_torque;
+
 use std::net::SocketAddrV4;
 
 use arrayvec::ArrayVec;
@@ -23,6 +25,7 @@ use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
 
+use self::stopping_torque::Comparison;
 use super::access::{Access, AccessFailure, Refusal};
 use super::admission::Admission;
 use super::axis::{AxisChannel, StopSettings};
@@ -90,6 +93,8 @@ struct Member {
     /// Attributes of the sequences that are being written to the drive: ticket, attribute and bytes. What the drive has
     /// taken is kept here as well, because the box goes by it.
     writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
+    /// A Stopping Torque that is being compared with the drive's torque limits.
+    comparison: Option<Comparison>,
 }
 
 /// What the settings of starts and stops are made of: attributes of the axis, its programs, and the control mode of the
@@ -207,6 +212,7 @@ impl DeviceChannel {
                     stops: *stops,
                     stopping: None,
                     writes: ArrayVec::new(),
+                    comparison: None,
                 })
             })
             .collect::<Result<_, ChannelError>>()?;
@@ -509,6 +515,19 @@ impl DeviceChannel {
                     if reject || program.rejects(parameter) {
                         return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
                     }
+                    if let AccessOperation::Write(bytes) = &access.operation
+                        && stopping_torque::is_stopping_torque(&entry)
+                    {
+                        if let Some(before) = member.comparison.take() {
+                            // Its drive was lost, or it is overtaken.
+                            let overtaken = Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+                            self.device.complete_attribute(before.ticket, overtaken);
+                        }
+                        let number = (self.number, member.axis);
+                        let begun = Comparison::begin(access, bytes, &entry, number, axis, buses)?;
+                        member.comparison = Some(begun);
+                        return Ok(());
+                    }
                     return self.shadow(access, place);
                 };
                 if held.to_drive.is_none() && entry.access != mapping::Access::Get {
@@ -520,6 +539,13 @@ impl DeviceChannel {
                     AccessOperation::Write(bytes) => {
                         let generic =
                             entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?;
+                        let kept = |id| {
+                            let entry = member.attributes.get(id)?;
+                            entry.to_generic(self.device.attribute(place, id).ok()?).ok()
+                        };
+                        if stopping_torque::exceeds(parameter, generic, &member.attributes, kept, axis) {
+                            return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+                        }
                         let (bytes, len, clamped) =
                             held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
                         if clamped {
@@ -579,6 +605,18 @@ impl DeviceChannel {
                 // It was checked against the type of the attribute when it was encoded.
                 let _ = self.device.put_attribute(place, id, &value);
             }
+        }
+        if let Some(place) = place
+            && let Some(comparison) = &mut self.members[place].comparison
+            && comparison.ticket == ticket
+        {
+            if let Some(verdict) = comparison.take(answer, &axes[answer.axis]) {
+                let (id, value) = (comparison.attribute, comparison.bytes.clone());
+                self.members[place].comparison = None;
+                let kept = verdict.and_then(|()| self.device.put_attribute(place, id, &value));
+                self.device.complete_attribute(ticket, kept.map(|()| &[][..]));
+            }
+            return true;
         }
         let member = place.map(|place| &self.members[place]);
         let mut bytes = [0; 8];

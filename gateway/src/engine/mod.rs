@@ -31,6 +31,7 @@ use profile_cip::target::motion_device::SyncState;
 use profile_cip::target::visualization::display::{self, Line};
 use profile_cip::target::visualization::{self, Indication};
 use profile_generic::fault::FaultCause;
+use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
@@ -44,7 +45,7 @@ use self::notice::Notice;
 use self::port::{NorthPort, SouthPort};
 use crate::latest::Publisher;
 use crate::mapping::Mapping;
-use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
+use crate::status::{AxisStatus, AxisWait, BoxState, BoxStatus, Indicators, PHASE_NONE};
 
 /// Most buses of a box.
 pub const BUSES_MAX: usize = 9;
@@ -72,6 +73,16 @@ struct Wait {
     since: Option<(Awaited, MonotonicTime)>,
     /// How long it may last until it is told, or told again.
     limit: DurationNs,
+}
+
+impl Wait {
+    /// What the status says of it: nothing before the log would.
+    fn shown(&self, now: MonotonicTime, axis: &AxisChannel) -> Option<AxisWait> {
+        let (awaited, since) = self.since?;
+        let time = now.since(since);
+        let waiting = (time >= WAIT_TOLD).then(|| axis.waiting()).flatten()?;
+        (waiting.awaited == awaited).then(|| AxisWait::new(waiting, time))
+    }
 }
 
 /// What the state of the box follows from.
@@ -555,8 +566,8 @@ impl Engine {
             }
             // Once more when it is known which one the drive has.
             if let Some(fault) = axis.fault().filter(|fault| before.1 != Some(fault.cause)) {
-                let (loss, trip) = (axis.loss(), axis.tripped());
-                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip });
+                let (loss, trip, jump) = (axis.loss(), axis.tripped(), axis.jump());
+                tell(&mut self.notices, Notice::Fault { axis: number, fault, loss, trip, jump });
             }
         }
         changed
@@ -576,8 +587,8 @@ impl Engine {
             }
             wait.limit = wait.limit * 10;
             if let Some(waiting) = axis.waiting().filter(|waiting| waiting.awaited == known) {
-                let axis = u8::try_from(number).unwrap_or(u8::MAX);
-                tell(&mut self.notices, Notice::Waiting { axis, time, waiting });
+                let (axis, wait) = (u8::try_from(number).unwrap_or(u8::MAX), AxisWait::new(waiting, time));
+                tell(&mut self.notices, Notice::Waiting { axis, wait });
             }
         }
     }
@@ -611,9 +622,9 @@ impl Engine {
             status.counters.refused_frames += channel.counters().refused;
             let (module, network) = (device.module_state(), channel.network_status());
             let node = device.node_condition();
-            for (place, (axis, state)) in channel.axis_states().enumerate() {
+            for (place, (number, state)) in channel.axis_states().enumerate() {
                 let shown = device.axis_condition(place);
-                if let (Some(entry), Some(axis)) = (status.axes.get_mut(axis), self.axes.get(axis)) {
+                if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), self.axes.get(number)) {
                     entry.indicators = Indicators {
                         module,
                         network,
@@ -623,6 +634,7 @@ impl Engine {
                         minor_fault: shown.is_some_and(|axis| axis.minor_fault),
                     };
                     fill(entry, axis);
+                    entry.wait = self.waits.get(number).and_then(|wait| wait.shown(now, axis));
                     entry.cip_axis_state = state.code().0;
                     entry.lost_updates = u32::try_from(lost).unwrap_or(u32::MAX);
                 }
@@ -646,7 +658,7 @@ fn fill(entry: &mut AxisStatus, axis: &AxisChannel) {
     entry.state = axis.state();
     entry.mode = feedback.mode;
     entry.status = feedback.status;
-    entry.inhibits = feedback.inhibits;
+    entry.inhibits = feedback.inhibits.union(axis.awaited().map_or(Inhibits::empty(), Awaited::inhibits));
     entry.fault = axis.fault().map(|fault| fault.cause);
     entry.fault_vendor_code = axis.fault().map_or(0, |fault| fault.vendor_code);
     entry.position = feedback.position;

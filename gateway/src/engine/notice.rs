@@ -23,13 +23,14 @@ use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
-use super::axis::{Loss, OwnWords, Trip, Waiting};
+use super::axis::{Loss, OwnWords, PositionJump, Trip};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use crate::mapping::{Cia402Error, Difference, InterpolationPeriod, Object, SercosError};
+use crate::status::AxisWait;
 
 /// How much a notice matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -256,15 +257,15 @@ pub enum Notice {
         loss: Option<Loss>,
         /// The limit that a set-point has exceeded, when that is the fault.
         trip: Option<Trip>,
+        /// The jump of the actual position, when that is the fault.
+        jump: Option<PositionJump>,
     },
     /// An axis has waited for longer than a second.
     Waiting {
         /// The axis.
         axis: u8,
-        /// For how long.
-        time: DurationNs,
-        /// What for, and what its drive shows.
-        waiting: Waiting,
+        /// For how long, what for, and what its drive shows.
+        wait: AxisWait,
     },
     /// The source of system time has stepped.
     TimeStep {
@@ -412,9 +413,7 @@ impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sercos(event) => write!(f, "{event}"),
-            Self::Waiting { time, waiting, .. } => {
-                write!(f, "waits since {} s for {waiting}", time.as_nanos() / 1_000_000_000)
-            }
+            Self::Waiting { wait, .. } => write!(f, "{wait}"),
             Self::Retry => f.write_str("phase-up failed; the next attempt follows"),
             Self::DriveMissing { address, .. } => {
                 write!(f, "expected a drive with SERCOS address {address} on the bus, found none")
@@ -494,6 +493,7 @@ impl fmt::Display for Notice {
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
             Self::Fault { fault, trip: Some(trip), .. } => write!(f, "{fault}: {trip}"),
+            Self::Fault { fault, jump: Some(jump), .. } => write!(f, "{fault}: {jump}"),
             Self::Fault { fault, .. } => write!(f, "{fault}"),
             Self::TimeStep { step } => {
                 write!(f, "system time stepped by {step}; it is reported to controllers, and no axis follows it")

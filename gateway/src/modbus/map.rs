@@ -224,6 +224,32 @@ pub const AXIS: &[Entry<AxisStatus>] = &[
         |axis| characters(axis, 0),
     ),
     entry(52, Kind::U64, "display_2", "the display's characters 9 to 16", |axis| characters(axis, 8)),
+    entry(
+        56,
+        Kind::U16,
+        "waits_for",
+        "what the axis has waited for longer than a second; 0 nothing",
+        |axis| axis.wait.map_or(0, |wait| u64::from(wait.waiting.awaited.code())),
+    ),
+    entry(57, Kind::U16, "waits_word", "status word of the drive while the axis waits", |axis| {
+        axis.wait.map_or(0, |wait| u64::from(wait.word()))
+    }),
+    entry(58, Kind::U16, "waits_mask", "bits of the word that keep the axis waiting", |axis| {
+        axis.wait.map_or(0, |wait| u64::from(wait.mask()))
+    }),
+    entry(59, Kind::U16, "waits_value", "what these bits have to be", |axis| {
+        axis.wait.map_or(0, |wait| u64::from(wait.value()))
+    }),
+    entry(60, Kind::U32, "waits_time", "seconds since the wait began", |axis| {
+        axis.wait.map_or(0, |wait| u64::from(wait.seconds))
+    }),
+    entry(
+        62,
+        Kind::U32,
+        "waits_item",
+        "number of the word: IDN, index x 256 + sub-index, or class x 65536 + attribute",
+        |axis| axis.wait.map_or(0, |wait| u64::from(wait.item())),
+    ),
 ];
 
 /// A lamp of an axis that is there.
@@ -296,6 +322,7 @@ mod tests {
     use profile_generic::inhibit::Inhibits;
 
     use super::*;
+    use crate::engine::axis::Awaited;
     use crate::status::tests::distinct;
 
     /// A block as a table of the documentation.
@@ -317,7 +344,7 @@ mod tests {
         text
     }
 
-    fn tables() -> [String; 7] {
+    fn tables() -> [String; 8] {
         [
             block(BOX),
             block(AXIS),
@@ -332,6 +359,10 @@ mod tests {
                 Indication::NAMED.iter().map(|(indication, name)| (indication.0.to_string(), *name)),
             ),
             names("display_text", LineText::NAMED.iter().map(|(text, name)| (text.0.to_string(), *name))),
+            names(
+                "waits_for",
+                Awaited::ALL.iter().map(|awaited| (awaited.code().to_string(), awaited.name())),
+            ),
         ]
     }
 
@@ -407,6 +438,9 @@ mod tests {
         // Solid red, off, solid red, INIT FLT with code 12, "INIT FLT S12".
         assert_eq!(shown[..6], [5, 0, 5, 15, 12, 0]);
         assert_eq!(shown[6..], [0x494E, 0x4954, 0x2046, 0x4C54, 0x2053, 0x3132, 0, 0]);
+        // Waits for its drive to follow: bit 12 has to be 1 and bit 6 to be 0 in object 6041:00.
+        let waits = registers(&status, 128 + 56, 8).unwrap();
+        assert_eq!(waits, [5, 0x0237, 0x1040, 0x1000, 0x0001, 0x0002, 0x0060, 0x4100]);
         assert_eq!(registers(&status, 192, 64).unwrap(), [0; 64]);
     }
 

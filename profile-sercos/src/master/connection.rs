@@ -355,6 +355,23 @@ mod tests {
         assert_eq!(run(&mut consumer, &[Some(1), Some(3)]), "waiting consuming*");
     }
 
+    /// A drive that hangs sends its last telegram for ever: a reset makes no new value of it.
+    #[test]
+    fn a_word_that_stood_before_a_reset_is_no_new_value_after_it() {
+        let mut consumer = ConsumerEnd::new(4, 1, 1);
+        let words = [Some(0x1003), Some(0x2001), Some(0x2001), Some(0x2001)];
+        assert_eq!(run(&mut consumer, &words), "consuming* consuming* warning error");
+        consumer.reset();
+        assert_eq!(
+            run(&mut consumer, &[Some(0x2001), Some(0x2001), None, Some(0x2001)]),
+            "waiting waiting waiting waiting"
+        );
+        assert_eq!(run(&mut consumer, &[Some(0x3003), Some(0x4001)]), "consuming* consuming*");
+        // One that went on meanwhile is taken from its first value.
+        consumer.reset();
+        assert_eq!(run(&mut consumer, &[Some(0x9001)]), "consuming*");
+    }
+
     #[test]
     fn a_producer_that_stands_still_has_nothing_new_after_a_reset() {
         for word in [0x5003, 0x0003, 0x0001] {

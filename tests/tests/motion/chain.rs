@@ -119,12 +119,17 @@ impl Chain {
 
     /// A rig whose bus is up.
     pub fn ready(self) -> Rig {
+        self.ready_with("")
+    }
+
+    /// The same with more limits of the axis.
+    pub fn ready_with(self, limits: &str) -> Rig {
         let (south, cycle, drives) = match self.bus {
             Bus::Sercos => (SERCOS, "2 ms", vec![(1, UnitKind::Rotary)]),
             Bus::Canopen => (CANOPEN, "4 ms", Vec::new()),
             Bus::Devicenet => (DEVICENET, "10 ms", Vec::new()),
         };
-        let configuration = format!("{FRONT}{south}").replace("CYCLE", cycle);
+        let configuration = format!("{FRONT}{limits}{south}").replace("CYCLE", cycle);
         Rig::ready(Settings { configuration, drives, ..Settings::default() })
     }
 

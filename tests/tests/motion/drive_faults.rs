@@ -3,15 +3,21 @@
 //! A drive that resets itself shows its error for as long as the row says, one telegram at the least, and can then be enabled again.
 //! Whatever the time, the axis has to be faulted from the first telegram, and nothing but a reset may bring it back.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use axisbridge_tests::rig::Rig;
+use axisbridge_tests::rig::ports::TamperCan;
+use axisbridge_tests::rig::{Rig, Tamper};
 use profile_cip::controller::{Controller, Step};
+use profile_cip::devicenet::wire::{Identifier, MacId};
 use profile_cip::target::axis_state::AxisState;
 use profile_cip::wire::motion::codes::ControlMode;
+use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
 use profile_generic::quantity::Position;
 use profile_generic::time::DurationNs;
+use profile_sercos::master::layout::ConnectionPlace;
+use profile_sercos::wire::header::Kind;
 
 use crate::chain::{Bus, Chain};
 use crate::scenario::AXIS;
@@ -57,8 +63,12 @@ enum Trouble {
     Silence,
     /// Its torque is gone without a word.
     TorqueLost,
+    /// Its telegrams arrive, and bring what they brought before: nothing else about them is wrong.
+    StaleData,
     /// Its position is another one from one value to the next.
     PositionJump,
+    /// The same of an axis with a velocity limit: it cannot have gone there.
+    PositionJumpWithLimit,
 }
 
 impl Trouble {
@@ -68,17 +78,20 @@ impl Trouble {
             Self::MainPower => "main power off".to_owned(),
             Self::Silence => "silence".to_owned(),
             Self::TorqueLost => "torque lost".to_owned(),
+            Self::StaleData => "stale data".to_owned(),
             Self::PositionJump => "position jump".to_owned(),
+            Self::PositionJumpWithLimit => "position jump, with a limit".to_owned(),
         }
     }
 
     fn begin(self, rig: &mut Rig, bus: Bus) {
         match self {
             Self::Silence => silence(rig, bus, true),
+            Self::StaleData => stale_data(rig, bus, true),
             Self::MainPower => main_power(rig, bus, false),
             Self::Fault(cause) => servo(rig, bus).raise_fault(cause),
             Self::TorqueLost => servo(rig, bus).lose_torque(),
-            Self::PositionJump => {
+            Self::PositionJump | Self::PositionJumpWithLimit => {
                 let servo = servo(rig, bus);
                 let there = servo.position();
                 servo.set_position(Position(there.get() + 2_000_000_000));
@@ -89,10 +102,11 @@ impl Trouble {
     fn end(self, rig: &mut Rig, bus: Bus) {
         match self {
             Self::Silence => silence(rig, bus, false),
+            Self::StaleData => stale_data(rig, bus, false),
             Self::MainPower => main_power(rig, bus, true),
             Self::Fault(cause) if bus == Bus::Canopen => can_axis(rig).recover(cause),
             Self::Fault(cause) => servo(rig, bus).recover(cause),
-            Self::TorqueLost | Self::PositionJump => {}
+            Self::TorqueLost | Self::PositionJump | Self::PositionJumpWithLimit => {}
         }
     }
 }
@@ -129,6 +143,60 @@ fn silence(rig: &mut Rig, bus: Bus, begins: bool) {
         Bus::Canopen => rig.can[0].bus.connect(now, 0, !begins),
         Bus::Devicenet => rig.devicenet[0].bus.connect(now, 0, !begins),
     }
+}
+
+/// SERCOS: C-CON and the values of its connection stand still, while the drive's service channel and device status go on. CANopen:
+/// its TPDO stays away, while heartbeats and SDO go on. DeviceNet: it answers each poll with the update of before.
+fn stale_data(rig: &mut Rig, bus: Bus, begins: bool) {
+    match bus {
+        Bus::Sercos => {
+            let place = produced(rig);
+            rig.tamper_frame = begins.then(|| standing_still(place));
+        }
+        Bus::Canopen => {
+            let tpdo = Id::Standard(0x181);
+            rig.can[0].tamper = begins.then(|| -> TamperCan { Box::new(move |_, frame| frame.id() != tpdo) });
+        }
+        Bus::Devicenet => rig.devicenet[0].tamper = begins.then(repeating),
+    }
+}
+
+/// Where the drive's connection is in its AT.
+fn produced(rig: &Rig) -> ConnectionPlace {
+    let slave = rig.sercos().master().layout().slaves[0].as_ref().expect("it takes part");
+    *slave.connections.iter().find(|place| place.kind == Kind::At).expect("it produces")
+}
+
+fn standing_still(place: ConnectionPlace) -> Tamper {
+    /// Ethernet header and the header of the telegram, whose first byte has its type and number.
+    const DATA: usize = 20;
+    const TYPE: usize = 14;
+    let at = DATA + usize::from(place.at.offset);
+    let mut first = None;
+    Box::new(move |frame| {
+        let bytes = frame.as_mut_slice();
+        let is_at = bytes[TYPE] & 0x40 != 0 && bytes[TYPE] & 0x0F == place.at.telegram;
+        if let Some(values) = bytes.get_mut(at..at + usize::from(place.len)).filter(|_| is_at) {
+            let first = first.get_or_insert_with(|| values.to_vec());
+            values.copy_from_slice(first);
+        }
+        true
+    })
+}
+
+/// Every fragment of an answer is the one of the first answer that has its number.
+fn repeating() -> TamperCan {
+    let of = Identifier::PollResponse(MacId::new(5).expect("a MAC ID")).can();
+    let mut first = BTreeMap::<u8, Vec<u8>>::new();
+    Box::new(move |_, frame| {
+        if frame.id() == of
+            && let Some(fragment) = frame.data().first()
+        {
+            let kept = first.entry(*fragment).or_insert_with(|| frame.data().to_vec());
+            *frame = Frame::new(of, kept).expect("as long as it was");
+        }
+        true
+    })
 }
 
 /// The axis when the trouble begins.
@@ -171,7 +239,8 @@ impl During {
 /// A row: what the controller saw, and when.
 fn row(bus: Bus, during: During, trouble: Trouble, duration: Option<i64>) -> String {
     let chain = Chain { bus, synchronous: true };
-    let mut rig = chain.ready();
+    let limits = if trouble == Trouble::PositionJumpWithLimit { "velocity = 10.0\n" } else { "" };
+    let mut rig = chain.ready_with(limits);
     let mut config = chain.controller(&rig);
     config.axes[0].control_mode = ControlMode::VELOCITY;
     rig.connect_with(config, during.program());
@@ -233,7 +302,11 @@ fn table(bus: Bus) -> String {
     let mut text =
         String::from("during    trouble                       for        cycle  states of the axis\n");
     let mut rows = 0;
-    let running = CAUSES.map(Trouble::Fault).into_iter().chain([Trouble::MainPower, Trouble::Silence]);
+    let running = CAUSES.map(Trouble::Fault).into_iter().chain([
+        Trouble::MainPower,
+        Trouble::Silence,
+        Trouble::StaleData,
+    ]);
     let running = running.map(|trouble| (During::Running, trouble));
     let states = [During::Stopped, During::Starting, During::Stopping];
     let others = states.into_iter().flat_map(|during| TWO.map(|cause| (during, Trouble::Fault(cause))));
@@ -243,7 +316,7 @@ fn table(bus: Bus) -> String {
             rows += 1;
         }
     }
-    for trouble in [Trouble::TorqueLost, Trouble::PositionJump] {
+    for trouble in [Trouble::TorqueLost, Trouble::PositionJump, Trouble::PositionJumpWithLimit] {
         writeln!(text, "{}", row(bus, During::Running, trouble, None)).expect("a string takes everything");
         rows += 1;
     }
@@ -264,4 +337,24 @@ fn canopen() {
 #[test]
 fn devicenet_drives() {
     insta::assert_snapshot!(table(Bus::Devicenet));
+}
+
+/// The log has what was measured: a jump of two turns where 10 turns a second are possible.
+#[test]
+fn a_position_jump_says_how_far_the_axis_went_and_how_far_it_could() {
+    let chain = Chain { bus: Bus::Sercos, synchronous: true };
+    let mut rig = chain.ready_with("velocity = 10.0\n");
+    let mut config = chain.controller(&rig);
+    // In position control the drive would find a following error in the same cycle.
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    rig.connect_with(config, vec![Step::Enable(AXIS), Step::Dwell { seconds: 5.0 }]);
+    rig.run_until(DurationNs::from_millis(5_000), "Running", |rig| rig.report().steps_finished == 1);
+    rig.run_for(DurationNs::from_millis(200));
+    assert_eq!(rig.engine.axes()[0].fault(), None);
+    Trouble::PositionJumpWithLimit.begin(&mut rig, Bus::Sercos);
+    rig.run_for(DurationNs::from_millis(20));
+    let fault = rig.engine.axes()[0].fault().expect("a fault");
+    assert_eq!(fault.cause, FaultCause::FEEDBACK_DATA_LOSS);
+    let line = "the actual position changed by 2.000 u in 2 ms, possible are 0.050 u";
+    assert_eq!(rig.told().lines().filter(|told| told.ends_with(line)).count(), 1, "{}", rig.told());
 }

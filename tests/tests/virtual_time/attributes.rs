@@ -24,6 +24,9 @@ const SHORT: u8 = 0x13;
 const NOT_SUPPORTED: u8 = 0x14;
 const LONG: u8 = 0x15;
 
+/// Kept where the drive never uses more, and refused otherwise.
+const STOPPING_TORQUE: u16 = 611;
+
 fn octets(data_type: CipType) -> usize {
     data_type.width().map_or(1, |width| width.bytes())
 }
@@ -129,6 +132,11 @@ fn every_attribute_answers_as_its_row_in_the_dictionary_says() {
             check("set of what the connection sets", set(&other), &[NOT_SETTABLE]);
             continue;
         }
+        if id == STOPPING_TORQUE {
+            // Never set: 0, and no drive stops without torque.
+            check("set of one that is compared", set(&value), &[INVALID_VALUE]);
+            continue;
+        }
         check("set", set(&value), &[OK]);
         check("set with an octet less", set(&value[..value.len() - 1]), &[SHORT]);
         check("set with an octet more", set(&[&value[..], &[0]].concat()), &[LONG]);
@@ -149,6 +157,52 @@ fn every_attribute_answers_as_its_row_in_the_dictionary_says() {
         Some(AxisState::Running),
         "nothing of it has disturbed the axis"
     );
+}
+
+/// Drives of SERCOS and CANopen brake within their torque limits: a Stopping Torque below either of them would have no effect.
+#[test]
+fn stopping_torque_is_kept_where_the_drive_never_uses_more_and_refused_otherwise() {
+    let can = Settings {
+        configuration: include_str!("can.toml").to_owned(),
+        drives: Vec::new(),
+        ..Settings::default()
+    };
+    for (bus, settings) in [("SERCOS", Settings::default()), ("CANopen", can)] {
+        let mut rig = Rig::ready(settings);
+        rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);
+        rig.run_until(millis(10_000), "Stopped", |rig| {
+            rig.engine.devices()[0].axis_states().next().is_some_and(|(_, state)| state == AxisState::Stopped)
+        });
+        let client = Client::connect(&mut rig, CONTROLLER);
+        let (positive, negative) = (504, 505);
+        let get = |rig: &mut Rig, id| {
+            let (status, value) = client.ask(rig, GET, 1, Some(id), &[]);
+            assert_eq!(status, OK, "{bus} {id}");
+            f32::from_le_bytes(value.try_into().expect("a REAL"))
+        };
+        let set = |rig: &mut Rig, id, value: f32| client.ask(rig, SET, 1, Some(id), &value.to_le_bytes()).0;
+        let limit = get(&mut rig, positive);
+        assert_eq!(get(&mut rig, negative), -limit, "{bus}");
+        assert!(limit >= 100.0, "{bus}: {limit}");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, limit - 1.0), INVALID_VALUE, "{bus}: the drive uses more");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, -limit), INVALID_VALUE, "{bus}: it has no sign");
+        assert_eq!(get(&mut rig, STOPPING_TORQUE), 0.0, "{bus}: never set");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, limit), OK, "{bus}");
+        assert_eq!(get(&mut rig, STOPPING_TORQUE), limit, "{bus}");
+        // Both directions count.
+        assert_eq!(set(&mut rig, positive, 60.0), OK, "{bus}");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, 60.0), INVALID_VALUE, "{bus}: the other direction");
+        assert_eq!(set(&mut rig, negative, -60.0), OK, "{bus}");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, 60.0), OK, "{bus}");
+        // And stay below it.
+        assert_eq!(set(&mut rig, positive, 61.0), INVALID_VALUE, "{bus}");
+        assert_eq!(set(&mut rig, negative, -61.0), INVALID_VALUE, "{bus}");
+        assert_eq!([positive, negative].map(|id| get(&mut rig, id)), [60.0, -60.0], "{bus}");
+        assert_eq!(set(&mut rig, negative, -50.0), OK, "{bus}");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, 55.0), INVALID_VALUE, "{bus}: the positive direction");
+        assert_eq!(set(&mut rig, STOPPING_TORQUE, 61.0), OK, "{bus}");
+        assert_eq!(set(&mut rig, positive, 61.0), OK, "{bus}");
+    }
 }
 
 /// A list of all the attributes that exist, read in pieces that fit, with the same answers as one by one.

@@ -31,6 +31,11 @@ const MODE_SHOWN: u16 = 0x6061;
 const TARGET_POSITION: u16 = 0x607A;
 const SUPPORTED_MODES: u16 = 0x6502;
 
+/// With a limit that no test reaches, a position that changes all at once is a jump, unless homing has given it.
+fn with_velocity_limit() -> Limits {
+    Limits { velocity: Some(Velocity(40 * NANO)), ..Limits::default() }
+}
+
 /// An axis of a device with all of these modes.
 fn ready(modes: &[ModeSelection], prepare: impl FnOnce(&mut Cia402Axis, &mut DriveNode)) -> GenericCan {
     GenericCan::ready(0, modes.iter().copied(), Limits::default(), prepare)
@@ -262,7 +267,7 @@ fn a_frequency_converter_is_led_in_vl() {
 
 /// A ready axis with a home switch from 1.3 to 1.6 turns; method 24 looks for its lower edge upward.
 fn with_home_switch(modes: &[ModeSelection]) -> GenericCan {
-    let mut rig = ready(modes, |_, _| ());
+    let mut rig = GenericCan::ready(0, modes.iter().copied(), with_velocity_limit(), |_, _| ());
     let window = CaptureWindow { from: Position(1_300_000_000), to: Position(1_600_000_000) };
     rig.drive_mut().servo_mut().set_home_switch(Some(window));
     rig.set_number(0x6098, 0, 24);
@@ -463,7 +468,7 @@ fn a_drive_with_negative_polarity_goes_forward_where_its_positions_rise() {
 #[test]
 fn the_second_axis_of_a_device_goes_to_targets_and_homes() {
     let modes = [POSITION, TARGET, HOMING];
-    let mut rig = GenericCan::ready(1, modes, Limits::default(), |_, _| ());
+    let mut rig = GenericCan::ready(1, modes, with_velocity_limit(), |_, _| ());
     let first: Vec<String> =
         rig.axis().south().expect("a program").telegram.command.iter().map(ToString::to_string).collect();
     assert_eq!(first[..3], ["6840:00", "6860:00", "687A:00"]);

@@ -1,16 +1,18 @@
 //! Something is wrong with a drive, or with a command.
 
-use axisbridge::engine::axis::SILENCE_TIME_OUT;
+use axisbridge::engine::axis::{Awaited, SILENCE_TIME_OUT};
 use axisbridge::engine::notice::Notice;
+use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, both, in_motion, millis};
 use axisbridge_tests::rig::motion_checker::violation::Rule;
-use axisbridge_tests::rig::{BOX, Rig, Settings};
+use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AttributeSet, AxisSet, Failure, Step};
 use profile_cip::target::exception::ExceptionAction;
 use profile_cip::target::fault_log::LogKind;
 use profile_cip::wire::motion::attribute_list::{AttributeSelector, Range};
 use profile_cip::wire::motion::codes::{AlarmType, AxisStateCode, ClearingEvent, FaultType};
 use profile_generic::fault::FaultCause;
+use profile_generic::inhibit::Inhibits;
 use profile_generic::quantity::Torque;
 use profile_generic::state::{DriveState, Report};
 
@@ -467,9 +469,49 @@ fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {
     let told = [up.clone(), line(1), line(10)];
     assert_eq!(waits(&rig, 0), told, "after a second, and ten times as long after it");
     assert_eq!(waits(&rig, 1), std::slice::from_ref(&up), "it has all it needs");
+    // The status has the same line, and the inhibits say it in a bit.
+    let shown =
+        |rig: &Rig| rig.status().axes[..2].iter().map(|axis| (axis.wait, axis.inhibits)).collect::<Vec<_>>();
+    let now = shown(&rig);
+    let (wait, inhibits) = now[0];
+    let wait = wait.expect("it waits");
+    assert_eq!(wait.to_string(), line(wait.seconds), "{} s", wait.seconds);
+    assert!((10..12).contains(&wait.seconds), "{} s", wait.seconds);
+    assert_eq!((wait.item(), wait.word(), wait.mask(), wait.value()), (135, 0x4000, 0xC000, 0x8000));
+    // No controller has configured either.
+    let unconfigured = Inhibits::CONFIGURATION_INCOMPLETE;
+    assert_eq!((inhibits, now[1]), (Inhibits::NO_POWER | unconfigured, (None, unconfigured)));
     rig.drive_mut(0).set_main_power(true);
     rig.line.cut(1);
     rig.run_for(millis(3_000));
     assert_eq!(waits(&rig, 0).len(), 3);
     assert_eq!(waits(&rig, 1), [up, "waits since 1 s for its drive to be heard again".to_owned()]);
+    let now = shown(&rig);
+    assert_eq!(now[0], (None, unconfigured), "it has power");
+    assert_eq!(now[1].1, Inhibits::NO_DRIVE | unconfigured);
+    let wait = now[1].0.expect("it waits");
+    assert_eq!((wait.waiting.awaited, wait.waiting.shown), (Awaited::Hearing, None));
+}
+
+/// Volume 9 has a state and a status bit for missing power, and no start inhibit (Table 5-2.74): the axis is in Pre-Charge with
+/// DC Bus Up at 0, no bit of 676 and 677 is set, and an Enable is an error that leaves it there.
+#[test]
+fn an_axis_without_main_power_is_in_pre_charge_and_not_start_inhibited() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.drive_mut(0).set_main_power(false);
+    rig.connect(vec![Step::Dwell { seconds: 4.0 }]);
+    rig.run_for(millis(2_500));
+    let client = Client::connect(&mut rig, CONTROLLER);
+    let mut word = |instance, id| {
+        let (status, data) = client.ask(&mut rig, 0x0E, instance, Some(id), &[]);
+        assert_eq!(status, 0, "attribute {id}");
+        data.iter().rev().fold(0_u32, |word, octet| word << 8 | u32::from(*octet))
+    };
+    let [pre_charge, stopped] =
+        [AxisStateCode::PRE_CHARGE, AxisStateCode::STOPPED].map(|state| u32::from(state.0));
+    assert_eq!([1, 2].map(|axis| word(axis, 650)), [pre_charge, stopped]);
+    // Axis Status, DC Bus Up.
+    assert_eq!([1, 2].map(|axis| word(axis, 651) >> 2 & 1), [0, 1]);
+    assert_eq!([676, 677].map(|id| word(1, id)), [0, 0]);
+    assert_eq!(rig.status().axes[0].inhibits, Inhibits::NO_POWER, "the box's own status says it");
 }

@@ -32,6 +32,7 @@ impl AxisChannel {
         let Some(received) = received.filter(|received| received.alive) else {
             // Not connected yet, or more losses in a row than the connection bears.
             self.age_feedback();
+            self.plausibility.restart();
             self.report(now, system, Report::Silent);
             return;
         };
@@ -68,6 +69,7 @@ impl AxisChannel {
             if referenced != self.feedback.status.contains(StatusBits::REFERENCED) {
                 // The drive counts from another place.
                 self.velocimeter.restart();
+                self.plausibility.restart();
             }
             if !tells_velocity {
                 self.feedback.present.remove(FeedbackSet::VELOCITY);
@@ -100,6 +102,7 @@ impl AxisChannel {
         let moved = self.may_move();
         self.report(now, system, report);
         self.go_on_with_procedure(now);
+        self.judge_position(now, system, sampled);
         self.watch(system);
         self.watch_software_limits(system, moved);
         self.watch_limit_switches(system, moved);
@@ -124,11 +127,28 @@ impl AxisChannel {
         {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
             hearing.restart();
+            self.plausibility.restart();
         }
         if let Some(selection) = unit.selection() {
             (self.feedback.mode, self.feedback.interpolation) = (selection.mode, selection.interpolation);
         }
         self.feedback.status = self.feedback.status.difference(ProcedureUnit::STATUS).union(unit.status());
+    }
+
+    /// A position that the axis cannot have come to stops it: what goes by it would be as wrong.
+    fn judge_position(&mut self, now: MonotonicTime, system: SystemTime, sampled: MonotonicTime) {
+        // A drive that seeks its reference or starts up may count from another place at any moment.
+        if self.procedure.selection().is_some() || self.state() == DriveState::NotReady {
+            return self.plausibility.restart();
+        }
+        if !self.feedback.present.contains(FeedbackSet::POSITION) {
+            return;
+        }
+        let judged = self.plausibility.judge(self.feedback.position, sampled, self.limits.velocity);
+        if let Some(jump) = judged {
+            self.raise(now, system, Fault::new(FaultCause::FEEDBACK_DATA_LOSS, system));
+            self.jump = Some((system, jump));
+        }
     }
 
     pub(super) fn age_feedback(&mut self) {

@@ -1,6 +1,6 @@
 //! From the axis to the controller.
 
-use super::{AxisChannel, Loss, Trip};
+use super::{AxisChannel, Loss, PositionJump, Trip};
 use crate::mapping::CipFault;
 use profile_cip::target::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -72,6 +72,15 @@ impl AxisChannel {
             )
         };
         self.tripped.filter(|_| self.fault.is_some_and(limits))
+    }
+
+    /// The jump of the actual position, when that is the fault.
+    #[must_use]
+    pub fn jump(&self) -> Option<PositionJump> {
+        let (at, jump) = self.jump?;
+        self.fault
+            .filter(|fault| fault.cause == FaultCause::FEEDBACK_DATA_LOSS && fault.at == at)
+            .map(|_| jump)
     }
 
     /// The fault that stands.

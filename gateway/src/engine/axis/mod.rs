@@ -20,6 +20,7 @@ mod image;
 mod north;
 mod overtravel;
 mod own_words;
+mod position_jump;
 pub mod procedure;
 pub mod rest;
 mod sequence;
@@ -31,6 +32,7 @@ mod waiting;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::own_words::OwnWords;
+pub use self::position_jump::PositionJump;
 pub use self::waiting::{Awaited, Waiting};
 
 use self::hookup::TestRun;
@@ -204,6 +206,9 @@ pub struct AxisChannel {
     own_words: own_words::Reading,
     /// For a drive that tells positions and no velocity.
     velocimeter: velocimeter::Velocimeter,
+    plausibility: position_jump::Plausibility,
+    /// The jump that the fault of this instant is about.
+    jump: Option<(SystemTime, PositionJump)>,
     loss: Option<Loss>,
     /// The drive shows a fault whose cause is being read since then.
     cause_wanted: Option<MonotonicTime>,
@@ -288,6 +293,8 @@ impl AxisChannel {
             diagnosis: diagnosis::Diagnosis::default(),
             own_words: own_words::Reading::default(),
             velocimeter: velocimeter::Velocimeter::default(),
+            plausibility: position_jump::Plausibility::default(),
+            jump: None,
             loss: None,
             cause_wanted: None,
             drive_reset_wanted: false,
@@ -410,6 +417,7 @@ impl AxisChannel {
         self.feedback.present = FeedbackSet::empty();
         self.end_diagnosis();
         self.velocimeter.restart();
+        self.plausibility.restart();
         self.report(now, system, report);
         self.south = None;
         self.control_modes = None;
@@ -481,6 +489,7 @@ impl AxisChannel {
         if self.procedure.answer(program.procedures(), access, generation, result, now) {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
             hearing.restart();
+            self.plausibility.restart();
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use profile_generic::inhibit::Inhibits;
 use profile_generic::program::BitPattern;
 use profile_generic::sequence::SequenceStep;
 use profile_generic::state::{DriveState, Report};
@@ -34,6 +35,66 @@ pub enum Awaited {
 }
 
 impl Awaited {
+    /// Everything that can be waited for.
+    pub const ALL: &'static [Self] = &[
+        Self::Drive,
+        Self::Hearing,
+        Self::Initialisation,
+        Self::Power,
+        Self::Following,
+        Self::Stop,
+        Self::FaultReaction,
+        Self::Reset,
+    ];
+
+    /// Its number for programs outside, from 1; never changed, only added to. 0 stands for nothing.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Drive => 1,
+            Self::Hearing => 2,
+            Self::Initialisation => 3,
+            Self::Power => 4,
+            Self::Following => 5,
+            Self::Stop => 6,
+            Self::FaultReaction => 7,
+            Self::Reset => 8,
+        }
+    }
+
+    /// What has this number.
+    #[must_use]
+    pub fn of_code(code: u8) -> Option<Self> {
+        Self::ALL.iter().copied().find(|known| known.code() == code)
+    }
+
+    /// Its name in the register map.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Drive => "drive",
+            Self::Hearing => "hearing",
+            Self::Initialisation => "initialisation",
+            Self::Power => "power",
+            Self::Following => "following",
+            Self::Stop => "stop",
+            Self::FaultReaction => "fault_reaction",
+            Self::Reset => "reset",
+        }
+    }
+
+    /// What keeps the axis from being enabled while it waits for this; a start, a stop and a reset end by themselves.
+    #[must_use]
+    pub const fn inhibits(self) -> Inhibits {
+        match self {
+            Self::Drive | Self::Hearing => Inhibits::NO_DRIVE,
+            Self::Power => Inhibits::NO_POWER,
+            Self::Initialisation | Self::Following | Self::Stop | Self::FaultReaction | Self::Reset => {
+                Inhibits::empty()
+            }
+        }
+    }
+
     /// What the drive has to show for it.
     fn wanted(self) -> Option<&'static [Report]> {
         match self {
