@@ -270,11 +270,12 @@ impl Master {
                 }
                 (Some(_), Some(_)) => self.hears(channel, channel),
             };
-            if side.asked.is_some() && side.asked == self.isolation.sides[number(other(channel))].end {
-                // It was found from the other port.
-                side.asked = None;
-            }
-            if answered {
+            let rival = &mut self.isolation.sides[number(other(channel))].asked;
+            if answered && *rival == side.asked {
+                // It is asked by both: the other channel takes its question back first, in a cycle of its own, so that the
+                // handshake bits of both stay in step.
+                *rival = None;
+            } else if answered {
                 self.find(channel, &mut side);
             } else if late || side.asked.is_none() {
                 side.asked = None;
@@ -429,9 +430,10 @@ impl Master {
         }))
     }
 
-    /// Everybody is lost, and may come back: the search is on, or has brought stations back that have to be valid for some
-    /// cycles before they count.
-    pub(super) fn may_recover(&self) -> bool {
+    /// Whether lost slaves may be back in a moment: a station that hangs is searched for, or the search has brought slaves back
+    /// that have to be valid for some cycles before they count.
+    #[must_use]
+    pub fn may_recover(&self) -> bool {
         let returning = |station: &Station| station.valid_cycles > 0;
         self.isolation.is_busy() || self.stations[..self.found].iter().any(returning)
     }
