@@ -25,7 +25,7 @@
 
 use super::Master;
 use super::event::{End, Event, Port, SlaveId};
-use super::station::Station;
+use super::station::{Presence, Station};
 use super::topology::{Route, Topology};
 use crate::wire::device_control::{DeviceControl, Topology as Loop};
 use crate::wire::device_status::{DeviceStatus, InactivePort};
@@ -49,6 +49,8 @@ enum Stage {
     Asking,
     /// The station in front of the one found last is commanded to fast forward.
     Opening,
+    /// Nothing is wrong behind the one that turns the telegrams round: it is commanded to fast forward.
+    Passing,
     /// There is nobody else to ask.
     Done,
 }
@@ -74,7 +76,7 @@ impl Side {
     }
 
     const fn is_open(&self) -> bool {
-        matches!(self.stage, Stage::Asking | Stage::Opening)
+        matches!(self.stage, Stage::Asking | Stage::Opening | Stage::Passing)
     }
 }
 
@@ -246,12 +248,20 @@ impl Master {
         let at = number(channel);
         let mut side = self.isolation.sides[at];
         side.cycles = side.cycles.saturating_add(1);
-        let late = side.cycles > COMMAND_CYCLES;
-        let status = self.end_status(channel);
+        if side.stage == Stage::Passing {
+            let end = side.end.and_then(|end| self.redundancy.at(end));
+            if end.is_none_or(|index| self.stations[index].follows_command()) {
+                side = Side::default();
+            } else if side.cycles > COMMAND_CYCLES {
+                end.into_iter().for_each(|index| self.stations[index].command_topology(loopback(channel)));
+                side.asked = self.next_addressed(channel, side.end);
+                side.enter(Stage::Opening);
+            }
+        }
         if side.stage == Stage::Opening {
-            if status.is_some() {
+            if self.end_status(channel).is_some() {
                 side.enter(Stage::Asking);
-            } else if late {
+            } else if side.cycles > COMMAND_CYCLES {
                 // It was there when the one before heard its telegrams, and is not any more: the search ends where that one is.
                 let back = side.before.and_then(|before| self.redundancy.at(before));
                 if let Some(index) = back {
@@ -277,7 +287,7 @@ impl Master {
                 *rival = None;
             } else if answered {
                 self.find(channel, &mut side);
-            } else if late || side.asked.is_none() {
+            } else if side.cycles > COMMAND_CYCLES || side.asked.is_none() {
                 side.asked = None;
                 side.enter(Stage::Done);
             }
@@ -308,7 +318,8 @@ impl Master {
             if let Some(index) = self.redundancy.at(found) {
                 self.stations[index].command_topology(Loop::FastForward);
             }
-            *side = Side::default();
+            side.asked = None;
+            side.enter(Stage::Passing);
         }
     }
 
@@ -344,7 +355,11 @@ impl Master {
     /// One cycle of that.
     fn resume(&mut self, cycles: u16) {
         self.isolation.resuming = Some(cycles);
-        if self.redundancy.topology() == Topology::Ring {
+        let follows = |side: &Side| {
+            let end = side.end.and_then(|end| self.station_at(end));
+            end.is_none_or(|(_, station)| station.follows_command())
+        };
+        if self.redundancy.topology().is_ring() && self.isolation.sides.iter().all(follows) {
             self.isolation = Isolation::default();
             self.emit(Event::RingClosed);
             self.measuring.ring_closed();
@@ -434,7 +449,7 @@ impl Master {
     /// that have to be valid for some cycles before they count.
     #[must_use]
     pub fn may_recover(&self) -> bool {
-        let returning = |station: &Station| station.valid_cycles > 0;
+        let returning = |station: &Station| station.presence == Presence::Lost && station.valid_cycles > 0;
         self.isolation.is_busy() || self.stations[..self.found].iter().any(returning)
     }
 

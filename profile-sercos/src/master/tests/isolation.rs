@@ -275,6 +275,8 @@ fn cycles_that_the_master_did_not_hear_are_nobodys_fault() {
             wanted[0] = 0;
             assert_eq!(run(&mut rig, 40), wanted, "{ports:?} {deaf}");
             assert_eq!(active(&rig).len(), 12, "{ports:?} {deaf}");
+            let blamed = |event: &&Event| matches!(event, Event::Isolated { .. } | Event::CableOpen { .. });
+            assert_eq!(rig.log.iter().find(blamed), None, "{ports:?} {deaf}");
             let whole = if ports == Ports::Both { Topology::Ring } else { Topology::LineOne };
             assert_eq!(rig.master.topology(), whole);
             rig.forget();
