@@ -10,8 +10,8 @@ use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
 use profile_cip::wire::motion::codes::ControlMode;
-use profile_sercos::police::court::Tried;
 use profile_sercos::police::Offender;
+use profile_sercos::police::court::Tried;
 
 use super::{AXIS, Outcome, does, said, table};
 
@@ -89,7 +89,10 @@ fn wordy(rig: &Rig, slave: &SercosSlave) {
         println!("{:#?}", slave.log());
         for refused in slave.refused() {
             let way = if refused.write { "write" } else { "read" };
-            println!("{way} of {}.{} {:02x?}: {:04x}", refused.idn, refused.element, refused.bytes, refused.code);
+            println!(
+                "{way} of {}.{} {:02x?}: {:04x}",
+                refused.idn, refused.element, refused.bytes, refused.code
+            );
         }
         for breach in rig.court.police.breaches() {
             println!("the police: {breach}");
@@ -190,12 +193,27 @@ fn telegrams_and_classes() {
         ("SCP_FixCFG, velocity", Oddities::fixcfg(), VELOCITY, V),
         ("SCP_FixCFG, velocity, nothing told", Oddities::fixcfg(), "", V),
         ("SCP_FixCFG, position", fixed(&[134, 47], &[135, 51]), "modes = [\"position\"]", P),
-        ("SCP_FixCFG, position asked of a list for velocity", Oddities::fixcfg(), "modes = [\"position\"]", P),
+        (
+            "SCP_FixCFG, position asked of a list for velocity",
+            Oddities::fixcfg(),
+            "modes = [\"position\"]",
+            P,
+        ),
         ("SCP_FixCFG, control word last", fixed(&[36, 134], &[40, 51, 135]), VELOCITY, V),
         ("SCP_FixCFG, producer first, a third connection", Oddities::odd_order(), VELOCITY, V),
-        ("SCP_FixCFG, its setup fixed as well", Oddities { fixed_setup: true, ..Oddities::fixcfg() }, VELOCITY, V),
+        (
+            "SCP_FixCFG, its setup fixed as well",
+            Oddities { fixed_setup: true, ..Oddities::fixcfg() },
+            VELOCITY,
+            V,
+        ),
         ("SCP_FixCFG, a torque command beside", fixed(&[134, 36, 80], &[135, 51, 40]), VELOCITY, V),
-        ("SCP_FixCFG, both commands, both modes", fixed(&[134, 36, 47], &[135, 51, 40]), "modes = [\"velocity\", \"position\"]", V),
+        (
+            "SCP_FixCFG, both commands, both modes",
+            fixed(&[134, 36, 47], &[135, 51, 40]),
+            "modes = [\"velocity\", \"position\"]",
+            V,
+        ),
         ("SCP_FixCFG, without the control word", fixed(&[36], &[135, 51, 40]), VELOCITY, V),
         ("SCP_FixCFG, without the status word", fixed(&[134, 36], &[51, 40]), VELOCITY, V),
         ("SCP_FixCFG, without a position", fixed(&[134, 36], &[135, 40]), VELOCITY, V),
@@ -235,7 +253,12 @@ fn parameters_and_the_service_channel() {
     let rows = vec![
         ("a small drive, velocity only", Oddities::sparse(), "", V),
         ("a small drive, asked for position", Oddities::sparse(), "modes = [\"position\"]", P),
-        ("velocity only, modes not told", with(|it| (it.modes, it.absent) = (vec![2], vec![Idn::s(292)])), "", V),
+        (
+            "velocity only, modes not told",
+            with(|it| (it.modes, it.absent) = (vec![2], vec![Idn::s(292)])),
+            "",
+            V,
+        ),
         ("position mode of another number", with(|it| it.modes = vec![4, 2]), "", P),
         ("modes of SERCOS II's bits", with(|it| it.old_mode_bits = true), "", P),
         ("without class 1 diagnostic", without(&[11]), "", P),
@@ -311,7 +334,8 @@ fn parameters_and_the_service_channel() {
             "scaling read only, linear",
             with(|it| {
                 it.scaling.read_only = true;
-                (it.scaling.position_type, it.scaling.velocity_type, it.scaling.acceleration_type) = (1, 1, 1);
+                (it.scaling.position_type, it.scaling.velocity_type, it.scaling.acceleration_type) =
+                    (1, 1, 1);
             }),
             "",
             P,
@@ -350,7 +374,12 @@ fn phases_and_states() {
             P,
         ),
         ("S-0-0128 fails with a list", with(|it| it.refuse_cp4 = vec![Idn::s(100)]), "", P),
-        ("S-0-0128 fails, and is not busy", with(|it| (it.refuse_cp4, it.error_without_busy) = (vec![Idn::s(100)], true)), "", P),
+        (
+            "S-0-0128 fails, and is not busy",
+            with(|it| (it.refuse_cp4, it.error_without_busy) = (vec![Idn::s(100)], true)),
+            "",
+            P,
+        ),
         ("S-0-0127 fails without a reason", failing(127), "", P),
         ("ignores the switch to CP1", with(|it| it.ignore_switch_to = Some(1)), "", P),
         ("ignores the switch to CP2", with(|it| it.ignore_switch_to = Some(2)), "", P),

@@ -755,7 +755,9 @@ impl Bus for SercosBus {
         let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
         let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
         let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = self.idle && !self.isolated && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
+        let rescan = self.idle
+            && !self.isolated
+            && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
         let led = |drive: &Drive| axes[drive.axis].may_have_torque();
         if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
             self.master.give_way(now);
