@@ -250,6 +250,7 @@ impl Scanner {
             Event::DoubleAddress { .. }
             | Event::AddressConflict { .. }
             | Event::ClassMismatch { .. }
+            | Event::Isolated { .. }
             | Event::CableOpen { .. } => {
                 self.bus.findings.push(event.to_string());
             }

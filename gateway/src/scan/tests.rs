@@ -13,6 +13,9 @@ use crate::config::{AxisKind, Config, DriveAt, Link};
 use crate::mapping::Mapping;
 use crate::simulate::drives::{DriveNetwork, SIMULATED_MAC, drives};
 
+const NOBODY: &str =
+    "no slave answers; with the link up: a station passes no telegrams on, or it is no SERCOS III slave";
+
 fn config() -> MasterConfig {
     MasterConfig { stable_cycles: 10, ..MasterConfig::new(SIMULATED_MAC, 2_000_000) }
 }
@@ -164,10 +167,10 @@ impl EthernetPort for Nobody {
 #[test]
 fn an_empty_bus_is_told() {
     let bus = scan_of(&mut Nobody);
-    assert_eq!(bus.findings, ["no slave answers"]);
+    assert_eq!(bus.findings, [NOBODY]);
     assert!(bus.slaves.is_empty());
     let mapping = Mapping::embedded().unwrap();
-    assert_eq!(text(&bus, &mapping.dictionaries.sercos), "0 slaves\n! no slave answers\n");
+    assert_eq!(text(&bus, &mapping.dictionaries.sercos), format!("0 slaves\n! {NOBODY}\n"));
 }
 
 #[test]

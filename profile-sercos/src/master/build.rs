@@ -14,7 +14,7 @@ use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
 use crate::wire::error::put_u16;
 use crate::wire::extended::{EXTENDED_LEN, EXTENDED_OFFSET, Extended};
-use crate::wire::header::{Kind, Phase, PhaseField, TELEGRAMS_MAX};
+use crate::wire::header::{Channel, Kind, Phase, PhaseField, TELEGRAMS_MAX};
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::SVC_LEN;
 
@@ -123,13 +123,24 @@ impl Master {
         }
         self.frames.copy_mdts();
         if let Some([_, secondary]) = fields {
-            self.frames.edit_secondary_mdt(|data| {
+            self.frames.edit_mdt(Channel::Secondary, 0, |data| {
                 let _ = secondary.emit(data);
             });
         }
+        self.build_questions();
         for (number, len) in used(at) {
             self.frames.add(Kind::At, number, len, |_| {}, |_| {});
         }
+    }
+
+    /// Gives a slave another C-DEV in the MDTs of one channel.
+    pub(super) fn write_control(&mut self, channel: Channel, index: usize, control: DeviceControl) {
+        let Some(slot) = slot(self.layout_phase, &self.layout, index, Kind::Mdt) else { return };
+        self.frames.edit_mdt(channel, slot.device.0, |data| {
+            if data.len() >= slot.device.1 + DEVICE_WORD_LEN {
+                put_u16(data, slot.device.1, control.bits());
+            }
+        });
     }
 
     /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds

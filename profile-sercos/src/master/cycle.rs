@@ -73,6 +73,10 @@ impl Master {
         if let Some(event) = self.wants_down() {
             return Some(event);
         }
+        if self.isolation.is_busy() {
+            // Who is not heard now will be, or not, in a few cycles.
+            return None;
+        }
         let target = self.target.unwrap_or(Phase::CP0);
         match self.state {
             State::Nrt | State::Cp4 => None,
@@ -229,6 +233,9 @@ impl Master {
 
     /// Whether the ATs that have come back have the data of every slave.
     pub(super) fn is_complete(&mut self) -> bool {
+        if let Some(complete) = self.search_is_complete() {
+            return complete;
+        }
         let back = |route: &Route| self.frames.all_back(Kind::At, *route);
         let scanned = self.scan.survey().map_or(&[][..], |survey| survey.topology.routes());
         let routes = match self.layout_phase {
@@ -341,6 +348,7 @@ impl Master {
     }
 
     fn supervise(&mut self) {
+        let excused = self.excuses_silence();
         for index in 0..self.found {
             let valid = self.is_valid(&self.stations[index]);
             let allowed = self.config.slave_valid_misses;
@@ -353,6 +361,7 @@ impl Master {
             }
             match station.presence {
                 Presence::Active if valid => station.misses = 0,
+                Presence::Active if excused => {}
                 Presence::Active => {
                     station.misses = station.misses.saturating_add(1);
                     if station.misses > allowed {
@@ -369,7 +378,7 @@ impl Master {
                 Presence::Excluded | Presence::Absent | Presence::Joining => {}
             }
         }
-        if !self.stations[..self.found].iter().any(Station::is_active) {
+        if !self.stations[..self.found].iter().any(Station::is_active) && !self.may_recover() {
             self.all_lost();
         }
     }

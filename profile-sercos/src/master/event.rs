@@ -130,7 +130,8 @@ pub enum Event {
         /// Slaves found.
         slaves: u16,
     },
-    /// CP0: no telegram comes back, or nobody is there.
+    /// CP0: no telegram comes back, or nobody is there. Where the link is up, a station does not pass telegrams on: C-DEV, by
+    /// which it could be found, exists from CP1 on.
     NoSlaves,
     /// CP0: topology or address list do not become stable.
     ScanUnstable,
@@ -250,6 +251,18 @@ pub enum Event {
         /// The end nearer to port 2.
         high: End,
     },
+    /// Nothing came back any more though no slave had lost a link. The slaves were asked one after the other to turn the telegrams
+    /// round, and this one does not answer: it passes nothing on. What is in front of it goes on.
+    Isolated {
+        /// The slave.
+        slave: SlaveId,
+        /// Its SERCOS address.
+        address: u16,
+        /// The master's port from which the telegrams come that end at it.
+        port: Port,
+        /// Who turns them round in front of it; the master's own port when nobody is in front of it.
+        end: End,
+    },
     /// The ring was open and is closed again.
     RingClosed,
     /// A slave did not do what closes the ring. It is open as before, and tried again after a while.
@@ -347,12 +360,22 @@ impl fmt::Display for Event {
                 f.write_str("no SERCOS telegrams any more until the other master has been silent for a while")
             }
             Event::Scanned { slaves } => write!(f, "{slaves} slaves found"),
-            Event::NoSlaves => f.write_str("no slave answers"),
+            Event::NoSlaves => f.write_str(
+                "no slave answers; with the link up: a station passes no telegrams on, or it is no SERCOS III slave",
+            ),
             Event::ScanUnstable => f.write_str("topology or address list do not become stable"),
             Event::TooManySlaves { found, max } => write!(f, "{found} slaves found, room for {max}"),
             Event::Missing { address } => write!(f, "the slave with address {address} was not found"),
             Event::Topology(topology) => write!(f, "topology: {topology}"),
             Event::CableOpen { low, high } => write!(f, "no connection between {low} and {high}"),
+            Event::Isolated { slave, address, port, end: End::Master(_) } => {
+                write!(f, "{slave} with address {address} passes no telegrams on: nobody is reached from {port}")
+            }
+            Event::Isolated { slave, address, port, end } => write!(
+                f,
+                "{slave} with address {address} passes no telegrams on though its link is up: those from {port} are \
+                 turned round in front of it by {end}"
+            ),
             Event::RingClosed => f.write_str("the ring is closed again"),
             Event::RingNotClosed { slave, address } => {
                 write!(f, "the ring cannot be closed: {slave} (address {address}) does not do as commanded")

@@ -147,10 +147,10 @@ impl Frames {
         }
     }
 
-    /// Changes MDT0 on port 2, once it is complete.
-    pub fn edit_secondary_mdt(&mut self, edit: impl FnOnce(&mut [u8])) {
-        let mdt0 = TelegramType::new(Channel::Secondary, Kind::Mdt, 0);
-        if let Some(frame) = self.sent[..self.used].iter_mut().find(|sent| sent.telegram == mdt0) {
+    /// Changes an MDT of one channel, once it is complete; nothing where that channel or that MDT is not sent.
+    pub fn edit_mdt(&mut self, channel: Channel, number: u8, edit: impl FnOnce(&mut [u8])) {
+        let mdt = TelegramType::new(channel, Kind::Mdt, number);
+        if let Some(frame) = self.sent[..self.used].iter_mut().find(|sent| sent.telegram == mdt) {
             edit(&mut frame.bytes[HEADER_LEN..frame.len]);
         }
     }

@@ -25,6 +25,7 @@ pub mod event;
 pub mod foreign;
 mod frames;
 pub mod hot_plug;
+mod isolation;
 pub mod layout;
 mod measure;
 pub mod phase;
@@ -47,6 +48,7 @@ use self::event::{Event, Output, Port, Refusal, SlaveId, Statistics, Ticket};
 use self::foreign::{Foreign, OtherMaster};
 use self::frames::Frames;
 use self::hot_plug::Admission;
+use self::isolation::Isolation;
 use self::layout::CyclicLayout;
 use self::measure::Measuring;
 use self::phase::{PhaseEvent, State};
@@ -124,6 +126,7 @@ pub struct Master {
     evaluated: bool,
     scan: Scan,
     redundancy: Redundancy,
+    isolation: Isolation,
     admission: Admission,
     measuring: Measuring,
     foreign: Foreign,
@@ -174,6 +177,7 @@ impl Master {
             evaluated: true,
             scan: Scan::new(config.stable_cycles, config.scan_timeout_cycles),
             redundancy: Redundancy::new(config.ports, slaves),
+            isolation: Isolation::default(),
             admission: Admission::new(&config),
             measuring: Measuring::default(),
             foreign: Foreign::default(),
@@ -312,8 +316,8 @@ impl Master {
 
     /// Takes a frame from the network. A refused one changes nothing; it is counted by its reason.
     pub fn handle_frame(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> Result<(), Refusal> {
-        let redundancy = &self.redundancy;
-        match self.frames.receive(port, frame, |route| redundancy.admits(route)) {
+        let (redundancy, isolating) = (&self.redundancy, self.isolation.is_busy());
+        match self.frames.receive(port, frame, |route| redundancy.admits(route, isolating)) {
             Ok(kind) => {
                 self.statistics.accepted += 1;
                 if kind == Kind::At && !self.evaluated && self.is_complete() {
@@ -565,6 +569,9 @@ impl Master {
         self.condition = false;
         self.left_before = false;
         self.proceed = false;
+        if next.announces().is_some() || next.phase().is_none() {
+            self.reset_isolation();
+        }
         self.enter(now, last);
         true
     }

@@ -86,8 +86,38 @@ impl Redundancy {
         }
     }
 
-    pub fn admits(&self, route: Route) -> bool {
-        self.watch.topology.admits(route, self.closing != Closing::Idle)
+    /// Whether telegrams can come in on this route; `changing` while stations are being commanded.
+    pub fn admits(&self, route: Route, changing: bool) -> bool {
+        self.watch.topology.admits(route, changing || self.closing != Closing::Idle)
+    }
+
+    /// The index of the station at a position from port 1 on.
+    pub fn at(&self, position: usize) -> Option<usize> {
+        self.order.get(position).copied().map(usize::from)
+    }
+
+    /// The position next to another one, or to the port, on the way of this channel's telegrams. None behind an open cable.
+    pub fn neighbour(&self, channel: Channel, position: Option<usize>) -> Option<usize> {
+        let (next, cable) = match (channel, position) {
+            (Channel::Primary, None) => (0, 0),
+            (Channel::Primary, Some(position)) => (position + 1, position + 1),
+            (Channel::Secondary, None) => (self.order.len().checked_sub(1)?, self.order.len()),
+            (Channel::Secondary, Some(position)) => (position.checked_sub(1)?, position),
+        };
+        let whole = self.open.get(cable).is_some_and(|open| !open);
+        (whole && next < self.order.len()).then_some(next)
+    }
+
+    /// A cable is open of which nobody is told by the slaves at its ends.
+    pub fn note_open(&mut self, cable: usize) {
+        if let Some(open) = self.open.get_mut(cable) {
+            *open = true;
+        }
+    }
+
+    /// What spoke for closing the ring counts no more.
+    pub fn leave_open(&mut self) {
+        self.closing = Closing::Idle;
     }
 
     /// The cables make a ring, or are being made one: C-DEV bit 11.
@@ -195,6 +225,7 @@ impl Master {
     /// The handshake bits start anew with each phase.
     pub(super) fn reset_topology_commands(&mut self) {
         self.redundancy.closing = Closing::Idle;
+        self.reset_isolation();
         self.admission.reset();
         for station in &mut self.stations[..self.found] {
             station.command = DeviceControl::empty();
@@ -202,7 +233,7 @@ impl Master {
     }
 
     /// The ends of a cable by its position.
-    fn cable(&self, cable: usize) -> (End, End) {
+    pub(super) fn cable(&self, cable: usize) -> (End, End) {
         let slave = |position: usize| {
             let index = usize::from(*self.redundancy.order.get(position)?);
             let address = self.stations.get(index)?.address;
@@ -239,12 +270,22 @@ impl Master {
                 self.emit(Event::Topology(topology));
             }
         }
-        self.find_open_cables();
-        if !self.redundancy.is_fixed() && self.state.announces().is_none() && !self.admission.is_busy() {
+        let switching = self.state.announces().is_some();
+        if !switching && !self.admission.is_busy() && self.redundancy.is_at_ease() {
+            self.isolate();
+        }
+        let isolating = self.isolation.is_busy();
+        if !isolating {
+            // Else they turn the telegrams round because they were asked to.
+            self.find_open_cables();
+        }
+        if !self.redundancy.is_fixed() && !switching && !self.admission.is_busy() && !isolating {
             self.close_ring();
         }
         if self.state == State::Cp4 {
-            self.admit();
+            if !isolating {
+                self.admit();
+            }
             self.measure_again();
         }
     }

@@ -164,6 +164,9 @@ impl Police {
         if telegram.kind() == Kind::Mdt && telegram.number() == 0 && self.phase >= Phase::CP3 {
             self.hot_plug_field(at, telegram.channel(), data);
         }
+        if telegram.kind() == Kind::Mdt && self.phase >= Phase::CP1 {
+            self.topology_commands(at, telegram, data);
+        }
         if telegram.kind() == Kind::Mdt && leads {
             self.mdt(at, telegram.number(), data);
         }
@@ -422,6 +425,16 @@ impl Police {
             for rule in rules {
                 self.breach(at, Offender::Master, rule);
             }
+        }
+    }
+
+    /// What the master tells the slaves about their topology, by either channel.
+    fn topology_commands(&mut self, at: MonotonicTime, telegram: TelegramType, data: &[u8]) {
+        let telegram = (telegram.channel(), telegram.number());
+        for index in 0..self.stations.len() {
+            let places = self.plan.as_ref().and_then(|plan| plan.slaves.get(index)?.as_ref());
+            let rule = self.stations[index].command(position(index), self.phase, telegram, data, places);
+            rule.into_iter().for_each(|rule| self.breach(at, Offender::Master, rule));
         }
     }
 

@@ -39,6 +39,8 @@ pub(super) struct Connection {
 pub(super) struct Places {
     pub svc_mdt: Offset,
     pub svc_at: Offset,
+    /// C-DEV; `None` like S-DEV.
+    pub control: Option<Offset>,
     /// S-DEV; `None` for a slave that only has a service channel yet.
     pub status: Option<Offset>,
     pub connections: Vec<Connection>,
@@ -158,7 +160,10 @@ impl Plan {
             ranges.push(svc_at.range(SVC_LEN));
         }
         self.drop(index);
-        self.set(index, Some(Places { svc_mdt, svc_at, status: None, connections: Vec::new(), own }));
+        self.set(
+            index,
+            Some(Places { svc_mdt, svc_at, control: None, status: None, connections: Vec::new(), own }),
+        );
     }
 
     /// A slave comes in with what it was told, beside the others and like `first`.
@@ -308,7 +313,7 @@ fn places(position: u16, slave: &Learned, taken: &mut Vec<Taken>, broken: &mut V
     for ranges in &mut own {
         ranges.sort_by_key(|range| range.start);
     }
-    Some(Places { svc_mdt, svc_at, status: Some(status), connections, own })
+    Some(Places { svc_mdt, svc_at, control: Some(control), status: Some(status), connections, own })
 }
 
 /// What every slave is told alike.

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::wire::device_control::DeviceControl;
 use crate::wire::header::{Kind, Phase, PhaseField, TelegramType};
 use crate::wire::hot_plug::{HotPlug, HotPlugCode};
 use crate::wire::idn::Idn;
@@ -244,6 +245,23 @@ pub enum Rule {
         /// The slave.
         slave: u16,
     },
+    /// C-DEV commands another topology together with its handshake bit only, and never store and forward.
+    TopologyCommand {
+        /// The slave.
+        slave: u16,
+        /// The commanded topology and the handshake bit.
+        found: DeviceControl,
+    },
+    /// The MDTs of the two channels command a slave alike, unless those of one channel ask it to turn that channel's telegrams
+    /// round: told anything else, it would turn its back on the only telegrams that it may get.
+    TopologyApart {
+        /// The slave.
+        slave: u16,
+        /// What the P telegrams command.
+        primary: DeviceControl,
+        /// What the S telegrams command.
+        secondary: DeviceControl,
+    },
     /// In CP1 the service channel only takes over the handshake bit.
     StepInCp1 {
         /// The slave.
@@ -380,6 +398,19 @@ impl fmt::Display for Rule {
             Rule::StepChanged { slave } => {
                 write!(f, "the step on the wire at position {slave} was changed without a handshake")
             }
+            Rule::TopologyCommand { slave, found } => {
+                write!(
+                    f,
+                    "position {slave} is commanded {} without a handshake, or what is no command",
+                    found.topology()
+                )
+            }
+            Rule::TopologyApart { slave, primary, secondary } => write!(
+                f,
+                "position {slave} is commanded {} by P telegrams and {} by S telegrams",
+                primary.topology(),
+                secondary.topology()
+            ),
             Rule::StepInCp1 { slave } => write!(f, "a step at position {slave} in CP1"),
             Rule::OutsideSlots { telegram, offset: Some(offset) } => {
                 write!(f, "changed byte {offset} of {telegram}, outside of its slots")

@@ -5,7 +5,7 @@ use super::plan::{Connection, Places};
 use super::rule::Rule;
 use crate::wire::connection::ConnectionControl;
 use crate::wire::cp12;
-use crate::wire::device_control::Topology;
+use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::error::u16_at;
 use crate::wire::header::{Channel, Kind, Phase};
@@ -36,6 +36,8 @@ pub(super) struct Station {
     /// On its way in by hot plug, with the telegrams of this channel.
     pub joining: bool,
     pub channel: Channel,
+    /// Topology command of C-DEV by channel, P first; `None` before the first MDT of the phase.
+    commands: [Option<DeviceControl>; 2],
     /// How it passed telegrams on in the last cycle.
     pub topology: Option<Topology>,
     /// Reported for this switch.
@@ -55,6 +57,7 @@ impl Default for Station {
             valid: false,
             joining: false,
             channel: Channel::Primary,
+            commands: [None; 2],
             topology: None,
             reported: false,
         }
@@ -71,6 +74,7 @@ impl Station {
     pub fn enter(&mut self, phase: Phase) {
         self.fresh = true;
         self.answer = None;
+        self.commands = [None; 2];
         self.inserts = false;
         self.reported = false;
         if phase <= Phase::CP1 {
@@ -154,6 +158,33 @@ impl Station {
         self.request(slave, phase, word)
     }
 
+    /// Takes its C-DEV of an MDT in CP1 to CP4, on either channel: how it is to pass telegrams on.
+    pub fn command(
+        &mut self,
+        slave: u16,
+        phase: Phase,
+        (channel, number): (Channel, u8),
+        data: &[u8],
+        places: Option<&Places>,
+    ) -> Option<Rule> {
+        let (_, at) = control_place(slave, phase, places).filter(|&(telegram, _)| telegram == number)?;
+        let word = data.get(at..at + 2).map(|bytes| DeviceControl::from_bits_retain(u16_at(bytes, 0)))?;
+        let own = DeviceControl::TOPOLOGY_CHANGE | DeviceControl::TOPOLOGY_1 | DeviceControl::TOPOLOGY_0;
+        let found = word.intersection(own);
+        let last = self.commands[usize::from(channel == Channel::Secondary)].replace(found);
+        let toggled = |last: DeviceControl| (last ^ found).contains(DeviceControl::TOPOLOGY_CHANGE);
+        let changed = last.is_some_and(|last| last.topology() != found.topology() && !toggled(last));
+        if changed || found.topology() == Topology::StoreAndForward {
+            return Some(Rule::TopologyCommand { slave, found });
+        }
+        let [Some(primary), Some(secondary)] = self.commands else { return None };
+        // One of the two is a question to whom the other one does not reach. In mid-cycle one of them may be the last cycle's.
+        let apart = primary != secondary && channel == Channel::Secondary;
+        let question = primary.topology() == Topology::LoopbackForwardPrimary
+            || secondary.topology() == Topology::LoopbackForwardSecondary;
+        (apart && !question).then_some(Rule::TopologyApart { slave, primary, secondary })
+    }
+
     /// Takes its part of an AT that it has just passed on.
     pub fn at(
         &mut self,
@@ -200,6 +231,14 @@ fn svc_place(kind: Kind, slave: u16, phase: Phase, places: Option<&Places>) -> O
         Kind::Mdt => places?.svc_mdt,
         Kind::At => places?.svc_at,
     };
+    Some((offset.telegram, usize::from(offset.offset)))
+}
+
+fn control_place(slave: u16, phase: Phase, places: Option<&Places>) -> Option<(u8, usize)> {
+    if phase < Phase::CP3 {
+        return cp12::place(slave).map(|place| (place.telegram, place.device));
+    }
+    let offset = places?.control?;
     Some((offset.telegram, usize::from(offset.offset)))
 }
 

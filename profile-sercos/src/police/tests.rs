@@ -1,5 +1,8 @@
 //! Networks of every size come up under the police, and every rule is broken once on purpose.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use super::bus::VirtualBus;
 use super::court::Tried;
 use super::learned::Learned;
@@ -235,6 +238,31 @@ fn every_rule_of_the_telegrams_is_seen_broken() {
     });
     case("step changed", master(State::Await2, Kind::Mdt, 0, |frame| frame[SVC_2 + 2] ^= frame[15] & 0x10));
     case("bits that are not on the wire", master(State::Await2, Kind::Mdt, 0, |frame| frame[SVC_2 + 1] = 1));
+    let topology = |frame: &mut Vec<u8>, bits: u8| frame[DEVICE_2 + 1] |= bits & frame[15].wrapping_mul(2);
+    case(
+        "topology without handshake",
+        master(State::Await2, Kind::Mdt, 0, move |frame| topology(frame, 0x20)),
+    );
+    case("store and forward", master(State::Await2, Kind::Mdt, 0, |frame| frame[DEVICE_2 + 1] |= 0x30));
+    case("S telegrams command otherwise", {
+        broken(State::Await2, |bus| {
+            // The same MDT again as an S telegram, in which slave 2 is to turn P telegrams round.
+            let sent = Rc::new(RefCell::new(Vec::new()));
+            let copy = sent.clone();
+            bus.outward = Box::new(move |frame| {
+                if is(frame, Kind::Mdt, 0) {
+                    copy.replace(frame.clone());
+                }
+                true
+            });
+            bus.cycles(1);
+            let mut frame = sent.borrow().clone();
+            frame[14] |= 0x80;
+            frame[DEVICE_2 + 1] ^= 0x50;
+            fix_crc(&mut frame);
+            bus.court.police.sent(bus.now, &frame);
+        })
+    });
     case("step in CP1", master(State::OpenSvc, Kind::Mdt, 0, |frame| frame[SVC_2] |= 0x0E));
     case("byte of another slave", slave_two(State::Await2, Kind::At, 0, |frame| frame[SVC_2 - 1] ^= 1));
     case("byte of nobody in CP4", slave_two(State::Cp4, Kind::At, 0, |frame| frame[HEADER_LEN + 3] ^= 1));

@@ -206,6 +206,11 @@ impl<A: Application> Slave<A> {
         self.ports.set_link(port, up);
     }
 
+    /// Sets the cycles which it takes to carry a topology command of C-DEV out; 0 after a new slave.
+    pub fn set_command_delay(&mut self, cycles: u8) {
+        self.ports.set_delay(cycles);
+    }
+
     /// Its ports, and how it passes telegrams on.
     pub fn ports(&self) -> &Ports {
         &self.ports

@@ -46,6 +46,13 @@ impl Way {
 struct Cable {
     up: bool,
     down: bool,
+    /// Both ends have their links, and no frame gets through.
+    blocked: bool,
+}
+
+impl Cable {
+    const WHOLE: Cable = Cable { up: true, down: true, blocked: false };
+    const CUT: Cable = Cable { up: false, down: false, blocked: false };
 }
 
 /// How a slave is plugged in.
@@ -56,10 +63,17 @@ struct Place {
     turned: bool,
     /// It takes telegrams and passes them on, but writes nothing into them.
     mute: bool,
+    /// It is switched on and does nothing: frames end at it.
+    hung: bool,
 }
 
 impl Place {
-    const NEW: Place = Place { powered: true, turned: false, mute: false };
+    const NEW: Place = Place { powered: true, turned: false, mute: false, hung: false };
+
+    /// It takes frames, and time passes for it.
+    const fn works(&self) -> bool {
+        self.powered && !self.hung
+    }
 
     /// The port on which a frame comes in on its way.
     const fn entry(&self, way: Way) -> Port {
@@ -102,7 +116,7 @@ impl<A: Application> Network<A> {
     pub fn ring(slaves: Vec<Slave<A>>) -> Self {
         let copy = Copied { bytes: [0; FRAME_MAX], cable: 0, way: Way::Up };
         let mut network = Network {
-            cables: vec![Cable { up: true, down: true }; slaves.len() + 1],
+            cables: vec![Cable::WHOLE; slaves.len() + 1],
             places: vec![Place::NEW; slaves.len()],
             slaves,
             copies: vec![copy; COPIES_MAX],
@@ -127,7 +141,7 @@ impl<A: Application> Network<A> {
     pub fn append(&mut self, slave: Slave<A>) {
         self.slaves.push(slave);
         self.places.push(Place::NEW);
-        self.cables.push(Cable { up: false, down: false });
+        self.cables.push(Cable::CUT);
         self.update_links();
     }
 
@@ -144,9 +158,17 @@ impl<A: Application> Network<A> {
     /// Sets the two wires of a cable: the one away from the master's port 1, and the one towards it.
     pub fn set_cable(&mut self, cable: usize, up: bool, down: bool) {
         if let Some(place) = self.cables.get_mut(cable) {
-            *place = Cable { up, down };
+            *place = Cable { up, down, ..*place };
         }
         self.update_links();
+    }
+
+    /// Makes a cable carry no frames while both its ends keep their links, as a media converter does whose far side is dead; or
+    /// lets it carry them again.
+    pub fn set_blocked(&mut self, cable: usize, blocked: bool) {
+        if let Some(place) = self.cables.get_mut(cable) {
+            place.blocked = blocked;
+        }
     }
 
     /// Turns a slave round: what was plugged into port 1 is plugged into port 2.
@@ -182,6 +204,14 @@ impl<A: Application> Network<A> {
         self.places.get(index).is_some_and(|place| place.mute)
     }
 
+    /// Hangs a slave up, or wakes it. A hung slave keeps the links of its neighbours up, passes no frame on and answers none; no
+    /// time passes for it. Woken, it is where it was, and finds out by itself how long the master has been silent for it.
+    pub fn set_hung(&mut self, index: usize, hung: bool) {
+        if let Some(place) = self.places.get_mut(index) {
+            place.hung = hung;
+        }
+    }
+
     /// Whether a master's port has a link.
     #[must_use]
     pub fn master_link(&self, port: Port) -> bool {
@@ -215,16 +245,16 @@ impl<A: Application> Network<A> {
     /// When [`handle_time`](Self::handle_time) has something to do unless a frame comes before; `None` without
     /// slaves.
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        self.powered().map(Slave::wake_at).min()
+        self.working().map(Slave::wake_at).min()
     }
 
-    fn powered(&self) -> impl Iterator<Item = &Slave<A>> {
-        self.slaves.iter().zip(&self.places).filter(|(_, place)| place.powered).map(|(slave, _)| slave)
+    fn working(&self) -> impl Iterator<Item = &Slave<A>> {
+        self.slaves.iter().zip(&self.places).filter(|(_, place)| place.works()).map(|(slave, _)| slave)
     }
 
     /// Looks after the time-outs of all slaves.
     pub fn handle_time(&mut self, now: MonotonicTime) {
-        for (slave, _) in self.slaves.iter_mut().zip(&self.places).filter(|(_, place)| place.powered) {
+        for (slave, _) in self.slaves.iter_mut().zip(&self.places).filter(|(_, place)| place.works()) {
             slave.handle_time(now);
         }
     }
@@ -302,7 +332,7 @@ impl<A: Application> Network<A> {
         // A frame passes each slave twice at most; more would be a loop.
         for _ in 0..=2 * self.slaves.len() {
             let wires = self.cables[cable];
-            if !(if way == Way::Up { wires.up } else { wires.down }) {
+            if wires.blocked || !(if way == Way::Up { wires.up } else { wires.down }) {
                 return;
             }
             let index = match way {
@@ -313,7 +343,7 @@ impl<A: Application> Network<A> {
             };
             let next = if way == Way::Up { cable + 1 } else { cable - 1 };
             let place = self.places[index];
-            if !place.powered {
+            if !place.works() {
                 return;
             }
             if watch.is_some() || place.mute {

@@ -34,6 +34,10 @@ pub struct Ports {
     /// The topology follows the links: CP0.
     follows: bool,
     toggle: bool,
+    /// Cycles which it takes to carry a topology command out.
+    delay: u8,
+    /// C-DEV of a command under way, and the cycles it still takes.
+    pending: Option<(DeviceControl, u8)>,
     /// What came in last on the inactive port.
     heard: Option<(Channel, MonotonicTime)>,
 }
@@ -47,8 +51,15 @@ impl Ports {
             topology: Topology::StoreAndForward,
             follows: false,
             toggle: false,
+            delay: 0,
+            pending: None,
             heard: None,
         }
+    }
+
+    /// Sets the cycles which it takes to carry a topology command out; by default it is done before the telegram has passed.
+    pub(super) fn set_delay(&mut self, cycles: u8) {
+        self.delay = cycles;
     }
 
     /// How telegrams are passed on.
@@ -160,7 +171,7 @@ impl Ports {
         self.follows = false;
         self.toggle = false;
         if !heard || self.inactive().is_none() {
-            *self = Ports { links: self.links, ..Ports::new() };
+            *self = Ports { links: self.links, delay: self.delay, ..Ports::new() };
         }
     }
 
@@ -179,6 +190,15 @@ impl Ports {
         let toggle = control.contains(DeviceControl::TOPOLOGY_CHANGE);
         let meant = control.contains(DeviceControl::MASTER_VALID) && toggle != self.toggle;
         if !meant || self.follows || self.topology == Topology::StoreAndForward {
+            self.pending = None;
+            return;
+        }
+        let left = match self.pending {
+            Some((same, left)) if same == control => left,
+            _ => self.delay,
+        };
+        self.pending = left.checked_sub(1).map(|left| (control, left));
+        if left > 0 {
             return;
         }
         self.toggle = toggle;

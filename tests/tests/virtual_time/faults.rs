@@ -434,6 +434,40 @@ fn a_lost_drive_is_major_faulted_when_nobody_waits_for_its_stop_any_longer_and_a
     assert!(silence.count() >= 1);
 }
 
+/// It keeps its links up and passes nothing on: nobody turns the telegrams round for it, and nothing comes back at all.
+#[test]
+fn a_drive_that_hangs_with_its_link_up_is_left_out_while_the_one_in_front_of_it_moves() {
+    let turntable = AxisSet::one(1);
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        Step::Enable(turntable),
+        Step::MoveAbsolute { axis: 1, position: 60.0, limits: TURNTABLE },
+        Step::WaitInWindow { axis: 1, window: 0.001, seconds: 1.0 },
+        Step::Disable(turntable),
+    ]);
+    rig.run_until(millis(5_000), "full speed", |rig| rig.velocity(0) > 49 * NANO / 10);
+    let before = rig.status();
+    rig.line.set_hung(1, true);
+    let mut slowest = i64::MAX;
+    rig.run_until(millis(500), "the search", |rig| {
+        slowest = slowest.min(rig.velocity(0));
+        rig.told().contains("passes no telegrams on")
+    });
+    assert!(slowest > 49 * NANO / 10, "{slowest}");
+    let line = "slave at position 2 with address 2 passes no telegrams on though its link is up: those from port 1 are \
+                turned round in front of it by the slave with address 1";
+    assert_eq!(rig.told().lines().filter(|told| *told == line).count(), 1, "{}", rig.told());
+    let report = rig.run(millis(60_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert!((rig.position(0) - 60 * NANO).abs() < NANO / 1_000);
+    assert_eq!(rig.status().axes[0].faults, 0);
+    // Two cycles in which nothing came back; in the third one the turntable turned the telegrams round.
+    assert_eq!(rig.status().axes[0].lost_telegrams - before.axes[0].lost_telegrams, 2);
+    // Nobody is connected any more, and still the bus is not started anew: phase 0 would find nobody.
+    rig.run_for(millis(60_000));
+    assert_eq!(rig.status().phase, 4, "{}", rig.told());
+}
+
 /// What the controller gets as a status, the log has as a sentence.
 #[test]
 fn a_refused_enable_is_logged_with_its_reason() {

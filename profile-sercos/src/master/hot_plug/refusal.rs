@@ -13,7 +13,7 @@ pub enum HotPlugRefusal {
     NoPlace,
     /// Something is plugged in at the end of a line, and no telegram comes back from it.
     #[error(
-        "something is plugged in at the end of the line and does not turn telegrams round: it has no SCP_HP, and \
+        "something is plugged in at the end of the line and does not turn telegrams round: it hangs or has no SCP_HP, and \
          stays out until the next scan (CP0)"
     )]
     NoTelegram,

@@ -115,6 +115,10 @@ fn three_missing_telegrams_lose_every_slave() {
     assert!(!rig.log.iter().any(|event| matches!(event, Event::SlaveLost { .. })));
     rig.cycles(1);
     assert!(rig.log.contains(&Event::SlaveLost { slave: SlaveId(0), address: 1, phase: Phase::CP4 }));
+    // The first slave of the line is asked to turn the telegrams round, in vain.
+    rig.cycles(10);
+    assert!(!rig.log.contains(&Event::AllSlavesLost));
+    rig.cycles(2);
     assert!(rig.log.contains(&Event::AllSlavesLost));
     // The master looks for slaves again and goes no further by itself.
     rig.run_until("scanning", |rig| rig.log.contains(&Event::NoSlaves));

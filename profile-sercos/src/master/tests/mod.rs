@@ -63,6 +63,7 @@ mod faults;
 mod foreign;
 mod full_slaves;
 mod hot_plug;
+mod isolation;
 mod phase_up;
 mod recording;
 mod ring;

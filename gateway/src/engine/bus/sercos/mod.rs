@@ -149,6 +149,8 @@ pub struct SercosBus {
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
     /// Since when a drive is lost that was there.
     lost_since: Option<MonotonicTime>,
+    /// A slave hangs and was left out. Phase 0 cannot get past it: a new scan would find nobody.
+    isolated: bool,
     rescan_pause: DurationNs,
     /// No controller is connected.
     idle: bool,
@@ -207,6 +209,7 @@ impl SercosBus {
             cycles_seen: 0,
             refused: ArrayVec::new(),
             lost_since: None,
+            isolated: false,
             rescan_pause: RESCAN_PAUSE,
             idle: true,
             planned: false,
@@ -249,6 +252,11 @@ impl SercosBus {
                 if self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive)) =>
             {
                 self.lost_since = None;
+            }
+            Event::Isolated { .. } => self.isolated = true,
+            Event::Phase(phase) if *phase == Phase::CP0 => {
+                self.isolated = false;
+                self.lose_all(now, system, axes);
             }
             Event::OtherMaster(_) => {
                 for drive in &self.drives {
@@ -776,9 +784,11 @@ impl Bus for SercosBus {
         }
         let cyclic = self.master.phase() == Some(Phase::CP4);
         let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
-        let alone = cyclic && self.drives.iter().all(gone);
+        let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
         let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = self.idle && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
+        let rescan = self.idle
+            && !self.isolated
+            && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
         let led = |drive: &Drive| axes[drive.axis].may_have_torque();
         if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
             self.master.give_way(now);

@@ -1,0 +1,465 @@
+//! A station that hangs with its links up: found, and left out by loopback.
+//!
+//! Its neighbours have their links, so that nobody turns the telegrams round: they end at it, on both channels, and nothing comes
+//! back at all. What the master sends still reaches every station in front of it, on either side. So the master has the
+//! stations turn the telegrams round (loopback by C-DEV), one after the other from its own port on:
+//!
+//! ```text
+//! port 1 === 1 === 2 === 3 = x = 4 === 5 === 6 === port 2
+//!            P>                             <S    first: the stations next to the ports
+//!            ok    P>                 <S    ok    then the next ones; the one before hears its own telegrams come back
+//!                  ok    P>    <S     ok          and is commanded to fast forward
+//! ```
+//!
+//! The station that turns the telegrams round hears its own ones on its inactive port as soon as the next one does so as
+//! well. Only then it is commanded to fast forward: nobody who has been found is lost again, and the last one that was found is
+//! where it has to be when the next one does not answer. What is behind it is left out until the next start, or comes in
+//! by hot plug.
+//!
+//! A station is commanded by the telegrams of one channel only, until it has answered on it. Were it told by both, one
+//! behind the break would hear of it from the other side, turn its back on the only telegrams it gets, and be lost.
+//!
+//! Cycles without any telegram may as well be the master's own fault, or over. When the first station found on a line hears
+//! its own telegrams, or telegrams get from one port to the other, nothing is wrong any more, and those that turn telegrams round
+//! are commanded to fast forward at once.
+
+use super::Master;
+use super::event::{End, Event, Port, SlaveId};
+use super::station::{Presence, Station};
+use super::topology::{Route, Topology};
+use crate::wire::device_control::{DeviceControl, Topology as Loop};
+use crate::wire::device_status::{DeviceStatus, InactivePort};
+use crate::wire::header::{Channel, Kind, Phase};
+
+/// Cycles in which a station has to follow a topology command.
+const COMMAND_CYCLES: u16 = 12;
+/// Cycles in a row without a telegram, at least, before anything is done about it.
+const SILENT_CYCLES_MIN: u16 = 2;
+
+/// Both channels, P first.
+const CHANNELS: [Channel; 2] = [Channel::Primary, Channel::Secondary];
+
+/// How far the search is from one port on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Stage {
+    /// Nothing is searched for on this side.
+    #[default]
+    Off,
+    /// The next station is asked to turn the telegrams round.
+    Asking,
+    /// The station in front of the one found last is commanded to fast forward.
+    Opening,
+    /// Nothing is wrong behind the one that turns the telegrams round: it is commanded to fast forward.
+    Passing,
+    /// There is nobody else to ask.
+    Done,
+}
+
+/// What a channel's telegrams reach from their port on. Stations by their position from port 1 on.
+#[derive(Debug, Clone, Copy, Default)]
+struct Side {
+    stage: Stage,
+    /// The one that turns the telegrams round.
+    end: Option<usize>,
+    /// The one that did so before.
+    before: Option<usize>,
+    /// The one that is asked to.
+    asked: Option<usize>,
+    /// Cycles in this stage.
+    cycles: u16,
+}
+
+impl Side {
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.cycles = 0;
+    }
+
+    const fn is_open(&self) -> bool {
+        matches!(self.stage, Stage::Asking | Stage::Opening | Stage::Passing)
+    }
+}
+
+/// The search for a station that hangs.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Isolation {
+    /// Cycles in a row without a telegram, by channel.
+    silent: [u16; 2],
+    sides: [Side; 2],
+    /// Cycles since both ends were commanded to fast forward because they hear each other.
+    resuming: Option<u16>,
+    /// That was tried, in vain.
+    resumed: bool,
+}
+
+impl Isolation {
+    /// Stations are being commanded.
+    pub fn is_busy(&self) -> bool {
+        self.sides.iter().any(|side| side.stage != Stage::Off)
+    }
+}
+
+const fn number(channel: Channel) -> usize {
+    match channel {
+        Channel::Primary => 0,
+        Channel::Secondary => 1,
+    }
+}
+
+/// How a station turns telegrams of this channel round.
+const fn loopback(channel: Channel) -> Loop {
+    match channel {
+        Channel::Primary => Loop::LoopbackForwardPrimary,
+        Channel::Secondary => Loop::LoopbackForwardSecondary,
+    }
+}
+
+/// What its inactive port shows while telegrams of this channel come in there.
+const fn heard(channel: Channel) -> InactivePort {
+    match channel {
+        Channel::Primary => InactivePort::PrimaryTelegram,
+        Channel::Secondary => InactivePort::SecondaryTelegram,
+    }
+}
+
+const fn other(channel: Channel) -> Channel {
+    match channel {
+        Channel::Primary => Channel::Secondary,
+        Channel::Secondary => Channel::Primary,
+    }
+}
+
+/// The port from which the telegrams of this channel are sent.
+const fn port_of(channel: Channel) -> Port {
+    match channel {
+        Channel::Primary => Port::One,
+        Channel::Secondary => Port::Two,
+    }
+}
+
+/// The route on which telegrams come back that were turned round.
+const fn route_of(channel: Channel) -> Route {
+    match channel {
+        Channel::Primary => Route::PRIMARY_ONE,
+        Channel::Secondary => Route::SECONDARY_TWO,
+    }
+}
+
+/// The command that asks a station to turn the telegrams of this channel round.
+fn asks(station: &Station, channel: Channel) -> DeviceControl {
+    station.command.with_topology(loopback(channel)).symmetric_difference(DeviceControl::TOPOLOGY_CHANGE)
+}
+
+impl Master {
+    /// One cycle of the search.
+    pub(super) fn isolate(&mut self) {
+        for channel in CHANNELS {
+            let silent = &mut self.isolation.silent[number(channel)];
+            let topology = self.redundancy.topology();
+            let expected = match topology {
+                Topology::Absent => false,
+                Topology::Ring | Topology::DefectRing { .. } => true,
+                _ => topology.routes().contains(&route_of(channel)),
+            };
+            // In a ring both are needed: where one of them comes back, no station swallows everything.
+            let frames = &self.frames;
+            let came = if topology.is_ring() {
+                Route::ALL.iter().any(|&route| frames.came(route))
+            } else {
+                frames.came(route_of(channel))
+            };
+            *silent = if expected && !came { silent.saturating_add(1) } else { 0 };
+            // Once for each silence: whom nobody answers is not asked again and again.
+            if *silent == SILENT_CYCLES_MIN.max(self.config.slave_valid_misses / 2) {
+                self.begin_search(channel);
+            }
+        }
+        if !self.isolation.is_busy() {
+            return;
+        }
+        if let Some(cycles) = self.isolation.resuming {
+            self.resume(cycles + 1);
+            return;
+        }
+        for channel in CHANNELS {
+            self.search(channel);
+        }
+        if self.is_whole() {
+            self.begin_resuming();
+        } else if !self.isolation.sides.iter().any(Side::is_open) {
+            self.end_search();
+        }
+    }
+
+    fn begin_search(&mut self, channel: Channel) {
+        if self.isolation.sides[number(channel)].stage != Stage::Off {
+            return;
+        }
+        self.redundancy.leave_open();
+        let asked = self.next_addressed(channel, None);
+        self.isolation.sides[number(channel)] = Side { stage: Stage::Asking, asked, ..Side::default() };
+    }
+
+    /// The next station behind `position`, or from the port on, that hears commands. A cable that is known to be open ends the
+    /// line, and so does what has been reached from the other port.
+    fn next_addressed(&self, channel: Channel, position: Option<usize>) -> Option<usize> {
+        let stop = self.isolation.sides[number(other(channel))].end;
+        let mut position = position;
+        loop {
+            let next = self.redundancy.neighbour(channel, position)?;
+            if Some(next) == stop {
+                return None;
+            }
+            if self.station_at(next)?.1.is_addressed(self.layout_phase) {
+                return Some(next);
+            }
+            position = Some(next);
+        }
+    }
+
+    fn station_at(&self, position: usize) -> Option<(usize, &Station)> {
+        let index = self.redundancy.at(position)?;
+        Some((index, self.stations.get(index)?))
+    }
+
+    /// What a station says that turns the telegrams of this channel round, seen on their own way back.
+    fn turns(&self, channel: Channel, position: usize, command: DeviceControl) -> Option<DeviceStatus> {
+        let (index, station) = self.station_at(position)?;
+        let status = self.valid_status(index)?;
+        let acknowledged = status.contains(DeviceStatus::TOPOLOGY_CHANGE)
+            == command.contains(DeviceControl::TOPOLOGY_CHANGE);
+        let own = station.valid_routes & 1 << route_of(channel).index() != 0;
+        (own && acknowledged && status.topology() == loopback(channel)).then_some(status)
+    }
+
+    /// The same of the station that turns this channel's telegrams round.
+    fn end_status(&self, channel: Channel) -> Option<DeviceStatus> {
+        let end = self.isolation.sides[number(channel)].end?;
+        self.turns(channel, end, self.station_at(end)?.1.command)
+    }
+
+    /// The station that turns this channel's telegrams round hears those of channel `wanted` on its inactive port.
+    fn hears(&self, channel: Channel, wanted: Channel) -> bool {
+        self.end_status(channel).is_some_and(|status| status.inactive_port() == heard(wanted))
+    }
+
+    /// One cycle of the search on one side.
+    fn search(&mut self, channel: Channel) {
+        let at = number(channel);
+        let mut side = self.isolation.sides[at];
+        side.cycles = side.cycles.saturating_add(1);
+        if side.stage == Stage::Passing {
+            let end = side.end.and_then(|end| self.redundancy.at(end));
+            if end.is_none_or(|index| self.stations[index].follows_command()) {
+                side = Side::default();
+            } else if side.cycles > COMMAND_CYCLES {
+                end.into_iter().for_each(|index| self.stations[index].command_topology(loopback(channel)));
+                side.asked = self.next_addressed(channel, side.end);
+                side.enter(Stage::Opening);
+            }
+        }
+        if side.stage == Stage::Opening {
+            if self.end_status(channel).is_some() {
+                side.enter(Stage::Asking);
+            } else if side.cycles > COMMAND_CYCLES {
+                // It was there when the one before heard its telegrams, and is not any more: the search ends where that one is.
+                let back = side.before.and_then(|before| self.redundancy.at(before));
+                if let Some(index) = back {
+                    self.stations[index].command_topology(loopback(channel));
+                }
+                (side.end, side.asked) = (side.before, None);
+                side.enter(Stage::Done);
+            }
+        }
+        if side.stage == Stage::Asking {
+            let answered = match (side.end, side.asked) {
+                (_, None) => false,
+                (None, Some(asked)) => {
+                    let command = self.station_at(asked).map(|(_, station)| asks(station, channel));
+                    command.and_then(|command| self.turns(channel, asked, command)).is_some()
+                }
+                (Some(_), Some(_)) => self.hears(channel, channel),
+            };
+            let rival = &mut self.isolation.sides[number(other(channel))].asked;
+            if answered && *rival == side.asked {
+                // It is asked by both: the other channel takes its question back first, in a cycle of its own, so that the
+                // handshake bits of both stay in step.
+                *rival = None;
+            } else if answered {
+                self.find(channel, &mut side);
+            } else if side.cycles > COMMAND_CYCLES || side.asked.is_none() {
+                side.asked = None;
+                side.enter(Stage::Done);
+            }
+        }
+        self.isolation.sides[at] = side;
+    }
+
+    /// The station that was asked turns the telegrams round.
+    fn find(&mut self, channel: Channel, side: &mut Side) {
+        let Some(found) = side.asked else { return };
+        if let Some(index) = self.redundancy.at(found) {
+            self.stations[index].command = asks(&self.stations[index], channel);
+        }
+        side.before = side.end.replace(found);
+        match side.before.and_then(|before| self.redundancy.at(before)) {
+            Some(index) => {
+                self.stations[index].command_topology(Loop::FastForward);
+                side.enter(Stage::Opening);
+            }
+            None => side.enter(Stage::Asking),
+        }
+        side.asked = self.next_addressed(channel, Some(found));
+        let command = self.station_at(found).map(|(_, station)| station.command);
+        let status = command.and_then(|command| self.turns(channel, found, command));
+        let hears_own = status.is_some_and(|status| status.inactive_port() == heard(channel));
+        if side.before.is_none() && hears_own {
+            // Nobody else has been asked yet: whoever ends the line turns the telegrams round, and all is well.
+            if let Some(index) = self.redundancy.at(found) {
+                self.stations[index].command_topology(Loop::FastForward);
+            }
+            side.asked = None;
+            side.enter(Stage::Passing);
+        }
+    }
+
+    /// Whether telegrams get from one port to the other, or would if the stations at the ends let them: nothing is wrong between
+    /// those.
+    fn is_whole(&self) -> bool {
+        let round = [Route::PRIMARY_TWO, Route::SECONDARY_ONE].iter().any(|&route| self.frames.came(route));
+        let [low, high] = self.isolation.sides.map(|side| side.end);
+        // Next to each other they are the ends of a ring that is closed in the usual way.
+        let apart = low.zip(high).is_some_and(|(low, high)| high > low + 1);
+        let hear = || CHANNELS.into_iter().all(|channel| self.hears(channel, other(channel)));
+        !self.isolation.resumed && (round || apart && hear())
+    }
+
+    /// Both ends are commanded to pass everything on again.
+    fn begin_resuming(&mut self) {
+        self.command_ends(|_| Loop::FastForward);
+        for side in &mut self.isolation.sides {
+            side.asked = None;
+        }
+        self.isolation.resuming = Some(0);
+    }
+
+    fn command_ends(&mut self, command: impl Fn(Channel) -> Loop) {
+        for channel in CHANNELS {
+            let end = self.isolation.sides[number(channel)].end;
+            if let Some(index) = end.and_then(|end| self.redundancy.at(end)) {
+                self.stations[index].command_topology(command(channel));
+            }
+        }
+    }
+
+    /// One cycle of that.
+    fn resume(&mut self, cycles: u16) {
+        self.isolation.resuming = Some(cycles);
+        let follows = |side: &Side| {
+            let end = side.end.and_then(|end| self.station_at(end));
+            end.is_none_or(|(_, station)| station.follows_command())
+        };
+        if self.redundancy.topology().is_ring() && self.isolation.sides.iter().all(follows) {
+            self.isolation = Isolation::default();
+            self.emit(Event::RingClosed);
+            self.measuring.ring_closed();
+        } else if cycles > COMMAND_CYCLES {
+            self.command_ends(loopback);
+            (self.isolation.resuming, self.isolation.resumed) = (None, true);
+            for channel in CHANNELS {
+                let end = self.isolation.sides[number(channel)].end;
+                let asked = self.next_addressed(channel, end);
+                let side = &mut self.isolation.sides[number(channel)];
+                side.asked = asked;
+                side.enter(Stage::Opening);
+            }
+        }
+    }
+
+    /// Every side has found its end: what is behind is left out.
+    fn end_search(&mut self) {
+        let sides = self.isolation.sides;
+        let [low, high] = sides.map(|side| side.end);
+        let found = low.is_some() || high.is_some();
+        let joined = low.zip(high).is_some_and(|(low, high)| low + 1 == high);
+        if joined {
+            // Nobody hangs: it is the cable, or it was the master. The ring is closed like any other that is open there.
+            let heard = CHANNELS.into_iter().all(|channel| self.hears(channel, other(channel)));
+            let cable = low.map_or(0, |low| low + 1);
+            self.redundancy.note_open(cable);
+            if !heard {
+                let (low, high) = self.cable(cable);
+                self.emit(Event::CableOpen { low, high });
+            }
+        }
+        for channel in CHANNELS.into_iter().filter(|_| found && !joined) {
+            let Side { stage, end, .. } = sides[number(channel)];
+            let behind = self.redundancy.neighbour(channel, end);
+            if let Some(position) = behind.filter(|_| stage != Stage::Off) {
+                self.tell_isolated(channel, end, position);
+            }
+        }
+        self.isolation = Isolation { silent: self.isolation.silent, ..Isolation::default() };
+    }
+
+    fn tell_isolated(&mut self, channel: Channel, end: Option<usize>, position: usize) {
+        let cable = if channel == Channel::Primary { position } else { position + 1 };
+        let end = end.and_then(|end| self.station_at(end)).map(|(index, station)| End::Slave {
+            slave: SlaveId::from_index(index),
+            address: station.address,
+        });
+        if end.is_some() {
+            self.redundancy.note_open(cable);
+        }
+        let Some((index, station)) = self.station_at(position) else { return };
+        let (slave, address, port) = (SlaveId::from_index(index), station.address, port_of(channel));
+        self.emit(Event::Isolated { slave, address, port, end: end.unwrap_or(End::Master(port)) });
+    }
+
+    /// C-DEV of the stations that are asked, in the MDTs of their channel alone.
+    pub(super) fn build_questions(&mut self) {
+        for channel in CHANNELS {
+            let Some(asked) = self.isolation.sides[number(channel)].asked else { continue };
+            let Some((index, station)) = self.station_at(asked) else { continue };
+            let mut control = asks(station, channel);
+            control.insert(DeviceControl::MASTER_VALID);
+            control.set(DeviceControl::RING_CLOSED, self.redundancy.is_closed());
+            self.write_control(channel, index, control);
+        }
+    }
+
+    /// During the search: whether every AT is back that can be waited for. `None` when nothing is searched for.
+    pub(super) fn search_is_complete(&self) -> Option<bool> {
+        if !self.isolation.is_busy() || self.isolation.resuming.is_some() {
+            return None;
+        }
+        let routes = self.redundancy.topology().routes();
+        Some(CHANNELS.into_iter().all(|channel| {
+            let side = &self.isolation.sides[number(channel)];
+            let back = || self.frames.all_back(Kind::At, route_of(channel));
+            match side.stage {
+                Stage::Off => !routes.contains(&route_of(channel)) || back(),
+                // Whether anybody answers at all is known when the cycle is over.
+                stage => back() || side.end.is_none() && stage == Stage::Done,
+            }
+        }))
+    }
+
+    /// Whether lost slaves may be back in a moment: a station that hangs is searched for, or the search has brought slaves back
+    /// that have to be valid for some cycles before they count.
+    #[must_use]
+    pub fn may_recover(&self) -> bool {
+        let returning = |station: &Station| station.presence == Presence::Lost && station.valid_cycles > 0;
+        self.isolation.is_busy() || self.stations[..self.found].iter().any(returning)
+    }
+
+    /// Below CP4 nobody moves: who is not heard during the search is not lost by that.
+    pub(super) fn excuses_silence(&self) -> bool {
+        self.layout_phase < Phase::CP4 && self.isolation.is_busy()
+    }
+
+    /// A phase begins.
+    pub(super) fn reset_isolation(&mut self) {
+        self.isolation = Isolation::default();
+    }
+}
