@@ -88,11 +88,15 @@ pub struct Invalid {
     count: usize,
 }
 
-impl Invalid {
-    /// A slave's list.
-    #[must_use]
-    pub fn new(list: &[Idn]) -> Self {
-        Self { idns: list.iter().copied().take(INVALID_TOLD).collect(), count: list.len() }
+impl FromIterator<Idn> for Invalid {
+    fn from_iter<T: IntoIterator<Item = Idn>>(list: T) -> Self {
+        let mut invalid = Self::default();
+        for idn in list {
+            invalid.count += 1;
+            // Of those without room the number is told.
+            let _ = invalid.idns.try_push(idn);
+        }
+        invalid
     }
 }
 

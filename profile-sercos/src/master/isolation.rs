@@ -25,19 +25,15 @@
 
 use super::Master;
 use super::event::{End, Event, Port, SlaveId};
+use super::redundancy::COMMAND_CYCLES;
 use super::station::{Presence, Station};
 use super::topology::{Route, Topology};
 use crate::wire::device_control::{DeviceControl, Topology as Loop};
 use crate::wire::device_status::{DeviceStatus, InactivePort};
 use crate::wire::header::{Channel, Kind, Phase};
 
-/// Cycles in which a station has to follow a topology command.
-const COMMAND_CYCLES: u16 = 12;
 /// Cycles in a row without a telegram, at least, before anything is done about it.
 const SILENT_CYCLES_MIN: u16 = 2;
-
-/// Both channels, P first.
-const CHANNELS: [Channel; 2] = [Channel::Primary, Channel::Secondary];
 
 /// How far the search is from one port on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -99,36 +95,6 @@ impl Isolation {
     }
 }
 
-const fn number(channel: Channel) -> usize {
-    match channel {
-        Channel::Primary => 0,
-        Channel::Secondary => 1,
-    }
-}
-
-/// How a station turns telegrams of this channel round.
-const fn loopback(channel: Channel) -> Loop {
-    match channel {
-        Channel::Primary => Loop::LoopbackForwardPrimary,
-        Channel::Secondary => Loop::LoopbackForwardSecondary,
-    }
-}
-
-/// What its inactive port shows while telegrams of this channel come in there.
-const fn heard(channel: Channel) -> InactivePort {
-    match channel {
-        Channel::Primary => InactivePort::PrimaryTelegram,
-        Channel::Secondary => InactivePort::SecondaryTelegram,
-    }
-}
-
-const fn other(channel: Channel) -> Channel {
-    match channel {
-        Channel::Primary => Channel::Secondary,
-        Channel::Secondary => Channel::Primary,
-    }
-}
-
 /// The port from which the telegrams of this channel are sent.
 const fn port_of(channel: Channel) -> Port {
     match channel {
@@ -147,14 +113,17 @@ const fn route_of(channel: Channel) -> Route {
 
 /// The command that asks a station to turn the telegrams of this channel round.
 fn asks(station: &Station, channel: Channel) -> DeviceControl {
-    station.command.with_topology(loopback(channel)).symmetric_difference(DeviceControl::TOPOLOGY_CHANGE)
+    station
+        .command
+        .with_topology(Loop::loopback(channel))
+        .symmetric_difference(DeviceControl::TOPOLOGY_CHANGE)
 }
 
 impl Master {
     /// One cycle of the search.
     pub(super) fn isolate(&mut self) {
-        for channel in CHANNELS {
-            let silent = &mut self.isolation.silent[number(channel)];
+        for channel in Channel::ALL {
+            let silent = &mut self.isolation.silent[channel.index()];
             let topology = self.redundancy.topology();
             let expected = match topology {
                 Topology::Absent => false,
@@ -181,7 +150,7 @@ impl Master {
             self.resume(cycles + 1);
             return;
         }
-        for channel in CHANNELS {
+        for channel in Channel::ALL {
             self.search(channel);
         }
         if self.is_whole() {
@@ -192,18 +161,18 @@ impl Master {
     }
 
     fn begin_search(&mut self, channel: Channel) {
-        if self.isolation.sides[number(channel)].stage != Stage::Off {
+        if self.isolation.sides[channel.index()].stage != Stage::Off {
             return;
         }
         self.redundancy.leave_open();
         let asked = self.next_addressed(channel, None);
-        self.isolation.sides[number(channel)] = Side { stage: Stage::Asking, asked, ..Side::default() };
+        self.isolation.sides[channel.index()] = Side { stage: Stage::Asking, asked, ..Side::default() };
     }
 
     /// The next station behind `position`, or from the port on, that hears commands. A cable that is known to be open ends the
     /// line, and so does what has been reached from the other port.
     fn next_addressed(&self, channel: Channel, position: Option<usize>) -> Option<usize> {
-        let stop = self.isolation.sides[number(other(channel))].end;
+        let stop = self.isolation.sides[channel.other().index()].end;
         let mut position = position;
         loop {
             let next = self.redundancy.neighbour(channel, position)?;
@@ -229,23 +198,23 @@ impl Master {
         let acknowledged = status.contains(DeviceStatus::TOPOLOGY_CHANGE)
             == command.contains(DeviceControl::TOPOLOGY_CHANGE);
         let own = station.valid_routes & 1 << route_of(channel).index() != 0;
-        (own && acknowledged && status.topology() == loopback(channel)).then_some(status)
+        (own && acknowledged && status.topology() == Loop::loopback(channel)).then_some(status)
     }
 
     /// The same of the station that turns this channel's telegrams round.
     fn end_status(&self, channel: Channel) -> Option<DeviceStatus> {
-        let end = self.isolation.sides[number(channel)].end?;
+        let end = self.isolation.sides[channel.index()].end?;
         self.turns(channel, end, self.station_at(end)?.1.command)
     }
 
     /// The station that turns this channel's telegrams round hears those of channel `wanted` on its inactive port.
     fn hears(&self, channel: Channel, wanted: Channel) -> bool {
-        self.end_status(channel).is_some_and(|status| status.inactive_port() == heard(wanted))
+        self.end_status(channel).is_some_and(|status| status.inactive_port() == InactivePort::hearing(wanted))
     }
 
     /// One cycle of the search on one side.
     fn search(&mut self, channel: Channel) {
-        let at = number(channel);
+        let at = channel.index();
         let mut side = self.isolation.sides[at];
         side.cycles = side.cycles.saturating_add(1);
         if side.stage == Stage::Passing {
@@ -253,7 +222,8 @@ impl Master {
             if end.is_none_or(|index| self.stations[index].follows_command()) {
                 side = Side::default();
             } else if side.cycles > COMMAND_CYCLES {
-                end.into_iter().for_each(|index| self.stations[index].command_topology(loopback(channel)));
+                end.into_iter()
+                    .for_each(|index| self.stations[index].command_topology(Loop::loopback(channel)));
                 side.asked = self.next_addressed(channel, side.end);
                 side.enter(Stage::Opening);
             }
@@ -265,7 +235,7 @@ impl Master {
                 // It was there when the one before heard its telegrams, and is not any more: the search ends where that one is.
                 let back = side.before.and_then(|before| self.redundancy.at(before));
                 if let Some(index) = back {
-                    self.stations[index].command_topology(loopback(channel));
+                    self.stations[index].command_topology(Loop::loopback(channel));
                 }
                 (side.end, side.asked) = (side.before, None);
                 side.enter(Stage::Done);
@@ -280,7 +250,7 @@ impl Master {
                 }
                 (Some(_), Some(_)) => self.hears(channel, channel),
             };
-            let rival = &mut self.isolation.sides[number(other(channel))].asked;
+            let rival = &mut self.isolation.sides[channel.other().index()].asked;
             if answered && *rival == side.asked {
                 // It is asked by both: the other channel takes its question back first, in a cycle of its own, so that the
                 // handshake bits of both stay in step.
@@ -312,7 +282,7 @@ impl Master {
         side.asked = self.next_addressed(channel, Some(found));
         let command = self.station_at(found).map(|(_, station)| station.command);
         let status = command.and_then(|command| self.turns(channel, found, command));
-        let hears_own = status.is_some_and(|status| status.inactive_port() == heard(channel));
+        let hears_own = status.is_some_and(|status| status.inactive_port() == InactivePort::hearing(channel));
         if side.before.is_none() && hears_own {
             // Nobody else has been asked yet: whoever ends the line turns the telegrams round, and all is well.
             if let Some(index) = self.redundancy.at(found) {
@@ -330,7 +300,7 @@ impl Master {
         let [low, high] = self.isolation.sides.map(|side| side.end);
         // Next to each other they are the ends of a ring that is closed in the usual way.
         let apart = low.zip(high).is_some_and(|(low, high)| high > low + 1);
-        let hear = || CHANNELS.into_iter().all(|channel| self.hears(channel, other(channel)));
+        let hear = || Channel::ALL.into_iter().all(|channel| self.hears(channel, channel.other()));
         !self.isolation.resumed && (round || apart && hear())
     }
 
@@ -344,8 +314,8 @@ impl Master {
     }
 
     fn command_ends(&mut self, command: impl Fn(Channel) -> Loop) {
-        for channel in CHANNELS {
-            let end = self.isolation.sides[number(channel)].end;
+        for channel in Channel::ALL {
+            let end = self.isolation.sides[channel.index()].end;
             if let Some(index) = end.and_then(|end| self.redundancy.at(end)) {
                 self.stations[index].command_topology(command(channel));
             }
@@ -364,12 +334,12 @@ impl Master {
             self.emit(Event::RingClosed);
             self.measuring.ring_closed();
         } else if cycles > COMMAND_CYCLES {
-            self.command_ends(loopback);
+            self.command_ends(Loop::loopback);
             (self.isolation.resuming, self.isolation.resumed) = (None, true);
-            for channel in CHANNELS {
-                let end = self.isolation.sides[number(channel)].end;
+            for channel in Channel::ALL {
+                let end = self.isolation.sides[channel.index()].end;
                 let asked = self.next_addressed(channel, end);
-                let side = &mut self.isolation.sides[number(channel)];
+                let side = &mut self.isolation.sides[channel.index()];
                 side.asked = asked;
                 side.enter(Stage::Opening);
             }
@@ -384,7 +354,7 @@ impl Master {
         let joined = low.zip(high).is_some_and(|(low, high)| low + 1 == high);
         if joined {
             // Nobody hangs: it is the cable, or it was the master. The ring is closed like any other that is open there.
-            let heard = CHANNELS.into_iter().all(|channel| self.hears(channel, other(channel)));
+            let heard = Channel::ALL.into_iter().all(|channel| self.hears(channel, channel.other()));
             let cable = low.map_or(0, |low| low + 1);
             self.redundancy.note_open(cable);
             if !heard {
@@ -392,8 +362,8 @@ impl Master {
                 self.emit(Event::CableOpen { low, high });
             }
         }
-        for channel in CHANNELS.into_iter().filter(|_| found && !joined) {
-            let Side { stage, end, .. } = sides[number(channel)];
+        for channel in Channel::ALL.into_iter().filter(|_| found && !joined) {
+            let Side { stage, end, .. } = sides[channel.index()];
             let behind = self.redundancy.neighbour(channel, end);
             if let Some(position) = behind.filter(|_| stage != Stage::Off) {
                 self.tell_isolated(channel, end, position);
@@ -418,8 +388,8 @@ impl Master {
 
     /// C-DEV of the stations that are asked, in the MDTs of their channel alone.
     pub(super) fn build_questions(&mut self) {
-        for channel in CHANNELS {
-            let Some(asked) = self.isolation.sides[number(channel)].asked else { continue };
+        for channel in Channel::ALL {
+            let Some(asked) = self.isolation.sides[channel.index()].asked else { continue };
             let Some((index, station)) = self.station_at(asked) else { continue };
             let mut control = asks(station, channel);
             control.insert(DeviceControl::MASTER_VALID);
@@ -434,8 +404,8 @@ impl Master {
             return None;
         }
         let routes = self.redundancy.topology().routes();
-        Some(CHANNELS.into_iter().all(|channel| {
-            let side = &self.isolation.sides[number(channel)];
+        Some(Channel::ALL.into_iter().all(|channel| {
+            let side = &self.isolation.sides[channel.index()];
             let back = || self.frames.all_back(Kind::At, route_of(channel));
             match side.stage {
                 Stage::Off => !routes.contains(&route_of(channel)) || back(),

@@ -18,7 +18,7 @@ use crate::wire::device_status::InactivePort;
 use crate::wire::header::{Channel, Kind, Phase};
 
 /// Cycles in which a slave has to follow a topology command.
-const COMMAND_CYCLES: u16 = 12;
+pub(super) const COMMAND_CYCLES: u16 = 12;
 /// Cycles before a refused closing is tried again.
 const REFUSED_CYCLES: u16 = 1000;
 /// Slaves that are commanded at the same time: both ends of a gap.

@@ -168,7 +168,7 @@ impl Master {
         let Some((step, instance)) = next else {
             station.work = if station.check_failed { Work::Failed } else { Work::Done };
             if station.check_failed {
-                let invalid = Invalid::new(&station.invalid);
+                let invalid = station.invalid.clone();
                 self.emit(Event::CheckFailed { slave: SlaveId::from_index(index), phase, invalid });
             }
             return;
@@ -201,7 +201,7 @@ impl Master {
         let failure = match row.outcome {
             RowOutcome::Failed(SvcFailure::CommandFailed(_)) if step == Step::CheckExecute => {
                 station.check_failed = true;
-                station.invalid.clear();
+                station.invalid = Invalid::default();
                 None
             }
             // It cannot be written: then it has to be what it would have been.
@@ -409,11 +409,7 @@ fn learn(
         Step::SlaveJitter => station.need.jitter_ns = number.unwrap_or(0),
         Step::ConsumerTime => station.need.consumer_ns = number.unwrap_or(0),
         Step::AtStartMinimum => station.need.at_start_min_ns = number.unwrap_or(0),
-        Step::CheckInvalid => {
-            let room = station.invalid.capacity();
-            station.invalid.clear();
-            station.invalid.extend(outcome.data.double_words().take(room).map(Idn));
-        }
+        Step::CheckInvalid => station.invalid = outcome.data.double_words().map(Idn).collect(),
         _ => {}
     }
     Ok(())

@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::config::{CONNECTIONS_MAX, ConnectionConfig, Connections, MasterConfig, SlaveConfig};
 use super::connection::{ConsumerEnd, ProducerEnd};
+use super::event::Invalid;
 use super::layout::SlaveNeed;
 use super::plan::{Cursor, Step};
 use super::report::{REPORT_MAX, ReportRow};
@@ -11,7 +12,6 @@ use super::svc::ServiceChannel;
 use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::header::Phase;
-use crate::wire::idn::Idn;
 use crate::wire::scp::{ScpClass, ScpEntry};
 use crate::wire::svc::AtSvc;
 
@@ -140,7 +140,7 @@ pub(super) struct Station {
     /// Buffer of the master's own list requests.
     pub list: Vec<u8>,
     /// S-0-0021 or S-0-0022 after a failed check.
-    pub invalid: Vec<Idn>,
+    pub invalid: Invalid,
 }
 
 impl Station {
@@ -172,7 +172,7 @@ impl Station {
             read_rows: 0,
             report: Vec::with_capacity(REPORT_MAX),
             list: Vec::with_capacity(config.list_capacity),
-            invalid: Vec::with_capacity(config.list_capacity / 4),
+            invalid: Invalid::default(),
         }
     }
 
@@ -204,7 +204,7 @@ impl Station {
         self.checked = false;
         self.read_rows = 0;
         self.report.clear();
-        self.invalid.clear();
+        self.invalid = Invalid::default();
     }
 
     pub fn is_active(&self) -> bool {

@@ -38,13 +38,6 @@ pub(super) struct HotPlugs {
     passed: Vec<u8>,
 }
 
-const fn place(channel: Channel) -> usize {
-    match channel {
-        Channel::Primary => 0,
-        Channel::Secondary => 1,
-    }
-}
-
 impl HotPlugs {
     /// A phase begins.
     pub fn reset(&mut self) {
@@ -52,7 +45,7 @@ impl HotPlugs {
     }
 
     pub fn is_enabled(&self, channel: Channel) -> bool {
-        self.lines[place(channel)].field.word & HotPlug::ENABLED != 0
+        self.lines[channel.index()].field.word & HotPlug::ENABLED != 0
     }
 
     /// MDT0 passes a station.
@@ -60,7 +53,7 @@ impl HotPlugs {
         if self.passed.len() <= index {
             self.passed.resize(index + 1, 0);
         }
-        self.passed[index] |= 1 << place(channel);
+        self.passed[index] |= 1 << channel.index();
     }
 
     /// The cycle is over: every slave that takes part has both channels and passes both on.
@@ -78,7 +71,7 @@ impl Police {
     /// The field of MDT0.
     pub(super) fn hot_plug_field(&mut self, at: MonotonicTime, channel: Channel, data: &[u8]) {
         let Ok(field) = HotPlug::parse(data) else { return };
-        let line = &mut self.hot_plugs.lines[place(channel)];
+        let line = &mut self.hot_plugs.lines[channel.index()];
         line.field = field;
         if field.word & HotPlug::ENABLED == 0 {
             line.offsets = (0, [None, None]);
@@ -140,7 +133,7 @@ impl Police {
         }
         self.drop_absent(address);
         let offset = Offset::from_parameter(u16::try_from(field.info).unwrap_or(u16::MAX));
-        let line = &mut self.hot_plugs.lines[place(channel)];
+        let line = &mut self.hot_plugs.lines[channel.index()];
         if line.offsets.0 != address {
             line.offsets = (address, [None, None]);
         }
@@ -169,7 +162,7 @@ impl Police {
 
     /// HP2 begins for the slave that was told its place.
     fn switch_to_svc(&mut self, channel: Channel) {
-        let line = &mut self.hot_plugs.lines[place(channel)];
+        let line = &mut self.hot_plugs.lines[channel.index()];
         let (address, [Some(mdt), Some(at)]) = line.offsets else { return };
         line.offsets.1 = [None, None];
         let joining = self.stations.iter().position(|station| {
@@ -202,7 +195,7 @@ impl Police {
             return;
         }
         let Ok(answer) = HotPlug::parse(after) else { return };
-        let asked = &self.hot_plugs.lines[place(channel)].asked;
+        let asked = &self.hot_plugs.lines[channel.index()].asked;
         let [code, _] = answer.word.to_le_bytes();
         let error = answer.word & HotPlug::ERROR != 0;
         let known = match u16::from(code) {

@@ -154,10 +154,7 @@ impl Ports {
     pub(super) fn join(&mut self, port: Port, channel: Channel) {
         self.start(port, channel);
         self.follows = false;
-        self.topology = match channel {
-            Channel::Primary => Topology::LoopbackForwardPrimary,
-            Channel::Secondary => Topology::LoopbackForwardSecondary,
-        };
+        self.topology = Topology::loopback(channel);
     }
 
     /// CP0 is over: the topology is the one of the scan until a link is lost or C-DEV commands another one.
@@ -225,8 +222,7 @@ impl Ports {
         status.with_inactive_port(match heard {
             _ if !self.has_link(inactive) => InactivePort::NoLink,
             None => InactivePort::Link,
-            Some((Channel::Primary, _)) => InactivePort::PrimaryTelegram,
-            Some((Channel::Secondary, _)) => InactivePort::SecondaryTelegram,
+            Some((channel, _)) => InactivePort::hearing(channel),
         })
     }
 

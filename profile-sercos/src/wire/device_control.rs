@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use super::header::Channel;
+
 bitflags::bitflags! {
     /// Device control word without the two bits of the commanded topology, which
     /// [`DeviceControl::topology`] reads.
@@ -36,6 +38,15 @@ pub enum Topology {
 }
 
 impl Topology {
+    /// How a station turns the telegrams of this channel round.
+    #[must_use]
+    pub const fn loopback(channel: Channel) -> Self {
+        match channel {
+            Channel::Primary => Topology::LoopbackForwardPrimary,
+            Channel::Secondary => Topology::LoopbackForwardSecondary,
+        }
+    }
+
     /// The two bits in place (13..12).
     pub const fn bits(self) -> u16 {
         match self {

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::device_control::Topology;
+use super::header::Channel;
 
 bitflags::bitflags! {
     /// Device status word; the current topology (bits 13..12) and the inactive port (bits 11..10) have
@@ -50,6 +51,15 @@ pub enum InactivePort {
 }
 
 impl InactivePort {
+    /// What is shown while telegrams of this channel arrive there.
+    #[must_use]
+    pub const fn hearing(channel: Channel) -> Self {
+        match channel {
+            Channel::Primary => InactivePort::PrimaryTelegram,
+            Channel::Secondary => InactivePort::SecondaryTelegram,
+        }
+    }
+
     /// The two bits in place (11..10).
     pub const fn bits(self) -> u16 {
         match self {

@@ -57,6 +57,28 @@ pub enum Channel {
     Secondary,
 }
 
+impl Channel {
+    /// Both, P first: each is at its [`index`](Self::index).
+    pub const ALL: [Channel; 2] = [Channel::Primary, Channel::Secondary];
+
+    /// The one that goes the other way round.
+    #[must_use]
+    pub const fn other(self) -> Channel {
+        match self {
+            Channel::Primary => Channel::Secondary,
+            Channel::Secondary => Channel::Primary,
+        }
+    }
+
+    /// 0 for P, 1 for S.
+    pub(crate) const fn index(self) -> usize {
+        match self {
+            Channel::Primary => 0,
+            Channel::Secondary => 1,
+        }
+    }
+}
+
 /// Who fills a telegram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {

@@ -83,21 +83,9 @@ impl Place {
     }
 }
 
-/// How the end of a line turns telegrams of this channel round.
-const fn loopback(channel: Channel) -> Loop {
-    match channel {
-        Channel::Primary => Loop::LoopbackForwardPrimary,
-        Channel::Secondary => Loop::LoopbackForwardSecondary,
-    }
-}
-
 /// The end of the line hears its own telegrams come back from behind.
 fn hears_own(status: DeviceStatus, channel: Channel) -> bool {
-    let own = match channel {
-        Channel::Primary => InactivePort::PrimaryTelegram,
-        Channel::Secondary => InactivePort::SecondaryTelegram,
-    };
-    status.topology() == loopback(channel) && status.inactive_port() == own
+    status.topology() == Loop::loopback(channel) && status.inactive_port() == InactivePort::hearing(channel)
 }
 
 /// What the master knows of the slave that is coming in.
@@ -379,7 +367,7 @@ impl Master {
             Stage::Switch => self.begin_service(),
             Stage::Close => {
                 if let Some(Place::Behind(end, channel)) = place {
-                    self.stations[end].command_topology(loopback(channel));
+                    self.stations[end].command_topology(Loop::loopback(channel));
                 }
                 self.release_slave();
                 self.admission.rest = REFUSED_CYCLES;
@@ -395,7 +383,7 @@ impl Master {
             let index = usize::from(index);
             let status = self.valid_status(index).filter(|_| self.stations[index].is_active())?;
             let position = self.redundancy.position(index)?;
-            (status.topology() == loopback(channel)).then_some((position, index, status))
+            (status.topology() == Loop::loopback(channel)).then_some((position, index, status))
         });
         ends.min_by_key(|(position, ..)| *position).map(|(_, index, status)| (index, status))
     }

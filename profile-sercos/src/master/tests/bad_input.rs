@@ -280,7 +280,8 @@ fn a_slave_that_refuses_s_0_0127_is_named_and_left_out() {
     rig.master.set_target_phase(Phase::CP4);
     rig.state(State::Await2);
     rig.master.proceed().unwrap();
-    let refused = Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2, invalid: Invalid::new(&[MODE]) };
+    let refused =
+        Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2, invalid: Invalid::from_iter([MODE]) };
     rig.run_until("refused", |rig| rig.saw(&refused));
     let said = "slave at position 2: the check to leave CP2 failed: the slave finds invalid S-0-0032";
     assert_eq!(refused.to_string(), said);

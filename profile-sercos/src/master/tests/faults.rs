@@ -250,7 +250,7 @@ fn refused_checks_show_what_is_wrong() {
         let mut rig = Rig::of(&[1, 2]);
         rig.line.peers[1].faults.invalid = Some((check, wrong.clone()));
         rig.master.set_target_phase(Phase::CP4);
-        let invalid = Invalid::new(&wrong);
+        let invalid = wrong.iter().copied().collect::<Invalid>();
         let failed = Event::CheckFailed { slave: SlaveId(1), phase, invalid };
         rig.run_until("refused", |rig| rig.log.contains(&failed));
         rig.auto_proceed = false;

@@ -83,7 +83,7 @@ fn checks_of_the_slave_are_shown_by_name() {
         let mut rig = full_rig(2);
         rig.line.slaves_mut()[1].application_mut().refuses = Some(phase);
         rig.master.set_target_phase(Phase::CP4);
-        let invalid = Invalid::new(&[MODE]);
+        let invalid = Invalid::from_iter([MODE]);
         let failed = Event::CheckFailed { slave: SlaveId(1), phase: refused, invalid };
         rig.run_until("there", |rig| rig.log.contains(&failed));
         rig.auto_proceed = false;

@@ -489,7 +489,7 @@ fn a_slave_that_cannot_be_set_up() {
     for phase in [Phase::CP3, Phase::CP4] {
         let before = Phase(phase.0 - 1);
         let rig = refused("a check", checked(phase), nothing(), (Some(7), R::SetUp), 0);
-        let invalid = Invalid::new(&[crate::police::light::MODE]);
+        let invalid = Invalid::from_iter([crate::police::light::MODE]);
         let failed = Event::CheckFailed { slave: SlaveId(2), phase: before, invalid };
         assert!(rig.before.contains(&failed), "{:?}", rig.before);
     }

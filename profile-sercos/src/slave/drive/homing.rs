@@ -550,7 +550,6 @@ mod tests {
         assert!(rig.run(20, Rig::follows));
     }
 
-    /// S-0-0146, 0171, 0172, 0191: the master moves the axis over switch and marker, stops, and takes the displacement over.
     /// The marker is a place of the machine: when the drive counts from another place, it has another number, and what the
     /// positions are off by it is less by as much.
     #[test]
@@ -570,6 +569,7 @@ mod tests {
         assert_eq!((none.marker, off(&none)), (None, None));
     }
 
+    /// S-0-0146, 0171, 0172, 0191: the master moves the axis over switch and marker, stops, and takes the displacement over.
     #[test]
     fn a_master_homes_with_displacement() {
         let mut rig = Rig::following();

@@ -3,6 +3,7 @@
 //! Steps run one after the other over the drive's service channel; all drives run at the same time. What the drive
 //! says is kept in its [`DriveFacts`], from which the next plan and in the end the drive's program are compiled.
 
+use arrayvec::ArrayVec;
 use profile_sercos::master::Master;
 use profile_sercos::master::event::{SlaveId, Ticket};
 use profile_sercos::master::svc::request::{
@@ -43,12 +44,17 @@ pub struct Commissioning<T = Ticket> {
     failure: Option<StepFailure>,
     /// Steps that failed and were allowed to.
     passed_over: Vec<StepFailure>,
-    /// Requests one after the other to which the drive has not said a word, and the first of them.
-    unanswered: (u8, Option<StepFailure>),
+    /// Steps one after the other to which the drive has not said a word.
+    unanswered: ArrayVec<StepFailure, UNANSWERED_MAX>,
 }
 
-/// So many requests without a word, and the drive is given up.
-const UNANSWERED_MAX: u8 = 5;
+/// So many steps without a word, and the drive is given up.
+const UNANSWERED_MAX: usize = 5;
+
+/// Whether the drive has not said a word.
+fn is_silence(failure: SvcFailure) -> bool {
+    matches!(failure, SvcFailure::HandshakeTimeout { .. } | SvcFailure::BusyTimeout { .. })
+}
 
 impl<T: Copy + PartialEq> Commissioning<T> {
     /// Starts a plan.
@@ -62,7 +68,7 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             ticket: None,
             failure: None,
             passed_over: Vec::new(),
-            unanswered: (0, None),
+            unanswered: ArrayVec::new(),
         }
     }
 
@@ -111,11 +117,9 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             return false;
         }
         self.ticket = None;
-        let silent = matches!(
-            outcome.result,
-            Err(SvcFailure::HandshakeTimeout { .. } | SvcFailure::BusyTimeout { .. })
-        );
-        self.unanswered = if silent { (self.unanswered.0 + 1, self.unanswered.1) } else { (0, None) };
+        if !matches!(outcome.result, Err(failure) if is_silence(failure)) {
+            self.unanswered.clear();
+        }
         match &outcome.result {
             Ok(reply) => {
                 let (idn, bytes) = (outcome.idn, outcome.data.as_slice());
@@ -222,10 +226,12 @@ impl<T: Copy + PartialEq> Commissioning<T> {
             return;
         }
         let failure = StepFailure { what, idn, failure };
-        let first = (self.unanswered.0 > 0).then(|| *self.unanswered.1.get_or_insert(failure));
+        if is_silence(failure.failure) && !self.unanswered.is_full() {
+            self.unanswered.push(failure);
+        }
         match refused {
             // Whatever it is asked now, it would not answer either.
-            _ if self.unanswered.0 >= UNANSWERED_MAX => self.failure = first,
+            _ if self.unanswered.is_full() => self.failure = self.unanswered.first().copied(),
             Refused::Fail => self.failure = Some(failure),
             Refused::Continue => {
                 self.passed_over.push(failure);
