@@ -130,20 +130,22 @@ impl<'t> Compiler<'t> {
 
     /// Why the drive cannot have a mode by what it says of its modes.
     fn not_listed(&self, rule: &ModeRule) -> Option<SercosError> {
-        let (tables, facts) = (self.tables, self.facts);
+        let has = |code: &u16| rule.codes.contains(code);
         let show =
             |codes: &[u16]| codes.iter().map(|code| format!("{code:#06x}")).collect::<Vec<_>>().join(", ");
-        let (mode, wanted) = (rule.selection, show(&rule.codes));
-        let list = tables.supported_modes;
-        if let Some(found) = facts.words(list) {
-            let found_codes = show(&found);
-            let has = rule.codes.iter().any(|code| found.contains(code));
-            return (!has).then_some(SercosError::NotSupported { list, mode, wanted, found: found_codes });
+        let (list, mode) = (self.tables.supported_modes, rule.selection);
+        if let Some(found) = self.facts.words(list) {
+            return (!found.iter().any(has)).then(|| {
+                let (wanted, found) = (show(&rule.codes), show(&found));
+                SercosError::NotSupported { list, mode, wanted, found }
+            });
         }
         let set = self.set_modes();
-        let has = set.is_empty() || set.iter().any(|(_, code)| rule.codes.contains(code));
-        let found: Vec<_> = set.iter().map(|(idn, code)| format!("{idn} = {code:#06x}")).collect();
-        (!has).then(|| SercosError::NotSelected { mode, wanted, found: found.join(", ") })
+        let lacks = !set.is_empty() && !set.iter().any(|(_, code)| has(code));
+        lacks.then(|| {
+            let found: Vec<_> = set.iter().map(|(idn, code)| format!("{idn} = {code:#06x}")).collect();
+            SercosError::NotSelected { mode, wanted: show(&rule.codes), found: found.join(", ") }
+        })
     }
 
     /// A value that a mode needs and that the fixed connections of a drive do not carry.

@@ -15,7 +15,7 @@ use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 
 use super::commissioning::{Commissioning, StepFailure};
-use super::connections;
+use super::{connections, limitations};
 use crate::engine::notice::Notice;
 use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis};
 
@@ -248,14 +248,10 @@ impl Commissioner {
                 for difference in work.facts.differences(&mapping.dictionaries.sercos) {
                     waiting.push_back(Done::Told(Notice::Difference { axis, difference }));
                 }
-                mapping.sercos_program(&work.needs, &work.facts).map(|program| {
-                    let modes = mapping.sercos_modes_left_out(&work.needs, &work.facts);
-                    if !modes.is_empty() {
-                        waiting.push_back(Done::Told(Notice::ModesLeftOut { axis, address, modes }));
-                    }
-                    if work.needs.modulo && program.position_step().is_none() {
-                        waiting.push_back(Done::Told(Notice::Ends { axis }));
-                    }
+                let (needs, facts) = (&work.needs, &work.facts);
+                mapping.sercos_program(needs, facts).map(|program| {
+                    let known = limitations(mapping, axis, address, needs, facts, &program);
+                    waiting.extend(known.into_iter().map(Done::Told));
                     Done::Program(run, program)
                 })
             };

@@ -31,7 +31,7 @@ use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Re
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
-use crate::mapping::{DriveFacts, Item, Mapping, SercosAxis, SercosError, Step};
+use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError, Step};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -254,10 +254,6 @@ impl SercosBus {
                 self.lost_since = None;
             }
             Event::Isolated { .. } => self.isolated = true,
-            Event::Phase(phase) if *phase == Phase::CP0 => {
-                self.isolated = false;
-                self.lose_all(now, system, axes);
-            }
             Event::OtherMaster(_) => {
                 for drive in &self.drives {
                     axes[drive.axis].doubt_south(now, system);
@@ -339,7 +335,10 @@ impl SercosBus {
             | Event::AddressConflict { slave } => self.refuse(now, system, *slave, axes),
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
-            Event::Phase(phase) if *phase < Phase::CP2 => self.lose_all(now, system, axes),
+            Event::Phase(phase) if *phase < Phase::CP2 => {
+                self.isolated &= *phase != Phase::CP0;
+                self.lose_all(now, system, axes);
+            }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
@@ -833,19 +832,31 @@ impl Bus for SercosBus {
     }
 }
 
+/// What people should know of a drive that can be used: modes that its axis does without, and the ends of its range.
+fn limitations(
+    mapping: &Mapping,
+    axis: u8,
+    address: u16,
+    needs: &SercosAxis,
+    facts: &DriveFacts,
+    program: &DriveProgram,
+) -> ArrayVec<Notice, 2> {
+    let modes = mapping.sercos_modes_left_out(needs, facts);
+    let modes = (!modes.is_empty()).then_some(Notice::ModesLeftOut { axis, address, modes });
+    // A drive that works modulo has a longest step from one position command to the next.
+    let ends = needs.modulo && program.position_step().is_none();
+    modes.into_iter().chain(ends.then_some(Notice::Ends { axis })).collect()
+}
+
 impl Drive {
     /// Gives the axis the program of its drive, once all is known of it.
     fn take(&self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
         match mapping.sercos_program(&self.needs, &self.facts) {
             Ok(program) => {
-                let modes = mapping.sercos_modes_left_out(&self.needs, &self.facts);
-                if !modes.is_empty() {
-                    notice(Notice::ModesLeftOut { axis: index(self.axis), address: self.address, modes });
-                }
-                // A drive that works modulo has a longest step from one position command to the next.
-                if self.needs.modulo && program.position_step().is_none() {
-                    notice(Notice::Ends { axis: index(self.axis) });
-                }
+                let axis = index(self.axis);
+                limitations(mapping, axis, self.address, &self.needs, &self.facts, &program)
+                    .into_iter()
+                    .for_each(notice);
                 axes[self.axis].set_south(program);
                 true
             }
