@@ -25,7 +25,11 @@ fn what_is_shipped_is_good() {
     ] {
         let output = check(&["--config", config, "--mappings", "examples/overlays"]);
         assert_eq!(output.status.code(), Some(0), "{}", out(&output));
-        assert!(out(&output).contains("checked the tables, 1 overlay, 2 axes"), "{}", out(&output));
+        assert!(
+            out(&output).contains("checked the tables, those of 6 families of drives, 1 overlay, 2 axes"),
+            "{}",
+            out(&output)
+        );
     }
 }
 

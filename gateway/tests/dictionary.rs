@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
 
 use axisbridge::mapping::{CipAttribute, Dictionaries, Enumeration, Mapping, PolarityEffect, Word};
 use serde_json::Value;
@@ -53,7 +54,7 @@ impl Record {
     }
 }
 
-fn dictionaries() -> Dictionaries {
+fn dictionaries() -> Arc<Dictionaries> {
     Mapping::embedded().expect("the shipped tables are good").dictionaries
 }
 
@@ -62,7 +63,7 @@ fn instance_attributes_come_back_from_csv_as_they_are_in_the_dictionary() {
     let (columns, records) = records(&["cip", "--format", "csv"]);
     let first = ["id", "name", "access", "data_type", "units", "B", "E", "F", "P", "V", "T", "source"];
     assert_eq!(columns[..first.len()], first);
-    let dictionary = dictionaries().cip;
+    let dictionary = &dictionaries().cip;
     assert_eq!(records.len(), 452);
     assert_eq!(records.len(), dictionary.attributes().len());
     for (record, row) in records.iter().zip(dictionary.attributes()) {

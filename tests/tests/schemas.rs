@@ -35,6 +35,9 @@ fn every_shipped_file_is_valid_and_broken_ones_are_not() {
     add("examples/two-axes-can.toml", "config", "good");
     add("examples/two-axes-devicenet.toml", "config", "good");
     add("examples/overlays/line-4.toml", "overlay", "good");
+    for family in root.join("mappings/families").read_dir().expect("the settings of families").flatten() {
+        add(&family.path().display().to_string(), "overlay", "good");
+    }
     // What the program refuses for its form or for a name, the schema refuses too.
     for (case, verdict) in [
         ("05-wrong-type", "bad"),

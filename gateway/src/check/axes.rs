@@ -207,6 +207,8 @@ pub(super) fn short(value: f64) -> String {
 /// Counts that a CiA 402 drive has in a turn, or in 10 mm, where no drive is known: an encoder of 20 bits, a spindle.
 const COUNTS_OF_A_TURN: i64 = 1 << 20;
 const WAY_OF_A_TURN: i64 = 10;
+/// Parts per million of the rated torque in a count.
+const TORQUE_COUNT: i64 = 1_000;
 
 /// The same for the tables alone: a turning and a sliding axis with the usual resolution, SERCOS drives scaled by the box, and
 /// CiA 402 drives that count in increments of their encoder.
@@ -261,7 +263,9 @@ fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
         way_of_a_turn: Ratio::new(WAY_OF_A_TURN, 1),
         counts: [Quantity::Position, Quantity::Velocity, Quantity::Acceleration]
             .map(|of| (of, count))
-            .to_vec(),
+            .into_iter()
+            .chain(Ratio::new(TORQUE_COUNT, 1).map(|ratio| (Quantity::Torque, ratio)))
+            .collect(),
         offsets: Signal::OFFSETS.to_vec(),
         ..Cia402Axis::default()
     };

@@ -46,6 +46,8 @@ pub struct Outcome {
     pub findings: Findings,
     /// How many overlays were laid over the tables.
     pub overlays: usize,
+    /// How many families of drives have rows of their own.
+    pub families: usize,
     /// How many worked examples came out or did not.
     pub examples: usize,
 }
@@ -59,11 +61,13 @@ pub fn check(request: &Request<'_>) -> Outcome {
     if let Some(texts) = texts(request, written.as_ref(), findings) {
         outcome.overlays = texts.overlays.len();
         outcome.mapping = Mapping::resolve(&texts, findings);
+        outcome.families = outcome.mapping.as_ref().map_or(0, |mapping| mapping.families().len());
         outcome.texts = Some(texts);
     }
     if let Some(mapping) = &outcome.mapping {
         outcome.examples = mapping.run_examples(findings);
         tables(mapping, findings);
+        mapping.families().iter().for_each(|family| tables(&family.mapping, findings));
         if let Some(written) = &written {
             axes::check(mapping, written, findings);
             bus::check(mapping, written, findings);

@@ -41,7 +41,8 @@ pub fn page(outcome: &Outcome) -> String {
     for file in &files {
         let _ = write!(page, "<a href=\"#{0}\">{0}</a>", escaped(name(&file.path)));
     }
-    for overlay in &texts.overlays {
+    let overlays = || texts.families.iter().chain(&texts.overlays);
+    for overlay in overlays() {
         let _ = write!(page, "<a href=\"#{0}\">{0}</a>", escaped(&overlay.path));
     }
     page.push_str("</nav>\n");
@@ -55,7 +56,7 @@ pub fn page(outcome: &Outcome) -> String {
     for file in files {
         table(&mut page, name(&file.path), &file.text);
     }
-    for overlay in &texts.overlays {
+    for overlay in overlays() {
         table(&mut page, &overlay.path, &overlay.text);
     }
     let _ = write!(page, "<script>{SCRIPT}</script>\n</body></html>\n");

@@ -161,6 +161,12 @@ fn identify(sections: &[Section], rows: &Map<String, Value>, definitions: &mut M
                     "anyOf": [{ "const": true }, { "type": "array", "items": { "type": "string" } }],
                 }),
             );
+            if section.first_wins {
+                properties.insert(
+                    "last".to_owned(),
+                    json!({ "description": "Puts a new row behind those that are there.", "type": "boolean" }),
+                );
+            }
             let rows = properties.clone();
             identify(section.lists, &rows, definitions);
         }

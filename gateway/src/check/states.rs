@@ -42,12 +42,12 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
         let counts = |wanted: Option<bool>| wanted.is_none_or(|wanted| wanted == told);
         let rows = sercos.rows.report.iter().filter(|row| counts(row.acknowledges));
         let drives = if told { "acknowledges" } else { "does not acknowledge" };
-        let place = (&sercos.text, sercos.rows.mapping.span());
+        let place = (&*sercos.text, sercos.rows.mapping.span());
         walk(&requests, rows.map(|row| &row.report), &format!("a drive that {drives}"), place, findings);
         let rows = cia402.rows.report.iter().filter(|row| counts(row.follows));
         let drives = if told { "tells" } else { "does not tell" };
         let drives = format!("a CiA 402 drive that {drives} whether it follows");
-        let place = (&cia402.text, cia402.rows.mapping.span());
+        let place = (&*cia402.text, cia402.rows.mapping.span());
         walk(&requests, rows.map(|row| &row.report), &drives, place, findings);
     }
 }

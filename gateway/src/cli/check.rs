@@ -100,7 +100,8 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
     };
     let _ = writeln!(
         text,
-        "; checked the tables{overlays}{axes} and {}",
+        "; checked the tables, those of {}{overlays}{axes} and {}",
+        plural(outcome.families, "family of drives"),
         plural(outcome.examples, "worked example")
     );
     text
@@ -109,6 +110,7 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
 fn plural(count: usize, what: &str) -> String {
     match (count, what) {
         (1, _) => format!("1 {what}"),
+        (_, "family of drives") => format!("{count} families of drives"),
         (_, "axis") => format!("{count} axes"),
         _ => format!("{count} {what}s"),
     }

@@ -13,6 +13,7 @@ use super::file::{CanDriveTable, CanTable, CountsTable};
 use super::{Can, CanDrive, CanLink, duration};
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
+use crate::mapping::VOLTAGE_BIT;
 
 /// CAN buses of one box.
 const BUSES_MAX: usize = 4;
@@ -26,6 +27,9 @@ const WATCH_MS: core::ops::RangeInclusive<i64> = 10..=10_000;
 const DEFAULT_HEARTBEAT_MS: u16 = 100;
 const DEFAULT_ALLOWED_LOSSES: u16 = 3;
 const AXES: core::ops::RangeInclusive<i64> = 0..=7;
+
+/// Parts per million in the rated torque.
+const RATED: Option<Ratio> = Ratio::new(1_000_000, 1);
 
 /// What an axis can be used for.
 pub(super) const MODES: [(&str, OperatingMode); 3] = [
@@ -41,10 +45,6 @@ const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
     ("following-error", (Signal::FollowingError, false)),
     ("inputs", (Signal::DigitalInputs, false)),
 ];
-
-/// What bit 4 of the statusword is: nothing to go by, or the supply of the power stage. maxon shows by it that the stage is on, others keep
-/// it at 0: a drive that is ready is ready.
-const VOLTAGE_BIT: [(&str, bool); 2] = [("ignore", false), ("dc-link", true)];
 
 /// Modes of operation of drives (6060).
 const DRIVE_MODES: [(&str, i8); 9] =
@@ -187,8 +187,8 @@ impl Checker {
             Some(names) => self.words(names, "offset", &OFFSETS),
         };
         let tells_voltage = match &table.voltage_bit {
-            None => Some(false),
-            Some(word) => self.word(word, "meaning of bit 4", &VOLTAGE_BIT),
+            None => Some(None),
+            Some(word) => self.word(word, "meaning of bit 4", &VOLTAGE_BIT).map(Some),
         };
         let drive_modes = match &table.drive_modes {
             None => Some(None),
@@ -216,7 +216,7 @@ impl Checker {
             modes: modes?,
             left_out: left_out?,
             offsets: offsets?,
-            acknowledges: table.acknowledges.unwrap_or(false),
+            acknowledges: table.acknowledges,
             tells_voltage: tells_voltage?,
             drive_modes: drive_modes?,
             way_of_a_turn: way_of_a_turn?,
@@ -271,16 +271,17 @@ impl Checker {
 
     fn counts(&mut self, table: &CountsTable) -> Option<Vec<(Quantity, Ratio)>> {
         let all = [
-            (Quantity::Position, &table.position),
-            (Quantity::Velocity, &table.velocity),
-            (Quantity::Acceleration, &table.acceleration),
+            (Quantity::Position, &table.position, NANO),
+            (Quantity::Velocity, &table.velocity, NANO),
+            (Quantity::Acceleration, &table.acceleration, NANO),
+            (Quantity::Torque, &table.torque, RATED),
         ];
         let mut counts = Vec::new();
-        for (quantity, value) in all {
+        for (quantity, value, unit) in all {
             let Some(value) = value else { continue };
-            // Generic units in a count: 10^9 over the counts in a unit.
+            // Generic units in a count: those in a unit over the counts in it.
             let per_unit = self.exact(value, "the number of counts")?;
-            let ratio = per_unit.inverse().and_then(|inverse| NANO?.then(inverse));
+            let ratio = per_unit.inverse().and_then(|inverse| unit?.then(inverse));
             let Some(ratio) = ratio else {
                 return self.report_as(
                     code::OUT_OF_RANGE,

@@ -339,13 +339,14 @@ pub struct CanDriveTable {
     /// Which trims go to the drive in every cycle, for it to add them: `"velocity"` (60B1) in position control, `"torque"` (60B2)
     /// in position and velocity control. Default: none, and such a trim of the controller has no effect.
     pub offsets: Option<Spanned<Vec<Spanned<String>>>>,
-    /// Whether its statusword tells by bit 12 that it follows command values. Default: false; a drive in operation follows.
+    /// Whether its statusword tells by bit 12 that it follows command values. Default: what the tables say of its
+    /// family, else false: a drive in operation follows.
     pub acknowledges: Option<bool>,
     /// What bit 4 of its statusword is: `"dc-link"` where the drive tells by it that its power stage is supplied, `"ignore"` otherwise. Default:
-    /// ignore; a drive that is ready is ready.
+    /// what the tables say of its family, else ignore: a drive that is ready is ready.
     pub voltage_bit: Option<Spanned<String>>,
     /// Modes of operation that the drive has, such as `"csp"` and `"pv"`, where it does not tell them by 6502 or tells wrong ones.
-    /// Default: what it tells; one that tells none is tried.
+    /// Default: what the tables say of its family, else what it tells; one that tells none is tried.
     pub drive_modes: Option<Spanned<Vec<Spanned<String>>>>,
     /// Millimetres that a linear axis makes in a turn of its motor; needed for a linear axis whose drive counts turns.
     pub millimetres_per_turn: Option<Spanned<f64>>,
@@ -413,6 +414,8 @@ pub struct CountsTable {
     pub velocity: Option<Spanned<f64>>,
     /// Acceleration counts in an axis unit per second squared.
     pub acceleration: Option<Spanned<f64>>,
+    /// Torque counts in the rated torque, 1000 where a count is a thousandth of it.
+    pub torque: Option<Spanned<f64>>,
 }
 
 /// `[[south.devicenet]]`

@@ -635,10 +635,10 @@ pub struct CanDrive {
     pub left_out: Vec<Signal>,
     /// Offsets that the drive adds to its set-points.
     pub offsets: Vec<Signal>,
-    /// Whether its statusword tells that it follows command values.
-    pub acknowledges: bool,
-    /// Whether its statusword tells that the power stage is supplied.
-    pub tells_voltage: bool,
+    /// Whether its statusword tells that it follows command values; `None`: as the tables say.
+    pub acknowledges: Option<bool>,
+    /// Whether its statusword tells that the power stage is supplied; `None`: as the tables say.
+    pub tells_voltage: Option<bool>,
     /// Its modes of operation, where it does not tell them, or tells wrong ones.
     pub drive_modes: Option<Vec<i8>>,
     /// Nanounits of a linear axis in a nanoturn.

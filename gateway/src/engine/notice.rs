@@ -29,7 +29,7 @@ use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
-use crate::mapping::{Cia402Error, Difference, InterpolationPeriod, Object, SercosError};
+use crate::mapping::{Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Object, SercosError};
 use crate::status::AxisWait;
 
 /// How much a notice matters.
@@ -202,6 +202,17 @@ pub enum Notice {
         /// Which, and why.
         modes: Vec<(ModeSelection, Cia402Error)>,
     },
+    /// A CANopen device is of a family of drives that has settings of its own.
+    Family {
+        /// The axis, the first one of the device.
+        axis: u8,
+        /// Its device.
+        node: NodeId,
+        /// What it says of itself.
+        identity: DriveIdentity,
+        /// The family.
+        name: String,
+    },
     /// The drive of a CANopen device expects set-points in another time than the cycle.
     Period {
         /// The axis.
@@ -332,6 +343,7 @@ impl Notice {
             | Self::ModesLeftOut { .. }
             | Self::Bare { .. }
             | Self::NodeModesLeftOut { .. }
+            | Self::Family { .. }
             | Self::Logged { entry: LogEntry { ended: Some(_), .. }, .. }
             | Self::Node { fault: NodeFault::NONE, alarm: NodeAlarm::NONE, .. }
             | Self::Sercos(
@@ -393,6 +405,7 @@ impl Notice {
             | Self::ModesLeftOut { axis, .. }
             | Self::Bare { axis, .. }
             | Self::NodeModesLeftOut { axis, .. }
+            | Self::Family { axis, .. }
             | Self::SlaveAnswers { axis, .. }
             | Self::ObjectsPassedOver { axis, .. }
             | Self::Program { axis, .. }
@@ -461,6 +474,11 @@ impl fmt::Display for Notice {
             }
             Self::NodeModesLeftOut { node, modes, .. } => {
                 write!(f, "node {node}: the axis does without {}", left_out(modes))
+            }
+            Self::Family { node, identity, name, .. } => {
+                let number = |number: Option<u32>| number.map_or_else(|| "none".to_owned(), |number| format!("{number:#x}"));
+                let (vendor, product) = (number(identity.vendor), number(identity.product));
+                write!(f, "node {node} has vendor-ID {vendor} and product code {product}: the settings for {name} are used")
             }
             Self::Period { node, expected, found, .. } => write!(
                 f,

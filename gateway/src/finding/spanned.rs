@@ -21,6 +21,11 @@ impl<T> Spanned<T> {
         self.0.span()
     }
 
+    /// The value without its place.
+    pub fn into_inner(self) -> T {
+        self.0.into_inner()
+    }
+
     /// The value.
     pub fn get_ref(&self) -> &T {
         self.0.get_ref()

@@ -59,17 +59,29 @@ pub(super) fn run(mapping: &Mapping, tables: &Tables, findings: &mut Findings) -
             runner.note(&sercos.text, result);
         }
     }
-    let cia402 = &tables.generic_cia402;
-    for row in &cia402.rows.scaling {
-        for example in &row.examples {
-            let result = runner.mapping.object_example(example);
-            runner.note(&cia402.text, result);
-        }
+    runner.cia402(mapping);
+    // What holds for all drives has to hold for those of a family as well, where it says nothing else. It is one example then.
+    for family in mapping.families() {
+        let before = runner.count;
+        let own = runner.cia402(&family.mapping);
+        runner.count = before + own;
     }
     runner.count
 }
 
 impl Runner<'_> {
+    /// Those between the generic model and CiA 402; how many of them stand in an overlay.
+    fn cia402(&mut self, mapping: &Mapping) -> usize {
+        let file = &mapping.tables().generic_cia402;
+        let mut own = 0;
+        for example in file.rows.scaling.iter().flat_map(|row| &row.examples) {
+            let (path, ..) = file.text.place(example.object.span().start);
+            own += usize::from(path != file.text.path());
+            self.note(&file.text, mapping.object_example(example));
+        }
+        own
+    }
+
     fn note(&mut self, text: &Source, result: Result<(), Wrong>) {
         self.count += 1;
         if let Err((span, message)) = result {

@@ -1,13 +1,14 @@
 //! Reading the table files: built in, from a folder in their place, and what is laid over them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::format::{
     Cia402CodeFile, Cia402ObjectFile, CipAttributeFile, CipEnumerationFile, CipFaultFile, CipGenericFile,
     CipNetworkFile, CipServiceFile, GenericCia402File, GenericFile, GenericSercosFile, SercosBitFile,
     SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
-use super::overlay::Overlay;
+use super::overlay::{self, FAMILIES, Overlay, ParsedFamily};
 use super::rows;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Source, read_file};
@@ -91,17 +92,32 @@ pub struct TableTexts {
     pub generic_sercos: TableText,
     /// Generic to CiA 402.
     pub generic_cia402: TableText,
+    /// Shipped settings of families of drives.
+    pub families: Vec<Overlay>,
     /// What is laid over them, in this order.
     pub overlays: Vec<Overlay>,
 }
 
-/// A parsed file together with its text.
-#[derive(Debug, Clone)]
+/// A parsed file together with its text; what many mappings have in common is there once.
+#[derive(Debug)]
 pub struct Parsed<T> {
     /// The text, and that of what was laid over it, for messages.
-    pub text: Source,
+    pub text: Arc<Source>,
     /// The rows.
-    pub rows: T,
+    pub rows: Arc<T>,
+}
+
+impl<T> Parsed<T> {
+    /// Rows and their text.
+    pub(super) fn new(text: Source, rows: T) -> Self {
+        Self { text: Arc::new(text), rows: Arc::new(rows) }
+    }
+}
+
+impl<T> Clone for Parsed<T> {
+    fn clone(&self) -> Self {
+        Self { text: Arc::clone(&self.text), rows: Arc::clone(&self.rows) }
+    }
 }
 
 /// All table files, parsed but not resolved.
@@ -156,7 +172,7 @@ impl TableTexts {
     /// of these: a misspelt name would otherwise be ignored without a word.
     pub fn from_folder(folder: &Path) -> Result<Self, Findings> {
         let mut findings = Findings::default();
-        for below in [PathBuf::new(), PathBuf::from("dictionary")] {
+        for below in [PathBuf::new(), PathBuf::from("dictionary"), PathBuf::from("families")] {
             refuse_strangers(folder, &below, &mut findings);
         }
         let mut texts = Self::embedded();
@@ -165,6 +181,15 @@ impl TableTexts {
             if path.exists() {
                 match read_file(&path, MAX_FILE_BYTES) {
                     Ok(text) => *table = TableText { path: path.display().to_string(), text },
+                    Err(found) => findings.extend(found),
+                }
+            }
+        }
+        for ((path, _), family) in FAMILIES.iter().zip(&mut texts.families) {
+            let path = folder.join(path);
+            if path.exists() {
+                match read_file(&path, MAX_FILE_BYTES) {
+                    Ok(text) => *family = Overlay::new(&path.display().to_string(), &text),
                     Err(found) => findings.extend(found),
                 }
             }
@@ -234,6 +259,7 @@ impl TableTexts {
             cip_generic,
             generic_sercos,
             generic_cia402,
+            families: FAMILIES.map(|(path, text)| Overlay::new(&format!("mappings/{path}"), text)).to_vec(),
             overlays: Vec::new(),
         }
     }
@@ -256,6 +282,7 @@ impl TableTexts {
             cip_generic,
             generic_sercos,
             generic_cia402,
+            families: _,
             overlays: _,
         } = self;
         [
@@ -278,10 +305,12 @@ impl TableTexts {
         ]
     }
 
-    /// Parses all files and lays over them what is to be laid over them. `None` with errors: every file that is no TOML,
+    /// Parses all files and lays over them what is to be laid over them; families of drives have tables of their own. `None` with errors: every file that is no TOML,
     /// or has unknown, missing or mistyped keys, with the place.
-    pub(super) fn parse(&self, findings: &mut Findings) -> Option<Tables> {
-        let layers = super::overlay::layers(&self.overlays, findings);
+    pub(super) fn parse(&self, findings: &mut Findings) -> Option<(Tables, Vec<ParsedFamily>)> {
+        let mut all = overlay::layers(&self.families, findings);
+        all.extend(overlay::layers(&self.overlays, findings));
+        let layers: Vec<_> = all.iter().filter(|layer| layer.is_general()).collect();
         let generic = rows::parse(&self.generic, "generic", &layers, findings);
         let cip_attributes = rows::parse(&self.cip_attributes, "cip-attributes", &layers, findings);
         let cip_enumerations = rows::parse(&self.cip_enumerations, "cip-enumerations", &layers, findings);
@@ -302,7 +331,8 @@ impl TableTexts {
         if findings.has_errors() {
             return None;
         }
-        Some(Tables {
+        let families = overlay::parse_families(&self.generic_cia402, &all, findings);
+        let tables = Tables {
             generic: generic?,
             cip_attributes: cip_attributes?,
             cip_enumerations: cip_enumerations?,
@@ -319,7 +349,8 @@ impl TableTexts {
             cip_generic: cip_generic?,
             generic_sercos: generic_sercos?,
             generic_cia402: generic_cia402?,
-        })
+        };
+        Some((tables, families))
     }
 }
 
@@ -337,8 +368,9 @@ fn refuse_strangers(folder: &Path, below: &Path, findings: &mut Findings) {
     for entry in entries.flatten() {
         let path = below.join(entry.file_name());
         let is_table = path.extension().is_some_and(|extension| extension == "toml");
-        if is_table && !FILES.iter().any(|(known, _)| Path::new(known) == path) {
-            let known: Vec<&str> = FILES.iter().map(|(known, _)| *known).collect();
+        let files = || FILES.iter().chain(&FAMILIES).map(|(known, _)| *known);
+        if is_table && !files().any(|known| Path::new(known) == path) {
+            let known: Vec<&str> = files().collect();
             let message = format!("expected one of {}, got `{}`", known.join(", "), path.display());
             findings.push_file(code::STRANGER, &folder.join(&path), message);
         }

@@ -47,6 +47,7 @@ mod survey;
 mod tests;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use profile_cip::target::attribute::AttributeDefinition;
 use profile_generic::mode::ModeSelection;
@@ -57,7 +58,8 @@ pub use capture_program::{
     WORDS_MAX as CAPTURE_WORDS_MAX,
 };
 pub use cia402::{
-    Cia402Axis, Cia402Error, Cia402Tables, InterpolationPeriod, ModeWords, ObjectFacts, ObjectStep, Plan,
+    Cia402Axis, Cia402Error, Cia402Tables, DriveIdentity, InterpolationPeriod, ModeWords, ObjectFacts,
+    ObjectStep, Plan, VOLTAGE_BIT,
 };
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
@@ -93,7 +95,7 @@ pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
-pub use overlay::{OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
+pub use overlay::{DrivesHead, OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
 pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos_tables::{ReportRule, SercosTables};
 
@@ -108,14 +110,27 @@ const EXCEPTION_BITS: u8 = 64;
 #[derive(Debug, Clone)]
 pub struct Mapping {
     /// What the profiles have.
-    pub dictionaries: Dictionaries,
+    pub dictionaries: Arc<Dictionaries>,
     /// CIP Motion and the generic model.
-    pub cip: CipTables,
+    pub cip: Arc<CipTables>,
     /// The generic model and SERCOS.
-    pub sercos: SercosTables,
+    pub sercos: Arc<SercosTables>,
     /// The generic model and CiA 402.
-    pub cia402: Cia402Tables,
+    pub cia402: Arc<Cia402Tables>,
     tables: Tables,
+    families: Vec<Family>,
+}
+
+/// CiA 402 drives that have rows of their own.
+#[derive(Debug, Clone)]
+pub struct Family {
+    /// What they are, in words.
+    pub name: String,
+    vendor: u32,
+    /// None: all that no other family of the vendor has.
+    products: Vec<u32>,
+    /// The tables with their rows.
+    pub mapping: Mapping,
 }
 
 impl Mapping {
@@ -157,24 +172,68 @@ impl Mapping {
 
     /// The tables in these texts, and everything that is found in them; `None` with errors.
     pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
-        let tables = texts.parse(findings)?;
+        let (tables, families) = texts.parse(findings)?;
         let dictionaries = Dictionaries::resolve(&tables, findings);
         // Tables that were parsed were parsed without an error: those there are now are the dictionaries'.
         let sound = !findings.has_errors();
-        let mapping = Self::join(tables, dictionaries, sound, findings);
+        let mut mapping = Self::join(tables, Arc::new(dictionaries), sound, findings);
+        if !findings.has_errors() {
+            mapping.families = families.into_iter().map(|family| mapping.family(family, findings)).collect();
+        }
         (!findings.has_errors()).then_some(mapping)
     }
 
     /// The mapping tables, resolved by the dictionaries, which are sound or were told not to be.
-    fn join(tables: Tables, dictionaries: Dictionaries, sound: bool, findings: &mut Findings) -> Self {
+    fn join(tables: Tables, dictionaries: Arc<Dictionaries>, sound: bool, findings: &mut Findings) -> Self {
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
         // What is wrong with a dictionary need not be told again by every row that names it.
         let cia402 = sound.then(|| Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, findings));
-        Self { dictionaries, cip, sercos, cia402: cia402.unwrap_or_default(), tables }
+        Self {
+            dictionaries,
+            cip: Arc::new(cip),
+            sercos: Arc::new(sercos),
+            cia402: Arc::new(cia402.unwrap_or_default()),
+            tables,
+            families: Vec::new(),
+        }
     }
 
-    /// The same with another text of one of the mapping tables, such as `cip-generic.toml`: for whoever
+    /// The same for a family of drives.
+    fn family(&self, family: overlay::ParsedFamily, findings: &mut Findings) -> Family {
+        let overlay::ParsedFamily { name, vendor, products, table } = family;
+        let cia402 = Arc::new(Cia402Tables::resolve(&table, &self.dictionaries, findings));
+        let tables = Tables { generic_cia402: table, ..self.tables.clone() };
+        Family {
+            name,
+            vendor,
+            products,
+            mapping: Self { cia402, tables, families: Vec::new(), ..self.clone() },
+        }
+    }
+
+    /// The families of CiA 402 drives that have rows of their own.
+    #[must_use]
+    pub fn families(&self) -> &[Family] {
+        &self.families
+    }
+
+    /// The family that a CiA 402 drive is of, by what its device says of itself.
+    #[must_use]
+    pub fn family_of(&self, identity: &DriveIdentity) -> Option<&Family> {
+        let (vendor, product) = (identity.vendor?, identity.product);
+        let mut own = self.families.iter().filter(|family| family.vendor == vendor);
+        let named = own.clone().find(|family| product.is_some_and(|code| family.products.contains(&code)));
+        named.or_else(|| own.find(|family| family.products.is_empty()))
+    }
+
+    /// The tables for a CiA 402 drive: those of its family, where it is of one.
+    #[must_use]
+    pub fn of_drive(&self, facts: &ObjectFacts) -> &Self {
+        self.family_of(facts.identity()).map_or(self, |family| &family.mapping)
+    }
+
+    /// The same with another text of one of the mapping tables, such as `cip-generic.toml`, for all drives: for whoever
     /// tries a change. The dictionaries stay as they are.
     ///
     /// # Errors
@@ -207,7 +266,7 @@ impl Mapping {
         if findings.has_errors() {
             return Err(findings);
         }
-        let mapping = Self::join(tables, self.dictionaries.clone(), true, &mut findings);
+        let mapping = Self::join(tables, Arc::clone(&self.dictionaries), true, &mut findings);
         findings.into_result(mapping)
     }
 

@@ -10,13 +10,13 @@ use crate::finding::{Findings, Source, deserialize, tree};
 pub(super) fn parse<T: DeserializeOwned>(
     table: &TableText,
     name: &str,
-    layers: &[Layer],
+    layers: &[&Layer],
     findings: &mut Findings,
 ) -> Option<Parsed<T>> {
     let mut text = Source::new(&table.path, &table.text);
     let is_plain = !layers.iter().any(|layer| layer.touches(name));
     if is_plain && let Ok(rows) = toml::from_str(&table.text) {
-        return Some(Parsed { text, rows });
+        return Some(Parsed::new(text, rows));
     }
     let mut tree = tree(&table.text, &text, findings)?;
     let bases: Vec<usize> = layers.iter().map(|layer| layer.add_to(&mut text)).collect();
@@ -24,5 +24,5 @@ pub(super) fn parse<T: DeserializeOwned>(
         overlay::lay(layer, base, name, tree.get_mut(), &text, findings);
     }
     let rows = deserialize(tree, &text, findings)?;
-    Some(Parsed { text, rows })
+    Some(Parsed::new(text, rows))
 }

@@ -7,6 +7,7 @@ mod cip_dictionary;
 mod cip_program;
 mod completeness;
 mod cyclic_axis;
+mod families;
 mod overlays;
 mod sercos_dictionary;
 mod sercos_program;

@@ -10,7 +10,16 @@ use super::stage::{Behind, StageAxis};
 use crate::mapping::{Cia402Dictionary, Item, Mapping, Object, Origin};
 
 impl StageAxis {
+    /// The tables that count for the drive.
+    fn tables<'m>(&self, mapping: &'m Mapping) -> &'m Mapping {
+        match &self.behind {
+            Behind::Can(drive) => mapping.of_drive(&drive.facts),
+            Behind::Sercos(_) | Behind::Devicenet(_) => mapping,
+        }
+    }
+
     pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.signal_row(signal),
             Behind::Devicenet(drive) => drive.is_motion().then(|| mapping.cyclic_row(signal))?,
@@ -25,6 +34,7 @@ impl StageAxis {
     }
 
     pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.mode_row(selection),
             Behind::Devicenet(_) => mapping.control_mode_row(selection.mode),
@@ -37,6 +47,7 @@ impl StageAxis {
 
     /// `status` is what the drive has shown.
     pub(super) fn action_row(&self, mapping: &Mapping, action: Action, status: u32) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.action_row(action),
             Behind::Can(_) => mapping.object_action_row(action, status),
@@ -46,6 +57,7 @@ impl StageAxis {
     }
 
     pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(drive) => mapping.report_row(status, drive.silent),
             Behind::Can(drive) => mapping.object_report_row(self.known(status), &drive.needs),
@@ -57,6 +69,7 @@ impl StageAxis {
     }
 
     pub(super) fn status_rows(&self, mapping: &Mapping, status: u32, words: &[(Item, u32)]) -> Vec<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(drive) => mapping.status_rows(status, words, drive.silent),
             Behind::Devicenet(_) => Vec::new(),
@@ -85,6 +98,7 @@ impl StageAxis {
         word: u32,
         cause: FaultCause,
     ) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match item {
             Item::Idn(idn) => mapping.fault_row(idn, word, cause),
             Item::Object(_) => mapping.object_fault_row(word),
@@ -93,6 +107,7 @@ impl StageAxis {
     }
 
     pub(super) fn parameter_row(&self, mapping: &Mapping, parameter: Parameter) -> Option<Origin> {
+        let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.parameter_row(parameter),
             Behind::Can(_) => mapping.object_parameter_row(parameter),

@@ -262,6 +262,7 @@ impl Stage {
                     .sercos_program(&drive.needs, &drive.facts)
                     .map_err(|error| failed(error.to_string()))?,
                 Behind::Can(drive) => mapping
+                    .of_drive(&drive.facts)
                     .cia402_program(&drive.needs, &drive.facts)
                     .map_err(|error| failed(error.to_string()))?,
                 Behind::Devicenet(drive) => {

@@ -5,10 +5,10 @@ use std::rc::Rc;
 
 use axisbridge::status::BoxState;
 use axisbridge_peers::can_drive::CanDrive;
-use axisbridge_peers::can_drive::settings::Settings as Oddities;
+use axisbridge_peers::can_drive::settings::{Settings as Oddities, VoltageBit};
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::controller::{Limits, Step};
+use profile_cip::controller::{Condition, Limits, Step};
 use profile_cip::wire::motion::codes::ControlMode;
 
 use super::{AXIS, Outcome, does, said, table};
@@ -72,7 +72,11 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
         true => vec![
             Step::Enable(AXIS),
             Step::RunAt { axis: 1, velocity: 2.0, acceleration: 4.0, jerk: 400.0 },
-            Step::Dwell { seconds: 3.0 },
+            // What the controller sees is what the drive does.
+            Step::Expect {
+                condition: Condition::Velocity { axis: 1, velocity: 2.0, tolerance: 0.1 },
+                within: millis(3_000),
+            },
         ],
     };
     let (mut was_enabled, mut fastest) = (false, 0);
@@ -109,6 +113,23 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
     Outcome { works: done && was_enabled && went, said: said(&rig, &of_drive) }
 }
 
+/// A drive that counts in rpm and does not say it.
+fn oriental_without_unit() -> Oddities {
+    let mut it = Oddities::oriental_like();
+    it.missing.push((0x60A9, None));
+    it
+}
+
+/// The same, and nobody knows who made it.
+fn of_an_unknown_maker() -> Oddities {
+    Oddities { vendor: 0x7FFF, ..oriental_without_unit() }
+}
+
+/// A drive that is ready without its DC link, and says so by bit 4.
+fn akd_without_mains() -> Oddities {
+    Oddities { voltage_bit: VoltageBit::Zero, ..Oddities::akd_like() }
+}
+
 /// A drive of the standard, at node 3.
 fn sound() -> Oddities {
     Oddities { node_id: 3, ..Oddities::default() }
@@ -117,46 +138,21 @@ fn sound() -> Oddities {
 #[test]
 fn families() {
     type Row = (&'static str, fn() -> Oddities, &'static str, ControlMode);
-    let rows: [Row; 15] = [
+    let rows: [Row; 18] = [
         ("the standard's", Oddities::default, "", ControlMode::POSITION),
         ("maxon EPOS4", Oddities::epos_like, "", ControlMode::POSITION),
         ("Oriental BLVD", Oddities::oriental_like, "", ControlMode::VELOCITY),
-        (
-            "Oriental BLVD without 60A9",
-            || {
-                let mut it = Oddities::oriental_like();
-                it.missing.push((0x60A9, None));
-                it
-            },
-            "",
-            ControlMode::VELOCITY,
-        ),
-        (
-            "of a maker that nobody knows, the same",
-            || {
-                let mut it = Oddities::oriental_like();
-                it.vendor = 0x7FFF;
-                it.missing.push((0x60A9, None));
-                it
-            },
-            "",
-            ControlMode::VELOCITY,
-        ),
-        (
-            "the same, told",
-            || {
-                let mut it = Oddities::oriental_like();
-                it.vendor = 0x7FFF;
-                it.missing.push((0x60A9, None));
-                it
-            },
-            "counts = { velocity = 60 }",
-            ControlMode::VELOCITY,
-        ),
+        ("Oriental BLVD without 60A9", oriental_without_unit, "", ControlMode::VELOCITY),
+        ("of a maker that nobody knows, the same", of_an_unknown_maker, "", ControlMode::VELOCITY),
+        ("the same, told", of_an_unknown_maker, "counts = { velocity = 60 }", ControlMode::VELOCITY),
         ("Faulhaber CO", Oddities::faulhaber_like, "", ControlMode::VELOCITY),
         ("Faulhaber CF", Oddities::faulhaber_cf_like, "", ControlMode::VELOCITY),
         ("Kollmorgen AKD", Oddities::akd_like, "", ControlMode::POSITION),
+        ("Kollmorgen AKD without mains", akd_without_mains, "", ControlMode::POSITION),
         ("Technosoft iPOS", Oddities::ipos_like, "", ControlMode::POSITION),
+        ("Technosoft iPOS in velocity control", Oddities::ipos_like, "", ControlMode::VELOCITY),
+        // 10 000 counts in a turn, 65.536 for each of them in a second.
+        ("the same, told", Oddities::ipos_like, "counts = { velocity = 655_360 }", ControlMode::VELOCITY),
         ("Kollmorgen RGM", Oddities::kollmorgen_rgm_like, "", ControlMode::POSITION),
         ("Eyou", Oddities::eyou_like, "", ControlMode::POSITION),
         (

@@ -12,9 +12,9 @@ use profile_generic::time::DurationNs;
 
 use super::captures::{CaptureRule, LatchRule};
 use super::{
-    ActionRule, Base, Cia402Tables, DriveMode, Drives, FixedUnit, Handover, Method, ModeRule, Object,
-    ParameterRule, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Value,
-    Words,
+    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, FixedUnit, Handover, Method, ModeRule,
+    Object, ParameterRule, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind,
+    StepRule, Tells, VOLTAGE_BIT, Value, Words,
 };
 use crate::finding::Findings;
 use crate::finding::registry as code;
@@ -55,6 +55,7 @@ impl Cia402Tables {
         for row in &rows.scaling {
             builder.scaling(row);
         }
+        builder.drive(rows);
         builder.words(rows);
         for row in &rows.signal {
             builder.signal(row);
@@ -222,6 +223,14 @@ impl<'a> Builder<'a> {
             None => None,
         };
         Some(Method { when, base, times, over })
+    }
+
+    fn drive(&mut self, rows: &GenericCia402File) {
+        let row = &rows.drive;
+        let voltage = self.resolver.word("voltage_bit", &row.voltage_bit, &VOLTAGE_BIT).unwrap_or_default();
+        let tells = Tells { follows: row.acknowledges, voltage };
+        let modes = row.modes.as_ref().map(|names| self.mode_codes(names));
+        self.tables.drive = DriveDefaults { tells, modes };
     }
 
     fn words(&mut self, rows: &GenericCia402File) {

@@ -44,11 +44,11 @@ pub struct Cia402Axis {
     pub cycle: DurationNs,
     /// Parameters to write at start, in generic units.
     pub parameters: Vec<(Parameter, i64)>,
-    /// The drive tells by bit 12 of its statusword whether it follows command values.
-    pub acknowledges: bool,
-    /// It tells by bit 4 whether its power stage is supplied.
-    pub tells_voltage: bool,
-    /// Its modes of operation, where it does not tell them by 6502, or tells wrong ones.
+    /// Whether the drive tells by bit 12 of its statusword that it follows command values; `None`: as the tables say.
+    pub acknowledges: Option<bool>,
+    /// Whether it tells by bit 4 that its power stage is supplied; `None`: as the tables say.
+    pub tells_voltage: Option<bool>,
+    /// Its modes of operation, where it does not tell them by 6502, or tells wrong ones; `None`: as the tables say.
     pub drive_modes: Option<Vec<i8>>,
     /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
@@ -265,7 +265,7 @@ impl Cia402Tables {
         axis: &Cia402Axis,
         facts: &mut ObjectFacts,
     ) -> Option<ModeWords> {
-        if let Some(codes) = &axis.drive_modes {
+        if let Some(codes) = axis.drive_modes.as_ref().or(self.drive.modes.as_ref()) {
             self.has_modes(facts, codes.iter().copied());
             return None;
         }
@@ -582,7 +582,8 @@ impl Cia402Tables {
                 None => program.actions.set(rule.action, rule.pattern),
             }
         }
-        for rule in self.reports.iter().filter(|rule| rule.drives.include(axis)) {
+        let tells = self.tells(axis);
+        for rule in self.reports.iter().filter(|rule| rule.drives.include(tells)) {
             for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
                 // A drive that carries out something by itself need not follow command values.
                 let led = rule.drives.follows == Some(true) || program.led_reports.push(pattern, rule.report);
@@ -591,7 +592,7 @@ impl Cia402Tables {
                 }
             }
         }
-        for rule in self.status.iter().filter(|rule| rule.drives.include(axis)) {
+        for rule in self.status.iter().filter(|rule| rule.drives.include(tells)) {
             let word = (rule.object != self.words.status).then(|| axis.item(rule.object)).flatten();
             if word.is_some_and(|word| !program.status_words.iter().any(|place: &Place| place.item == word)) {
                 continue;

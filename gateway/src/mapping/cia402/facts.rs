@@ -6,9 +6,19 @@ use profile_generic::program::Width;
 
 use super::{Object, Value};
 
+/// Who made a device, by 1018.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct DriveIdentity {
+    /// Vendor-ID (1018:1), where it has one.
+    pub vendor: Option<u32>,
+    /// Product code (1018:2), where it has one.
+    pub product: Option<u32>,
+}
+
 /// What a drive has said about itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ObjectFacts {
+    identity: DriveIdentity,
     facts: BTreeMap<Object, Fact>,
 }
 
@@ -23,6 +33,18 @@ impl ObjectFacts {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Nothing known but what the device of the drive is.
+    #[must_use]
+    pub fn of(identity: DriveIdentity) -> Self {
+        Self { identity, ..Self::default() }
+    }
+
+    /// What its device is.
+    #[must_use]
+    pub fn identity(&self) -> &DriveIdentity {
+        &self.identity
     }
 
     /// Whether nothing is known, as before the drive was asked.

@@ -25,7 +25,7 @@ use profile_generic::time::DurationNs;
 
 pub use self::commissioning::{InterpolationPeriod, ObjectStep, Plan};
 pub use self::compile::{Cia402Axis, Cia402Error, ModeWords};
-pub use self::facts::ObjectFacts;
+pub use self::facts::{DriveIdentity, ObjectFacts};
 
 use self::captures::CaptureRule;
 use super::drive_program::{FaultRow, Handover, MAX_MODES};
@@ -135,11 +135,31 @@ pub(crate) struct Drives {
 }
 
 impl Drives {
-    /// Whether the drive of an axis is one of them.
-    pub fn include(self, axis: &Cia402Axis) -> bool {
-        self.follows.is_none_or(|follows| follows == axis.acknowledges)
-            && self.voltage.is_none_or(|voltage| voltage == axis.tells_voltage)
+    /// Whether a drive that tells this is one of them.
+    pub fn include(self, tells: Tells) -> bool {
+        self.follows.is_none_or(|follows| follows == tells.follows)
+            && self.voltage.is_none_or(|voltage| voltage == tells.voltage)
     }
+}
+
+/// What bit 4 of the statusword is: nothing to go by, or the supply of the power stage.
+pub const VOLTAGE_BIT: [(&str, bool); 2] = [("ignore", false), ("dc-link", true)];
+
+/// What a drive tells by bits of its statusword that not all drives keep.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Tells {
+    /// By bit 12, that it follows command values.
+    pub follows: bool,
+    /// By bit 4, that there is power.
+    pub voltage: bool,
+}
+
+/// How drives are of which the configuration does not say it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct DriveDefaults {
+    pub tells: Tells,
+    /// Modes of operation, whatever 6502 tells.
+    pub modes: Option<Vec<i8>>,
 }
 
 #[derive(Debug, Clone)]
@@ -219,6 +239,7 @@ pub(super) struct Words {
 pub struct Cia402Tables {
     pub(super) units: Vec<FixedUnit>,
     pub(super) scalings: Vec<ScalingRule>,
+    pub(super) drive: DriveDefaults,
     pub(super) words: Words,
     pub(super) signals: Vec<SignalRule>,
     pub(super) modes: Vec<ModeRule>,
@@ -240,6 +261,15 @@ impl Cia402Tables {
         let mut rules = self.signals.iter().filter(|rule| rule.signal == signal);
         let general = rules.clone().find(|rule| rule.modes.is_empty());
         rules.find(|rule| rule.modes.contains(&mode)).or(general)
+    }
+
+    /// What the drive of an axis tells.
+    pub(super) fn tells(&self, axis: &Cia402Axis) -> Tells {
+        let usual = self.drive.tells;
+        Tells {
+            follows: axis.acknowledges.unwrap_or(usual.follows),
+            voltage: axis.tells_voltage.unwrap_or(usual.voltage),
+        }
     }
 
     /// The operating modes that a controller can lead drives in.

@@ -60,7 +60,7 @@ impl Cia402Tables {
             return Ok(ratio);
         }
         for method in &rule.methods {
-            if let Some(ratio) = self.by(method, axis, facts)? {
+            if let Some(ratio) = self.by(method, rule.quantity, axis, facts)? {
                 return Ok(ratio);
             }
         }
@@ -71,6 +71,7 @@ impl Cia402Tables {
     fn by(
         &self,
         method: &Method,
+        quantity: Quantity,
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Option<Ratio>, Cia402Error> {
@@ -83,12 +84,12 @@ impl Cia402Tables {
         }
         let mut ratio = match &method.base {
             Base::Like(place) => self.scaled(*place, axis, facts)?,
-            Base::Generic(base) => match axis.units.kind {
-                UnitKind::Rotary => *base,
-                UnitKind::Linear => {
+            Base::Generic(base) => match (quantity, axis.units.kind) {
+                (Quantity::Position | Quantity::Velocity | Quantity::Acceleration, UnitKind::Linear) => {
                     let way = axis.way_of_a_turn.ok_or(Cia402Error::Way)?;
                     base.then(way).ok_or(Cia402Error::Way)?
                 }
+                _ => *base,
             },
         };
         for (values, invert) in [(&method.times, false), (&method.over, true)] {

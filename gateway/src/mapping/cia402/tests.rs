@@ -22,8 +22,8 @@ fn axis(modes: &[OperatingMode]) -> Cia402Axis {
         modes: modes.iter().map(|mode| (*mode).into()).collect(),
         cycle: DurationNs::from_millis(2),
         left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
-        acknowledges: true,
-        tells_voltage: true,
+        acknowledges: Some(true),
+        tells_voltage: Some(true),
         drive_modes: None,
         any_mode: false,
         ..Cia402Axis::default()
@@ -127,7 +127,7 @@ fn a_drive_is_led_from_its_start_into_operation() {
 fn what_every_status_says() {
     let program = program(&ALL);
     // One whose bits 4 and 12 are not looked at.
-    let plain = Cia402Axis { acknowledges: false, tells_voltage: false, ..axis(&ALL) };
+    let plain = Cia402Axis { acknowledges: None, tells_voltage: None, ..axis(&ALL) };
     let plain = shipped().cia402_program(&plain, &servo()).unwrap();
     let mut text = String::new();
     for mode in [8_u32, 9, 3, 0] {

@@ -19,6 +19,8 @@ pub struct GenericCia402File {
     pub unit: Vec<UnitRow>,
     /// Units that the drive's factor group defines.
     pub scaling: Vec<Cia402ScalingRow>,
+    /// How drives are of which the configuration does not say it.
+    pub drive: Cia402DriveRow,
     /// Control, status and modes.
     pub words: Cia402WordsRow,
     /// Signals.
@@ -55,6 +57,20 @@ pub struct Cia402UnboundRow {
     pub reason: Name,
     /// Their numbers, a family by the first one.
     pub objects: Vec<Name>,
+}
+
+/// How drives are of which the configuration does not say it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cia402DriveRow {
+    /// Whether bit 12 of the statusword tells that the drive follows command values.
+    pub acknowledges: bool,
+    /// What bit 4 of the statusword is: `dc-link` where the drive tells by it that its power stage is supplied, `ignore` otherwise.
+    pub voltage_bit: Name,
+    /// The modes of operation that the drive has, whatever 6502 tells. Default: what it tells.
+    pub modes: Option<Vec<Name>>,
+    /// Where it comes from.
+    pub source: Source,
 }
 
 /// How a unit follows from the drive's factor group.

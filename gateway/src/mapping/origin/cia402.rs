@@ -53,8 +53,9 @@ impl Mapping {
     #[must_use]
     pub fn object_report_row(&self, status: u32, axis: &Cia402Axis) -> Option<Origin> {
         let file = &self.tables.generic_cia402;
+        let tells = self.cia402.tells(axis);
         let at = self.cia402.reports.iter().position(|rule| {
-            rule.drives.include(axis) && shows(&rule.modes, status) && rule.pattern.matches(status)
+            rule.drives.include(tells) && shows(&rule.modes, status) && rule.pattern.matches(status)
         })?;
         let row = file.rows.report.get(at)?;
         Some(beside(origin(&file.text, "report", &row.report), Some(&row.state)))
@@ -68,8 +69,9 @@ impl Mapping {
             Some((_, word)) => Some(*word),
             None => (object == self.cia402.words.status).then_some(status),
         };
+        let tells = self.cia402.tells(axis);
         let rows = self.cia402.status.iter().zip(&file.rows.status).filter(|(rule, _)| {
-            rule.drives.include(axis)
+            rule.drives.include(tells)
                 && shows(&rule.modes, status)
                 && value(rule.object).is_some_and(|word| rule.pattern.matches(word))
         });
@@ -136,7 +138,7 @@ mod tests {
         );
         assert_eq!(key(mapping.object_action_row(Action::Enable, 0x08)), Some("action enable".to_owned()));
         // csp follows, csp ignores, profile velocity has no bit 12.
-        let axis = Cia402Axis { acknowledges: true, ..Cia402Axis::default() };
+        let axis = Cia402Axis { acknowledges: Some(true), ..Cia402Axis::default() };
         let report = |status| key(mapping.object_report_row(status, &axis));
         assert_eq!(report(0x08_1027), Some("report operating, Operation enabled".to_owned()));
         assert_eq!(report(0x08_0027), Some("report enabling, Operation enabled".to_owned()));

@@ -13,6 +13,9 @@ use crate::finding::{Findings, Problem, Source, closest};
 /// The key that takes a row away, or keys of it.
 const REMOVE: &str = "remove";
 
+/// The key of a new row that comes behind those that are there, although the first one that fits counts.
+const LAST: &str = "last";
+
 type Value<'t> = Spanned<DeValue<'t>>;
 
 /// Lays what a layer has of a table over it. `base` is where the layer begins in the source.
@@ -116,6 +119,17 @@ impl Merger<'_> {
             });
             seen.push(id);
             let remove = row.remove(REMOVE);
+            let last = row.remove(LAST).map(|value| (value.span(), value.get_ref().clone()));
+            let last = match (last, at.is_none() && section.first_wins) {
+                (Some((_, DeValue::Boolean(last))), true) => last,
+                (Some((place, _)), _) => {
+                    let message =
+                        "expected true or false in a new row of a list whose first row that fits counts";
+                    self.problem(code::CONTRADICTION, place, LAST, message);
+                    false
+                }
+                (None, _) => false,
+            };
             match (at, remove.as_ref().map(|value| (value.span(), value.get_ref()))) {
                 (Some(at), Some((place, DeValue::Boolean(true)))) => {
                     if row.keys().any(|key| !section.key.contains(&key.get_ref().as_ref())) {
@@ -139,7 +153,7 @@ impl Merger<'_> {
                 }
                 (None, None) => {
                     let row = Spanned::new(span, DeValue::Table(row));
-                    if section.first_wins {
+                    if section.first_wins && !last {
                         known.insert(added, row);
                         added += 1;
                     } else {

@@ -12,9 +12,14 @@
 //! missing = "reject"
 //! ```
 //!
+//! `drives = { vendor_id = 0x2BE, product_codes = [0x13F7], source = "..." }` in the head makes it the settings of a family of CiA 402 drives:
+//! its rows count for drives that say in 1018 that they are of it, and for no others. Some families are shipped ([`FAMILIES`]).
+//!
 //! A row that has the same identity ([`sections`]) as one that is there changes the keys that it has; `remove = true` takes it
-//! away, `remove = ["reaction"]` takes keys away; any other row is added.
+//! away, `remove = ["reaction"]` takes keys away; any other row is added: before those that are there where the first one that fits
+//! counts, behind them with `last = true`.
 
+mod families;
 mod merge;
 mod sections;
 
@@ -28,6 +33,7 @@ use super::load::{FILES, FORMAT, MAX_FILE_BYTES, TableTexts, table_name};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source, Spanned, closest, deserialize, read_file, tree};
 
+pub(super) use families::{FAMILIES, ParsedFamily, parse as parse_families};
 pub(super) use merge::lay;
 pub use sections::{Section, sections};
 
@@ -60,21 +66,48 @@ pub struct OverlayHead {
     /// Overlays that come before this one; the paths count from the folder of this file.
     #[serde(default)]
     pub base: Vec<Spanned<String>>,
+    /// The CiA 402 drives that it is for. Default: all.
+    pub drives: Option<Spanned<DrivesHead>>,
+}
+
+/// Drives that an overlay is for, by what they say of themselves.
+#[derive(Debug, Clone, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DrivesHead {
+    /// Vendor-ID (1018:1).
+    pub vendor_id: u32,
+    /// Product codes (1018:2). Default: all of the vendor.
+    #[serde(default)]
+    pub product_codes: Vec<u32>,
+    /// Where this was read.
+    pub source: String,
 }
 
 /// The keys of the head.
-const HEAD: [&str; 3] = ["format", "overlay", "base"];
+const HEAD: [&str; 4] = ["format", "overlay", "base", "drives"];
+
+/// The table of which a family of drives can have rows of its own.
+const OF_FAMILIES: &str = "generic-cia402";
 
 /// An overlay as a tree.
 pub(super) struct Layer<'t> {
     overlay: &'t Overlay,
     tree: DeTable<'t>,
+    /// What it is for, in words.
+    name: String,
+    /// The drives that it is for; `None`: all.
+    drives: Option<DrivesHead>,
 }
 
 impl<'t> Layer<'t> {
     /// Whether it has rows of a table.
     pub fn touches(&self, table: &str) -> bool {
         self.tree.contains_key(table)
+    }
+
+    /// Whether it is for all drives.
+    pub fn is_general(&self) -> bool {
+        self.drives.is_none()
     }
 
     /// Adds its text to a source, and returns where it begins there.
@@ -107,6 +140,9 @@ fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>>
         );
     }
     let tree = tree.into_inner();
+    let (name, drives) = head
+        .map(|head| (head.overlay.into_inner(), head.drives.map(Spanned::into_inner)))
+        .unwrap_or_default();
     let names: Vec<&str> = FILES.iter().map(|(path, _)| table_name(path)).collect();
     for key in tree.keys().filter(|key| !HEAD.contains(&key.get_ref().as_ref())) {
         let name = key.get_ref().as_ref();
@@ -121,9 +157,17 @@ fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>>
                     None => problem.help(format!("the tables are {}", names.join(", "))),
                 },
             );
+        } else if drives.is_some() && name != OF_FAMILIES {
+            let problem = Problem::new(code::CONTRADICTION, key.span()).key(name);
+            findings.push(
+                &source,
+                problem.expected(format!(
+                    "expected rows of {OF_FAMILIES}: the other tables are the same for all drives"
+                )),
+            );
         }
     }
-    Some(Layer { overlay, tree })
+    Some(Layer { overlay, tree, name, drives })
 }
 
 impl TableTexts {

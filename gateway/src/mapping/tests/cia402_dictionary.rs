@@ -8,7 +8,8 @@ use crate::mapping::{
 
 fn cia402() -> &'static Cia402Dictionary {
     static DICTIONARY: OnceLock<Cia402Dictionary> = OnceLock::new();
-    DICTIONARY.get_or_init(|| Mapping::embedded().expect("the shipped tables are good").dictionaries.cia402)
+    DICTIONARY
+        .get_or_init(|| Mapping::embedded().expect("the shipped tables are good").dictionaries.cia402.clone())
 }
 
 /// Objects and types of which the facts say that two sources agree.

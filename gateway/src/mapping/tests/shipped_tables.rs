@@ -204,6 +204,6 @@ fn every_object_of_cia_402_is_bound_or_has_a_reason() {
             neither.push(format!("{:04X} {}", object.index, object.name));
         }
     }
-    assert_eq!((mapping.dictionaries.cia402.objects().len(), unbound.len()), (194, 131));
+    assert_eq!((mapping.dictionaries.cia402.objects().len(), unbound.len()), (194, 132));
     assert_eq!(neither, Vec::<String>::new());
 }

@@ -14,7 +14,9 @@ use crate::engine::build::can::{described, network};
 use crate::engine::build::scaling;
 use crate::engine::bus::can::commissioner;
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdos, Part};
-use crate::mapping::{Cia402Axis, CipScaling, DriveProgram, Item, Mapping, ObjectFacts, ObjectStep, Plan};
+use crate::mapping::{
+    Cia402Axis, CipScaling, DriveIdentity, DriveProgram, Item, Mapping, ObjectFacts, ObjectStep, Plan,
+};
 use crate::simulate::can_bus::InProcessCan;
 
 /// A CiA 402 drive, or one axis of it.
@@ -218,7 +220,10 @@ fn lead(
     sheet: &DeviceDescription,
 ) -> Result<(CanDrive, DriveProgram), String> {
     let (node, needs) = (member.node, &member.needs);
-    let facts = asked(mapping, node.get(), needs, sheet)?;
+    let number = |sub| sheet.sub(0x1018, sub)?.setting()?.at(node.get())?.as_u32();
+    let identity = DriveIdentity { vendor: number(1), product: number(2) };
+    let mapping = mapping.family_of(&identity).map_or(mapping, |family| &family.mapping);
+    let facts = asked(mapping, identity, node.get(), needs, sheet)?;
     let program = mapping.cia402_program(needs, &facts).map_err(|error| error.to_string())?;
     let telegram = &program.telegram;
     let both = commissioner::pdos(
@@ -253,11 +258,12 @@ fn lead(
 /// What a drive answers that has what its data sheet says, and takes what it is told.
 fn asked(
     mapping: &Mapping,
+    identity: DriveIdentity,
     node: u8,
     needs: &Cia402Axis,
     sheet: &DeviceDescription,
 ) -> Result<ObjectFacts, String> {
-    let mut facts = ObjectFacts::new();
+    let mut facts = ObjectFacts::of(identity);
     for plan in [Plan::Ask, Plan::Tell] {
         for step in mapping.cia402_steps(plan, needs, &facts).map_err(|error| error.to_string())? {
             let (ObjectStep::Read { object, .. } | ObjectStep::Write { object, .. }) = step;

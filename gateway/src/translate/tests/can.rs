@@ -19,8 +19,12 @@ const MODES: [OperatingMode; 3] = [OperatingMode::Position, OperatingMode::Veloc
 
 /// The two axes of a simulated drive with node-id 3.
 fn stage() -> Stage {
-    let node = can_drive::drive(NodeId::new(3).ok(), 2).unwrap();
-    let sheet = eds::read(node.eds()).unwrap().description;
+    stage_of(can_drive::drive(NodeId::new(3).ok(), 2).unwrap().eds())
+}
+
+/// The same of a drive with this data sheet.
+fn stage_of(sheet: &[u8]) -> Stage {
+    let sheet = eds::read(sheet).unwrap().description;
     let member = |axis: u16, instance: u8, name: &str| CanMember {
         name: name.to_owned(),
         device: 0,
@@ -127,6 +131,32 @@ fn what_drives_say_is_wrong_is_told_of_every_axis() {
             "can 7ff 05",
         ]
     ));
+}
+
+/// Rows of the family that a drive is of, by its data sheet.
+#[test]
+fn the_rows_of_a_family_are_named_for_its_drives() {
+    let node = can_drive::drive(NodeId::new(3).ok(), 2).unwrap();
+    let sheet = String::from_utf8(node.eds().to_vec()).unwrap();
+    let with = |sub: u8, value: &str, sheet: &str| {
+        let head = format!("[1018sub{sub}]");
+        let (before, after) = sheet.split_once(&head).unwrap();
+        let (section, rest) = after.split_at(after.find("\n[").unwrap());
+        let lines = section.lines().map(|line| match line.split_once('=') {
+            Some(("DefaultValue", _)) => format!("DefaultValue={value}"),
+            _ => line.to_owned(),
+        });
+        format!("{before}{head}{}{rest}", lines.collect::<Vec<_>>().join("\n"))
+    };
+    let oriental = with(2, "0x13F7", &with(1, "0x2BE", &sheet));
+    // Bit 15: the torque limit of this family, and nothing in other drives.
+    let told = |sheet: &str| {
+        let mut translator = Translator::new(stage_of(sheet.as_bytes()));
+        lines(&mut translator, &["can 080", "can 183 37 96 08 00 00 04 00", "can 283 00 10 00 00 f4 01"])
+    };
+    let (any, own) = (told(&sheet), told(&oriental));
+    assert!(!any.contains("torque limit") && !any.contains("torque_limit"), "{any}");
+    assert!(own.contains("torque limit  <-") && own.contains("[[status]] torque_limit"), "{own}");
 }
 
 #[test]

@@ -26,8 +26,8 @@ pub use super::trial::Tried;
 use crate::engine::notice::Notice;
 
 use crate::mapping::{
-    Cia402Axis, Cia402Dictionary, Cia402Error, DriveProgram, Item, Mapping, Object, ObjectFacts, ObjectStep,
-    Plan,
+    Cia402Axis, Cia402Dictionary, Cia402Error, DriveIdentity, DriveProgram, Item, Mapping, Object,
+    ObjectFacts, ObjectStep, Plan,
 };
 
 /// Messages under way in each direction.
@@ -52,8 +52,8 @@ pub struct Run {
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
 pub enum Job {
-    /// A device can be set up.
-    Begin(Run),
+    /// A device can be set up, which has told this of itself.
+    Begin(Run, DriveIdentity),
     /// The device does not let its mapping be changed, so that the PDOs that it has are to be used; or it is to be tried again.
     Keep(Run, bool),
     /// What came of a request.
@@ -183,6 +183,7 @@ struct Work {
     node: NodeId,
     axes: Vec<AxisSetup>,
     run: Run,
+    identity: DriveIdentity,
     /// The axis that is being set up, and what is done with it; `None` when nothing is.
     at: Option<(usize, Task)>,
     facts: ObjectFacts,
@@ -230,6 +231,7 @@ impl Commissioner {
             node,
             axes,
             run: Run { device: 0, number: 0 },
+            identity: DriveIdentity::default(),
             at: None,
             facts: ObjectFacts::new(),
             steps: VecDeque::new(),
@@ -256,9 +258,9 @@ impl Commissioner {
         while let Ok(job) = self.jobs.pop() {
             let Self { desk, devices, .. } = self;
             match job {
-                Job::Begin(run) => {
+                Job::Begin(run, identity) => {
                     if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.begin(run, desk);
+                        work.begin(run, identity, desk);
                     }
                 }
                 Job::Keep(run, keeps) => {
@@ -289,9 +291,13 @@ impl Commissioner {
 }
 
 impl Work {
-    fn begin(&mut self, run: Run, desk: &mut Desk) {
+    fn begin(&mut self, run: Run, identity: DriveIdentity, desk: &mut Desk) {
         self.give_up();
-        self.run = run;
+        (self.run, self.identity) = (run, identity);
+        if let Some(family) = desk.mapping.family_of(&identity) {
+            let (axis, node, name) = (self.number(0), self.node, family.name.clone());
+            desk.waiting.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
+        }
         self.pdos = [Vec::new(), Vec::new()];
         self.set_out(0, Plan::Ask, desk);
     }
@@ -307,9 +313,9 @@ impl Work {
     fn set_out(&mut self, place: usize, plan: Plan, desk: &mut Desk) {
         let Some(setup) = self.axes.get(place) else { return };
         if plan == Plan::Ask {
-            self.facts = ObjectFacts::new();
+            self.facts = ObjectFacts::of(self.identity);
         }
-        match desk.mapping.cia402_steps(plan, &setup.needs, &self.facts) {
+        match desk.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
             Ok(steps) => {
                 self.at = Some((place, Task::Plan(plan)));
                 self.steps = steps.into();
@@ -384,12 +390,13 @@ impl Work {
             let failures = std::mem::take(&mut self.passed_over);
             desk.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
         }
+        let mapping = desk.mapping.of_drive(&self.facts);
         let mut unmapped = Vec::new();
         let made = loop {
             let setup = &self.axes[place];
-            let made = desk.mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
-            let made = made
-                .and_then(|program| Ok((spread(&desk.mapping, setup, &program, found.as_ref())?, program)));
+            let made = mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
+            let made =
+                made.and_then(|program| Ok((spread(mapping, setup, &program, found.as_ref())?, program)));
             match made {
                 // What is in none of the PDOs that it keeps it does not have for the box: perhaps the axis can do without.
                 Err(Misfit::Mapped(lack))
@@ -412,7 +419,7 @@ impl Work {
             let objects = unmapped.iter().map(|lack| lack.object).collect();
             desk.waiting.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
         }
-        let left_out = desk.mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
+        let left_out = mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
         if !left_out.is_empty() {
             desk.waiting.push_back(Done::Told(Notice::NodeModesLeftOut {
                 axis,
@@ -425,7 +432,7 @@ impl Work {
             Err(error) => return self.fail(place, error, desk),
         };
         let needs = &self.axes[place].needs;
-        if let Some(found) = desk.mapping.cia402_other_period(needs, &self.facts) {
+        if let Some(found) = mapping.cia402_other_period(needs, &self.facts) {
             let (node, expected) = (self.node, needs.cycle);
             desk.waiting.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
         }
@@ -450,7 +457,7 @@ impl Work {
     /// The drive has been asked everything. What it does not tell of its modes stands in the configuration, or is tried.
     fn learn_modes(&mut self, place: usize, desk: &mut Desk) {
         let needs = &self.axes[place].needs;
-        if let Some(words) = desk.mapping.cia402_modes_untold(needs, &mut self.facts) {
+        if let Some(words) = desk.mapping.of_drive(&self.facts).cia402_modes_untold(needs, &mut self.facts) {
             let mut trial = Trial::new(words);
             if let Some(request) = trial.begin() {
                 self.at = Some((place, Task::Try(trial)));
@@ -463,7 +470,7 @@ impl Work {
 
     fn tried(&mut self, place: usize, trial: Trial, desk: &mut Desk) {
         let (axis, node, tried) = (self.number(place), self.node, trial.tried());
-        desk.mapping.cia402_has_modes(&mut self.facts, tried.codes());
+        desk.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
         desk.waiting.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
         self.set_out(place, Plan::Tell, desk);
     }

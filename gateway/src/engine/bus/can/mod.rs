@@ -35,7 +35,7 @@ use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Re
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
 use crate::engine::port::{CanInput, CanSent, SouthPort};
-use crate::mapping::{Item, Mapping};
+use crate::mapping::{DriveIdentity, Item, Mapping};
 
 /// Axes of one device.
 const AXES_MAX: usize = 8;
@@ -283,10 +283,11 @@ impl CanBus {
             let _ = self.master.node_ready(node);
             return;
         };
+        let [vendor, product, ..] = self.master.node(node).map(|info| info.identity).unwrap_or_default();
         let device = &mut self.devices[place];
         device.runs = device.runs.wrapping_add(1);
         let run = device.run(place);
-        if self.commissioner.push(Job::Begin(run)) {
+        if self.commissioner.push(Job::Begin(run, DriveIdentity { vendor, product })) {
             device.stage = Stage::Commissioning { tickets: ArrayVec::new() };
         } else {
             self.give_up(now, place);
