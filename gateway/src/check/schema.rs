@@ -104,7 +104,7 @@ fn set_title(schema: &mut Value, name: &str) {
 /// The rows of every table under its name, none of whose keys is required but those that identify it.
 fn overlay(mapping: &Mapping) -> Value {
     let mut overlay = root::<OverlayHead>(&mut generator());
-    let mut all = Map::new();
+    let mut all = overlay["definitions"].as_object().cloned().unwrap_or_default();
     let mut tables = Map::new();
     for kind in KINDS.iter().filter(|kind| kind.name != "config") {
         let mut schema = (kind.root)(&mut generator());
