@@ -162,7 +162,13 @@ fn a_target_that_is_halted_goes_on_when_it_is_enabled_again() {
 /// In csp the drive comes to rest behind its last set-point: it does not go back there when the halt is over.
 #[test]
 fn a_halt_in_cyclic_position_ends_without_a_jump() {
-    let mut rig = ready(&[POSITION], |_, _| ());
+    // Limits that the way of the halt would exceed if it were a set-point: it is none.
+    let limits = Limits {
+        velocity: Some(Velocity(3 * NANO)),
+        following_error: Some(Position(NANO / 20)),
+        ..Limits::default()
+    };
+    let mut rig = GenericCan::ready(0, [POSITION], limits, |_, _| ());
     rig.set_number(0x6084, 0, 10 * TURN);
     rig.enable();
     rig.lead(2 * NANO, POSITION);

@@ -333,11 +333,14 @@ impl AxisChannel {
         let position = last.selection() == OperatingMode::Position.into();
         let led = operating && (position && !self.drive_leads() || self.stands_by_command());
         let velocity = points.velocity.unwrap_or(last.velocity);
+        // A drive that brakes by itself comes to rest behind its last command, which is moved there while the drive halts.
+        let rests = self.halted_at.filter(|_| self.halts_by_command());
         let rest = if still(OperatingMode::Position) {
             last.position.saturating_add(way(velocity, span))
+        } else if let Some(place) = rests {
+            place
         } else if self.halts_by_command() {
-            // A drive that brakes by itself comes to rest behind its last command.
-            self.halted_at.unwrap_or(last.position)
+            last.position
         } else if led {
             last.position
         } else {
@@ -360,6 +363,7 @@ impl AxisChannel {
         self.write_trims(fine.is_some_and(|fine| fine.quality != Quality::Lost));
         match fine {
             Some(fine) if fine.quality != Quality::Lost => Lead::SetPoints,
+            _ if rests.is_some() => Lead::Nobody,
             // It holds, or ramps down.
             _ if led || fine.is_some() => Lead::Gateway,
             _ => Lead::Nobody,

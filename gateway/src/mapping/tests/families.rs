@@ -107,6 +107,7 @@ fn the_rated_torque_of_an_epos4_is_in_micronewtonmetre() {
         program.parameter(Parameter::MOTOR_RATED_TORQUE).unwrap().decode(&300_000_u32.to_le_bytes())
     };
     // Micronewtonmetre are the generic unit: 0.3 Nm.
+    assert_eq!(rated(0xFB, 0x6050_0000), Some(300_000));
     assert_eq!(rated(0xFB, 0x6150_0000), Some(300_000));
     assert_eq!(rated(0xFB, 0x6552_0000), Some(300_000));
     // 300 Nm of any other drive.
