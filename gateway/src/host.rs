@@ -7,8 +7,8 @@ use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 
 use arrayvec::ArrayString;
-use profile_cip::target::config::AdapterConfig;
-use profile_cip::target::ethernet_link::{InterfaceCounters, InterfaceType, LinkState, MediaCounters};
+use profile_cip::device::config::AdapterConfig;
+use profile_cip::device::ethernet_link::{InterfaceCounters, InterfaceType, LinkState, MediaCounters};
 
 use crate::sys::interfaces::{self, InterfaceAddress};
 

@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use profile_cip::target::config::{AdapterConfig, QosConfig};
-use profile_cip::target::event::{Event, ResetKind};
-use profile_cip::target::qos::DSCP_MAX;
-use profile_cip::target::tcp_ip::INACTIVITY_TIMEOUT_MAX_S;
+use profile_cip::device::config::{AdapterConfig, QosConfig};
+use profile_cip::device::event::{Event, ResetKind};
+use profile_cip::device::qos::DSCP_MAX;
+use profile_cip::device::tcp_ip::INACTIVITY_TIMEOUT_MAX_S;
 use serde::{Deserialize, Serialize};
 
 /// Bytes of a settings file; a real one has a few hundred for each device.

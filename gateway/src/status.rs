@@ -2,9 +2,9 @@
 
 mod wait;
 
-use profile_cip::target::identity::ModuleState;
-use profile_cip::target::visualization::Indication;
-use profile_cip::target::visualization::display::{LINE_MAX, Line, LineText};
+use profile_cip::device::identity::ModuleState;
+use profile_cip::device::visualization::Indication;
+use profile_cip::device::visualization::display::{LINE_MAX, Line, LineText};
 use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::inhibit::Inhibits;

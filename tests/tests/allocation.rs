@@ -19,7 +19,7 @@ use axisbridge_tests::rig::ports::TamperCan;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;

@@ -9,8 +9,8 @@ use axisbridge::engine::build::{Host, adapter_config};
 use axisbridge::mapping::{ConnectionDataFormat, ETHERNET_IP, Mapping, networks};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::axisbridge;
-use profile_cip::target::motion_open;
-use profile_cip::target::object_list::OBJECT_CLASSES;
+use profile_cip::device::motion_open;
+use profile_cip::device::object_list::OBJECT_CLASSES;
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::forward_open::Trigger;
 use profile_cip::wire::motion::Format;
@@ -176,8 +176,8 @@ fn the_device_is_what_its_network_asks_for() {
     assert_eq!((network.trigger.as_str(), motion_open::TRANSPORT.trigger), ("cyclic", Trigger::CYCLIC));
     assert_eq!(network.priority, "urgent");
     assert_eq!(network.udp_port, Some(IO_PORT));
-    assert_eq!(usize::from(*network.axes.end()), profile_cip::target::config::AXES_MAX);
-    assert_eq!(usize::from(*network.axes.end()), profile_cip::target::motion_device::AXES_MAX);
+    assert_eq!(usize::from(*network.axes.end()), profile_cip::device::config::AXES_MAX);
+    assert_eq!(usize::from(*network.axes.end()), profile_cip::device::motion_device::AXES_MAX);
     assert_eq!(network.axes, 1..=16);
 }
 

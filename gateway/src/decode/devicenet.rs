@@ -5,6 +5,8 @@
 
 use std::fmt;
 
+use profile_cip::device::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
+use profile_cip::device::identity::CLASS_IDENTITY;
 use profile_cip::devicenet::connection::{CLASS_CONNECTION, ConnectionKind};
 use profile_cip::devicenet::fragmentation::{ExplicitReceiver, FragmentError, IO_MAX, IoReceiver};
 use profile_cip::devicenet::wire::allocation::{ALLOCATE, CLASS_DEVICENET, RELEASE};
@@ -13,8 +15,6 @@ use profile_cip::devicenet::wire::{
     AcknowledgeStatus, Allocate, AllocationChoice, BodyFormat, DuplicateMac, Fragment, FragmentKind, Header,
     Identifier, MacId, Request, Response,
 };
-use profile_cip::target::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
-use profile_cip::target::identity::CLASS_IDENTITY;
 use profile_cip::wire::Error;
 use profile_cip::wire::motion::codes::ConnectionFormat;
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};

@@ -11,15 +11,15 @@
 
 mod writer;
 
-use profile_cip::target::adapter::SESSIONS_MAX;
-use profile_cip::target::config::{
+use profile_cip::device::adapter::SESSIONS_MAX;
+use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
     DEVICE_TYPE_CIP_MOTION_ENCODER,
 };
-use profile_cip::target::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX};
-use profile_cip::target::motion_open;
-use profile_cip::target::object_list::{OBJECT_CLASSES, ObjectClass};
-use profile_cip::target::router::CLASS_CONNECTION_MANAGER;
+use profile_cip::device::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX};
+use profile_cip::device::motion_open;
+use profile_cip::device::object_list::{OBJECT_CLASSES, ObjectClass};
+use profile_cip::device::router::CLASS_CONNECTION_MANAGER;
 use profile_cip::wire::class1::SEQUENCE_COUNT_LEN;
 use profile_cip::wire::forward_open::Trigger;
 use profile_cip::wire::network_parameters::ConnectionType;

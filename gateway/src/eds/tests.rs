@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use profile_cip::target::config::MOTION_SIZE_MAX;
-use profile_cip::target::motion_open;
+use profile_cip::device::config::MOTION_SIZE_MAX;
+use profile_cip::device::motion_open;
 
 use super::*;
 use crate::config::Config;

@@ -11,7 +11,7 @@
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddrV4};
 
-use profile_cip::target::motion_link::OpenParameters;
+use profile_cip::device::motion_link::OpenParameters;
 use profile_cip::wire::class1::Class1Datagram;
 use profile_generic::time::MonotonicTime;
 

@@ -27,9 +27,9 @@ pub mod port;
 
 use std::cell::RefCell;
 
-use profile_cip::target::motion_device::SyncState;
-use profile_cip::target::visualization::display::{self, Line};
-use profile_cip::target::visualization::{self, Indication};
+use profile_cip::device::motion_device::SyncState;
+use profile_cip::device::visualization::display::{self, Line};
+use profile_cip::device::visualization::{self, Indication};
 use profile_generic::fault::FaultCause;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;

@@ -1,6 +1,6 @@
 //! The attributes that the device serves for one axis.
 
-use profile_cip::target::axis_object::PositionView;
+use profile_cip::device::axis_object::PositionView;
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Width};

@@ -2,7 +2,7 @@
 
 mod builder;
 
-use profile_cip::target::drive_link::DriveAction;
+use profile_cip::device::drive_link::DriveAction;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;

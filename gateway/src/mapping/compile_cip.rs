@@ -2,8 +2,8 @@
 
 use arrayvec::ArrayVec;
 use bitflags::bitflags;
-use profile_cip::target::drive_link::{DriveAction, TRIMS_MAX, Trims};
-use profile_cip::target::fault_log::LogKind;
+use profile_cip::device::drive_link::{DriveAction, TRIMS_MAX, Trims};
+use profile_cip::device::fault_log::LogKind;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;

@@ -1,6 +1,6 @@
 //! From the tables to the attributes of the CIP Motion device: what may be read and set, and what its values may be.
 
-use profile_cip::target::attribute::{self, AttributeDefinition, DataType, DefaultValue, Scope};
+use profile_cip::device::attribute::{self, AttributeDefinition, DataType, DefaultValue, Scope};
 
 use profile_generic::cast;
 

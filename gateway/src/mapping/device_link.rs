@@ -1,6 +1,6 @@
 //! Between the compiled tables and the CIP Motion device: its images.
 
-use profile_cip::target::drive_link::{DriveAction, DriveCondition, DriveImage, ExceptionAction};
+use profile_cip::device::drive_link::{DriveAction, DriveCondition, DriveImage, ExceptionAction};
 use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, EventChecking, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::capture::CaptureSet;

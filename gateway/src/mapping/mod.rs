@@ -49,7 +49,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use profile_cip::target::attribute::AttributeDefinition;
+use profile_cip::device::attribute::AttributeDefinition;
 use profile_generic::mode::ModeSelection;
 
 pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
@@ -100,8 +100,8 @@ pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos_tables::{ReportRule, SercosTables};
 
 use crate::finding::Findings;
-use profile_cip::target::attribute::{DefaultValue, ElementRule};
-use profile_cip::target::exception;
+use profile_cip::device::attribute::{DefaultValue, ElementRule};
+use profile_cip::device::exception;
 
 /// Bits of Axis Exceptions.
 const EXCEPTION_BITS: u8 = 64;

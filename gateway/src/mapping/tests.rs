@@ -18,8 +18,8 @@ mod simulated_drive;
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
-use profile_cip::target::attribute::{AttributeTable as DeviceTable, Backing as DeviceBacking, Scope};
-use profile_cip::target::drive_link::{DriveAction, DriveCondition, DriveImage};
+use profile_cip::device::attribute::{AttributeTable as DeviceTable, Backing as DeviceBacking, Scope};
+use profile_cip::device::drive_link::{DriveAction, DriveCondition, DriveImage};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{FaultSet, Origin};

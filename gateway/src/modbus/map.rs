@@ -3,7 +3,7 @@
 //! `docs/modbus.md` holds the same tables; a test compares them. Numbers of more than one register begin with
 //! the most significant one. Registers that are not in the table read 0.
 
-use profile_cip::target::visualization::{self, Indication};
+use profile_cip::device::visualization::{self, Indication};
 
 use crate::config::AXES_MAX;
 use crate::status::{AxisStatus, BoxStatus, mode_code, state_code};
@@ -316,7 +316,7 @@ fn fill<S>(block: &mut [u16], entries: &[Entry<S>], source: &S) {
 mod tests {
     use std::fmt::Write as _;
 
-    use profile_cip::target::visualization::display::LineText;
+    use profile_cip::device::visualization::display::LineText;
     use profile_generic::fault::FaultCause;
     use profile_generic::image::StatusBits;
     use profile_generic::inhibit::Inhibits;

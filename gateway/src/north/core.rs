@@ -2,9 +2,9 @@
 
 use std::net::SocketAddrV4;
 
-use profile_cip::target::adapter::{Adapter, DEVICE_TIMEOUT};
-use profile_cip::target::event::Event;
-use profile_cip::target::motion_link::{MotionReply, MotionRequest, OpenParameters};
+use profile_cip::device::adapter::{Adapter, DEVICE_TIMEOUT};
+use profile_cip::device::event::Event;
+use profile_cip::device::motion_link::{MotionReply, MotionRequest, OpenParameters};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::link::AdapterEnd;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-use profile_cip::target::motion_link::{MotionReply, MotionRequest};
+use profile_cip::device::motion_link::{MotionReply, MotionRequest};
 use rtrb::{Consumer, Producer, PushError, RingBuffer};
 
 /// Requests, and replies, that can be under way: one for each stream an adapter serves at once.
@@ -110,7 +110,7 @@ impl DeviceEnd {
 
 #[cfg(test)]
 mod tests {
-    use profile_cip::target::motion_link::{CloseParameters, ConnectionTriad, Token};
+    use profile_cip::device::motion_link::{CloseParameters, ConnectionTriad, Token};
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! The north side's explicit messaging: EtherNet/IP sessions over TCP and the List commands over UDP.
 //!
-//! The protocol is `profile_cip::target::adapter`, which knows no socket. Here are the sockets around it and
+//! The protocol is `profile_cip::device::adapter`, which knows no socket. Here are the sockets around it and
 //! the way to the motion device, which runs in the cycle thread:
 //!
 //! ```text

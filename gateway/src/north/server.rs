@@ -7,9 +7,9 @@ use std::pin::pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use profile_cip::target::adapter::Adapter;
-use profile_cip::target::event::Event;
-use profile_cip::target::motion_link::OpenParameters;
+use profile_cip::device::adapter::Adapter;
+use profile_cip::device::event::Event;
+use profile_cip::device::motion_link::OpenParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 use tokio::io::ReadBuf;
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
@@ -30,7 +30,7 @@ use crate::sys::gate::Admitted;
 const PORT_EXPLICIT: u16 = profile_cip::wire::encapsulation::EXPLICIT_PORT;
 
 /// Streams there are at once, those among them that are on their way out. The adapter serves fewer.
-const STREAMS_MAX: usize = 2 * profile_cip::target::adapter::SESSIONS_MAX;
+const STREAMS_MAX: usize = 2 * profile_cip::device::adapter::SESSIONS_MAX;
 
 /// Longest datagram worth reading: List requests are shorter.
 const DATAGRAM_LEN_MAX: usize = 1500;

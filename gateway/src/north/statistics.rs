@@ -1,6 +1,6 @@
 //! What the server has counted.
 
-use profile_cip::target::counters::Counters;
+use profile_cip::device::counters::Counters;
 
 /// Counted since the server started; only `streams` falls.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

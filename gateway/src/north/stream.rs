@@ -7,7 +7,7 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use profile_cip::target::adapter::SessionSlot;
+use profile_cip::device::adapter::SessionSlot;
 use profile_generic::time::{DurationNs, MonotonicTime};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;

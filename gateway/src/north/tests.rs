@@ -13,15 +13,15 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use arrayvec::{ArrayString, ArrayVec};
-use profile_cip::target::adapter::Adapter;
-use profile_cip::target::config::{
+use profile_cip::device::adapter::Adapter;
+use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
-use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
-use profile_cip::target::event::Event;
-use profile_cip::target::identity::Health;
-use profile_cip::target::motion_link::{ExplicitReply, MotionReply, MotionRequest, ObjectPath, OpenRefusal};
+use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
+use profile_cip::device::event::Event;
+use profile_cip::device::identity::Health;
+use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, ObjectPath, OpenRefusal};
 use profile_cip::wire::encapsulation::Command;
 use profile_cip::wire::forward_open::ForwardOpenReply;
 use profile_cip::wire::motion::Format;
@@ -260,8 +260,8 @@ async fn a_full_queue_holds_a_request_until_the_device_makes_room() {
     let (mut link, end) = motion_link();
     let triad = client::triad(9);
     for number in 0..QUEUE_LEN {
-        let token = profile_cip::target::motion_link::Token(1_000_000 + u64::try_from(number).unwrap());
-        let close = profile_cip::target::motion_link::CloseParameters { token, triad, o_to_t_id: 1 };
+        let token = profile_cip::device::motion_link::Token(1_000_000 + u64::try_from(number).unwrap());
+        let close = profile_cip::device::motion_link::CloseParameters { token, triad, o_to_t_id: 1 };
         link.request(MotionRequest::Close(close)).unwrap();
     }
     let server =

@@ -1,6 +1,6 @@
 //! What the indicators show, as log lines whenever it changes: a box without lamps tells it to whoever reads its log.
 
-use profile_cip::target::visualization::{self, Indication};
+use profile_cip::device::visualization::{self, Indication};
 
 use crate::status::{BoxStatus, Indicators};
 
@@ -65,8 +65,8 @@ impl Shown {
 
 #[cfg(test)]
 mod tests {
-    use profile_cip::target::identity::ModuleState;
-    use profile_cip::target::visualization::display::{Line, LineText};
+    use profile_cip::device::identity::ModuleState;
+    use profile_cip::device::visualization::display::{Line, LineText};
 
     use super::*;
     use crate::status::tests::distinct;

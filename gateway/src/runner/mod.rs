@@ -19,11 +19,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime as WallClock};
 
-use profile_cip::target::adapter::Adapter;
-use profile_cip::target::event::Event;
-use profile_cip::target::identity::{Health, ModuleState};
-use profile_cip::target::motion_device::SyncState;
-use profile_cip::target::time_sync::{ClockInfo, TimeSyncState};
+use profile_cip::device::adapter::Adapter;
+use profile_cip::device::event::Event;
+use profile_cip::device::identity::{Health, ModuleState};
+use profile_cip::device::motion_device::SyncState;
+use profile_cip::device::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
@@ -100,7 +100,7 @@ pub enum StartError {
         /// Its name.
         name: String,
         /// Why.
-        error: profile_cip::target::config::ConfigError,
+        error: profile_cip::device::config::ConfigError,
     },
     /// The Modbus TCP port is not to be had.
     #[error("cannot listen on {address} for Modbus TCP: {source}")]

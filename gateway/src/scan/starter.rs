@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use profile_cip::target::config::AXES_MAX as DEVICE_AXES_MAX;
+use profile_cip::device::config::AXES_MAX as DEVICE_AXES_MAX;
 
 use super::questions as ask;
 use super::report::title;

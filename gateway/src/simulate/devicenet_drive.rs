@@ -3,6 +3,9 @@
 use std::fmt;
 
 use arrayvec::ArrayString;
+use profile_cip::device::attribute::{Access, AttributeDefinition, DataType, Scope};
+use profile_cip::device::axis_state::AxisState;
+use profile_cip::device::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use profile_cip::devicenet::access::AccessState;
 use profile_cip::devicenet::master::config::DataRate;
 use profile_cip::devicenet::slave::application::Application;
@@ -11,9 +14,6 @@ use profile_cip::devicenet::slave::speed_drive::{SpeedDrive, SpeedDriveConfig};
 use profile_cip::devicenet::slave::{Slave, SlaveConfig};
 use profile_cip::devicenet::wire::speed::SupervisorState;
 use profile_cip::devicenet::wire::{BodyFormat, MacId};
-use profile_cip::target::attribute::{Access, AttributeDefinition, DataType, Scope};
-use profile_cip::target::axis_state::AxisState;
-use profile_cip::target::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use profile_generic::can::Frame;
 use profile_generic::fault::FaultCause;
 use profile_generic::servo::{Servo, ServoActual, ServoParameters};

@@ -1,7 +1,7 @@
 //! From the controller to the drive.
 
 use profile_cia402::master::config::Direction;
-use profile_cip::target::drive_link::Trims;
+use profile_cip::device::drive_link::Trims;
 use profile_cip::wire::motion::{CommandBlock, CommandPosition, CommandValues};
 use profile_generic::image::{AxisCommand, Signal};
 use profile_generic::program::{ConversionReport, Field, Width};

@@ -27,7 +27,7 @@ mod written;
 
 use std::sync::Arc;
 
-use profile_cip::target::drive_link::Trims;
+use profile_cip::device::drive_link::Trims;
 use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::quantity::{

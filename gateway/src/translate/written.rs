@@ -1,6 +1,6 @@
 //! The cyclic write data of an update.
 
-use profile_cip::target::drive_link::Trims;
+use profile_cip::device::drive_link::Trims;
 use profile_cip::wire::motion::WriteBlock;
 use profile_generic::image::AxisCommand;
 use profile_generic::program::Width;

@@ -7,12 +7,12 @@ use arrayvec::ArrayVec;
 use axisbridge::mapping::Mapping;
 use axisbridge_tests::rig::{Rig, Settings};
 use criterion::Criterion;
-use profile_cip::target::AxisConfig;
-use profile_cip::target::adapter::SessionSlot;
-use profile_cip::target::attribute::{Access, AttributeDefinition, DataType, Scope};
-use profile_cip::target::axis_state::ControlKind;
-use profile_cip::target::motion_device::{DeviceConfig, MotionDevice};
-use profile_cip::target::motion_link::{
+use profile_cip::device::AxisConfig;
+use profile_cip::device::adapter::SessionSlot;
+use profile_cip::device::attribute::{Access, AttributeDefinition, DataType, Scope};
+use profile_cip::device::axis_state::ControlKind;
+use profile_cip::device::motion_device::{DeviceConfig, MotionDevice};
+use profile_cip::device::motion_link::{
     ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, ObjectPath, Token,
 };
 use profile_cip::wire::motion::Format;

@@ -9,12 +9,12 @@ use axisbridge::mapping::{CipScaling, Mapping};
 use profile_cip::controller::{
     AxisSet, AxisSetup, Controller, ControllerConfig, DATAGRAM_MAX, Limits, Step, StreamAction,
 };
-use profile_cip::target::AxisConfig;
-use profile_cip::target::adapter::{Adapter, SessionSlot};
-use profile_cip::target::attribute::AttributeDefinition;
-use profile_cip::target::axis_state::{AxisState, ControlKind};
-use profile_cip::target::drive_link::{Command, DriveAction, DriveImage};
-use profile_cip::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
+use profile_cip::device::AxisConfig;
+use profile_cip::device::adapter::{Adapter, SessionSlot};
+use profile_cip::device::attribute::AttributeDefinition;
+use profile_cip::device::axis_state::{AxisState, ControlKind};
+use profile_cip::device::drive_link::{Command, DriveAction, DriveImage};
+use profile_cip::device::motion_device::{DeviceConfig, MotionDevice, SyncState};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
 use profile_cip::wire::encapsulation::{self, EncapsulationStatus, HEADER_LEN, Header, Packet};

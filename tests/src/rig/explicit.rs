@@ -2,7 +2,7 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
-use profile_cip::target::adapter::SessionSlot;
+use profile_cip::device::adapter::SessionSlot;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
 use profile_cip::wire::encapsulation::{Command, EncapsulationStatus, HEADER_LEN, Header, Packet};
 use profile_cip::wire::message_router::{Reply, Request};

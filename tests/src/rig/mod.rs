@@ -47,10 +47,10 @@ use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
 };
+use profile_cip::device::adapter::{Adapter, SessionSlot};
+use profile_cip::device::axis_state::AxisState;
+use profile_cip::device::motion_device::SyncState;
 use profile_cip::devicenet::wire::{Identifier, MacId};
-use profile_cip::target::adapter::{Adapter, SessionSlot};
-use profile_cip::target::axis_state::AxisState;
-use profile_cip::target::motion_device::SyncState;
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::motion::Format;
 use profile_generic::scaling::UnitKind;

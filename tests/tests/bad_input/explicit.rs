@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use axisbridge_tests::rig::explicit::{Client, packet};
 use axisbridge_tests::rig::motion::{in_motion, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::target::counters::Counters;
+use profile_cip::device::counters::Counters;
 use profile_cip::wire::ConnectionTriad;
 use profile_cip::wire::encapsulation::{Command, EncapsulationStatus, Header};
 use profile_cip::wire::forward_open::{ForwardOpen, Transport, Trigger};

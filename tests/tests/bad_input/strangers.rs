@@ -13,7 +13,7 @@ use axisbridge_tests::rig::motion::{SLIDE_END, TURNTABLE_END, both, in_motion, l
 use axisbridge_tests::rig::network::Random;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::Step;
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_generic::time::DurationNs;
 

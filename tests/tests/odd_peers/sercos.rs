@@ -9,7 +9,7 @@ use axisbridge_peers::sercos_slave::{Connection, Idn, SercosSlave, Settings as O
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_sercos::police::Offender;
 use profile_sercos::police::court::Tried;

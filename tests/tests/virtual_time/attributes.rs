@@ -10,7 +10,7 @@ use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, millis};
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::id_list::IdList;
 
 const GET: u8 = 0x0E;

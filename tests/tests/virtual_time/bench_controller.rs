@@ -4,7 +4,7 @@ use axisbridge_tests::rig::motion::{NANO, both, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::condition::Condition;
 use profile_cip::controller::{Controller, Event, Failure, Limits, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::codes::{ControlMode, NodeFault};
 use profile_generic::time::DurationNs;
 

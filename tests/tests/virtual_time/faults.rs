@@ -7,8 +7,8 @@ use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, both, in_mo
 use axisbridge_tests::rig::motion_checker::violation::Rule;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AttributeSet, AxisSet, Failure, Step};
-use profile_cip::target::exception::ExceptionAction;
-use profile_cip::target::fault_log::LogKind;
+use profile_cip::device::exception::ExceptionAction;
+use profile_cip::device::fault_log::LogKind;
 use profile_cip::wire::motion::attribute_list::{AttributeSelector, Range};
 use profile_cip::wire::motion::codes::{AlarmType, AxisStateCode, ClearingEvent, FaultType};
 use profile_generic::fault::FaultCause;

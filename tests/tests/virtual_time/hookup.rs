@@ -7,7 +7,7 @@ use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, at_rest, both, millis, moves};
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::Writer;
 use profile_cip::wire::motion::codes::TestStatus;
 use profile_cip::wire::motion::test_service::{HookupTestData, RunHookupTest};

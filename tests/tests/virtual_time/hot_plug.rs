@@ -5,7 +5,7 @@ use axisbridge::simulate::drives::linear;
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Condition, ControllerConfig, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;

@@ -10,7 +10,7 @@ use axisbridge_tests::rig::motion::{
 };
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Failure, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{AxisStateCode, FaultType, NodeFault};
 use profile_cip::wire::motion::{ActualFrame, ActualPosition};

@@ -7,7 +7,7 @@ use axisbridge_tests::rig::motion_checker::violation::{Rule, Violation};
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::Step;
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_generic::time::DurationNs;
 
 /// Where the short moves end.

@@ -7,8 +7,8 @@ use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
-use profile_cip::target::axis_state::AxisState;
-use profile_cip::target::object_list::OBJECT_CLASSES;
+use profile_cip::device::axis_state::AxisState;
+use profile_cip::device::object_list::OBJECT_CLASSES;
 use profile_cip::wire::motion::codes::AxisStateCode;
 
 const GET: u8 = 0x0E;

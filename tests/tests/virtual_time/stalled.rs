@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use axisbridge_tests::rig::motion::long_moves;
 use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::target::adapter::SESSIONS_MAX;
+use profile_cip::device::adapter::SESSIONS_MAX;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Everything that went over the bus, each frame with its time, and what the controller saw.

@@ -6,7 +6,7 @@ use axisbridge_tests::rig::motion::{NANO, millis};
 use axisbridge_tests::rig::motion_checker::violation::Rule;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AttributeSet, AxisSet, Limits, Step};
-use profile_cip::target::axis_state::AxisState;
+use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{AxisControl, AxisStateCode, ControlMode};
 use profile_cip::wire::motion::{ActualFrame, CommandFrame, CommandInstance};

@@ -1,7 +1,7 @@
 //! From the controller to the axis: actions and resets.
 
 use super::{AxisChannel, Loss, RESET_CYCLES, RESET_TIME_OUT, Reset};
-use profile_cip::target::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
+use profile_cip::device::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::fault_set::{ActiveFault, Origin};
 use profile_generic::sequence::StopPlan;

@@ -3,7 +3,7 @@
 //! The motor and feedback test runs in torque control ([`HookupMove`]) and only while the drive says that it is in torque
 //! control; the feedback test only watches. Either is gone the moment its order is.
 
-use profile_cip::target::drive_link::{HookupTest, TestOrder, TestReport};
+use profile_cip::device::drive_link::{HookupTest, TestOrder, TestReport};
 use profile_cip::wire::motion::codes::TestStatus;
 use profile_cip::wire::motion::test_service::{HookupTestData, hookup_status};
 use profile_generic::cast;

@@ -2,7 +2,7 @@
 
 use super::{AxisChannel, Loss, PositionJump, Trip};
 use crate::mapping::CipFault;
-use profile_cip::target::drive_link::DriveImage;
+use profile_cip::device::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::Report;

@@ -37,7 +37,7 @@ pub use self::waiting::{Awaited, Waiting};
 
 use self::hookup::TestRun;
 use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing, Told};
-use profile_cip::target::drive_link::{AbortOrder, DriveAction, Withheld};
+use profile_cip::device::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};

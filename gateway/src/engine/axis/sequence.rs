@@ -15,7 +15,7 @@
 
 use super::{AxisChannel, START_TIME_OUT};
 use crate::mapping::DriveProgram;
-use profile_cip::target::drive_link::DriveImage;
+use profile_cip::device::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::FeedbackSet;
 use profile_generic::interpolation::SetPoints as FinePoints;

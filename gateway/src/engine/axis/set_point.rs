@@ -4,7 +4,7 @@ use super::guard::{Bounds, Finding, Lead, Trip, way};
 use super::{AxisChannel, Loss, MODE_TIME_OUT};
 use crate::engine::bus::Cycle;
 use crate::mapping::{CyclicValues, DriveProgram, Order};
-use profile_cip::target::drive_link::{DriveAction, SetPoints};
+use profile_cip::device::drive_link::{DriveAction, SetPoints};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};

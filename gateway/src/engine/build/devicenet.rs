@@ -1,7 +1,7 @@
 //! The DeviceNet networks of a configuration.
 
+use profile_cip::device::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
 use profile_cip::devicenet::master::config::{MasterConfig, SlaveConfig};
-use profile_cip::target::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::mode::OperatingMode;
 use profile_generic::ratio::Ratio;

@@ -9,14 +9,14 @@ use std::net::Ipv4Addr;
 use std::sync::Arc;
 
 use arrayvec::{ArrayString, ArrayVec};
-use profile_cip::target::axis_object::AxisConfig;
-use profile_cip::target::axis_state::ControlKind;
-use profile_cip::target::config::{
+use profile_cip::device::axis_object::AxisConfig;
+use profile_cip::device::axis_state::ControlKind;
+use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
     DEVICE_TYPE_CIP_MOTION_ENCODER, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
 };
-use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
-use profile_cip::target::motion_device::DeviceConfig;
+use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
+use profile_cip::device::motion_device::DeviceConfig;
 use profile_cip::wire::motion::Format;
 use profile_generic::fault::Reaction;
 use profile_generic::parameter::Parameter;

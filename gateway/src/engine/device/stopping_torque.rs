@@ -7,7 +7,7 @@
 //! A drive whose limits the gateway does not know (DeviceNet) is refused: what it stops with nobody could say.
 
 use arrayvec::ArrayVec;
-use profile_cip::target::attribute_worker::AttributeAccess;
+use profile_cip::device::attribute_worker::AttributeAccess;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
 

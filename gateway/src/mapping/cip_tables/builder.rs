@@ -1,6 +1,6 @@
 //! CIP Motion <-> generic: from rows to the resolved mapping.
 
-use profile_cip::target::exception::ExceptionAction;
+use profile_cip::device::exception::ExceptionAction;
 use profile_generic::capture::CaptureStatus;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use profile_cip::target::exception::ExceptionAction;
+use profile_cip::device::exception::ExceptionAction;
 use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::{BitPattern, MAX_STATE_ROWS};

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use profile_cip::target::axis_state::{AxisState, ControlKind};
-use profile_cip::target::visualization::AxisCondition;
-use profile_cip::target::visualization::display::{self, NodeCondition, Startup};
+use profile_cip::device::axis_state::{AxisState, ControlKind};
+use profile_cip::device::visualization::AxisCondition;
+use profile_cip::device::visualization::display::{self, NodeCondition, Startup};
 use profile_cip::wire::motion::codes::{AlarmType, FaultType, NodeAlarm, NodeFault};
 
 use super::*;

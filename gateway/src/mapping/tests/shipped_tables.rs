@@ -1,7 +1,7 @@
 //! The shipped tables are complete, and their examples come out.
 
-use profile_cip::target::attribute::DefaultValue;
-use profile_cip::target::exception::ExceptionAction;
+use profile_cip::device::attribute::DefaultValue;
+use profile_cip::device::exception::ExceptionAction;
 
 use super::*;
 

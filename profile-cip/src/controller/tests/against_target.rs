@@ -11,20 +11,20 @@ use crate::controller::{
     AttributeSet, AxisSet, Controller, ControllerConfig, DATAGRAM_MAX, Event, Limits, Report, Step,
     StreamAction,
 };
-use crate::target::adapter::{Adapter, SessionSlot};
-use crate::target::attribute::{Access, AttributeDefinition, DataType, Scope, id};
-use crate::target::axis_object::AxisConfig;
-use crate::target::axis_state::AxisState;
-use crate::target::config::{
+use crate::device::adapter::{Adapter, SessionSlot};
+use crate::device::attribute::{Access, AttributeDefinition, DataType, Scope, id};
+use crate::device::axis_object::AxisConfig;
+use crate::device::axis_state::AxisState;
+use crate::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
-use crate::target::drive_link::{
+use crate::device::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
 };
-use crate::target::ethernet_link::{InterfaceType, LinkState};
-use crate::target::motion_device::{DeviceConfig, MotionDevice, SyncState};
-use crate::target::motion_link::MotionReply;
+use crate::device::ethernet_link::{InterfaceType, LinkState};
+use crate::device::motion_device::{DeviceConfig, MotionDevice, SyncState};
+use crate::device::motion_link::MotionReply;
 use crate::wire::class1::Class1Datagram;
 use crate::wire::encapsulation::IO_PORT;
 use crate::wire::motion::Format;

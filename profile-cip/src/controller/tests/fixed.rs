@@ -10,7 +10,7 @@ use crate::controller::sets::DataSets;
 use crate::controller::{
     AttributeSet, AxisSet, AxisSetup, ControllerConfig, Event, Limits, Misbehaviour, Report, Step,
 };
-use crate::target::attribute::id;
+use crate::device::attribute::id;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{
     ActualDataSet, AxisIoStatus, AxisStateCode, AxisStatus, CommandDataSet, CommandTarget, ControlMode,

@@ -5,7 +5,7 @@ use core::fmt;
 use super::super::connection::{Change, ConnectionKind};
 use super::super::link::Refusal;
 use super::super::wire::{AllocationChoice, MacId};
-use crate::target::event::ResetKind;
+use crate::device::event::ResetKind;
 
 /// Something that happened to a slave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -36,7 +36,7 @@ use super::connection::{Change, Connection, ConnectionEvent, ConnectionKind, Con
 use super::fragmentation::IoReceiver;
 use super::link::{self, Refusal};
 use super::wire::{AllocationChoice, BodyFormat, DuplicateMac, Identifier, MacId};
-use crate::target::config::IdentityConfig;
+use crate::device::config::IdentityConfig;
 use crate::wire::status::GeneralStatus;
 
 /// Frames kept until they are taken: what one call can bring about.

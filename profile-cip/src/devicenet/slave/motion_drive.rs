@@ -33,21 +33,21 @@ use super::super::fragmentation::{Body, IoData};
 use super::super::wire::{MacId, Request};
 use super::application::{Application, ServiceError};
 use super::explicit::{append, path_of};
-use crate::target::AxisConfig;
-use crate::target::attribute::AttributeDefinition;
-use crate::target::axis_state::{AxisState, ControlKind};
-use crate::target::config::MOTION_SIZE_FIXED;
-use crate::target::drive_link::{
+use crate::device::AxisConfig;
+use crate::device::attribute::AttributeDefinition;
+use crate::device::axis_state::{AxisState, ControlKind};
+use crate::device::config::MOTION_SIZE_FIXED;
+use crate::device::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
     SetPoints,
 };
-use crate::target::identity::{Health, ModuleState};
-use crate::target::motion_device::{DeviceConfig, DeviceError, MotionDevice};
-use crate::target::motion_link::{
+use crate::device::identity::{Health, ModuleState};
+use crate::device::motion_device::{DeviceConfig, DeviceError, MotionDevice};
+use crate::device::motion_link::{
     CloseParameters, ConnectionTriad, EXPLICIT_DATA_MAX, ExplicitRequest, MotionReply, MotionRequest,
     OpenParameters, Token,
 };
-use crate::target::router::CLASS_MOTION_DEVICE_AXIS;
+use crate::device::router::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::motion::codes::{ControlMode, FaultType};
 use crate::wire::motion::{CommandPosition, FORMAT_REVISION, Format, fixed};
 use crate::wire::status::GeneralStatus;

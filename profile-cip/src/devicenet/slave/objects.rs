@@ -2,9 +2,9 @@
 
 use super::super::wire::{AllocationChoice, MacId};
 use super::SlaveConfig;
-use crate::target::identity::CLASS_IDENTITY;
-use crate::target::object::Object;
-use crate::target::router::CLASS_MESSAGE_ROUTER;
+use crate::device::identity::CLASS_IDENTITY;
+use crate::device::object::Object;
+use crate::device::router::CLASS_MESSAGE_ROUTER;
 use crate::wire::status::GeneralStatus;
 
 /// Classes of this module.

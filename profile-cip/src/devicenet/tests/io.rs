@@ -5,6 +5,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::bench::Bench;
 use super::rig::{MASTER, Net, Node, mac, refusals, slave_config};
+use crate::device::identity::Health;
 use crate::devicenet::connection::{Change, Connection, ConnectionKind, ConnectionSetup, ConnectionState};
 use crate::devicenet::fragmentation::{Body, IoData};
 use crate::devicenet::master::config::{IoConfig, SlaveConfig as Planned};
@@ -12,7 +13,6 @@ use crate::devicenet::slave::Slave;
 use crate::devicenet::slave::application::{Application, ServiceError};
 use crate::devicenet::slave::event::SlaveEvent;
 use crate::devicenet::wire::{Identifier, MacId, Request};
-use crate::target::identity::Health;
 use crate::wire::status::GeneralStatus;
 
 /// Inputs and outputs, and nothing behind them.

@@ -3,10 +3,10 @@
 use core::cell::RefCell;
 
 use super::rig::{Net, mac, motion};
+use crate::device::axis_state::AxisState;
 use crate::devicenet::connection::ConnectionKind;
 use crate::devicenet::master::event::{Event, ExplicitRequest, Outcome};
 use crate::devicenet::master::motion::{MotionEnd, SetPoint, UpdateError, Watched};
-use crate::target::axis_state::AxisState;
 use crate::wire::motion::codes::{AxisControl, AxisStateCode};
 
 const POLL: ConnectionKind = ConnectionKind::Poll;

@@ -10,6 +10,7 @@ use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::io::Terminal;
+use crate::device::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use crate::devicenet::master::Master;
 use crate::devicenet::master::config::{DataRate, MasterConfig, SlaveConfig as Planned};
 use crate::devicenet::master::event::Event;
@@ -19,7 +20,6 @@ use crate::devicenet::slave::speed_drive::{SpeedDrive, SpeedDriveConfig};
 use crate::devicenet::slave::{Slave, SlaveConfig};
 use crate::devicenet::wire::speed::Assembly;
 use crate::devicenet::wire::{BodyFormat, Identifier, MacId};
-use crate::target::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 
 pub const MASTER: MacId = mac(1);
 pub const VENDOR: u16 = 0x0123;

@@ -4,12 +4,12 @@ use core::fmt::Write as _;
 
 use super::bench::Bench;
 use super::rig::{mac, ms, slave_config, speed_drive};
+use crate::device::event::ResetKind;
 use crate::devicenet::access::AccessState;
 use crate::devicenet::connection::{ConnectionKind, ConnectionState};
 use crate::devicenet::slave::SlaveConfig;
 use crate::devicenet::slave::event::SlaveEvent;
 use crate::devicenet::wire::BodyFormat;
-use crate::target::event::ResetKind;
 
 const UNCONNECTED: u16 = 0x44E;
 const REQUEST: u16 = 0x44C;

@@ -17,12 +17,12 @@ use std::time::{Duration, Instant};
 use arrayvec::{ArrayString, ArrayVec};
 use axisbridge::north::{self, ExplicitServer, motion_link};
 use ciplink::adapter::{Adapter as OtherAdapter, AdapterConfig as OtherConfig, AdapterIdentity};
-use profile_cip::target::adapter::Adapter;
-use profile_cip::target::config::{
+use profile_cip::device::adapter::Adapter;
+use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
-use profile_cip::target::ethernet_link::{InterfaceType, LinkState};
+use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::wire::motion::Format;
 
 const OURS: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 41);
