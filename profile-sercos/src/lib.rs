@@ -2,7 +2,7 @@
 //!
 //! * [`wire`]: what stands in the Ethernet frame and in the service channel, as values.
 //! * [`master`]: the master role, from the first CP0 telegram to cyclic operation.
-//! * [`police`]: judges everything on the wire by the rules; carries the tests.
+//! * [`checker`]: judges everything on the wire by the rules; carries the tests.
 //! * [`slave`]: the slave role, with a simulated drive behind it, and networks of slaves.
 //! * [`port`]: the two Ethernet ports of both.
 //!
@@ -15,8 +15,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod checker;
 pub mod master;
-pub mod police;
 pub mod port;
 pub mod slave;
 pub mod wire;

@@ -1,4 +1,4 @@
-//! A foreign master's recorded telegrams are played to a line of two slaves of ours, under the police. The answers are
+//! A foreign master's recorded telegrams are played to a line of two slaves of ours, under the checker. The answers are
 //! compared with those of the recorded slaves, a small simulator: which telegrams come back, which bytes of them slaves
 //! have written, and what stands there. Every difference is in the snapshot:
 //!
@@ -18,7 +18,7 @@ use std::fmt::Write;
 
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
-use profile_sercos::police::court::Court;
+use profile_sercos::checker::checked_bus::CheckedBus;
 use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::phase::State;
@@ -137,7 +137,7 @@ fn compare(places: &[Places], number: u8, passage: &Passage, ours: &[u8]) -> Vec
 #[test]
 fn a_foreign_master_takes_the_line_to_cp4() {
     let mut line = line();
-    let mut court = Court::new(MonotonicTime::ZERO);
+    let mut checked = CheckedBus::new(MonotonicTime::ZERO);
     let mut context = DecodeContext::default();
     let (mut now, mut last) = (MonotonicTime(1_000_000_000), 0);
     let mut differences = Vec::<String>::new();
@@ -157,8 +157,8 @@ fn a_foreign_master_takes_the_line_to_cp4() {
         let mut frame = passage.sent.clone();
         let mut back = None;
         let mut arrived = |port, frame: &mut [u8]| back = Some((port, frame.to_vec()));
-        court.send(now, Port::One, &mut frame, &mut line, &mut |_, _, _| {}, &mut arrived);
-        court.judge();
+        checked.send(now, Port::One, &mut frame, &mut line, &mut |_, _, _| {}, &mut arrived);
+        checked.judge();
         let Some((Port::One, ours)) = back else { panic!("{header} does not come back") };
         assert_eq!(ours[..HEADER_LEN], passage.returned[..HEADER_LEN], "{header}");
         let state = line.slaves()[0].state();

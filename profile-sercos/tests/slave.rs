@@ -7,8 +7,8 @@ mod bench;
 use bench::{Bench, CYCLE};
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::DurationNs;
-use profile_sercos::police::court::Tried;
-use profile_sercos::police::{Breach, Offender, Rule};
+use profile_sercos::checker::checked_bus::Tried;
+use profile_sercos::checker::{Offender, Rule, Violation};
 use profile_sercos::slave::phase::{Fault, State};
 use profile_sercos::wire::data_status::CommandState;
 use profile_sercos::wire::device_status::DeviceStatus;
@@ -17,16 +17,16 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::SvcStatus;
 use profile_sercos::wire::svc_error::SvcError;
 
-fn by_the_master(breach: &Breach) -> bool {
-    breach.offender == Offender::Master
+fn by_the_master(violation: &Violation) -> bool {
+    violation.offender == Offender::Master
 }
 
 /// What noise in place of telegrams breaks. It may hold what looks like a slave's answer; what a slave must never do,
 /// writing outside of its slots, is not in this list.
-fn from_noise(breach: &Breach) -> bool {
-    by_the_master(breach)
+fn from_noise(violation: &Violation) -> bool {
+    by_the_master(violation)
         || matches!(
-            breach.rule,
+            violation.rule,
             Rule::Handshake | Rule::Busy | Rule::Production { .. } | Rule::InsertsWhileSwitching { .. }
         )
 }
@@ -160,7 +160,9 @@ fn a_switch_without_its_check_ends_in_nrt_with_an_error() {
 fn lost_msts_are_counted_warned_of_and_end_in_nrt() {
     let mut bench = Bench::in_cp4(1);
     assert_eq!(bench.feedback[0].device, DeviceStatus::from_bits_retain(0x1100));
-    let late = |breach: &Breach| by_the_master(breach) && matches!(breach.rule, Rule::MstInterval { .. });
+    let late = |violation: &Violation| {
+        by_the_master(violation) && matches!(violation.rule, Rule::MstInterval { .. })
+    };
     bench.now = bench.now + CYCLE * 2;
     bench.breaking(late, Bench::cycle);
     assert_eq!(bench.feedback[0].device.bits(), 0x1100, "two of four are no warning");
@@ -207,8 +209,9 @@ fn a_second_copy_of_a_telegram_changes_nothing() {
     let (mut again, mut first, mut second) = (mdt.clone(), at.clone(), at);
     bench.send(&mut mdt);
     bench.send(&mut first);
-    let twice = |breach: &Breach| {
-        by_the_master(breach) && matches!(breach.rule, Rule::CycleCounter { .. } | Rule::MstInterval { .. })
+    let twice = |violation: &Violation| {
+        by_the_master(violation)
+            && matches!(violation.rule, Rule::CycleCounter { .. } | Rule::MstInterval { .. })
     };
     bench.breaking(twice, |bench| {
         bench.send(&mut again);
@@ -225,10 +228,10 @@ fn broken_headers_are_passed_on_and_counted() {
     mdt[16] ^= 1;
     let sent = mdt.clone();
     // Without its MST the AT is one of the cycle before, and the production is not seen.
-    let broken = |breach: &Breach| {
+    let broken = |violation: &Violation| {
         use Rule as R;
         let follows = matches!(
-            breach.rule,
+            violation.rule,
             R::Order { .. }
                 | R::PhaseMixed { .. }
                 | R::TelegramTooLate { .. }
@@ -236,7 +239,7 @@ fn broken_headers_are_passed_on_and_counted() {
                 | R::MstInterval { .. }
                 | R::Production { .. }
         );
-        by_the_master(breach) && (breach.rule == Rule::Header || follows)
+        by_the_master(violation) && (violation.rule == Rule::Header || follows)
     };
     bench.breaking(broken, |bench| {
         assert!(bench.send(&mut mdt));

@@ -1,12 +1,12 @@
-//! Scans of simulated drives in virtual time, under the police.
+//! Scans of simulated drives in virtual time, under the checker.
 
 use std::collections::VecDeque;
 
 use profile_generic::scaling::UnitKind;
 use profile_generic::time::MonotonicTime;
+use profile_sercos::checker::checked_bus::CheckedBus;
 use profile_sercos::master::config::MasterConfig;
 use profile_sercos::master::event::Port;
-use profile_sercos::police::court::Court;
 
 use super::*;
 use crate::config::{AxisKind, Config, DriveAt, Link};
@@ -39,17 +39,17 @@ fn names_are_utf_8_or_latin_1_without_what_is_no_letter() {
     }
 }
 
-/// Drives with these addresses in a line before the police.
+/// Drives with these addresses in a line, with the checker.
 struct Judged {
     network: DriveNetwork,
-    court: Court,
+    checked: CheckedBus,
     returned: VecDeque<(Port, Vec<u8>)>,
 }
 
 impl Judged {
     fn line(slaves: impl IntoIterator<Item = (u16, UnitKind)>) -> Self {
-        let (network, court) = (drives(slaves, false), Court::new(MonotonicTime::ZERO));
-        Self { network, court, returned: VecDeque::new() }
+        let (network, checked) = (drives(slaves, false), CheckedBus::new(MonotonicTime::ZERO));
+        Self { network, checked, returned: VecDeque::new() }
     }
 }
 
@@ -64,8 +64,8 @@ impl EthernetPort for Judged {
         self.network.handle_time(now);
         let mut arrived = |port, frame: &mut [u8]| self.returned.push_back((port, frame.to_vec()));
         let frame = &mut frame.to_vec();
-        self.court.send(now, port, frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
-        self.court.judge();
+        self.checked.send(now, port, frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
+        self.checked.judge();
         true
     }
 }

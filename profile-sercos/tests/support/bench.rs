@@ -1,9 +1,9 @@
-//! A hand-driven master for a line of slaves: as little as a test needs to take them to CP4 and to use them. The police
+//! A hand-driven master for a line of slaves: as little as a test needs to take them to CP4 and to use them. The checker
 //! judges both.
 
 use profile_generic::servo::ServoParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
-use profile_sercos::police::court::{Court, Tried};
+use profile_sercos::checker::checked_bus::{CheckedBus, Tried};
 use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config, Network, Slave};
@@ -55,7 +55,7 @@ pub struct Feedback {
 /// The master and its line.
 pub struct Bench {
     pub line: Network<Drive>,
-    pub court: Court,
+    pub checked: CheckedBus,
     pub now: MonotonicTime,
     pub phase: Phase,
     pub switching: Option<Phase>,
@@ -69,8 +69,8 @@ pub struct Bench {
 }
 
 impl Tried for Bench {
-    fn court(&mut self) -> &mut Court {
-        &mut self.court
+    fn checked(&mut self) -> &mut CheckedBus {
+        &mut self.checked
     }
 }
 
@@ -85,7 +85,7 @@ impl Bench {
         let n = slaves.len();
         Bench {
             line: Network::line(slaves),
-            court: Court::new(MonotonicTime::ZERO),
+            checked: CheckedBus::new(MonotonicTime::ZERO),
             now: MonotonicTime(1_000_000_000),
             phase: Phase::CP0,
             switching: None,
@@ -120,7 +120,7 @@ impl Bench {
         frame
     }
 
-    /// Sends a frame through the line, before the police, and puts what comes back in its place. Returns whether
+    /// Sends a frame through the line, before the checker, and puts what comes back in its place. Returns whether
     /// something did.
     pub fn send(&mut self, frame: &mut [u8]) -> bool {
         let mut back = None;
@@ -129,8 +129,8 @@ impl Bench {
                 back = Some(frame.to_vec());
             }
         };
-        self.court.send(self.now, Port::One, frame, &mut self.line, &mut |_, _, _| {}, &mut arrived);
-        self.court.judge();
+        self.checked.send(self.now, Port::One, frame, &mut self.line, &mut |_, _, _| {}, &mut arrived);
+        self.checked.judge();
         back.inspect(|back| frame.copy_from_slice(back)).is_some()
     }
 

@@ -11,8 +11,8 @@ use profile_generic::can::bus::Bus;
 use profile_generic::can::timing::BitRate;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::checker::bus::{Arrived, Stations, Watch};
 use profile_sercos::master::event::Port;
-use profile_sercos::police::bus::{Arrived, Stations, Watch};
 use profile_sercos::slave::STRANGER;
 
 use super::ports::CanWire;

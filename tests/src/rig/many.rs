@@ -28,7 +28,7 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::servo::ServoActual;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
-use profile_sercos::police::court::Court;
+use profile_sercos::checker::checked_bus::CheckedBus;
 
 use super::network::{Knobs, Pipe};
 use super::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
@@ -172,7 +172,7 @@ pub struct Many {
     line: DriveNetwork,
     can: Vec<CanWire>,
     devicenet: Vec<CanWire<DevicenetNode>>,
-    court: Court,
+    checked: CheckedBus,
     mapping: Mapping,
     config: Config,
     commissioners: Commissioners,
@@ -221,7 +221,7 @@ impl Many {
                 .iter()
                 .map(|network| CanWire::new(InProcessCan::of_devicenet(network, None)))
                 .collect(),
-            court: Court::new(START),
+            checked: CheckedBus::new(START),
             mapping,
             config,
             commissioners,
@@ -385,7 +385,7 @@ impl Many {
         drop((ports, north));
         self.commissioners.poll();
         self.line.handle_time(now);
-        self.south.exchange(now, &mut self.court, Some(&mut self.line), &mut |_| true);
+        self.south.exchange(now, &mut self.checked, Some(&mut self.line), &mut |_| true);
         for seat in &mut self.seats {
             while let Some((datagram, _)) = seat.north.outbound.pop() {
                 seat.actuals.send(now, &Knobs::GOOD, datagram);

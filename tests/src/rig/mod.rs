@@ -5,8 +5,8 @@
 //!            --datagrams (Knobs)-->         (NorthQueue, SouthQueue)
 //! ```
 //!
-//! Every telegram stands before the police of `profile_sercos`; a test that has a rule broken on purpose says which one
-//! with [`Tried::breaking`](profile_sercos::police::court::Tried::breaking).
+//! Every telegram stands before the checker of `profile_sercos`; a test that has a rule broken on purpose says which one
+//! with [`Tried::breaking`](profile_sercos::checker::checked_bus::Tried::breaking).
 //!
 //! Seconds of the machine pass in milliseconds. The same settings and the same seed give the same run; a
 //! test that fails
@@ -57,8 +57,8 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
-use profile_sercos::police::bus::Stations;
-use profile_sercos::police::court::{Court, Tried};
+use profile_sercos::checker::bus::Stations;
+use profile_sercos::checker::checked_bus::{CheckedBus, Tried};
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
@@ -168,8 +168,8 @@ pub struct Rig {
     pub foreign: Option<CanWire<Foreign>>,
     /// SERCOS slaves of somebody else in place of the line.
     pub foreign_line: Option<ForeignLine>,
-    /// The police over the line.
-    pub court: Court,
+    /// The checker over the line.
+    pub checked: CheckedBus,
     /// The checker of every set-point.
     pub motion_checker: MotionChecker,
     /// What was seen of each drive.
@@ -220,8 +220,8 @@ pub struct Rig {
 }
 
 impl Tried for Rig {
-    fn court(&mut self) -> &mut Court {
-        &mut self.court
+    fn checked(&mut self) -> &mut CheckedBus {
+        &mut self.checked
     }
 }
 
@@ -250,7 +250,7 @@ impl Rig {
             devicenet: devicenet.collect(),
             foreign: None,
             foreign_line: None,
-            court: Court::new(START),
+            checked: CheckedBus::new(START),
             motion_checker: MotionChecker::new(&config, settings.seed),
             knobs: settings.knobs,
             tamper_command: None,
@@ -750,7 +750,7 @@ impl Rig {
         let line = self.cable.then_some(line);
         let tamper = &mut self.tamper_frame;
         let mut back = |frame: &mut Bytes| tamper.as_mut().is_none_or(|tamper| tamper(frame));
-        self.south.exchange(self.now, &mut self.court, line, &mut back);
+        self.south.exchange(self.now, &mut self.checked, line, &mut back);
         while let Some((mut datagram, _)) = self.north.outbound.pop() {
             if self.tamper_actual.as_mut().is_none_or(|tamper| tamper(&mut datagram)) {
                 self.actuals.send(self.now, &self.knobs, datagram);

@@ -8,9 +8,9 @@ use axisbridge::simulate::can_bus::{CanNode, InProcessCan};
 use axisbridge::simulate::can_drive::DriveNode;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::MonotonicTime;
+use profile_sercos::checker::bus::Stations;
+use profile_sercos::checker::checked_bus::CheckedBus;
 use profile_sercos::master::event::Port;
-use profile_sercos::police::bus::Stations;
-use profile_sercos::police::court::Court;
 
 /// Frames or datagrams that a queue holds; more are lost.
 const QUEUE: usize = 64;
@@ -164,7 +164,7 @@ pub struct SouthQueue {
 }
 
 impl SouthQueue {
-    /// Sends what the master has put out through the line, before the police. `back` may change or lose what comes
+    /// Sends what the master has put out through the line, before the checker. `back` may change or lose what comes
     /// back; without a `line` there is no cable, and nothing does.
     ///
     /// # Panics
@@ -172,13 +172,13 @@ impl SouthQueue {
     pub fn exchange(
         &mut self,
         now: MonotonicTime,
-        court: &mut Court,
+        checked: &mut CheckedBus,
         mut line: Option<&mut dyn Stations>,
         back: &mut dyn FnMut(&mut Bytes) -> bool,
     ) {
         while let Some((mut frame, ())) = self.outbound.pop() {
             let Some(line) = line.as_deref_mut() else {
-                court.sent(now, Port::One, frame.as_slice());
+                checked.sent(now, Port::One, frame.as_slice());
                 continue;
             };
             let inbound = &mut self.inbound;
@@ -188,9 +188,9 @@ impl SouthQueue {
                     inbound.push(frame.as_slice(), ());
                 }
             };
-            court.send(now, Port::One, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
+            checked.send(now, Port::One, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
         }
-        court.judge();
+        checked.judge();
     }
 }
 

@@ -10,8 +10,8 @@ use axisbridge_tests::rig::Rig;
 use axisbridge_tests::rig::motion_checker::statistics::Statistics;
 use profile_cip::controller::{AxisSet, Controller, ControllerConfig, Limits, Step};
 use profile_generic::time::DurationNs;
-use profile_sercos::police::court::Tried;
-use profile_sercos::police::{Breach, Rule};
+use profile_sercos::checker::checked_bus::Tried;
+use profile_sercos::checker::{Rule, Violation};
 
 use crate::chain::Chain;
 
@@ -78,7 +78,7 @@ pub fn run_program(
     let mut rig = chain.ready();
     rig.motion_checker.record();
     // An engine that wakes up late sends its MST late.
-    let late = |breach: &Breach| matches!(breach.rule, Rule::MstInterval { .. });
+    let late = |violation: &Violation| matches!(violation.rule, Rule::MstInterval { .. });
     rig.tolerating(late, |rig| go(rig, chain, program, change, act));
     outcome(&rig)
 }

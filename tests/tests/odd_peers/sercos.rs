@@ -11,8 +11,8 @@ use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::codes::ControlMode;
-use profile_sercos::police::Offender;
-use profile_sercos::police::court::Tried;
+use profile_sercos::checker::Offender;
+use profile_sercos::checker::checked_bus::Tried;
 
 use super::{AXIS, Outcome, does, said, table};
 
@@ -95,8 +95,8 @@ fn wordy(rig: &Rig, slave: &SercosSlave) {
                 refused.idn, refused.element, refused.bytes, refused.code
             );
         }
-        for breach in rig.court.police.breaches() {
-            println!("the police: {breach}");
+        for violation in rig.checked.checker.violations() {
+            println!("the checker: {violation}");
         }
         println!("{}\n{}", rig.told(), rig.log());
         println!("position {} velocity {} phase {:?}", slave.position(), slave.velocity(), slave.phase());
@@ -107,7 +107,7 @@ fn wordy(rig: &Rig, slave: &SercosSlave) {
 fn run(oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
     let (mut rig, slave) = rig(oddities, keys);
     rig.tolerating(
-        |breach| breach.offender != Offender::Master,
+        |violation| violation.offender != Offender::Master,
         |rig| {
             come_up(rig);
             drive(rig, &slave, mode)
@@ -469,7 +469,7 @@ type Harm = fn(&mut SercosSlave, u64);
 fn harmed(oddities: Oddities, harm: Harm) -> String {
     let (mut rig, slave) = rig(oddities, "");
     rig.tolerating(
-        |breach| breach.offender != Offender::Master,
+        |violation| violation.offender != Offender::Master,
         |rig| {
             come_up(rig);
             let steps = vec![

@@ -9,8 +9,8 @@ use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::time::DurationNs;
-use profile_sercos::police::court::Tried;
-use profile_sercos::police::{self, Breach};
+use profile_sercos::checker::checked_bus::Tried;
+use profile_sercos::checker::{self, Violation};
 
 /// What the axes do while nothing disturbs them is on the curve to the resolution of the drives.
 #[test]
@@ -26,8 +26,8 @@ fn an_undisturbed_motion_violates_nothing() {
 }
 
 /// An engine that wakes up late sends its MST late.
-fn late(breach: &Breach) -> bool {
-    matches!(breach.rule, police::Rule::MstInterval { .. })
+fn late(violation: &Violation) -> bool {
+    matches!(violation.rule, checker::Rule::MstInterval { .. })
 }
 
 /// M1: wake-ups that are late by up to 0.2 ms make noise of the velocity.

@@ -12,23 +12,23 @@
 //!
 //! Two stations that send the same bits at the same time are one frame, as slaves answering an LSS fastscan are. The same
 //! identifier with other bits behind it is a collision: both spoil each other's frame, again and again, until one is off.
-//! The bus tells of this and of everything else that cannot happen on a well-built network by station and rule: [`Breach`].
+//! The bus tells of this and of everything else that cannot happen on a well-built network by station and rule: [`Violation`].
 //!
 //! Nothing is allocated once the stations are there, as long as it is polled until `None` after each call.
 
-mod breach;
 mod disturbance;
 mod station;
 #[cfg(test)]
 mod tests;
+mod violation;
 
 use std::collections::VecDeque;
 
-use self::breach::Police;
-pub use self::breach::{BREACHES_MAX, Breach, Rule};
 pub use self::disturbance::{DISTURBANCES_MAX, Disturbance, Effect};
 use self::station::{Card, Late, Waiting};
 pub use self::station::{State, Statistics};
+use self::violation::Checker;
+pub use self::violation::{Rule, VIOLATIONS_MAX, Violation};
 use super::frame::{Frame, Id};
 use super::timing::{BitRate, ERROR_FRAME_BITS, RECOVERY_BITS, exact};
 use crate::time::{DurationNs, MonotonicTime};
@@ -168,7 +168,7 @@ pub struct Bus {
     /// Busy time and instant of the last reading of the load.
     load_from: (MonotonicTime, DurationNs),
     disturbances: disturbance::List,
-    police: Police,
+    checker: Checker,
     restart: Option<DurationNs>,
 }
 
@@ -185,7 +185,7 @@ impl Bus {
             traffic: Traffic::default(),
             load_from: (MonotonicTime::ZERO, DurationNs::ZERO),
             disturbances: disturbance::List::default(),
-            police: Police::default(),
+            checker: Checker::default(),
             restart: None,
         }
     }
@@ -222,33 +222,33 @@ impl Bus {
 
     /// Permits several stations to send this identifier.
     pub fn share(&mut self, id: Id) {
-        self.police.share(id);
+        self.checker.share(id);
     }
 
-    /// Calls it a breach when a frame waits longer than this for the bus.
+    /// Calls it a violation when a frame waits longer than this for the bus.
     pub fn set_patience(&mut self, patience: DurationNs) {
-        self.police.patience = patience;
+        self.checker.patience = patience;
     }
 
-    /// What could not happen on a well-built network, in order; the first [`BREACHES_MAX`].
+    /// What could not happen on a well-built network, in order; the first [`VIOLATIONS_MAX`].
     #[must_use]
-    pub fn breaches(&self) -> &[Breach] {
-        self.police.breaches()
+    pub fn violations(&self) -> &[Violation] {
+        self.checker.violations()
     }
 
-    /// Forgets the breaches so far and gives how many there were.
+    /// Forgets the violations so far and gives how many there were.
     pub fn pardon(&mut self) -> usize {
-        self.police.pardon()
+        self.checker.pardon()
     }
 
     /// Ends a test that broke a rule without meaning to.
     ///
     /// # Panics
-    /// With station and rule of each breach since the start or the last [`Bus::pardon`].
+    /// With station and rule of each violation since the start or the last [`Bus::pardon`].
     #[track_caller]
     pub fn judge(&self) {
-        let breaches: Vec<String> = self.breaches().iter().map(Breach::to_string).collect();
-        assert!(breaches.is_empty(), "on the CAN bus:\n{}", breaches.join("\n"));
+        let violations: Vec<String> = self.violations().iter().map(Violation::to_string).collect();
+        assert!(violations.is_empty(), "on the CAN bus:\n{}", violations.join("\n"));
     }
 
     /// Hands in a frame.
@@ -266,7 +266,7 @@ impl Bus {
         } else if card.state() == State::BusOff {
             Err(SendError::BusOff)
         } else if frame.is_fd() && !self.rate.is_fd() {
-            self.police.broken(Breach { at: now, station, rule: Rule::FdFrame { id: frame.id() } });
+            self.checker.broken(Violation { at: now, station, rule: Rule::FdFrame { id: frame.id() } });
             Err(SendError::Fd)
         } else if card.is_full() {
             Err(SendError::Full)
@@ -278,7 +278,7 @@ impl Bus {
             return refused;
         }
         card.push(Waiting { since: now, frame: *frame });
-        self.police.sent(now, station, frame);
+        self.checker.sent(now, station, frame);
         Ok(())
     }
 
@@ -456,7 +456,7 @@ impl Bus {
         let fate = if let (Some(rival), Some(station)) = (rival, first) {
             let rule =
                 Rule::Collision { with: Station(u8::try_from(rival).unwrap_or(u8::MAX)), id: frame.id() };
-            self.police.broken(Breach { at: start, station, rule });
+            self.checker.broken(Violation { at: start, station, rule });
             self.traffic.collisions += 1;
             Fate::Collision
         } else if !heard {
@@ -503,7 +503,7 @@ impl Bus {
                 (true, Fate::Good) => {
                     if let Some(waited) = card.sent(start) {
                         self.out.push_back(Output::Sent { at: end, from: station, frame });
-                        self.police.waited(start, station, frame.id(), waited);
+                        self.checker.waited(start, station, frame.id(), waited);
                     }
                 }
                 (true, Fate::Unacknowledged) => card.unacknowledged(),

@@ -111,7 +111,7 @@ fn the_queue_goes_in_order_and_refuses_when_full() {
     assert_eq!((statistics.sent, statistics.refused, statistics.queue_max), (10, 1, 10));
     // The same identifier once from each: the second one is told.
     assert_eq!(
-        bus.breaches().iter().map(Breach::to_string).collect::<Vec<_>>(),
+        bus.violations().iter().map(Violation::to_string).collect::<Vec<_>>(),
         ["0.001000000 s: station 1 sends 2FF, which is an identifier of station 0"]
     );
 }
@@ -171,9 +171,9 @@ fn two_stations_with_one_identifier_collide_until_both_are_off() {
     assert_eq!((bus.statistics(c).sent, bus.traffic().collisions), (1, 32));
     assert_eq!(bus.state(a), State::BusOff);
     assert_eq!(bus.send(us(20_000), a, &frame(1, &[])), Err(SendError::BusOff));
-    let breaches = bus.breaches().iter().map(Breach::to_string).collect::<Vec<_>>();
+    let violations = bus.violations().iter().map(Violation::to_string).collect::<Vec<_>>();
     assert_eq!(
-        breaches,
+        violations,
         [
             "0.001000000 s: station 1 sends 701, which is an identifier of station 0",
             "0.001000000 s: station 0 sends 701 at the same time as station 1, with other bits behind it"
@@ -339,9 +339,9 @@ fn waiting_too_long_and_frames_of_fd_are_told() {
     assert_eq!(bus.send(T0, b, &fd), Err(SendError::Fd));
     run(&mut bus, us(1000));
     let waited = duration(&frame(0x181, &[0x55; 8]));
-    let breaches = bus.breaches().iter().map(Breach::to_string).collect::<Vec<_>>();
+    let violations = bus.violations().iter().map(Violation::to_string).collect::<Vec<_>>();
     assert_eq!(
-        breaches,
+        violations,
         [
             "0.001000000 s: station 1 sends 301 as an FD frame on a classic bus".to_owned(),
             format!(
@@ -351,7 +351,7 @@ fn waiting_too_long_and_frames_of_fd_are_told() {
             ),
         ]
     );
-    assert_eq!((bus.pardon(), bus.breaches().len()), (2, 0));
+    assert_eq!((bus.pardon(), bus.violations().len()), (2, 0));
 }
 
 #[test]

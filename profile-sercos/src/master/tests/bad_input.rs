@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use super::full_slaves::{FullRig, full_rig};
 use super::*;
-use crate::police::court::Tried;
-use crate::police::light::{FEEDBACK, MODE, Mirror};
-use crate::police::{Breach, Offender, Rule};
+use crate::checker::checked_bus::Tried;
+use crate::checker::light::{FEEDBACK, MODE, Mirror};
+use crate::checker::{Offender, Rule, Violation};
 use crate::slave::communication::{FixedConnection, idn};
 use crate::slave::{self, Slave};
 use crate::wire::data_status::DataStatus;
@@ -69,8 +69,8 @@ fn behave(rig: &mut FullRig) {
 }
 
 /// The bad slave breaks this rule.
-fn by_the_bad_one(broken: fn(&Rule) -> bool) -> impl Fn(&Breach) -> bool + 'static {
-    move |breach| breach.offender == Offender::Slave(BAD) && broken(&breach.rule)
+fn by_the_bad_one(broken: fn(&Rule) -> bool) -> impl Fn(&Violation) -> bool + 'static {
+    move |violation| violation.offender == Offender::Slave(BAD) && broken(&violation.rule)
 }
 
 fn svc_at(rig: &FullRig) -> Offset {
@@ -82,18 +82,18 @@ fn fix_crc(frame: &mut [u8]) {
     frame[16..20].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// What follows for the police when a cycle seems to have no MST: its telegrams are those of the cycle before.
-fn without_an_mst(breach: &Breach) -> bool {
+/// What follows for the checker when a cycle seems to have no MST: its telegrams are those of the cycle before.
+fn without_an_mst(violation: &Violation) -> bool {
     use Rule as R;
     let follows = matches!(
-        breach.rule,
+        violation.rule,
         R::Order { .. }
             | R::PhaseMixed { .. }
             | R::TelegramTooLate { .. }
             | R::CycleCounter { .. }
             | R::MstInterval { .. }
     );
-    breach.offender == Offender::Master && follows
+    violation.offender == Offender::Master && follows
 }
 
 /// Two cycles of damaged MDTs: the slaves go on with the values they had and take the next good ones.
@@ -110,7 +110,8 @@ fn damaged_on_the_way_out(said: &str, broken: fn(&Rule) -> bool, damage: fn(&mut
         }
         true
     });
-    let named = move |breach: &Breach| breach.offender == Offender::Master && broken(&breach.rule);
+    let named =
+        move |violation: &Violation| violation.offender == Offender::Master && broken(&violation.rule);
     rig.tolerating(without_an_mst, |rig| {
         rig.breaking(named, |rig| {
             rig.cycles(2);
@@ -180,12 +181,12 @@ fn an_mdt_of_a_wrong_phase_ends_communication_and_the_bus_comes_up_again() {
         fix_crc(frame);
         true
     });
-    let phase = |breach: &Breach| matches!(breach.rule, Rule::PhaseSequence { .. });
+    let phase = |violation: &Violation| matches!(violation.rule, Rule::PhaseSequence { .. });
     // A frame of CP4 has not the telegrams of CP2, and the way back to CP4 begins in the middle of a step.
-    let follows = |breach: &Breach| {
+    let follows = |violation: &Violation| {
         use Rule as R;
-        matches!(breach.rule, R::Length { .. } | R::Missing { .. } | R::StepTooEarly { .. })
-            && breach.offender == Offender::Master
+        matches!(violation.rule, R::Length { .. } | R::Missing { .. } | R::StepTooEarly { .. })
+            && violation.offender == Offender::Master
     };
     rig.tolerating(follows, |rig| {
         rig.breaking(phase, |rig| {
@@ -376,7 +377,7 @@ fn a_slave_that_flips_ahs_twice() {
     let wrong = rig.master.svc_submit(BAD_ID, SvcRequest::read(Idn::CYCLE_TIME)).unwrap();
     rig.run_until("answered", |rig| rig.outcome(wrong).is_some());
     assert_eq!(rig.outcome(wrong).unwrap().data.unsigned(), Some(1_000_000));
-    let named = rig.court.police.breaches().iter().map(ToString::to_string).collect::<Vec<_>>();
+    let named = rig.checked.checker.violations().iter().map(ToString::to_string).collect::<Vec<_>>();
     assert_eq!(named.len(), 1, "the way back is to where MHS is: {named:?}");
     assert!(named[0].ends_with("slave at position 2: AHS moved without MHS"), "{named:?}");
     runs(&mut rig, &[0, 1, 2]);

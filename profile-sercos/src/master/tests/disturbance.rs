@@ -1,7 +1,7 @@
 //! A line that loses and damages frames at random: the master neither panics nor takes what is damaged.
 
 use super::*;
-use crate::police::bus::Cable;
+use crate::checker::bus::Cable;
 use proptest::prelude::*;
 
 /// A small generator, so that a case is told by its seed.

@@ -1,8 +1,8 @@
 use super::peer::Faults;
 use super::*;
+use crate::checker::checked_bus::Tried;
+use crate::checker::{Offender, Rule, Violation};
 use crate::master::event::Invalid;
-use crate::police::court::Tried;
-use crate::police::{Breach, Offender, Rule};
 use crate::wire::svc::Element;
 use crate::wire::svc_error::SvcError;
 
@@ -336,7 +336,8 @@ fn a_slave_that_does_not_stop_inserting_stops_the_switch() {
         rig.line.peers[0].faults.stubborn = true;
         let late = Rule::InsertsWhileSwitching { phase: from };
         let failed = Event::SwitchFailed { from, to, slave: Some(SlaveId(0)) };
-        let named = move |breach: &Breach| breach.rule == late && breach.offender == Offender::Slave(1);
+        let named =
+            move |violation: &Violation| violation.rule == late && violation.offender == Offender::Slave(1);
         rig.breaking(named, |rig| rig.run_until("failed", |rig| rig.log.contains(&failed)));
         assert_eq!(
             failed.to_string(),

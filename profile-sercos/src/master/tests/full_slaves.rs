@@ -1,9 +1,9 @@
 //! The master against the crate's slave role, each with its own state machines.
 
 use super::*;
+use crate::checker::light::{COMMAND, FEEDBACK, MODE, Mirror};
 use crate::master::config::Connections;
 use crate::master::event::Invalid;
-use crate::police::light::{COMMAND, FEEDBACK, MODE, Mirror};
 use crate::slave::{self, Network, Slave};
 
 pub(super) type FullRig = VirtualBus<Network<Mirror>>;

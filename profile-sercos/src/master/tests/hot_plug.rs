@@ -1,15 +1,15 @@
-//! Slaves that come in by hot plug, against the crate's slave role and under the police.
+//! Slaves that come in by hot plug, against the crate's slave role and under the checker.
 
 use super::full_slaves::{configured, mirror};
 use super::ring::{RingRig, ring_config};
 use super::*;
+use crate::checker::checked_bus::Tried as _;
+use crate::checker::light::{COMMAND, Mirror};
+use crate::checker::{Offender, Violation};
 use crate::master::config::Ports;
 use crate::master::event::{HotPlugRefusal, Invalid};
 use crate::master::layout::{ConnectionNeed, SlaveNeed};
 use crate::master::topology::Topology;
-use crate::police::court::Tried as _;
-use crate::police::light::{COMMAND, Mirror};
-use crate::police::{Breach, Offender};
 use crate::slave::phase::State as SlaveState;
 use crate::slave::{self, Network, Slave};
 use crate::wire::scp::{ScpClass, ScpEntry};
@@ -324,7 +324,7 @@ fn there_is_no_hot_plug_in_a_closed_ring() {
     let mut rig = RingRig::new(plug_config(&[1, 2, 3], &[7], Ports::Both), Network::ring(slaves()));
     rig.master.set_target_phase(Phase::CP4);
     rig.run_until("in CP4", |rig| rig.master.state() == State::Cp4);
-    // The police would see hot plug.
+    // The checker would see hot plug.
     rig.cycles(100);
     assert_eq!(refusals(&rig), [(Some(7), HotPlugRefusal::RingClosed)]);
     assert!(rig.log.contains(&Event::PlaceKept { address: 7 }));
@@ -489,7 +489,7 @@ fn a_slave_that_cannot_be_set_up() {
     for phase in [Phase::CP3, Phase::CP4] {
         let before = Phase(phase.0 - 1);
         let rig = refused("a check", checked(phase), nothing(), (Some(7), R::SetUp), 0);
-        let invalid = Invalid::from_iter([crate::police::light::MODE]);
+        let invalid = Invalid::from_iter([crate::checker::light::MODE]);
         let failed = Event::CheckFailed { slave: SlaveId(2), phase: before, invalid };
         assert!(rig.before.contains(&failed), "{:?}", rig.before);
     }
@@ -567,8 +567,8 @@ fn two_slaves_with_one_address_get_no_command_value() {
     rig.network.append(pluggable(7));
     rig.network.mend(3);
     rig.network.mend(2);
-    // The police sees the second one write where the first one has its place.
-    let shadow = |breach: &Breach| breach.offender == Offender::Slave(515);
+    // The checker sees the second one write where the first one has its place.
+    let shadow = |violation: &Violation| violation.offender == Offender::Slave(515);
     rig.breaking(shadow, |rig| rig.run_until("refused", |rig| !refusals(rig).is_empty()));
     assert_eq!(refusals(&rig), [(Some(7), HotPlugRefusal::Shadow)]);
     rig.tolerating(shadow, |rig| rig.cycles(3000));

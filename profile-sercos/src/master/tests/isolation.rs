@@ -322,7 +322,7 @@ fn one_that_hung_comes_in_by_hot_plug_and_the_ring_is_closed() {
     let classes = crate::slave::communication::CLASSES_WITH_HOT_PLUG;
     let slave = |address| {
         let config = crate::slave::Config { address, classes, ..Default::default() };
-        crate::slave::Slave::new(&config, crate::police::light::Mirror::default())
+        crate::slave::Slave::new(&config, crate::checker::light::Mirror::default())
     };
     let mut config = MasterConfig { slave_valid_misses: 5, mst_losses: 20, ..ring_config(4) };
     for slave in &mut config.slaves {

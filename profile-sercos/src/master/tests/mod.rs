@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use crate::police::bus::VirtualBus;
+use crate::checker::bus::VirtualBus;
 
 use self::peer::Line;
 use super::config::{ConnectionConfig, MasterConfig, SlaveConfig};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use profile_generic::time::MonotonicTime;
 
-use crate::police::bus::{Arrived, Stations, Watch};
+use crate::checker::bus::{Arrived, Stations, Watch};
 use crate::port::Port;
 use crate::wire::cp12;
 use crate::wire::header::{HEADER_LEN, Header, Kind, Phase};

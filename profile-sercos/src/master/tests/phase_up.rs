@@ -1,6 +1,6 @@
 use super::*;
-use crate::police::court::Tried;
-use crate::police::{Breach, Offender, Rule};
+use crate::checker::checked_bus::Tried;
+use crate::checker::{Offender, Rule, Violation};
 use crate::wire::scp::ScpClass;
 use crate::wire::svc::Element;
 
@@ -208,8 +208,8 @@ fn late_polls_skip_cycles_and_keep_the_grid() {
     rig.up_to(Phase::CP4);
     let due = rig.master.wake_at().unwrap();
     rig.now = due + DurationNs(3_400_000);
-    let late = |breach: &Breach| {
-        breach.offender == Offender::Master && matches!(breach.rule, Rule::MstInterval { .. })
+    let late = |violation: &Violation| {
+        violation.offender == Offender::Master && matches!(violation.rule, Rule::MstInterval { .. })
     };
     rig.breaking(late, |rig| rig.cycles(1));
     assert_eq!(rig.master.statistics().skipped, 3);

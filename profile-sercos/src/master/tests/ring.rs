@@ -2,12 +2,12 @@
 
 use super::full_slaves::{configured, mirror};
 use super::*;
+use crate::checker::checked_bus::{CheckedBus, Tried};
+use crate::checker::light::{COMMAND, Mirror};
 use crate::master::Master;
 use crate::master::config::Ports;
 use crate::master::event::End;
 use crate::master::topology::Topology;
-use crate::police::court::{Court, Tried};
-use crate::police::light::{COMMAND, Mirror};
 use crate::slave::Network;
 use crate::wire::header::{Channel, Kind};
 
@@ -18,7 +18,7 @@ pub(super) struct RingRig {
     pub now: MonotonicTime,
     pub master: Master,
     pub network: Network<Mirror>,
-    court: Court,
+    checked: CheckedBus,
     pub tamper: Tamper,
     pub log: Vec<Event>,
     /// An older log, where a test keeps it.
@@ -46,8 +46,8 @@ pub(super) fn ring_config(count: u16) -> MasterConfig {
 }
 
 impl Tried for RingRig {
-    fn court(&mut self) -> &mut Court {
-        &mut self.court
+    fn checked(&mut self) -> &mut CheckedBus {
+        &mut self.checked
     }
 }
 
@@ -59,7 +59,7 @@ impl RingRig {
             lost: vec![(0, 0); network.slaves().len().max(config.slaves.len())],
             master: Master::new(config).unwrap(),
             network,
-            court: Court::new(MonotonicTime::ZERO),
+            checked: CheckedBus::new(MonotonicTime::ZERO),
             tamper: Box::new(|_, _| true),
             log: Vec::new(),
             before: Vec::new(),
@@ -121,9 +121,9 @@ impl RingRig {
                     assert!(lenient || taken.is_ok(), "{taken:?} on {port}: {:02x?}", &frame[14..16]);
                 }
             };
-            self.court.send(now, port, &mut frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
+            self.checked.send(now, port, &mut frame, &mut self.network, &mut |_, _, _| {}, &mut arrived);
         }
-        self.court.judge();
+        self.checked.judge();
         while let Some(event) = self.master.poll_event() {
             if matches!(event, Event::AwaitingApplication { .. }) {
                 self.master.proceed().unwrap();
@@ -425,14 +425,14 @@ fn a_telegram_on_the_wrong_port_is_refused() {
             let (now, master) = (rig.now, &mut rig.master);
             if port == Port::Two {
                 // The S telegram comes in on port 1, untouched by any slave.
-                rig.court.sent(now, port, &frame);
+                rig.checked.sent(now, port, &frame);
                 assert_eq!(master.handle_frame(now, Port::One, &frame), Err(Refusal::Port));
                 continue;
             }
             let mut arrived = |port, frame: &mut [u8]| master.handle_frame(now, port, frame).unwrap();
-            rig.court.send(now, port, &mut frame, &mut rig.network, &mut |_, _, _| {}, &mut arrived);
+            rig.checked.send(now, port, &mut frame, &mut rig.network, &mut |_, _, _| {}, &mut arrived);
         }
-        rig.court.judge();
+        rig.checked.judge();
     }
     assert_eq!((rig.master.topology(), rig.told()), (Topology::LineOne, vec![]));
     assert_eq!(rig.master.statistics().refused(Refusal::Port), 40);

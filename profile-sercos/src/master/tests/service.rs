@@ -75,7 +75,7 @@ fn cycles_a_parameter() {
 fn the_phase_up_loses_no_cycle_either() {
     let mut rig = full_rig(1);
     rig.master.set_target_phase(Phase::CP4);
-    let cycles = |rig: &mut VirtualBus<crate::slave::Network<crate::police::light::Mirror>>, from, to| {
+    let cycles = |rig: &mut VirtualBus<crate::slave::Network<crate::checker::light::Mirror>>, from, to| {
         rig.state(from);
         let start = rig.cycles.len();
         rig.state(to);

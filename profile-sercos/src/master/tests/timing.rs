@@ -2,8 +2,8 @@
 
 use super::full_slaves::{FullRig, configured, full_rig, mirror};
 use super::*;
+use crate::checker::light::Mirror;
 use crate::master::config::ConfigError;
-use crate::police::light::Mirror;
 use crate::slave::{self, Network, Slave};
 use crate::wire::connection::ConnectionControl;
 use crate::wire::device_status::DeviceStatus;

@@ -447,7 +447,7 @@ impl fmt::Display for Rule {
 
 /// A broken rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Breach {
+pub struct Violation {
     /// When.
     pub at: MonotonicTime,
     /// Who.
@@ -456,7 +456,7 @@ pub struct Breach {
     pub rule: Rule,
 }
 
-impl fmt::Display for Breach {
+impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} us: {}: {}", self.at.0 / 1000, self.offender, self.rule)
     }

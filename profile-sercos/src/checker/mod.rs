@@ -1,16 +1,16 @@
-//! Polices a network: every telegram of the master and every change that a slave makes is judged by the standard.
+//! Checks a network: every telegram of the master and every change that a slave makes is judged by the standard.
 //!
-//! [`Police`] is told what passes: [`Police::sent`] for each telegram of the master, [`Police::passed`] for each
+//! [`Checker`] is told what passes: [`Checker::sent`] for each telegram of the master, [`Checker::passed`] for each
 //! station behind which a telegram looks different or not. What the slaves are told over their service channels is
 //! learned from the wire, not from the master, so that master and slaves cannot agree on the same mistake. A
-//! [`Breach`] names the station and the rule.
+//! [`Violation`] names the station and the rule.
 //!
-//! [`bus::VirtualBus`] is a master and its slaves in virtual time under a police; it carries the protocol tests. Rigs with
-//! other masters, or with the whole box in front, stand before a [`court::Court`] as well.
-//! The police allocates; it is no part of the cyclic path.
+//! [`bus::VirtualBus`] is a master and its slaves in virtual time under a checker; it carries the protocol tests. Rigs with
+//! other masters, or with the whole box in front, use a [`checked_bus::CheckedBus`] as well.
+//! The checker allocates; it is no part of the cyclic path.
 
 pub mod bus;
-pub mod court;
+pub mod checked_bus;
 mod hot_plug;
 #[cfg(test)]
 mod hot_plug_tests;
@@ -25,7 +25,7 @@ mod tests;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-pub use self::rule::{Breach, Offender, Part, Rule};
+pub use self::rule::{Offender, Part, Rule, Violation};
 
 use self::hot_plug::HotPlugs;
 use self::plan::Plan;
@@ -55,9 +55,9 @@ const SETUP_STEP_NS: i64 = 250_000;
 /// Bytes of a frame on the wire that are not in the buffer: preamble 8, FCS 4.
 const WIRE_EXTRA: usize = 12;
 
-/// What the police has to know besides what is on the wire.
+/// What the checker has to know besides what is on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PoliceConfig {
+pub struct CheckerConfig {
     /// Deviation of the MST in CP0 to CP2, where no slave has been told S-0-1023 yet.
     pub setup_jitter: DurationNs,
     /// The master sends ATs right behind the MDTs instead of at t1, as soft masters do. Masters that tell so in
@@ -65,9 +65,9 @@ pub struct PoliceConfig {
     pub soft_master: bool,
 }
 
-impl Default for PoliceConfig {
-    fn default() -> PoliceConfig {
-        PoliceConfig { setup_jitter: DurationNs::from_micros(50), soft_master: true }
+impl Default for CheckerConfig {
+    fn default() -> CheckerConfig {
+        CheckerConfig { setup_jitter: DurationNs::from_micros(50), soft_master: true }
     }
 }
 
@@ -81,9 +81,9 @@ struct Cycle {
 
 /// Watches one master and its slaves.
 #[derive(Debug)]
-pub struct Police {
-    config: PoliceConfig,
-    breaches: Vec<Breach>,
+pub struct Checker {
+    config: CheckerConfig,
+    violations: Vec<Violation>,
     /// End of the last telegram, or the start of the watch.
     quiet_since: MonotonicTime,
     cycle: Option<Cycle>,
@@ -102,13 +102,13 @@ pub struct Police {
     hot_plugs: HotPlugs,
 }
 
-impl Police {
+impl Checker {
     /// Begins to watch at `now`, with nothing on the wire.
     #[must_use]
-    pub fn new(config: PoliceConfig, now: MonotonicTime) -> Police {
-        Police {
+    pub fn new(config: CheckerConfig, now: MonotonicTime) -> Checker {
+        Checker {
             config,
-            breaches: Vec::new(),
+            violations: Vec::new(),
             quiet_since: now,
             cycle: None,
             phase: Phase::CP0,
@@ -125,23 +125,23 @@ impl Police {
 
     /// What was broken so far, in order.
     #[must_use]
-    pub fn breaches(&self) -> &[Breach] {
-        &self.breaches
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
     }
 
-    /// Takes the breaches away.
-    pub fn take_breaches(&mut self) -> Vec<Breach> {
-        std::mem::take(&mut self.breaches)
+    /// Takes the violations away.
+    pub fn take_violations(&mut self) -> Vec<Violation> {
+        std::mem::take(&mut self.violations)
     }
 
-    fn breach(&mut self, at: MonotonicTime, offender: Offender, rule: Rule) {
-        self.breaches.push(Breach { at, offender, rule });
+    fn violation(&mut self, at: MonotonicTime, offender: Offender, rule: Rule) {
+        self.violations.push(Violation { at, offender, rule });
     }
 
     /// The master sends a telegram; its preamble begins on the wire at `at`.
     pub fn sent(&mut self, at: MonotonicTime, frame: &[u8]) {
         let Ok(header) = Header::parse(frame) else {
-            self.breach(at, Offender::Master, Rule::Header);
+            self.violation(at, Offender::Master, Rule::Header);
             return;
         };
         let telegram = header.telegram;
@@ -154,7 +154,7 @@ impl Police {
         }
         let mst = self.cycle.as_ref().map(|cycle| cycle.phase);
         if let Some(mst) = mst.filter(|&mst| mst != header.phase) {
-            self.breach(at, Offender::Master, Rule::PhaseMixed { telegram, found: header.phase, mst });
+            self.violation(at, Offender::Master, Rule::PhaseMixed { telegram, found: header.phase, mst });
         }
         let data = &frame[HEADER_LEN..];
         self.length(at, telegram, data.len());
@@ -198,7 +198,7 @@ impl Police {
         self.finish_cycle(at);
         let last = self.cycle.as_ref().map(|cycle| (cycle.start, cycle.phase));
         let silence = at - self.quiet_since;
-        let broken = |police: &mut Police, rule| police.breach(at, Offender::Master, rule);
+        let broken = |checker: &mut Checker, rule| checker.violation(at, Offender::Master, rule);
         let cycles = last.is_some() && silence < SILENCE;
         // Behind a silence any count may follow: some masters count the cycles in which they are silent, too.
         if let Some((_, last)) = last.filter(|_| cycles) {
@@ -246,13 +246,13 @@ impl Police {
     fn enter(&mut self, at: MonotonicTime, phase: Phase, silence: DurationNs) {
         let fast = self.version.contains(CommunicationVersion::FAST_PHASE_SWITCH);
         if phase != Phase::CP4 && silence < SILENCE && !fast {
-            self.breach(at, Offender::Master, Rule::Silence { kept: silence });
+            self.violation(at, Offender::Master, Rule::Silence { kept: silence });
         }
         if self.switching_since.take().is_some() {
             for index in 0..self.stations.len() {
                 if self.stations[index].inserts {
                     let rule = Rule::LeftEarly { phase: self.phase, slave: position(index) };
-                    self.breach(at, Offender::Master, rule);
+                    self.violation(at, Offender::Master, rule);
                 }
             }
         }
@@ -287,8 +287,8 @@ impl Police {
         }
         // Most concern every slave alike.
         for rule in broken {
-            if !self.breaches.iter().any(|breach| breach.at == at && breach.rule == rule) {
-                self.breach(at, Offender::Master, rule);
+            if !self.violations.iter().any(|violation| violation.at == at && violation.rule == rule) {
+                self.violation(at, Offender::Master, rule);
             }
         }
     }
@@ -305,14 +305,14 @@ impl Police {
             let jitter = self.config.setup_jitter.0;
             let off = (found.0 + jitter).rem_euclid(SETUP_STEP_NS) > 2 * jitter;
             if found.0 < min.0 - jitter || off {
-                self.breach(at, Offender::Master, Rule::SetupCycle { found });
+                self.violation(at, Offender::Master, Rule::SetupCycle { found });
             }
             return;
         };
         let cycle = DurationNs(i64::from(plan.cycle_ns));
         let jitter = DurationNs(i64::from(plan.jitter_ns));
         if (found.0 - cycle.0).abs() > jitter.0 {
-            self.breach(at, Offender::Master, Rule::MstInterval { found, cycle, jitter });
+            self.violation(at, Offender::Master, Rule::MstInterval { found, cycle, jitter });
         }
     }
 
@@ -338,20 +338,20 @@ impl Police {
         let closed = self.hot_plugs.ring_is_closed(&self.stations);
         let enabled = [Channel::Primary, Channel::Secondary].into_iter();
         if closed && enabled.into_iter().any(|channel| self.hot_plugs.is_enabled(channel)) {
-            self.breach(at, Offender::Master, Rule::HotPlugInRing);
+            self.violation(at, Offender::Master, Rule::HotPlugInRing);
         }
         let Some(cycle) = &self.cycle else { return };
         let missing: Vec<_> =
             self.expected().map(|(telegram, _)| telegram).filter(|t| !cycle.seen.contains(t)).collect();
         for telegram in missing {
-            self.breach(at, Offender::Master, Rule::Missing { telegram });
+            self.violation(at, Offender::Master, Rule::Missing { telegram });
         }
         if self.switching_since.is_some_and(|since| at - since >= SWITCH_TIMEOUT) {
             for index in 0..self.stations.len() {
                 let station = &mut self.stations[index];
                 if station.inserts && !std::mem::replace(&mut station.reported, true) {
                     let rule = Rule::InsertsWhileSwitching { phase: self.phase };
-                    self.breach(at, Offender::Slave(position(index)), rule);
+                    self.violation(at, Offender::Slave(position(index)), rule);
                 }
             }
         }
@@ -362,7 +362,7 @@ impl Police {
         // Both channels have the same telegrams.
         let telegram = TelegramType(telegram.0 & 0x7F);
         if !self.expected().any(|(expected, _)| expected == telegram) {
-            self.breach(at, Offender::Master, Rule::Unexpected { telegram, phase });
+            self.violation(at, Offender::Master, Rule::Unexpected { telegram, phase });
             return;
         }
         let Some(cycle) = &mut self.cycle else { return };
@@ -370,7 +370,7 @@ impl Police {
         cycle.seen.push(telegram);
         let rank = |telegram: TelegramType| (telegram.kind() == Kind::At, telegram.number());
         if let Some(last) = last.filter(|&last| rank(last) >= rank(telegram)) {
-            self.breach(at, Offender::Master, Rule::Order { telegram, last });
+            self.violation(at, Offender::Master, Rule::Order { telegram, last });
         }
     }
 
@@ -378,7 +378,7 @@ impl Police {
         let same = TelegramType::new(Channel::Primary, telegram.kind(), telegram.number());
         let expected = self.expected().find(|&(expected, _)| expected == same).map(|(_, len)| len);
         if let Some(expected) = expected.filter(|&expected| expected != found) {
-            self.breach(at, Offender::Master, Rule::Length { telegram, found, expected });
+            self.violation(at, Offender::Master, Rule::Length { telegram, found, expected });
         }
     }
 
@@ -396,10 +396,10 @@ impl Police {
         let limit = plan.uc_start_ns.unwrap_or(plan.cycle_ns);
         let limit = DurationNs(i64::from(limit) + jitter);
         if let Some(t1) = t1.filter(|t1| start.0 + jitter < t1.0) {
-            self.breach(at, Offender::Master, Rule::AtTooEarly { start, t1 });
+            self.violation(at, Offender::Master, Rule::AtTooEarly { start, t1 });
         }
         if end > limit {
-            self.breach(at, Offender::Master, Rule::TelegramTooLate { telegram, end, limit });
+            self.violation(at, Offender::Master, Rule::TelegramTooLate { telegram, end, limit });
         }
     }
 
@@ -423,7 +423,7 @@ impl Police {
             let rules: Vec<_> =
                 rule.into_iter().chain(produced.filter_map(|link| link.judge(data))).collect();
             for rule in rules {
-                self.breach(at, Offender::Master, rule);
+                self.violation(at, Offender::Master, rule);
             }
         }
     }
@@ -434,7 +434,7 @@ impl Police {
         for index in 0..self.stations.len() {
             let places = self.plan.as_ref().and_then(|plan| plan.slaves.get(index)?.as_ref());
             let rule = self.stations[index].command(position(index), self.phase, telegram, data, places);
-            rule.into_iter().for_each(|rule| self.breach(at, Offender::Master, rule));
+            rule.into_iter().for_each(|rule| self.violation(at, Offender::Master, rule));
         }
     }
 
@@ -452,7 +452,7 @@ impl Police {
         let telegram = header.telegram;
         let offender = Offender::Slave(slave);
         if before.len() != after.len() || before[..HEADER_LEN] != after[..HEADER_LEN] {
-            self.breach(at, offender, Rule::OutsideSlots { telegram, offset: None });
+            self.violation(at, offender, Rule::OutsideSlots { telegram, offset: None });
             return;
         }
         let (before, after) = (&before[HEADER_LEN..], &after[HEADER_LEN..]);
@@ -462,7 +462,7 @@ impl Police {
         }
         if !outward {
             if before != after {
-                self.breach(at, offender, Rule::ReturnPath { telegram });
+                self.violation(at, offender, Rule::ReturnPath { telegram });
             }
             return;
         }
@@ -476,7 +476,7 @@ impl Police {
             own.insert(0, 0..HOT_PLUG_LEN);
         }
         if let Some(offset) = first_change(before, after, &own) {
-            self.breach(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
+            self.violation(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
         }
         if answers {
             self.hot_plug_answer(at, slave, telegram.channel(), before, after);
@@ -500,7 +500,7 @@ impl Police {
             .filter_map(|link| link.judge(data));
         let rules: Vec<_> = rule.into_iter().chain(produced).collect();
         for rule in rules {
-            self.breach(at, Offender::Slave(slave), rule);
+            self.violation(at, Offender::Slave(slave), rule);
         }
     }
 
@@ -542,12 +542,12 @@ impl Police {
         }
         if telegram.kind() == Kind::Mdt || before.len() < cp0::AT_LEN {
             let offset = first_change(before, after, &[]);
-            self.breach(at, offender, Rule::OutsideSlots { telegram, offset });
+            self.violation(at, offender, Rule::OutsideSlots { telegram, offset });
             return;
         }
         let (first, second) = (u16_at(before, 0), u16_at(after, 0));
         if SequenceCounter(first).next().0 != second {
-            self.breach(at, offender, Rule::Scan { before: first, after: second });
+            self.violation(at, offender, Rule::Scan { before: first, after: second });
         }
         let topology = usize::from(SequenceCounter(first).count() & 0x1FF);
         let field = 2 * topology..2 * topology + 2;
@@ -558,7 +558,7 @@ impl Police {
         let writes = outward && topology > 0;
         let own = if writes { field } else { 0..0 };
         if let Some(offset) = first_change(before, after, &[0..CONNECTION_CONTROL_LEN, own]) {
-            self.breach(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
+            self.violation(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
         } else if writes && usize::from(slave) == topology {
             // In a ring the S telegram counts from the other end; the P telegram gives the number.
             let word = u16_at(after, 2 * topology);

@@ -8,8 +8,8 @@ use super::Station;
 use crate::can::frame::{Frame, Id};
 use crate::time::{DurationNs, MonotonicTime};
 
-/// Breaches that are kept.
-pub const BREACHES_MAX: usize = 64;
+/// Violations that are kept.
+pub const VIOLATIONS_MAX: usize = 64;
 
 /// Extended identifiers whose senders are remembered.
 const EXTENDED_MAX: usize = 64;
@@ -64,7 +64,7 @@ impl fmt::Display for Rule {
 
 /// A rule that a station broke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Breach {
+pub struct Violation {
     /// When.
     pub at: MonotonicTime,
     /// Who.
@@ -73,7 +73,7 @@ pub struct Breach {
     pub rule: Rule,
 }
 
-impl fmt::Display for Breach {
+impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {} {}", self.at, self.station, self.rule)
     }
@@ -81,8 +81,8 @@ impl fmt::Display for Breach {
 
 /// Who sends what, and what is wrong with it.
 #[derive(Debug)]
-pub(super) struct Police {
-    breaches: ArrayVec<Breach, BREACHES_MAX>,
+pub(super) struct Checker {
+    violations: ArrayVec<Violation, VIOLATIONS_MAX>,
     /// Owners of the standard identifiers.
     standard: Box<[Owner; Id::STANDARD_MAX as usize + 1]>,
     extended: ArrayVec<(u32, Owner), EXTENDED_MAX>,
@@ -97,10 +97,10 @@ enum Owner {
     Shared,
 }
 
-impl Default for Police {
+impl Default for Checker {
     fn default() -> Self {
         Self {
-            breaches: ArrayVec::new(),
+            violations: ArrayVec::new(),
             standard: Box::new([Owner::Nobody; Id::STANDARD_MAX as usize + 1]),
             extended: ArrayVec::new(),
             patience: DurationNs::MAX,
@@ -109,25 +109,25 @@ impl Default for Police {
     }
 }
 
-impl Police {
-    pub fn breaches(&self) -> &[Breach] {
-        &self.breaches
+impl Checker {
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
     }
 
     pub fn pardon(&mut self) -> usize {
-        let count = self.breaches.len() + self.beyond;
-        self.breaches.clear();
+        let count = self.violations.len() + self.beyond;
+        self.violations.clear();
         self.beyond = 0;
         count
     }
 
-    /// Keeps a breach; what repeats itself without end, as a collision does, is told once.
-    pub fn broken(&mut self, breach: Breach) {
-        let same = |last: &Breach| (last.station, last.rule) == (breach.station, breach.rule);
-        if self.breaches.last().is_some_and(same) {
+    /// Keeps a violation; what repeats itself without end, as a collision does, is told once.
+    pub fn broken(&mut self, violation: Violation) {
+        let same = |last: &Violation| (last.station, last.rule) == (violation.station, violation.rule);
+        if self.violations.last().is_some_and(same) {
             return;
         }
-        if self.breaches.try_push(breach).is_err() {
+        if self.violations.try_push(violation).is_err() {
             self.beyond += 1;
         }
     }
@@ -147,7 +147,7 @@ impl Police {
             Owner::One(before) if before != station => {
                 // Told once; from here on it has no one owner.
                 *owner = Owner::Shared;
-                self.broken(Breach { at, station, rule: Rule::Sender { owner: before, id } });
+                self.broken(Violation { at, station, rule: Rule::Sender { owner: before, id } });
             }
             Owner::One(_) | Owner::Shared => {}
         }
@@ -157,7 +157,7 @@ impl Police {
     pub fn waited(&mut self, at: MonotonicTime, station: Station, id: Id, waited: DurationNs) {
         let patience = self.patience;
         if waited > patience {
-            self.broken(Breach { at, station, rule: Rule::Wait { id, waited, patience } });
+            self.broken(Violation { at, station, rule: Rule::Wait { id, waited, patience } });
         }
     }
 

@@ -1,4 +1,4 @@
-//! Holds what a police finds against a test: a breach that the test has not declared ends it, and so does a
+//! Holds what a checker finds against a test: a violation that the test has not declared ends it, and so does a
 //! declared one that does not come.
 
 use std::fmt;
@@ -6,7 +6,7 @@ use std::fmt;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::bus::{Arrived, Stations};
-use super::{Breach, Police, PoliceConfig, wire_time};
+use super::{Checker, CheckerConfig, Violation, wire_time};
 use crate::master::event::Port;
 
 /// Smallest gap between two frames: 12 bytes at 100 Mbit/s.
@@ -15,34 +15,37 @@ const GAP: DurationNs = DurationNs(960);
 /// Changes a frame as it leaves a station: topology address, outward, frame.
 pub type Misdeeds<'a> = dyn FnMut(u16, bool, &mut [u8]) + 'a;
 
-/// Breaches that are made on purpose.
+/// Violations that are made on purpose.
 struct Purpose {
-    is: Box<dyn Fn(&Breach) -> bool>,
+    is: Box<dyn Fn(&Violation) -> bool>,
     came: bool,
 }
 
-/// A police, and what of its findings is meant to be.
-pub struct Court {
-    /// The police.
-    pub police: Police,
+/// A checker, and what of its findings is meant to be.
+pub struct CheckedBus {
+    /// The checker.
+    pub checker: Checker,
     purposes: Vec<Purpose>,
     judged: usize,
     /// When each port of the master is through with its last frame.
     free: [MonotonicTime; 2],
 }
 
-impl fmt::Debug for Court {
+impl fmt::Debug for CheckedBus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Court").field("police", &self.police).field("purposes", &self.purposes.len()).finish()
+        f.debug_struct("CheckedBus")
+            .field("checker", &self.checker)
+            .field("purposes", &self.purposes.len())
+            .finish()
     }
 }
 
-impl Court {
+impl CheckedBus {
     /// Begins to watch at `now`, with nothing on the wire.
     #[must_use]
-    pub fn new(now: MonotonicTime) -> Court {
-        Court {
-            police: Police::new(PoliceConfig::default(), now),
+    pub fn new(now: MonotonicTime) -> CheckedBus {
+        CheckedBus {
+            checker: Checker::new(CheckerConfig::default(), now),
             purposes: Vec::new(),
             judged: 0,
             free: [now; 2],
@@ -53,7 +56,7 @@ impl Court {
     pub fn sent(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> MonotonicTime {
         let start = self.free[port.index()].max(now);
         self.free[port.index()] = start + wire_time(frame.len()) + GAP;
-        self.police.sent(start, frame);
+        self.checker.sent(start, frame);
         start
     }
 
@@ -69,10 +72,10 @@ impl Court {
         arrived: &mut Arrived<'_>,
     ) {
         let start = self.sent(now, port, frame);
-        let police = &mut self.police;
+        let checker = &mut self.checker;
         let mut watch = |slave, outward, before: &[u8], after: &mut [u8]| {
             misdeed(slave, outward, after);
-            police.passed(start, slave, outward, before, after);
+            checker.passed(start, slave, outward, before, after);
         };
         stations.pass(now, port, frame, &mut watch, arrived);
     }
@@ -80,32 +83,32 @@ impl Court {
     /// Judges what was found since the last time.
     ///
     /// # Panics
-    /// With station and rule of a breach that was not declared.
+    /// With station and rule of a violation that was not declared.
     pub fn judge(&mut self) {
-        let new = self.police.breaches().get(self.judged..).unwrap_or_default();
-        for breach in new {
+        let new = self.checker.violations().get(self.judged..).unwrap_or_default();
+        for violation in new {
             let mut meant = false;
-            for purpose in self.purposes.iter_mut().filter(|purpose| (purpose.is)(breach)) {
+            for purpose in self.purposes.iter_mut().filter(|purpose| (purpose.is)(violation)) {
                 (purpose.came, meant) = (true, true);
             }
-            assert!(meant, "{breach}");
+            assert!(meant, "{violation}");
         }
-        self.judged = self.police.breaches().len();
+        self.judged = self.checker.violations().len();
     }
 }
 
-/// A test's rig whose every frame stands before a [`Court`].
+/// A test's rig whose every frame passes a [`CheckedBus`].
 pub trait Tried: Sized {
-    /// The court.
-    fn court(&mut self) -> &mut Court;
+    /// The checked bus.
+    fn checked(&mut self) -> &mut CheckedBus;
 
-    /// Runs `script`, in which the breaches that `declared` knows are made on purpose.
+    /// Runs `script`, in which the violations that `declared` knows are made on purpose.
     ///
     /// # Panics
     /// When none of them came.
     fn breaking<T>(
         &mut self,
-        declared: impl Fn(&Breach) -> bool + 'static,
+        declared: impl Fn(&Violation) -> bool + 'static,
         script: impl FnOnce(&mut Self) -> T,
     ) -> T {
         let (result, came) = tried(self, Box::new(declared), script);
@@ -113,10 +116,10 @@ pub trait Tried: Sized {
         result
     }
 
-    /// Runs `script`, in which the breaches that `declared` knows may come: where chance decides what is broken.
+    /// Runs `script`, in which the violations that `declared` knows may come: where chance decides what is broken.
     fn tolerating<T>(
         &mut self,
-        declared: impl Fn(&Breach) -> bool + 'static,
+        declared: impl Fn(&Violation) -> bool + 'static,
         script: impl FnOnce(&mut Self) -> T,
     ) -> T {
         tried(self, Box::new(declared), script).0
@@ -125,12 +128,12 @@ pub trait Tried: Sized {
 
 fn tried<R: Tried, T>(
     rig: &mut R,
-    is: Box<dyn Fn(&Breach) -> bool>,
+    is: Box<dyn Fn(&Violation) -> bool>,
     script: impl FnOnce(&mut R) -> T,
 ) -> (T, bool) {
-    rig.court().purposes.push(Purpose { is, came: false });
+    rig.checked().purposes.push(Purpose { is, came: false });
     let result = script(rig);
-    let court = rig.court();
-    court.judge();
-    (result, court.purposes.pop().is_some_and(|purpose| purpose.came))
+    let checked = rig.checked();
+    checked.judge();
+    (result, checked.purposes.pop().is_some_and(|purpose| purpose.came))
 }

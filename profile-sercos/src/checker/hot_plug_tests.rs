@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::bus::VirtualBus;
-use super::court::Tried as _;
+use super::checked_bus::Tried as _;
 use super::light::{COMMAND, FEEDBACK, Mirror};
 use crate::master::config::{ConnectionConfig, MasterConfig, Ports, SlaveConfig};
 use crate::master::event::{Event, Port};
@@ -75,15 +75,15 @@ fn master(bus: &mut Bus, change: impl Fn(&mut HotPlug) + 'static) {
     });
 }
 
-/// What the police says first within 400 cycles of CP4 in which slave 7 is plugged in.
+/// What the checker says first within 400 cycles of CP4 in which slave 7 is plugged in.
 fn said(misdeed: impl FnOnce(&mut Bus)) -> String {
     let mut bus = bus(false);
     bus.state(State::Cp4);
     plug(&mut bus);
     misdeed(&mut bus);
     bus.breaking(|_| true, |bus| bus.cycles(400));
-    let breach = &bus.court.police.breaches()[0];
-    format!("{}: {}", breach.offender, breach.rule)
+    let violation = &bus.checked.checker.violations()[0];
+    format!("{}: {}", violation.offender, violation.rule)
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_slave_comes_in_by_the_rules_and_is_watched_from_then_on() {
     plug(&mut bus);
     bus.run_until("in", |bus| bus.log.iter().any(|event| matches!(event, Event::HotPlugged { .. })));
     bus.cycles(20);
-    assert_eq!(bus.court.police.breaches(), []);
+    assert_eq!(bus.checked.checker.violations(), []);
     // Its slots are known: one byte beside them is somebody else's.
     let at = usize::from(bus.master.layout().slaves[2].as_ref().unwrap().svc_at.offset);
     bus.station = Box::new(move |number, outward, frame| {
@@ -102,8 +102,8 @@ fn a_slave_comes_in_by_the_rules_and_is_watched_from_then_on() {
         }
     });
     bus.breaking(|_| true, |bus| bus.cycles(1));
-    let breach = bus.court.police.breaches()[0].to_string();
-    assert!(breach.contains(&format!("changed byte {} of AT0 P", at - 1)), "{breach}");
+    let violation = bus.checked.checker.violations()[0].to_string();
+    assert!(violation.contains(&format!("changed byte {} of AT0 P", at - 1)), "{violation}");
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn every_rule_of_hot_plug_is_seen_broken() {
         bus.state(State::Check3);
         master(&mut bus, |field| field.word |= HotPlug::SUPPORTED | HotPlug::ENABLED);
         bus.breaking(|_| true, |bus| bus.cycles(1));
-        bus.court.police.breaches()[0].rule.to_string()
+        bus.checked.checker.violations()[0].rule.to_string()
     });
     case("in a closed ring", {
         let mut bus = bus(true);
@@ -183,7 +183,7 @@ fn every_rule_of_hot_plug_is_seen_broken() {
         master(&mut bus, |field| field.word |= HotPlug::SUPPORTED | HotPlug::ENABLED);
         bus.breaking(|_| true, |bus| bus.cycles(2));
         assert!(bus.line.master_link(Port::Two));
-        bus.court.police.breaches()[0].rule.to_string()
+        bus.checked.checker.violations()[0].rule.to_string()
     });
     insta::assert_snapshot!(seen);
 }

@@ -1,10 +1,10 @@
-//! Networks of every size come up under the police, and every rule is broken once on purpose.
+//! Networks of every size come up under the checker, and every rule is broken once on purpose.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
 use super::bus::VirtualBus;
-use super::court::Tried;
+use super::checked_bus::Tried;
 use super::learned::Learned;
 use super::light::{COMMAND, FEEDBACK, Mirror};
 use super::*;
@@ -66,7 +66,7 @@ fn comes_up(count: u16, connected: u16, cycle_ns: u32, hot_plug_in_all: bool) ->
         assert_eq!(consumer.data, (i32::from(index) + 7).to_le_bytes());
     }
     assert!(Refusal::ALL.iter().all(|&reason| bus.master.statistics().refused(reason) == 0));
-    assert_eq!(bus.court.police.breaches(), []);
+    assert_eq!(bus.checked.checker.violations(), []);
     bus
 }
 
@@ -104,7 +104,7 @@ fn is(frame: &[u8], kind: Kind, number: u8) -> bool {
     telegram.kind() == kind && telegram.number() == number
 }
 
-/// Lets a bus of two slaves come to `state`, breaks a rule there, and gives what the police says first.
+/// Lets a bus of two slaves come to `state`, breaks a rule there, and gives what the checker says first.
 fn broken(state: State, misdeed: impl FnOnce(&mut Bus)) -> String {
     let mut bus = bus(2, 2, 1_000_000, true);
     bus.master.set_target_phase(Phase::CP4);
@@ -117,7 +117,7 @@ fn broken(state: State, misdeed: impl FnOnce(&mut Bus)) -> String {
         }
         bus.cycles(3);
     }
-    assert_eq!(bus.court.police.breaches(), []);
+    assert_eq!(bus.checked.checker.violations(), []);
     bus.tolerating(
         |_| true,
         |bus| {
@@ -125,7 +125,7 @@ fn broken(state: State, misdeed: impl FnOnce(&mut Bus)) -> String {
             bus.cycles(8);
         },
     );
-    let Some(first) = bus.court.police.breaches().first() else {
+    let Some(first) = bus.checked.checker.violations().first() else {
         return format!("NOTHING WAS SEEN in {state:?}");
     };
     format!("{}: {}", first.offender, first.rule)
@@ -188,33 +188,33 @@ fn every_rule_of_the_telegrams_is_seen_broken() {
     case("length in CP4", master(State::Cp4, Kind::At, 0, |frame| frame.push(0)));
     case("cycle in CP2", broken(State::Await2, |bus| bus.now = bus.now + DurationNs::from_micros(1600)));
     case("late MST in CP4", broken(State::Cp4, |bus| bus.now = bus.now + DurationNs::from_micros(1600)));
-    case("AT before t1", broken(State::Await3, |bus| bus.court.police.config.soft_master = false));
+    case("AT before t1", broken(State::Await3, |bus| bus.checked.checker.config.soft_master = false));
     case(
         "AT in the UC channel",
         broken(State::Cp4, |bus| {
             let mut at = vec![0; 60];
             let telegram = TelegramType::new(Channel::Primary, Kind::At, 0);
-            let phase = bus.court.police.cycle.as_ref().unwrap().phase;
+            let phase = bus.checked.checker.cycle.as_ref().unwrap().phase;
             Header { source: [2; 6], telegram, phase }.emit(&mut at).unwrap();
-            bus.court.police.cycle.as_mut().unwrap().seen.clear();
-            bus.court.police.sent(bus.now + DurationNs::from_micros(900), &at);
+            bus.checked.checker.cycle.as_mut().unwrap().seen.clear();
+            bus.checked.checker.sent(bus.now + DurationNs::from_micros(900), &at);
         }),
     );
     case("first telegram in CP1", {
-        let mut police = Police::new(PoliceConfig::default(), MonotonicTime::ZERO);
+        let mut checker = Checker::new(CheckerConfig::default(), MonotonicTime::ZERO);
         let mut mdt = vec![0; 60];
         let telegram = TelegramType::new(Channel::Primary, Kind::Mdt, 0);
         Header { source: [2; 6], telegram, phase: PhaseField(1) }.emit(&mut mdt).unwrap();
-        police.sent(MonotonicTime(200_000_000), &mdt);
-        police.breaches()[0].rule.to_string()
+        checker.sent(MonotonicTime(200_000_000), &mdt);
+        checker.violations()[0].rule.to_string()
     });
     case("no silence at the start", {
-        let mut police = Police::new(PoliceConfig::default(), MonotonicTime::ZERO);
+        let mut checker = Checker::new(CheckerConfig::default(), MonotonicTime::ZERO);
         let mut mdt = vec![0; 60];
         let telegram = TelegramType::new(Channel::Primary, Kind::Mdt, 0);
         Header { source: [2; 6], telegram, phase: PhaseField(0) }.emit(&mut mdt).unwrap();
-        police.sent(MonotonicTime(119_000_000), &mdt);
-        police.breaches()[0].rule.to_string()
+        checker.sent(MonotonicTime(119_000_000), &mdt);
+        checker.violations()[0].rule.to_string()
     });
     case(
         "no silence before CP2",
@@ -260,7 +260,7 @@ fn every_rule_of_the_telegrams_is_seen_broken() {
             frame[14] |= 0x80;
             frame[DEVICE_2 + 1] ^= 0x50;
             fix_crc(&mut frame);
-            bus.court.police.sent(bus.now, &frame);
+            bus.checked.checker.sent(bus.now, &frame);
         })
     });
     case("step in CP1", master(State::OpenSvc, Kind::Mdt, 0, |frame| frame[SVC_2] |= 0x0E));
@@ -320,7 +320,7 @@ fn late(bus: &mut Bus) {
 
 #[test]
 #[should_panic(expected = "master: 1600 us from MST to MST, the cycle has 1000 us +- 23 us")]
-fn a_breach_that_was_not_declared_ends_a_test_with_station_and_rule() {
+fn a_violation_that_was_not_declared_ends_a_test_with_station_and_rule() {
     let mut bus = bus(1, 1, 1_000_000, true);
     bus.up_to(Phase::CP4);
     bus.cycles(2);
@@ -333,7 +333,7 @@ fn a_declaration_is_over_with_its_script() {
     let mut bus = bus(1, 1, 1_000_000, true);
     bus.up_to(Phase::CP4);
     bus.cycles(2);
-    let declared = |breach: &Breach| matches!(breach.rule, Rule::MstInterval { .. });
+    let declared = |violation: &Violation| matches!(violation.rule, Rule::MstInterval { .. });
     bus.breaking(declared, |bus| {
         late(bus);
         bus.cycles(5);
@@ -343,16 +343,16 @@ fn a_declaration_is_over_with_its_script() {
 
 #[test]
 #[should_panic(expected = "1600 us from MST to MST")]
-fn another_breach_than_the_declared_one_ends_a_test() {
+fn another_violation_than_the_declared_one_ends_a_test() {
     let mut bus = bus(1, 1, 1_000_000, true);
     bus.up_to(Phase::CP4);
     bus.cycles(2);
-    bus.tolerating(|breach| breach.offender == Offender::Slave(1), late);
+    bus.tolerating(|violation| violation.offender == Offender::Slave(1), late);
 }
 
 #[test]
 #[should_panic(expected = "the rule that was to be broken on purpose was kept")]
-fn a_declared_breach_that_does_not_come_ends_a_test() {
+fn a_declared_violation_that_does_not_come_ends_a_test() {
     let mut bus = bus(1, 1, 1_000_000, true);
     bus.up_to(Phase::CP4);
     bus.breaking(|_| true, |bus| bus.cycles(3));
@@ -367,12 +367,12 @@ fn the_counter_is_free_across_a_silence_and_nowhere_else() {
         Header { source: [2; 6], telegram, phase }.emit(&mut frame).unwrap();
         frame
     };
-    let mut police = Police::new(PoliceConfig::default(), MonotonicTime::ZERO);
+    let mut checker = Checker::new(CheckerConfig::default(), MonotonicTime::ZERO);
     let mut cycle = |now: i64, count: u8| {
         let now = MonotonicTime::ZERO + DurationNs::from_micros(now);
-        police.sent(now, &telegram(Kind::Mdt, cp0::MDT_LEN, count));
-        police.sent(now + DurationNs::from_micros(10), &telegram(Kind::At, cp0::AT_LEN, count));
-        police.take_breaches().iter().map(|breach| breach.rule.to_string()).collect::<Vec<_>>()
+        checker.sent(now, &telegram(Kind::Mdt, cp0::MDT_LEN, count));
+        checker.sent(now + DurationNs::from_micros(10), &telegram(Kind::At, cp0::AT_LEN, count));
+        checker.take_violations().iter().map(|violation| violation.rule.to_string()).collect::<Vec<_>>()
     };
     assert_eq!(cycle(200_000, 6), [""; 0], "any count begins");
     assert_eq!(cycle(201_000, 7), [""; 0]);
@@ -394,11 +394,11 @@ fn a_slave_that_never_stops_inserting_is_named() {
             frame[DEVICE_2 + 1] = 1;
         }
     });
-    let inserts = |breach: &Breach| matches!(breach.rule, Rule::InsertsWhileSwitching { .. });
+    let inserts = |violation: &Violation| matches!(violation.rule, Rule::InsertsWhileSwitching { .. });
     bus.breaking(inserts, |bus| bus.cycles(205));
     let rule = Rule::InsertsWhileSwitching { phase: Phase::CP2 };
-    let found = bus.court.police.breaches().iter().find(|breach| breach.rule == rule);
-    assert_eq!(found.map(|breach| breach.offender), Some(Offender::Slave(2)));
+    let found = bus.checked.checker.violations().iter().find(|violation| violation.rule == rule);
+    assert_eq!(found.map(|violation| violation.offender), Some(Offender::Slave(2)));
 }
 
 /// Two slaves as the recording's master configures them: MDT {134, 36}, AT {135, 40, 51}.
@@ -511,9 +511,9 @@ fn addresses_are_unique_from_cp3_on() {
     let mut bus = bus(3, 0, 1_000_000, true);
     bus.master.set_target_phase(Phase::CP4);
     bus.state(State::Await2);
-    bus.court.police.stations[2].address = 1;
-    bus.breaking(|breach| matches!(breach.rule, Rule::Address { .. }), |bus| bus.state(State::Await3));
-    assert_eq!(bus.court.police.breaches()[0].rule, Rule::Address { slave: 3, address: 1 });
+    bus.checked.checker.stations[2].address = 1;
+    bus.breaking(|violation| matches!(violation.rule, Rule::Address { .. }), |bus| bus.state(State::Await3));
+    assert_eq!(bus.checked.checker.violations()[0].rule, Rule::Address { slave: 3, address: 1 });
 }
 
 const fn class(class: ScpClass, version: u8) -> ScpEntry {

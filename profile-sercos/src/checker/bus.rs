@@ -1,13 +1,13 @@
-//! A master and its slaves in virtual time, under a police.
+//! A master and its slaves in virtual time, under a checker.
 //!
 //! Time jumps from cycle to cycle. The telegrams of a cycle go out back to back, pass every station, and come
-//! back in the same moment. A breach of a rule ends the test unless it is made on purpose: see [`court`](super::court).
+//! back in the same moment. A violation of a rule ends the test unless it is made on purpose: see [`checked_bus`](super::checked_bus).
 
 use std::fmt;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::court::{Court, Tried};
+use super::checked_bus::{CheckedBus, Tried};
 use crate::master::Master;
 use crate::master::config::{ConfigError, MasterConfig};
 use crate::master::event::{Event, Output, Port, SlaveId, Ticket};
@@ -62,7 +62,7 @@ impl<A: Application> Stations for Network<A> {
 /// What happens to a frame on a cable; false when it does not arrive.
 pub type Cable = Box<dyn FnMut(&mut Vec<u8>) -> bool>;
 
-/// A master, what is behind its port, and the police.
+/// A master, what is behind its port, and the checker.
 pub struct VirtualBus<S> {
     /// The virtual time.
     pub now: MonotonicTime,
@@ -70,8 +70,8 @@ pub struct VirtualBus<S> {
     pub master: Master,
     /// The slaves.
     pub line: S,
-    /// The police, and what is broken on purpose.
-    pub court: Court,
+    /// The checker, and what is broken on purpose.
+    pub checked: CheckedBus,
     /// Makes the master do what it does not do by itself: changes its frames before anybody sees them.
     pub outward: Cable,
     /// Makes a station do what it does not do by itself.
@@ -87,8 +87,8 @@ pub struct VirtualBus<S> {
 }
 
 impl<S: Stations> Tried for VirtualBus<S> {
-    fn court(&mut self) -> &mut Court {
-        &mut self.court
+    fn checked(&mut self) -> &mut CheckedBus {
+        &mut self.checked
     }
 }
 
@@ -108,7 +108,7 @@ impl<S: Stations> VirtualBus<S> {
             now: MonotonicTime::ZERO,
             master: Master::new(config)?,
             line,
-            court: Court::new(MonotonicTime::ZERO),
+            checked: CheckedBus::new(MonotonicTime::ZERO),
             outward: Box::new(|_| true),
             station: Box::new(|_, _, _| {}),
             cable: Box::new(|_| true),
@@ -148,9 +148,9 @@ impl<S: Stations> VirtualBus<S> {
                     let _ = master.handle_frame(now, port, &frame);
                 }
             };
-            self.court.send(now, port, &mut frame, &mut self.line, &mut self.station, &mut arrived);
+            self.checked.send(now, port, &mut frame, &mut self.line, &mut self.station, &mut arrived);
         }
-        self.court.judge();
+        self.checked.judge();
         while let Some(event) = self.master.poll_event() {
             if let Event::HotPlugAwaits { slave, .. } = event
                 && self.auto_proceed

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::learned::Learned;
 use super::rule::{Offender, Part, Rule};
 use super::station::Station;
-use super::{Police, position};
+use super::{Checker, position};
 use crate::wire::cp0::CommunicationVersion;
 use crate::wire::device_control::Topology;
 use crate::wire::error::u16_at;
@@ -67,7 +67,7 @@ impl HotPlugs {
     }
 }
 
-impl Police {
+impl Checker {
     /// The field of MDT0.
     pub(super) fn hot_plug_field(&mut self, at: MonotonicTime, channel: Channel, data: &[u8]) {
         let Ok(field) = HotPlug::parse(data) else { return };
@@ -79,12 +79,12 @@ impl Police {
             // In CP3 and CP4 single parameters may be told without hot plug.
             let told = field.address() == BROADCAST_ADDRESS && field.word & HotPlug::SWITCH_TO_SVC == 0;
             if !nothing && !told {
-                self.breach(at, Offender::Master, Rule::HotPlugField { field });
+                self.violation(at, Offender::Master, Rule::HotPlugField { field });
             }
             return;
         }
         if self.phase != Phase::CP4 {
-            self.breach(at, Offender::Master, Rule::HotPlugPhase { phase: self.phase });
+            self.violation(at, Offender::Master, Rule::HotPlugPhase { phase: self.phase });
             return;
         }
         let code = field.code();
@@ -100,7 +100,7 @@ impl Police {
             _ => false,
         };
         if !good || field.word & HotPlug::SUPPORTED == 0 || field.word & !CONTROL_BITS != 0 {
-            self.breach(at, Offender::Master, Rule::HotPlugField { field });
+            self.violation(at, Offender::Master, Rule::HotPlugField { field });
             return;
         }
         match code {
@@ -119,7 +119,7 @@ impl Police {
         let expected = expected(field.code(), learned, self.version);
         if let Some(expected) = expected.filter(|&expected| expected != field.info) {
             let (code, found) = (field.code(), field.info);
-            self.breach(at, Offender::Master, Rule::HotPlugValue { code, found, expected });
+            self.violation(at, Offender::Master, Rule::HotPlugValue { code, found, expected });
         }
     }
 
@@ -128,7 +128,7 @@ impl Police {
         let address = field.address();
         let taken = self.stations.iter().any(|station| station.address() == address && station.valid);
         if taken {
-            self.breach(at, Offender::Master, Rule::HotPlugAddress { address });
+            self.violation(at, Offender::Master, Rule::HotPlugAddress { address });
             return;
         }
         self.drop_absent(address);
@@ -146,7 +146,7 @@ impl Police {
             plan.check_free(kind, offset, SVC_LEN, Part::Svc(0), &mut broken);
         }
         for rule in broken {
-            self.breach(at, Offender::Master, rule);
+            self.violation(at, Offender::Master, rule);
         }
     }
 
@@ -206,7 +206,7 @@ impl Police {
             _ => asked.contains(&code),
         };
         if !known || answer.word & !(HotPlug::ERROR | 0x00FF) != 0 {
-            self.breach(at, Offender::Slave(slave), Rule::HotPlugAnswer { word: answer.word });
+            self.violation(at, Offender::Slave(slave), Rule::HotPlugAnswer { word: answer.word });
         }
         let index = usize::from(slave) - 1;
         while self.stations.len() <= index {
@@ -240,7 +240,7 @@ impl Police {
             broken.push(Rule::Address { slave: position(index), address });
         }
         for rule in broken {
-            self.breach(at, Offender::Master, rule);
+            self.violation(at, Offender::Master, rule);
         }
     }
 }
