@@ -146,8 +146,8 @@ fn commands(text: &mut String, program: &DriveProgram) {
     for selection in SELECTIONS {
         let (carried, needed) = (program.carries(selection), program.needs(selection));
         line(text, format_args!("  {selection}: carries {carried:?}, needs {needed:?}"));
-        if let Some(handover) = program.handover(selection) {
-            line(text, format_args!("    asks {:?}, taken {:?}", handover.ask, handover.taken));
+        if let Some(handshake) = program.handshake(selection) {
+            line(text, format_args!("    asks {:?}, taken {:?}", handshake.ask, handshake.taken));
         }
         let ModeSelection { mode, interpolation } = selection;
         let command = AxisCommand { mode, interpolation, ..AxisCommand::default() };
@@ -188,7 +188,7 @@ fn statuses(text: &mut String, program: &DriveProgram) {
     let len = usize::from(program.telegram.feedback_bytes);
     telegram[..3].copy_from_slice(&[0x37, 0x12, 1]);
     let (mut feedback, mut report) = (AxisFeedback::default(), ConversionReport::default());
-    let mut hearing = program.hearing();
+    let mut hearing = program.cached_status();
     program.decode(&telegram[..len], false, &mut feedback, &mut hearing, &mut report);
     for signal in [Signal::PositionActual, Signal::VelocityActual, Signal::TorqueActual] {
         line(text, format_args!("    {signal} {:?}", feedback.get(signal)));

@@ -77,7 +77,7 @@ fn translation_allocates_nothing() {
             torque: Some(10.0),
             ..CommandValues::default()
         };
-        let (mut trackers, mut south) = (axis.north.trackers(), axis.south.hearing());
+        let (mut trackers, mut south) = (axis.north.trackers(), axis.south.cached_status());
         let (mut command, mut feedback) = (AxisCommand::default(), AxisFeedback::default());
         let (mut telegram, mut seen) = ([0; 128], CyclicValues::default());
         let mut report = ConversionReport::default();

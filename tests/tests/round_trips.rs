@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use axisbridge::config::Config;
-use axisbridge::mapping::{Cia402Axis, DriveProgram, Hearing, Mapping, Object, ObjectFacts};
+use axisbridge::mapping::{CachedStatus, Cia402Axis, DriveProgram, Mapping, Object, ObjectFacts};
 use axisbridge::translate::{Stage, StageAxis};
 use axisbridge_tests::can_frames;
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
@@ -79,8 +79,8 @@ fn there_and_back(program: &DriveProgram, to: Signal, from: Signal, generic: i64
     let [out, back] = [command, actual].map(|field| usize::from(field.offset));
     came[back..back + len].copy_from_slice(&sent[out..out + len]);
     let mut feedback = AxisFeedback::default();
-    let mut hearing = program.hearing();
-    program.decode(&came, false, &mut feedback, &mut hearing, &mut report)?;
+    let mut cached = program.cached_status();
+    program.decode(&came, false, &mut feedback, &mut cached, &mut report)?;
     assert!(report.is_clean());
     Some((feedback.get(from)?, step(actual.conversion.ratio)))
 }
@@ -144,7 +144,7 @@ fn every_signal_and_most_parameters_go_there_and_back() {
 struct Followed<'s> {
     axis: &'s StageAxis,
     field: Field,
-    hearing: Hearing,
+    cached: CachedStatus,
     feedback: AxisFeedback,
     telegram: [u8; TELEGRAM],
     total: i128,
@@ -156,7 +156,7 @@ impl<'s> Followed<'s> {
         let mut followed = Self {
             axis,
             field,
-            hearing: axis.south.hearing(),
+            cached: axis.south.cached_status(),
             feedback: AxisFeedback::default(),
             telegram: [0; TELEGRAM],
             total: 0,
@@ -179,7 +179,7 @@ impl<'s> Followed<'s> {
         let mut report = ConversionReport::default();
         let south = &self.axis.south;
         south
-            .decode(&self.telegram, false, &mut self.feedback, &mut self.hearing, &mut report)
+            .decode(&self.telegram, false, &mut self.feedback, &mut self.cached, &mut report)
             .expect("it is long enough");
         assert!(report.is_clean(), "{} after {} counts", self.axis.name, self.total);
     }
@@ -239,7 +239,7 @@ fn many_steps_are_one() {
                 "{}",
                 axis.name
             );
-            assert_eq!(one.hearing, many.hearing, "{}: nothing else is kept", axis.name);
+            assert_eq!(one.cached, many.cached, "{}: nothing else is kept", axis.name);
             one.check();
         }
     }

@@ -518,9 +518,9 @@ impl Engine {
                         let word = answer.result.as_ref().ok().and_then(|(data, _)| unsigned(data));
                         axes[answer.axis].diagnostic_word(now, system, answer.item, word);
                     }
-                    Purpose::OwnWords => {
+                    Purpose::DiagnosticMessage => {
                         let data = answer.result.as_ref().ok().map(|(data, _)| data.as_slice());
-                        let said = axes[answer.axis].own_words_read(answer.item, data);
+                        let said = axes[answer.axis].diagnostic_message_read(answer.item, data);
                         let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
                         if let Some(said) = said {
                             tell(&mut notices.borrow_mut(), Notice::DriveSays { axis, said });

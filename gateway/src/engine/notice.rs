@@ -23,7 +23,7 @@ use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
-use super::axis::{Loss, OwnWords, PositionJump, Trip};
+use super::axis::{DiagnosticMessage, Loss, PositionJump, Trip};
 use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
 use super::bus::can::lss::LssNotice;
 use super::bus::devicenet::end::MessageError;
@@ -283,12 +283,12 @@ pub enum Notice {
         /// By how much.
         step: DurationNs,
     },
-    /// What a drive says in its own words of a fault or warning that it has.
+    /// The diagnostic message of a drive that has a fault or warning.
     DriveSays {
         /// The axis.
         axis: u8,
         /// Number and text.
-        said: OwnWords,
+        said: DiagnosticMessage,
     },
     /// A fault or alarm came into the log of an axis, or ended there.
     Logged {
@@ -516,7 +516,7 @@ impl fmt::Display for Notice {
             Self::TimeStep { step } => {
                 write!(f, "system time stepped by {step}; it is reported to controllers, and no axis follows it")
             }
-            Self::DriveSays { said, .. } => own_words(f, said),
+            Self::DriveSays { said, .. } => diagnostic_message(f, said),
             Self::Logged { entry, cause, .. } => logged(f, entry, *cause),
             Self::Node { device, fault, alarm } => {
                 write!(f, "device {device}: {fault} ({}), {alarm} ({})", fault.0, alarm.0)
@@ -563,7 +563,7 @@ where
 }
 
 /// `the drive says 0xC00F0007 "overcurrent"`.
-fn own_words(f: &mut fmt::Formatter<'_>, said: &OwnWords) -> fmt::Result {
+fn diagnostic_message(f: &mut fmt::Formatter<'_>, said: &DiagnosticMessage) -> fmt::Result {
     f.write_str("the drive says")?;
     if let Some(number) = said.number {
         write!(f, " {number:#010X}")?;

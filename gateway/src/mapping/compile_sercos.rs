@@ -450,7 +450,7 @@ impl DriveProgram {
                 control,
                 status,
                 bits: BitPattern::default(),
-                handover: None,
+                handshake: None,
                 needs,
                 carried,
             };
@@ -494,8 +494,8 @@ impl DriveProgram {
         for row in &tables.faults {
             program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
         }
-        let own_words = tables.diagnosis.into_iter().flatten();
-        program.diagnosis.extend(own_words.filter(|idn| !facts.is_missing(*idn)).map(Item::from));
+        let diagnostic_message = tables.diagnosis.into_iter().flatten();
+        program.diagnosis.extend(diagnostic_message.filter(|idn| !facts.is_missing(*idn)).map(Item::from));
         for (action, idn) in &tables.commands {
             program
                 .commands

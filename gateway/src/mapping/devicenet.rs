@@ -203,7 +203,7 @@ fn mode_entry(code: u8, mode: OperatingMode, carried: CommandSet) -> ModeEntry {
         status: pattern,
         // Its code is all that a mode changes.
         bits: BitPattern::default(),
-        handover: None,
+        handshake: None,
         needs: carried,
         carried,
     }

@@ -98,7 +98,7 @@ impl ParameterEntry {
 
 /// How a drive takes a target over: it is asked by bits of the control word and answers by bits of the status word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Handover {
+pub struct Handshake {
     /// The bits that ask.
     pub ask: BitPattern,
     /// The bits that answer.
@@ -130,7 +130,7 @@ pub(super) struct ModeEntry {
     /// Bits of the control word that belong to modes, as they stand in this one while the drive is in operation.
     pub bits: BitPattern,
     /// How it takes over what it goes to by itself, or is told to begin.
-    pub handover: Option<Handover>,
+    pub handshake: Option<Handshake>,
     /// Its signals without which it must not be chosen.
     pub needs: CommandSet,
     /// Its signals that the telegram carries.
@@ -149,14 +149,14 @@ pub(super) struct StepRow {
 
 /// What is kept of a drive's telegrams from one to the next.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Hearing {
+pub struct CachedStatus {
     /// Unrolls the values that wrap.
     trackers: Trackers,
     /// What the drive showed last, and what that says: it seldom shows anything new.
     last: Option<(Shown, Said)>,
 }
 
-impl Hearing {
+impl CachedStatus {
     /// Forgets where all counters were: the next values are taken as they are.
     pub fn restart(&mut self) {
         self.trackers.restart();
@@ -504,7 +504,7 @@ impl DriveProgram {
         }
         let operates = matches!(action, Action::Enable | Action::Halt)
             && matches!(self.report(status), Report::Operating | Report::Enabling | Report::Halted);
-        let ask = entry.handover.map_or(BitPattern::default(), |handover| handover.ask);
+        let ask = entry.handshake.map_or(BitPattern::default(), |handshake| handshake.ask);
         match (operates, asks) {
             (true, true) => ask.apply(entry.bits.apply(control)),
             (true, false) => entry.bits.apply(control),
@@ -514,9 +514,9 @@ impl DriveProgram {
     }
 
     /// How the drive takes over, step by step, what it goes to by itself in a mode.
-    pub fn handover(&self, selection: ModeSelection) -> Option<Handover> {
+    pub fn handshake(&self, selection: ModeSelection) -> Option<Handshake> {
         let entry = self.entry(selection).filter(|_| self.procedure(selection).is_none());
-        entry.and_then(|entry| entry.handover)
+        entry.and_then(|entry| entry.handshake)
     }
 
     /// Whether a status shows the mode.
@@ -531,30 +531,30 @@ impl DriveProgram {
         telegram: &[u8],
         led: bool,
         feedback: &mut AxisFeedback,
-        hearing: &mut Hearing,
+        cached: &mut CachedStatus,
         report: &mut ConversionReport,
     ) -> Option<u32> {
         let status = self.status(telegram)?;
         let shown = Shown { status, words: self.words(telegram), led };
-        let said = match hearing.last {
+        let said = match cached.last {
             Some((last, said)) if last == shown => said,
             _ => {
                 let said = self.said(shown);
-                hearing.last = Some((shown, said));
+                cached.last = Some((shown, said));
                 said
             }
         };
         feedback.report = said.report;
         (feedback.mode, feedback.interpolation) = (said.mode.mode, said.mode.interpolation);
         feedback.status = feedback.status.difference(self.known_status).union(said.bits);
-        self.feedback.decode(telegram, feedback, &mut hearing.trackers, report);
+        self.feedback.decode(telegram, feedback, &mut cached.trackers, report);
         Some(status)
     }
 
     /// What [`DriveProgram::decode`] keeps of a drive that was not heard yet.
     #[must_use]
-    pub fn hearing(&self) -> Hearing {
-        Hearing { trackers: self.feedback.trackers(), last: None }
+    pub fn cached_status(&self) -> CachedStatus {
+        CachedStatus { trackers: self.feedback.trackers(), last: None }
     }
 
     fn said(&self, shown: Shown) -> Said {
@@ -691,7 +691,7 @@ impl DriveProgram {
         rows.map(|(_, row)| row.word)
     }
 
-    /// What the drive says of a fault or warning in its own words: number and text. Empty where it has neither.
+    /// The diagnostic message that the drive has for a fault or warning: number and text. Empty where it has neither.
     pub fn diagnosis(&self) -> &[Item] {
         &self.diagnosis
     }

@@ -87,8 +87,8 @@ pub use dictionary::{
 };
 pub use drive_facts::{Difference, DriveFacts};
 pub use drive_program::{
-    DriveProgram, FaultRow, Hearing, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry, Procedure,
-    ProcedureBy, Telegram,
+    CachedStatus, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry,
+    Procedure, ProcedureBy, Telegram,
 };
 pub use fixed_connections::{FixedConnection, FixedConnections};
 pub use item::{Attribute, Item, Object};

@@ -164,7 +164,7 @@ pub struct SercosTables {
     pub(super) reports: Vec<ReportRule>,
     pub(super) status: Vec<StatusRule>,
     pub(super) faults: Vec<FaultRow>,
-    /// What the drive says of them in its own words: number and text.
+    /// The diagnostic message that the drive has for them: number and text.
     pub(super) diagnosis: Option<[Idn; 2]>,
     pub(super) parameters: Vec<ParameterRule>,
     pub(super) captures: Vec<CaptureRule>,

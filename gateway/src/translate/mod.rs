@@ -38,7 +38,7 @@ use profile_generic::state::{Action, BasicDrive, Report};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
 
-use crate::mapping::{CipTrackers, Hearing};
+use crate::mapping::{CachedStatus, CipTrackers};
 
 use devicenet::Listener;
 pub use frame::{FrameError, Recognised, recognise};
@@ -62,7 +62,7 @@ struct AxisState {
     control: u32,
     status: u32,
     north: CipTrackers,
-    south: Hearing,
+    south: CachedStatus,
     command: AxisCommand,
     feedback: AxisFeedback,
     /// Attributes of the cyclic write data, in their order.
@@ -122,7 +122,7 @@ impl Translator {
             // Before it was heard it counts as operating.
             status: axis.south.status_of(Report::Operating).unwrap_or(0),
             north: axis.north.trackers(),
-            south: axis.south.hearing(),
+            south: axis.south.cached_status(),
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),
             writes: Vec::new(),

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Hearing, Mapping};
+use axisbridge::mapping::{CachedStatus, CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
@@ -38,7 +38,7 @@ pub struct Axis {
     north: CipProgram,
     trackers: CipTrackers,
     south: DriveProgram,
-    hearing: Hearing,
+    cached: CachedStatus,
     interpolator: FineInterpolator,
     period: DurationNs,
     command: AxisCommand,
@@ -79,7 +79,7 @@ impl Axis {
         let mut axis = Self {
             trackers: north.trackers(),
             north,
-            hearing: south.hearing(),
+            cached: south.cached_status(),
             south,
             interpolator,
             period,
@@ -152,7 +152,7 @@ impl Axis {
     /// what the state asks for to bytes.
     pub fn step(&mut self, telegram: &[u8]) {
         let mut report = ConversionReport::default();
-        let told = self.south.decode(telegram, false, &mut self.feedback, &mut self.hearing, &mut report);
+        let told = self.south.decode(telegram, false, &mut self.feedback, &mut self.cached, &mut report);
         assert!(told.is_some());
         self.encode();
     }
@@ -160,7 +160,7 @@ impl Axis {
     /// Bytes of the drive become the generic feedback, and that the values of an answer.
     pub fn feedback(&mut self, telegram: &[u8]) -> CyclicValues {
         let mut report = ConversionReport::default();
-        let word = self.south.decode(telegram, false, &mut self.feedback, &mut self.hearing, &mut report);
+        let word = self.south.decode(telegram, false, &mut self.feedback, &mut self.cached, &mut report);
         assert!(word.is_some());
         let mut values = CyclicValues::default();
         self.north.encode(&self.feedback, WANTED, &mut values);

@@ -219,7 +219,7 @@ fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
     assert_eq!(report.failure, None, "{}", rig.log());
 }
 
-/// What was told of the drive's own words, in order.
+/// Diagnostic messages of the drive that were logged, in order.
 fn drive_says(rig: &Rig, axis: u8) -> Vec<String> {
     let says = |notice: &&Notice| matches!(notice, Notice::DriveSays { axis: of, .. } if *of == axis);
     rig.notices.iter().filter(says).map(ToString::to_string).collect()

@@ -13,7 +13,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use crate::mapping::Item;
 
-use super::own_words::Reading;
+use super::diagnostic_message::Reading;
 use super::{AxisChannel, caused_by_controller};
 
 /// How long the words of a drive with a fault are read without a pause for its cause.
@@ -143,7 +143,7 @@ impl AxisChannel {
         let fault = Fault::new(cause, system).with_reaction(reaction).with_vendor_code(word);
         let new = self.faults.raise(fault, Origin::Drive);
         if new {
-            self.own_words.want();
+            self.diagnostic_message.want();
         }
         // While a reset is under way the drive may still show what is being reset; what stands is found after it.
         let resetting = self.reset.is_some_and(|reset| reset.begun);
@@ -195,14 +195,14 @@ impl AxisChannel {
 
     fn warn(&mut self, warning: Fault) {
         if self.faults.raise(warning, Origin::Warning) {
-            self.own_words.want();
+            self.diagnostic_message.want();
         }
     }
 
     /// What the drive no longer shows is gone.
     pub(super) fn end_drive_faults(&mut self) {
         if !self.shows_error() && !self.shows_warning() {
-            self.end_own_words();
+            self.end_diagnostic_message();
         }
         if !self.shows_error() {
             self.faults.clear_all(Origin::Drive, |_| false);
@@ -217,7 +217,7 @@ impl AxisChannel {
     /// The drive is gone, and with it what it was asked.
     pub(super) fn end_diagnosis(&mut self) {
         self.diagnosis = Diagnosis::default();
-        self.own_words = Reading::default();
+        self.diagnostic_message = Reading::default();
         self.cause_wanted = None;
         self.faults.clear_all(Origin::Drive, |_| false);
         self.faults.clear_all(Origin::Warning, |_| false);

@@ -25,7 +25,7 @@ impl AxisChannel {
         sampled: MonotonicTime,
         received: Option<Received<'_>>,
     ) {
-        let Some((program, hearing)) = self.south.as_mut() else {
+        let Some((program, cached)) = self.south.as_mut() else {
             self.tick(now, system);
             return;
         };
@@ -48,12 +48,12 @@ impl AxisChannel {
         let mut conversions = ConversionReport::default();
         let led = self.procedure.leads();
         let referenced = self.feedback.status.contains(StatusBits::REFERENCED);
-        let status = program.decode(received.data, led, &mut self.feedback, hearing, &mut conversions);
+        let status = program.decode(received.data, led, &mut self.feedback, cached, &mut conversions);
         let Some(status) = status else { return };
         let tells_velocity = program.tells(Signal::VelocityActual);
         self.status = status;
         self.shown = program.mode(status);
-        if program.handover(self.command.selection()).is_some() && !self.handover.is_done(&self.command) {
+        if program.handshake(self.command.selection()).is_some() && !self.handshake.is_done(&self.command) {
             // It has come to the target of before.
             self.feedback.status.remove(StatusBits::TARGET_REACHED);
         }
@@ -123,10 +123,10 @@ impl AxisChannel {
         unit.want(self.south().and_then(|program| program.procedure(self.command.selection())), &around);
         self.procedure = unit;
         if unit.has_shifted()
-            && let Some((_, hearing)) = &mut self.south
+            && let Some((_, cached)) = &mut self.south
         {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
-            hearing.restart();
+            cached.restart();
             self.plausibility.restart();
         }
         if let Some(selection) = unit.selection() {

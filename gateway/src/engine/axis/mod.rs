@@ -11,15 +11,15 @@
 mod action;
 pub mod capture;
 mod diagnosis;
+mod diagnostic_message;
 mod feedback;
 mod guard;
-mod handover;
+mod handshake;
 mod history;
 mod hookup;
 mod image;
 mod north;
 mod overtravel;
-mod own_words;
 mod position_jump;
 pub mod procedure;
 pub mod rest;
@@ -29,14 +29,14 @@ mod trim;
 mod velocimeter;
 mod waiting;
 
+pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
-pub use self::own_words::OwnWords;
 pub use self::position_jump::PositionJump;
 pub use self::waiting::{Awaited, Waiting};
 
 use self::hookup::TestRun;
-use crate::mapping::{CipProgram, CipTrackers, DriveProgram, Hearing, Told};
+use crate::mapping::{CachedStatus, CipProgram, CipTrackers, DriveProgram, Told};
 use profile_cip::device::drive_link::{AbortOrder, DriveAction, Withheld};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
@@ -152,7 +152,7 @@ pub struct AxisChannel {
     trackers: CipTrackers,
     /// The status that the controller was told last.
     said: Told,
-    south: Option<(DriveProgram, Hearing)>,
+    south: Option<(DriveProgram, CachedStatus)>,
     limits: Limits,
     command_loss: Reaction,
     /// It may be switched on.
@@ -203,7 +203,7 @@ pub struct AxisChannel {
     /// Everything that is wrong now.
     faults: FaultSet,
     diagnosis: diagnosis::Diagnosis,
-    own_words: own_words::Reading,
+    diagnostic_message: diagnostic_message::Reading,
     /// For a drive that tells positions and no velocity.
     velocimeter: velocimeter::Velocimeter,
     plausibility: position_jump::Plausibility,
@@ -225,7 +225,7 @@ pub struct AxisChannel {
     overtravel: overtravel::Overtravel,
     /// The same of the software limits.
     software_overtravel: overtravel::Overtravel,
-    handover: handover::Handover,
+    handshake: handshake::Handshake,
     /// Since when the drive is told the operating mode that it is told now.
     told_since: MonotonicTime,
     /// Where the axis came to rest in a halt.
@@ -291,7 +291,7 @@ impl AxisChannel {
             fault: None,
             faults: FaultSet::new(),
             diagnosis: diagnosis::Diagnosis::default(),
-            own_words: own_words::Reading::default(),
+            diagnostic_message: diagnostic_message::Reading::default(),
             velocimeter: velocimeter::Velocimeter::default(),
             plausibility: position_jump::Plausibility::default(),
             jump: None,
@@ -306,7 +306,7 @@ impl AxisChannel {
             procedure: ProcedureUnit::default(),
             overtravel: overtravel::Overtravel::default(),
             software_overtravel: overtravel::Overtravel::default(),
-            handover: handover::Handover::default(),
+            handshake: handshake::Handshake::default(),
             told_since: MonotonicTime::default(),
             halted_at: None,
             shown: None,
@@ -385,9 +385,9 @@ impl AxisChannel {
 
     /// The drive is commissioned and will be spoken to by this program.
     pub fn set_south(&mut self, program: DriveProgram) {
-        let hearing = program.hearing();
+        let cached = program.cached_status();
         self.procedure.restart(program.procedures());
-        self.south = Some((program, hearing));
+        self.south = Some((program, cached));
         self.control_modes = self.modes_of_drive();
         self.programs += 1;
         self.captures.restart();
@@ -485,10 +485,10 @@ impl AxisChannel {
         generation: u8,
         result: Result<Progress, AccessFailure>,
     ) {
-        let Some((program, hearing)) = &mut self.south else { return };
+        let Some((program, cached)) = &mut self.south else { return };
         if self.procedure.answer(program.procedures(), access, generation, result, now) {
             // The drive has given its place another position: it is what the drive says, not so many turns more.
-            hearing.restart();
+            cached.restart();
             self.plausibility.restart();
         }
     }

@@ -230,9 +230,9 @@ impl AxisChannel {
         let order = Order {
             action,
             told: self.procedure.told(),
-            asks: self.procedure.asks() || self.handover.asks(),
+            asks: self.procedure.asks() || self.handshake.asks(),
         };
-        let command = self.handover.apply(&self.command);
+        let command = self.handshake.apply(&self.command);
         let control = program.encode(&command, order, self.control, self.status, telegram, &mut conversions);
         if program.mode_octet(control) != program.mode_octet(self.control) {
             self.told_since = now;
@@ -255,10 +255,10 @@ impl AxisChannel {
             && self.procedure.told().is_none();
         let south = self.south().filter(|program| leads && program.shows(selection, self.status));
         let answers = south
-            .and_then(|program| program.handover(selection))
-            .map(|handover| handover.taken.matches(self.status));
+            .and_then(|program| program.handshake(selection))
+            .map(|handshake| handshake.taken.matches(self.status));
         let wanted = self.command.present.contains(CommandSet::TARGET_POSITION) && self.sequence.is_some();
-        if !self.handover.go_on(now, answers, wanted.then_some(&self.command)) {
+        if !self.handshake.go_on(now, answers, wanted.then_some(&self.command)) {
             // It goes on to the target of before, or nowhere.
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
         }
@@ -339,9 +339,7 @@ impl AxisChannel {
             last.position.saturating_add(way(velocity, span))
         } else if let Some(place) = rests {
             place
-        } else if self.halts_by_command() {
-            last.position
-        } else if led {
+        } else if led || self.halts_by_command() {
             last.position
         } else {
             self.feedback.position

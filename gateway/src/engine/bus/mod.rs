@@ -4,8 +4,8 @@ mod backoff;
 mod bus_return;
 pub mod can;
 pub mod devicenet;
-mod outlet;
 pub mod sercos;
+mod transmit_queue;
 
 use profile_generic::state::Action;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
@@ -34,8 +34,8 @@ pub enum Purpose {
     },
     /// A diagnostic word, to find the cause of a fault or a warning.
     Diagnosis,
-    /// What the drive says in its own words, for people.
-    OwnWords,
+    /// The diagnostic message of the drive, for people.
+    DiagnosticMessage,
     /// The drive's fault reset.
     FaultReset,
     /// Capturing events, with the generation of the axis's captures.
@@ -335,10 +335,10 @@ fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Acces
     {
         axis.word_asked(now, item);
     }
-    if let Some(item) = axis.wants_own_words(now)
-        && access(&Access::read(item), Purpose::OwnWords)
+    if let Some(item) = axis.wanted_diagnostic(now)
+        && access(&Access::read(item), Purpose::DiagnosticMessage)
     {
-        axis.own_words_asked(now, item);
+        axis.diagnostic_requested(now, item);
     }
     if let Some((wanted, part, generation)) = axis.capture_access()
         && access(&wanted, Purpose::Capture(part, generation))

@@ -12,7 +12,7 @@ use profile_generic::time::DurationNs;
 
 use super::captures::{CaptureRule, LatchRule};
 use super::{
-    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, FixedUnit, Handover, Method, ModeRule,
+    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, FixedUnit, Handshake, Method, ModeRule,
     Object, ParameterRule, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind,
     StepRule, Tells, VOLTAGE_BIT, Value, Words,
 };
@@ -21,7 +21,7 @@ use crate::finding::registry as code;
 use crate::mapping::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::mapping::drive_program::FaultRow;
 use crate::mapping::format::{
-    Cia402CaptureRow, Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandoverRow,
+    Cia402CaptureRow, Cia402CommissionRow, Cia402FaultClassRow, Cia402FaultRow, Cia402HandshakeRow,
     Cia402MethodRow, Cia402ModeRow, Cia402ParameterRow, Cia402ProcedureRow, Cia402ScalingRow,
     Cia402SignalRow, Cia402UnboundRow, FieldValueRow, GenericCia402File, Name,
 };
@@ -340,14 +340,14 @@ impl<'a> Builder<'a> {
             self.resolver.error(code::MISSING_KEY, row.mode.span(), "modes", message);
         }
         let control = self.pattern("Controlword", &row.control);
-        let handover = match &row.handover {
+        let handshake = match &row.handshake {
             None => Some(None),
-            Some(handover) => self.handover(handover).map(Some),
+            Some(handshake) => self.handshake(handshake).map(Some),
         };
         let command = self.mapped("command", &row.command, &modes);
         let actual = self.mapped("actual", &row.actual, &modes);
-        let (Some(mode), Some(interpolation), Some(optional), Some(control), Some(handover)) =
-            (mode, interpolation, optional, control, handover)
+        let (Some(mode), Some(interpolation), Some(optional), Some(control), Some(handshake)) =
+            (mode, interpolation, optional, control, handshake)
         else {
             return;
         };
@@ -357,14 +357,14 @@ impl<'a> Builder<'a> {
         if known.any(|known| modes.contains(known)) {
             self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
         }
-        let rule = ModeRule { selection, optional, modes, control, handover, command, actual };
+        let rule = ModeRule { selection, optional, modes, control, handshake, command, actual };
         self.tables.modes.push(rule);
     }
 
-    fn handover(&mut self, row: &Cia402HandoverRow) -> Option<Handover> {
+    fn handshake(&mut self, row: &Cia402HandshakeRow) -> Option<Handshake> {
         let ask = self.pattern("Controlword", &row.ask);
         let taken = self.pattern("Statusword", &row.taken);
-        Some(Handover { ask: ask?, taken: taken? })
+        Some(Handshake { ask: ask?, taken: taken? })
     }
 
     fn procedure(&mut self, row: &Cia402ProcedureRow) {

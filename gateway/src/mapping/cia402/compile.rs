@@ -16,7 +16,7 @@ use super::{
 use crate::mapping::capture_program::{CaptureMode, Place};
 use crate::mapping::dictionary::Cia402Dictionary;
 use crate::mapping::drive_program::{
-    DriveProgram, FaultRow, Handover, MAX_MODES, MODE_SHIFT, ModeEntry, ModeProcedure,
+    DriveProgram, FaultRow, Handshake, MAX_MODES, MODE_SHIFT, ModeEntry, ModeProcedure,
     PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
 use crate::mapping::item::Item;
@@ -481,16 +481,16 @@ impl Cia402Tables {
         // Every bit of the controlword that one of the modes uses means something else, or nothing, in the others.
         let of_modes = chosen
             .iter()
-            .map(|(rule, _)| rule.control.mask | rule.handover.map_or(0, |handover| handover.ask.mask));
+            .map(|(rule, _)| rule.control.mask | rule.handshake.map_or(0, |handshake| handshake.ask.mask));
         let mask =
             of_modes.chain(procedures.iter().map(|(rule, _)| rule.start.mask)).fold(0, |all, one| all | one);
         let entry =
-            |selection, mode: &DriveMode, control: BitPattern, handover: Option<Handover>| ModeEntry {
+            |selection, mode: &DriveMode, control: BitPattern, handshake: Option<Handshake>| ModeEntry {
                 selection,
                 control: shown(mode.code),
                 status: shown(mode.code),
                 bits: BitPattern::new(mask, control.value),
-                handover,
+                handshake,
                 needs: CommandSet::empty(),
                 carried: CommandSet::empty(),
             };
@@ -503,12 +503,12 @@ impl Cia402Tables {
             let entry = ModeEntry {
                 needs: set(rule.command.iter().filter(needed).collect()),
                 carried: set(rule.command.iter().filter(there).collect()),
-                ..entry(rule.selection, mode, rule.control, rule.handover)
+                ..entry(rule.selection, mode, rule.control, rule.handshake)
             };
             program.modes.try_push(entry).map_err(full)?;
         }
         for (rule, mode) in procedures {
-            let start = Handover { ask: rule.start, taken: rule.done };
+            let start = Handshake { ask: rule.start, taken: rule.done };
             let entry = entry(rule.selection, mode, BitPattern::default(), Some(start));
             program.modes.try_push(entry).map_err(full)?;
             let mut failed = [None; PROCEDURE_FAILURES_MAX];

@@ -28,7 +28,7 @@ pub use self::compile::{Cia402Axis, Cia402Error, ModeWords};
 pub use self::facts::{DriveIdentity, ObjectFacts};
 
 use self::captures::CaptureRule;
-use super::drive_program::{FaultRow, Handover, MAX_MODES};
+use super::drive_program::{FaultRow, Handshake, MAX_MODES};
 use super::item::Object;
 
 /// Wraps of a position: the range of its 32 bits.
@@ -102,7 +102,7 @@ pub(super) struct ModeRule {
     pub modes: Vec<DriveMode>,
     /// Bits of the controlword that stand in it.
     pub control: BitPattern,
-    pub handover: Option<Handover>,
+    pub handshake: Option<Handshake>,
     pub command: Vec<Signal>,
     pub actual: Vec<Signal>,
 }

@@ -216,15 +216,15 @@ fn set_points_and_actual_values_go_both_ways() {
     assert_eq!(control, 0x08_000F);
     // Controlword, mode 8, 900 counts, -3600 counts a second, 500 permille.
     assert_eq!(bytes, [0x0F, 0, 8, 0x84, 0x03, 0, 0, 0xF0, 0xF1, 0xFF, 0xFF, 0xF4, 0x01]);
-    let (mut feedback, mut hearing) = (AxisFeedback::default(), program.hearing());
+    let (mut feedback, mut cached) = (AxisFeedback::default(), program.cached_status());
     let shown = [0x37, 0x12, 9, 0x84, 0x03, 0, 0, 0xF0, 0xF1, 0xFF, 0xFF, 0x0C, 0xFE];
-    let status = program.decode(&shown, false, &mut feedback, &mut hearing, &mut report);
+    let status = program.decode(&shown, false, &mut feedback, &mut cached, &mut report);
     assert_eq!(status, Some(0x09_1237));
     assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
     assert_eq!(feedback.get(Signal::PositionActual), Some(250_000_000));
     assert_eq!(feedback.get(Signal::VelocityActual), Some(-1_000_000_000));
     assert_eq!(feedback.get(Signal::TorqueActual), Some(-500_000));
-    assert_eq!(program.decode(&shown[..2], false, &mut feedback, &mut hearing, &mut report), None);
+    assert_eq!(program.decode(&shown[..2], false, &mut feedback, &mut cached, &mut report), None);
 }
 
 #[test]
@@ -471,7 +471,7 @@ fn inputs(
     }
     let mut feedback = AxisFeedback::default();
     let mut report = ConversionReport::default();
-    program.decode(&telegram, false, &mut feedback, &mut program.hearing(), &mut report);
+    program.decode(&telegram, false, &mut feedback, &mut program.cached_status(), &mut report);
     let seen = feedback.get(Signal::DigitalInputs);
     assert_eq!(seen, place.map(|_| i64::from(word)), "the word as it is");
     assert_eq!(program.knows_status(StatusBits::LIMIT_SWITCHES), place.is_some());
@@ -521,7 +521,7 @@ fn the_following_error_is_that_of_the_drive_where_it_is_sent() {
         telegram[at..at + len].copy_from_slice(&900_i32.to_le_bytes());
         let mut feedback = AxisFeedback::default();
         let mut report = ConversionReport::default();
-        program.decode(&telegram, false, &mut feedback, &mut program.hearing(), &mut report);
+        program.decode(&telegram, false, &mut feedback, &mut program.cached_status(), &mut report);
         assert_eq!(feedback.get(Signal::FollowingError), Some(expected), "{polarity:02X}");
     }
 }
@@ -538,25 +538,25 @@ fn what_a_drive_says_follows_what_it_shows_in_every_cycle() {
         states.flat_map(move |state| [8, 9, 10].map(|mode| (inputs, state, mode)))
     });
     let shown: Vec<_> = words.flat_map(|shown| [(shown, false), (shown, true)]).collect();
-    let hear = |hearing: &mut _, ((inputs, state, mode), led): ((u8, u32, u8), bool)| {
+    let hear = |cached: &mut _, ((inputs, state, mode), led): ((u8, u32, u8), bool)| {
         let mut telegram = vec![0; bytes];
         telegram[..2].copy_from_slice(&state.to_le_bytes()[..2]);
         (telegram[2], telegram[at]) = (mode, inputs);
         let (mut feedback, mut report) = (AxisFeedback::default(), ConversionReport::default());
-        program.decode(&telegram, led, &mut feedback, hearing, &mut report).unwrap();
+        program.decode(&telegram, led, &mut feedback, cached, &mut report).unwrap();
         (feedback.report, feedback.mode, feedback.status)
     };
-    let alone: Vec<_> = shown.iter().map(|shown| hear(&mut program.hearing(), *shown)).collect();
+    let alone: Vec<_> = shown.iter().map(|shown| hear(&mut program.cached_status(), *shown)).collect();
     let mut said = alone.clone();
     said.sort_by_key(|said| format!("{said:?}"));
     said.dedup();
     assert!(said.len() > 20, "they say different things: {}", said.len());
-    let mut hearing = program.hearing();
+    let mut cached = program.cached_status();
     for step in [1, 2, 6, 48, 7, 96] {
         for turn in 0..2 * shown.len() {
             // Everything twice, and each behind another one than before.
             let at = turn / 2 * step % shown.len();
-            assert_eq!(hear(&mut hearing, shown[at]), alone[at], "{:?}", shown[at]);
+            assert_eq!(hear(&mut cached, shown[at]), alone[at], "{:?}", shown[at]);
         }
     }
 }

@@ -98,12 +98,12 @@ fn values_go_in_the_units_of_the_profile_and_positions_wrap() {
     assert_eq!(row[3..7], 1500_i32.to_le_bytes(), "7.5 mm are a turn and a half");
     assert_eq!(row[7..11], 2.0_f32.to_le_bytes(), "10 mm/s are 2 turns a second");
     assert_eq!(row[11..15], 12.5_f32.to_le_bytes(), "percent of the rated torque");
-    let mut hearing = program.hearing();
+    let mut cached = program.cached_status();
     let mut feedback = AxisFeedback::default();
     let mut back = |position: i32| {
         row[..3].copy_from_slice(&[4, 1, 1]);
         row[3..7].copy_from_slice(&position.to_le_bytes());
-        program.decode(&row, false, &mut feedback, &mut hearing, &mut report).unwrap();
+        program.decode(&row, false, &mut feedback, &mut cached, &mut report).unwrap();
         (feedback.position, feedback.velocity, feedback.mode)
     };
     let wanted =

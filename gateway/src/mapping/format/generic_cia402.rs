@@ -185,7 +185,7 @@ pub struct Cia402ModeRow {
     #[serde(default)]
     pub control: Vec<FieldValueRow>,
     /// How the drive takes a target over.
-    pub handover: Option<Cia402HandoverRow>,
+    pub handshake: Option<Cia402HandshakeRow>,
     /// Signals to the drive.
     pub command: Vec<Name>,
     /// Signals from the drive.
@@ -219,7 +219,7 @@ pub struct Cia402ProcedureRow {
 /// How a drive takes a target over: it is asked to, says that it has, and may then be asked again.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Cia402HandoverRow {
+pub struct Cia402HandshakeRow {
     /// Fields of the controlword that ask; the bits are the other way round before and after.
     pub ask: Vec<FieldValueRow>,
     /// Fields of the statusword that answer.

@@ -41,7 +41,7 @@ pub struct GenericSercosFile {
     pub status: Vec<SercosStatusRow>,
     /// Faults and warnings in the diagnostic words.
     pub fault: Vec<SercosFaultRow>,
-    /// What the drive says of them in its own words.
+    /// The diagnostic message that the drive has for them.
     pub diagnosis: DiagnosisRow,
     /// Parameters.
     pub parameter: Vec<SercosParameterRow>,
@@ -392,7 +392,7 @@ pub struct SercosFaultRow {
     pub source: Source,
 }
 
-/// Where a drive says in its own words what is wrong with it.
+/// Where a drive has its diagnostic message.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagnosisRow {

@@ -76,7 +76,7 @@ struct Chain {
     north: CipProgram,
     trackers: CipTrackers,
     south: DriveProgram,
-    hearing: crate::mapping::Hearing,
+    cached: crate::mapping::CachedStatus,
     feedback: AxisFeedback,
 }
 
@@ -90,8 +90,8 @@ impl Chain {
         let north = mapping.cip_program(&scaling).unwrap();
         let mut trackers = north.trackers();
         trackers.start(0, 0);
-        let hearing = south.hearing();
-        Self { north, trackers, south, hearing, feedback: AxisFeedback::default() }
+        let cached = south.cached_status();
+        Self { north, trackers, south, cached, feedback: AxisFeedback::default() }
     }
 
     /// Where the controller sees the axis after a drive without any lag was commanded to `at`.
@@ -109,7 +109,7 @@ impl Chain {
         // S-0-0047 follows the control word, S-0-0051 the status word.
         let mut back = [0; 12];
         back[2..6].copy_from_slice(&telegram[2..6]);
-        self.south.decode(&back, false, &mut self.feedback, &mut self.hearing, &mut report).unwrap();
+        self.south.decode(&back, false, &mut self.feedback, &mut self.cached, &mut report).unwrap();
         let mut image = DriveImage::default();
         self.north.drive_image(&self.feedback, &FaultSet::new(), &mut Told::default(), &mut image);
         seen(&image)

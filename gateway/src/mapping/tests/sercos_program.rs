@@ -126,12 +126,12 @@ fn telegrams_of_the_drive_become_feedback() {
     let mapping = shipped();
     let axis = rotary_axis(true);
     let program = mapping.sercos_program(&axis, &obedient(mapping, &axis)).unwrap();
-    let (mut hearing, mut report) = (program.hearing(), ConversionReport::default());
+    let (mut cached, mut report) = (program.cached_status(), ConversionReport::default());
     let mut feedback =
         AxisFeedback { status: StatusBits::IN_POSITION | StatusBits::FAULT, ..AxisFeedback::default() };
     // In operation, following, second mode; 1843199999 counts, then 1: one step over the end of 512 turns and on.
     let mut telegram = [0x08, 0xC1, 0xFF, 0xFF, 0xDC, 0x6D, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
-    assert_eq!(program.decode(&telegram, false, &mut feedback, &mut hearing, &mut report), Some(0xC108));
+    assert_eq!(program.decode(&telegram, false, &mut feedback, &mut cached, &mut report), Some(0xC108));
     assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
     assert_eq!(
         feedback.status,
@@ -142,9 +142,9 @@ fn telegrams_of_the_drive_become_feedback() {
     // 0.0001 1/min backward are -1666.67 nanounits a second.
     assert_eq!(feedback.velocity, Velocity(-1_667));
     telegram[2..6].copy_from_slice(&1_i32.to_le_bytes());
-    program.decode(&telegram, false, &mut feedback, &mut hearing, &mut report);
+    program.decode(&telegram, false, &mut feedback, &mut cached, &mut report);
     assert_eq!((feedback.position.0, report.is_clean()), (512_000_000_278, true));
-    assert_eq!(program.decode(&[0], false, &mut feedback, &mut hearing, &mut report), None);
+    assert_eq!(program.decode(&[0], false, &mut feedback, &mut cached, &mut report), None);
 }
 
 #[test]
@@ -290,7 +290,7 @@ proptest! {
         let (mut telegram, mut report) = ([0; 12], ConversionReport::default());
         program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
         let mut feedback = AxisFeedback::default();
-        program.decode(&telegram, false, &mut feedback, &mut program.hearing(), &mut report);
+        program.decode(&telegram, false, &mut feedback, &mut program.cached_status(), &mut report);
         let count = 1_000_000_000_u64.div_ceil(u64::from(resolution)).max(1);
         let lost = feedback.position.0.abs_diff(position);
         // The fraction may lead one count over the range of 32 bits, where the drive's value is held.
@@ -400,13 +400,13 @@ fn class_3_bits_become_status() {
     facts.note_data(Idn::standard(187), &[13, 0, 0, 0, 84, 0, 0, 0, 51, 0, 0, 0, 40, 0, 0, 0]);
     let program = mapping.sercos_program(&axis, &facts).unwrap();
     assert_eq!(program.telegram.feedback.last(), Some(&Idn::standard(13).into()));
-    let (mut hearing, mut report) = (program.hearing(), ConversionReport::default());
+    let (mut cached, mut report) = (program.cached_status(), ConversionReport::default());
     let mut feedback = AxisFeedback::default();
     let mut text = String::new();
     for bit in 0..16 {
         let mut telegram = [0; 14];
         telegram[12..].copy_from_slice(&(1_u16 << bit).to_le_bytes());
-        program.decode(&telegram, false, &mut feedback, &mut hearing, &mut report).unwrap();
+        program.decode(&telegram, false, &mut feedback, &mut cached, &mut report).unwrap();
         let names: Vec<_> = StatusBits::NAMED
             .iter()
             .filter(|(status, _)| feedback.status.contains(*status))

@@ -282,7 +282,7 @@ fn polarities_count_once() {
             sent.extend_from_slice(if place == 2 { &bytes[..2] } else { &bytes });
         }
         let mut feedback = AxisFeedback::default();
-        program.decode(&sent, false, &mut feedback, &mut program.hearing(), &mut report);
+        program.decode(&sent, false, &mut feedback, &mut program.cached_status(), &mut report);
         let forward = if bit(3) == 1 { -1 } else { 1 };
         let signs = [feedback.position.0.signum(), feedback.velocity.0.signum(), feedback.torque.0.signum()];
         assert_eq!(signs, [forward; 3], "{bits:#b}");
@@ -412,7 +412,7 @@ proptest! {
         let mut facts = obedient(mapping, &axis);
         facts.note_data(Idn::standard(103), &range.to_le_bytes()[..4]);
         let program = mapping.sercos_program(&axis, &facts).unwrap();
-        let (mut hearing, mut report) = (program.hearing(), ConversionReport::default());
+        let (mut cached, mut report) = (program.cached_status(), ConversionReport::default());
         let (mut command, mut feedback) = (AxisCommand::default(), AxisFeedback::default());
         // The drive's counts, whole.
         let mut position = 0_i64;
@@ -425,7 +425,7 @@ proptest! {
             program.encode(&command, Action::None, 0, 0, &mut telegram, &mut report);
             let sent = i64::from(i32::from_le_bytes(telegram[2..6].try_into().unwrap()));
             prop_assert!((0..range).contains(&sent), "{} of {}", sent, range);
-            program.decode(&telegram, false, &mut feedback, &mut hearing, &mut report);
+            program.decode(&telegram, false, &mut feedback, &mut cached, &mut report);
             let lost = feedback.position.0.abs_diff(command.position.0);
             prop_assert!(lost <= 278, "{} nanoturns at {}", lost, position);
             prop_assert!(step * 2_500 / 9 <= program.position_step().unwrap());

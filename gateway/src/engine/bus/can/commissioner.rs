@@ -19,8 +19,8 @@ use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{Mux, NodeId};
 
-use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, Spread, object};
-use super::look::Look;
+use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, PdoMap, object};
+use super::readback::Readback;
 use super::trial::Trial;
 pub use super::trial::Tried;
 use crate::engine::notice::Notice;
@@ -73,7 +73,7 @@ pub enum Done {
     /// A request to the device.
     Submit(Run, SdoRequest),
     /// The program of an axis, by its place in the device, and how its values are spread over RPDOs and TPDOs.
-    Program(Run, u8, DriveProgram, [Spread; 2]),
+    Program(Run, u8, DriveProgram, [PdoMap; 2]),
     /// The RPDOs and TPDOs of the device: it is through. On the way back those that it had.
     Pdos(Run, PdoSet),
     /// The device cannot be used.
@@ -97,12 +97,12 @@ impl Done {
 
 /// The cycle thread's end.
 #[derive(Debug)]
-pub struct CommissionerEnd {
+pub struct CommissionerHandle {
     jobs: rtrb::Producer<Job>,
     done: rtrb::Consumer<Done>,
 }
 
-impl CommissionerEnd {
+impl CommissionerHandle {
     /// Hands a job over; `false` when there is no room, and it is dropped.
     pub fn push(&mut self, job: Job) -> bool {
         self.jobs.push(job).is_ok()
@@ -174,7 +174,7 @@ enum Task {
     /// Modes of operation are tried, of a drive that does not tell them.
     Try(Trial),
     /// The PDOs are read that its device keeps.
-    Look(Look),
+    Readback(Readback),
 }
 
 /// One device.
@@ -201,7 +201,7 @@ struct Work {
 /// Commissions the drives of a bus.
 #[derive(Debug)]
 pub struct Commissioner {
-    desk: Desk,
+    context: Context,
     devices: Vec<Work>,
     jobs: rtrb::Consumer<Job>,
     done: rtrb::Producer<Done>,
@@ -209,7 +209,7 @@ pub struct Commissioner {
 
 /// What the work on every device needs.
 #[derive(Debug)]
-struct Desk {
+struct Context {
     mapping: Mapping,
     /// The network, with the PDOs that its devices have been given.
     network: MasterConfig,
@@ -224,7 +224,7 @@ impl Commissioner {
         mapping: Mapping,
         network: MasterConfig,
         devices: impl IntoIterator<Item = (NodeId, Vec<AxisSetup>)>,
-    ) -> (Self, CommissionerEnd) {
+    ) -> (Self, CommissionerHandle) {
         let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
         let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
         let work = |(node, axes)| Work {
@@ -242,9 +242,9 @@ impl Commissioner {
             pdos: [Vec::new(), Vec::new()],
         };
         let devices = devices.into_iter().map(work).collect();
-        let end = CommissionerEnd { jobs: jobs_in, done: done_out };
-        let desk = Desk { mapping, network, waiting: VecDeque::new() };
-        (Self { desk, devices, jobs, done }, end)
+        let end = CommissionerHandle { jobs: jobs_in, done: done_out };
+        let context = Context { mapping, network, waiting: VecDeque::new() };
+        (Self { context, devices, jobs, done }, end)
     }
 
     /// Whether the cycle thread has gone.
@@ -256,11 +256,11 @@ impl Commissioner {
     /// Does what there is to do, without waiting.
     pub fn poll(&mut self) {
         while let Ok(job) = self.jobs.pop() {
-            let Self { desk, devices, .. } = self;
+            let Self { context, devices, .. } = self;
             match job {
                 Job::Begin(run, identity) => {
                     if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.begin(run, identity, desk);
+                        work.begin(run, identity, context);
                     }
                 }
                 Job::Keep(run, keeps) => {
@@ -271,7 +271,7 @@ impl Commissioner {
                 Job::Outcome(run, outcome) => {
                     let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
                     if let Some(work) = work {
-                        work.handle(&outcome, desk);
+                        work.handle(&outcome, context);
                     }
                 }
                 Job::Unsent(run, _) => {
@@ -281,9 +281,9 @@ impl Commissioner {
                 Job::Spent(_) | Job::Unused(_) => {}
             }
         }
-        while let Some(done) = self.desk.waiting.pop_front() {
+        while let Some(done) = self.context.waiting.pop_front() {
             if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
-                self.desk.waiting.push_front(done);
+                self.context.waiting.push_front(done);
                 return;
             }
         }
@@ -291,15 +291,15 @@ impl Commissioner {
 }
 
 impl Work {
-    fn begin(&mut self, run: Run, identity: DriveIdentity, desk: &mut Desk) {
+    fn begin(&mut self, run: Run, identity: DriveIdentity, context: &mut Context) {
         self.give_up();
         (self.run, self.identity) = (run, identity);
-        if let Some(family) = desk.mapping.family_of(&identity) {
+        if let Some(family) = context.mapping.family_of(&identity) {
             let (axis, node, name) = (self.number(0), self.node, family.name.clone());
-            desk.waiting.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
+            context.waiting.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
         }
         self.pdos = [Vec::new(), Vec::new()];
-        self.set_out(0, Plan::Ask, desk);
+        self.set_out(0, Plan::Ask, context);
     }
 
     fn give_up(&mut self) {
@@ -310,31 +310,33 @@ impl Work {
     }
 
     /// Begins a plan of an axis.
-    fn set_out(&mut self, place: usize, plan: Plan, desk: &mut Desk) {
+    fn set_out(&mut self, place: usize, plan: Plan, context: &mut Context) {
         let Some(setup) = self.axes.get(place) else { return };
         if plan == Plan::Ask {
             self.facts = ObjectFacts::of(self.identity);
         }
-        match desk.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
+        match context.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
             Ok(steps) => {
                 self.at = Some((place, Task::Plan(plan)));
                 self.steps = steps.into();
-                self.go_on(desk);
+                self.go_on(context);
             }
-            Err(error) => self.fail(place, error.into(), desk),
+            Err(error) => self.fail(place, error.into(), context),
         }
     }
 
-    fn fail(&mut self, place: usize, error: Misfit, desk: &mut Desk) {
+    fn fail(&mut self, place: usize, error: Misfit, context: &mut Context) {
         let axis = self.number(place);
-        desk.waiting.push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
+        context
+            .waiting
+            .push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
         self.give_up();
     }
 
     /// A step failed that the axis cannot do without.
-    fn break_off(&mut self, place: usize, failure: StepFailure, desk: &mut Desk) {
+    fn break_off(&mut self, place: usize, failure: StepFailure, context: &mut Context) {
         let (axis, node) = (self.number(place), self.node);
-        desk.waiting.push_back(Done::Failed(self.run, Notice::NodeCommissioning { axis, node, failure }));
+        context.waiting.push_back(Done::Failed(self.run, Notice::NodeCommissioning { axis, node, failure }));
         self.give_up();
     }
 
@@ -343,12 +345,12 @@ impl Work {
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.
-    fn go_on(&mut self, desk: &mut Desk) {
-        if let Some((_, Task::Look(look))) = &mut self.at {
-            while look.under_way() < WINDOW
-                && let Some(object) = look.next()
+    fn go_on(&mut self, context: &mut Context) {
+        if let Some((_, Task::Readback(readback))) = &mut self.at {
+            while readback.under_way() < WINDOW
+                && let Some(object) = readback.next()
             {
-                desk.waiting.push_back(Done::Submit(self.run, SdoRequest::upload(object)));
+                context.waiting.push_back(Done::Submit(self.run, SdoRequest::upload(object)));
             }
         }
         while self.sent.len() < WINDOW
@@ -358,45 +360,45 @@ impl Work {
             let Some(request) = request(&step, &self.axes[place].needs) else {
                 // A device without this axis has been told of already, by the axis that it does not have.
                 let axis = self.axes[place].needs.axis;
-                self.fail(place, Cia402Error::Axis(axis).into(), desk);
+                self.fail(place, Cia402Error::Axis(axis).into(), context);
                 return;
             };
-            desk.waiting.push_back(Done::Submit(self.run, request));
+            context.waiting.push_back(Done::Submit(self.run, request));
             self.sent.push_back(step);
         }
         let is_through = match &self.at {
-            Some((_, Task::Look(look))) => look.under_way() == 0,
+            Some((_, Task::Readback(readback))) => readback.under_way() == 0,
             Some((_, Task::Plan(_))) => self.sent.is_empty(),
             Some((_, Task::Try(_))) | None => false,
         };
         if is_through && let Some((place, task)) = self.at.take() {
-            self.through(place, task, desk);
+            self.through(place, task, context);
         }
     }
 
-    fn through(&mut self, place: usize, task: Task, desk: &mut Desk) {
+    fn through(&mut self, place: usize, task: Task, context: &mut Context) {
         let found = match task {
-            Task::Plan(Plan::Ask) => return self.learn_modes(place, desk),
+            Task::Plan(Plan::Ask) => return self.learn_modes(place, context),
             Task::Plan(_) if self.axes[place].pdos.kept || self.falls_back => {
-                self.at = Some((place, Task::Look(Look::new(self.axes[place].pdos))));
-                return self.go_on(desk);
+                self.at = Some((place, Task::Readback(Readback::new(self.axes[place].pdos))));
+                return self.go_on(context);
             }
             Task::Plan(_) => None,
-            Task::Look(look) => Some(look.found()),
-            Task::Try(trial) => return self.tried(place, trial, desk),
+            Task::Readback(readback) => Some(readback.found()),
+            Task::Try(trial) => return self.tried(place, trial, context),
         };
         let axis = self.number(place);
         if !self.passed_over.is_empty() {
             let failures = std::mem::take(&mut self.passed_over);
-            desk.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
+            context.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
         }
-        let mapping = desk.mapping.of_drive(&self.facts);
+        let mapping = context.mapping.of_drive(&self.facts);
         let mut unmapped = Vec::new();
         let made = loop {
             let setup = &self.axes[place];
             let made = mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
             let made =
-                made.and_then(|program| Ok((spread(mapping, setup, &program, found.as_ref())?, program)));
+                made.and_then(|program| Ok((pdo_map(mapping, setup, &program, found.as_ref())?, program)));
             match made {
                 // What is in none of the PDOs that it keeps it does not have for the box: perhaps the axis can do without.
                 Err(Misfit::Mapped(lack))
@@ -417,11 +419,11 @@ impl Work {
         };
         if made.is_ok() && !unmapped.is_empty() {
             let objects = unmapped.iter().map(|lack| lack.object).collect();
-            desk.waiting.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
+            context.waiting.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
         }
         let left_out = mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
         if !left_out.is_empty() {
-            desk.waiting.push_back(Done::Told(Notice::NodeModesLeftOut {
+            context.waiting.push_back(Done::Told(Notice::NodeModesLeftOut {
                 axis,
                 node: self.node,
                 modes: left_out,
@@ -429,76 +431,77 @@ impl Work {
         }
         let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
             Ok(made) => made,
-            Err(error) => return self.fail(place, error, desk),
+            Err(error) => return self.fail(place, error, context),
         };
         let needs = &self.axes[place].needs;
         if let Some(found) = mapping.cia402_other_period(needs, &self.facts) {
             let (node, expected) = (self.node, needs.cycle);
-            desk.waiting.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
+            context.waiting.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
         }
         self.pdos[0].extend(receive);
         self.pdos[1].extend(transmit);
         let which = u8::try_from(place).unwrap_or(u8::MAX);
-        desk.waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
+        context.waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
         if place + 1 < self.axes.len() {
-            self.set_out(place + 1, Plan::Ask, desk);
+            self.set_out(place + 1, Plan::Ask, context);
         } else {
             let [receive, transmit] = std::mem::take(&mut self.pdos);
-            match PdoSet::new(&desk.network, self.node, receive, transmit) {
+            match PdoSet::new(&context.network, self.node, receive, transmit) {
                 Ok(set) => {
-                    desk.network.take_pdos(&set);
-                    desk.waiting.push_back(Done::Pdos(self.run, set));
+                    context.network.take_pdos(&set);
+                    context.waiting.push_back(Done::Pdos(self.run, set));
                 }
-                Err(error) => self.fail(place, error.into(), desk),
+                Err(error) => self.fail(place, error.into(), context),
             }
         }
     }
 
     /// The drive has been asked everything. What it does not tell of its modes stands in the configuration, or is tried.
-    fn learn_modes(&mut self, place: usize, desk: &mut Desk) {
+    fn learn_modes(&mut self, place: usize, context: &mut Context) {
         let needs = &self.axes[place].needs;
-        if let Some(words) = desk.mapping.of_drive(&self.facts).cia402_modes_untold(needs, &mut self.facts) {
+        if let Some(words) = context.mapping.of_drive(&self.facts).cia402_modes_untold(needs, &mut self.facts)
+        {
             let mut trial = Trial::new(words);
             if let Some(request) = trial.begin() {
                 self.at = Some((place, Task::Try(trial)));
-                desk.waiting.push_back(Done::Submit(self.run, request));
+                context.waiting.push_back(Done::Submit(self.run, request));
                 return;
             }
         }
-        self.set_out(place, Plan::Tell, desk);
+        self.set_out(place, Plan::Tell, context);
     }
 
-    fn tried(&mut self, place: usize, trial: Trial, desk: &mut Desk) {
+    fn tried(&mut self, place: usize, trial: Trial, context: &mut Context) {
         let (axis, node, tried) = (self.number(place), self.node, trial.tried());
-        desk.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
-        desk.waiting.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
-        self.set_out(place, Plan::Tell, desk);
+        context.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
+        context.waiting.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
+        self.set_out(place, Plan::Tell, context);
     }
 
-    fn handle(&mut self, outcome: &SdoOutcome, desk: &mut Desk) {
+    fn handle(&mut self, outcome: &SdoOutcome, context: &mut Context) {
         if let Some((place, Task::Try(trial))) = &mut self.at {
             let place = *place;
             match trial.handle(outcome) {
-                Ok(Some(request)) => desk.waiting.push_back(Done::Submit(self.run, request)),
+                Ok(Some(request)) => context.waiting.push_back(Done::Submit(self.run, request)),
                 Ok(None) => {
                     if let Some((place, task)) = self.at.take() {
-                        self.through(place, task, desk);
+                        self.through(place, task, context);
                     }
                 }
                 Err(failure) => {
                     let object = Object { index: outcome.object.index, sub: outcome.object.sub };
-                    self.break_off(place, StepFailure { what: "trying", object, failure }, desk);
+                    self.break_off(place, StepFailure { what: "trying", object, failure }, context);
                 }
             }
             return;
         }
-        if let Some((place, Task::Look(look))) = &mut self.at {
+        if let Some((place, Task::Readback(readback))) = &mut self.at {
             let place = *place;
-            return match look.handle(outcome) {
-                Ok(()) => self.go_on(desk),
+            return match readback.handle(outcome) {
+                Ok(()) => self.go_on(context),
                 Err((object, failure)) => {
                     let object = Object { index: object.index, sub: object.sub };
-                    self.break_off(place, StepFailure { what: "reading", object, failure }, desk);
+                    self.break_off(place, StepFailure { what: "reading", object, failure }, context);
                 }
             };
         }
@@ -528,12 +531,12 @@ impl Work {
                 let gone = matches!(failure, SdoFailure::Timeout { .. } | SdoFailure::NodeLost);
                 let failure = StepFailure { what, object, failure };
                 if must || gone {
-                    return self.break_off(place, failure, desk);
+                    return self.break_off(place, failure, context);
                 }
                 self.passed_over.push(failure);
             }
         }
-        self.go_on(desk);
+        self.go_on(context);
     }
 }
 
@@ -548,12 +551,12 @@ fn request(step: &ObjectStep, needs: &Cia402Axis) -> Option<SdoRequest> {
 }
 
 /// RPDOs and TPDOs of an axis whose telegrams are known.
-fn spread(
+fn pdo_map(
     mapping: &Mapping,
     setup: &AxisSetup,
     program: &DriveProgram,
     found: Option<&FoundPdos>,
-) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
+) -> Result<[(Vec<PdoConfig>, PdoMap); 2], Misfit> {
     let telegram = &program.telegram;
     pdos(mapping, &setup.pdos, &telegram.command, &telegram.feedback, found)
 }
@@ -568,7 +571,7 @@ pub fn pdos(
     command: &[Item],
     feedback: &[Item],
     found: Option<&FoundPdos>,
-) -> Result<[(Vec<PdoConfig>, Spread); 2], Misfit> {
+) -> Result<[(Vec<PdoConfig>, PdoMap); 2], Misfit> {
     let values = |items: &[Item]| -> Result<Vec<(Object, u8)>, Misfit> {
         let value = |item: &Item| {
             let len = mapping.dictionaries.cia402.len_of(*item).ok_or(Misfit::Length(*item))?;
@@ -583,5 +586,5 @@ pub fn pdos(
             pdos.find(Direction::Transmit, &feedback, transmit)?,
         ]);
     }
-    Ok([pdos.spread(Direction::Receive, &command)?, pdos.spread(Direction::Transmit, &feedback)?])
+    Ok([pdos.pdo_map(Direction::Receive, &command)?, pdos.pdo_map(Direction::Transmit, &feedback)?])
 }

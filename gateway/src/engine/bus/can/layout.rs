@@ -52,7 +52,7 @@ pub struct Part {
 
 /// How the values of an axis are spread over its PDOs, one way.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Spread {
+pub struct PdoMap {
     parts: ArrayVec<Part, PARTS_MAX>,
     numbers: ArrayVec<u16, PDOS_MAX>,
     len: usize,
@@ -152,7 +152,7 @@ impl fmt::Display for Only {
 #[error("{0} does not fit: an axis has {PDOS_MAX} PDOs of {PDO_LEN_MAX} bytes each way")]
 pub struct NoRoom(pub Object);
 
-impl Spread {
+impl PdoMap {
     /// What is put in which PDO.
     #[must_use]
     pub fn parts(&self) -> &[Part] {
@@ -194,12 +194,12 @@ impl AxisPdos {
     ///
     /// # Errors
     /// They do not fit.
-    pub fn spread(
+    pub fn pdo_map(
         &self,
         direction: Direction,
         values: &[(Object, u8)],
-    ) -> Result<(Vec<PdoConfig>, Spread), NoRoom> {
-        let mut spread = Spread::default();
+    ) -> Result<(Vec<PdoConfig>, PdoMap), NoRoom> {
+        let mut pdo_map = PdoMap::default();
         let mut pdos: Vec<Vec<MappingEntry>> = Vec::new();
         let mut used: Vec<usize> = Vec::new();
         for (object, len) in values {
@@ -214,20 +214,20 @@ impl AxisPdos {
                 }
                 None => return Err(NoRoom(*object)),
             };
-            let part = Part { pdo, at: used[pdo], from: spread.len, len: size };
-            spread.parts.try_push(part).map_err(|_| NoRoom(*object))?;
+            let part = Part { pdo, at: used[pdo], from: pdo_map.len, len: size };
+            pdo_map.parts.try_push(part).map_err(|_| NoRoom(*object))?;
             pdos[pdo].push(MappingEntry::new(Mux::new(object.index, object.sub), len * 8));
             used[pdo] += size;
-            spread.len += size;
+            pdo_map.len += size;
         }
         let ids = self.ids_of(direction);
         let mut configs = Vec::with_capacity(pdos.len());
         for (number, (place, mapping)) in (self.first..).zip(pdos.into_iter().enumerate()) {
-            spread.numbers.push(number);
+            pdo_map.numbers.push(number);
             let id = ids.map(|ids| ids[place]);
             configs.push(PdoConfig { id, ..self.config(direction, number, mapping) });
         }
-        Ok((configs, spread))
+        Ok((configs, pdo_map))
     }
 
     /// A PDO that goes in every cycle, as far as the device lets it.
@@ -277,7 +277,7 @@ impl AxisPdos {
         direction: Direction,
         values: &[(Object, u8)],
         found: &[FoundPdo],
-    ) -> Result<(Vec<PdoConfig>, Spread), NotMapped> {
+    ) -> Result<(Vec<PdoConfig>, PdoMap), NotMapped> {
         let found: Vec<&FoundPdo> = found.iter().filter(|pdo| self.numbers().contains(&pdo.number)).collect();
         let listed = || {
             let all: Vec<_> = found.iter().map(ToString::to_string).collect();
@@ -318,17 +318,17 @@ impl AxisPdos {
             used.push(best);
         }
         used.sort_by_key(|pdo| pdo.number);
-        let mut spread = Spread { len: row, ..Spread::default() };
+        let mut pdo_map = PdoMap { len: row, ..PdoMap::default() };
         let mut configs = Vec::with_capacity(used.len());
         for (place, pdo) in used.iter().enumerate() {
-            spread.numbers.push(pdo.number);
+            pdo_map.numbers.push(pdo.number);
             for (value, from) in values.iter().zip(&froms) {
                 // What comes twice is taken from the first one.
                 let again =
-                    direction == Direction::Transmit && spread.parts.iter().any(|part| part.from == *from);
+                    direction == Direction::Transmit && pdo_map.parts.iter().any(|part| part.from == *from);
                 let Some(at) = carries(pdo, value).filter(|_| !again) else { continue };
                 let part = Part { pdo: place, at, from: *from, len: usize::from(value.1) };
-                spread.parts.try_push(part).map_err(|_| missing(value.0))?;
+                pdo_map.parts.try_push(part).map_err(|_| missing(value.0))?;
             }
             configs.push(PdoConfig {
                 id: pdo.id.or_else(|| Some(self.ids_of(direction)?[place])),
@@ -336,7 +336,7 @@ impl AxisPdos {
                 ..self.config(direction, pdo.number, pdo.mapping.clone())
             });
         }
-        Ok((configs, spread))
+        Ok((configs, pdo_map))
     }
 }
 
@@ -406,7 +406,7 @@ mod tests {
     #[test]
     fn values_go_into_the_first_pdo_with_room() {
         // Control, mode, position; velocity and torque; and a byte that the first one still has room for.
-        let (pdos, spread) = first().spread(Direction::Receive, &objects(&[2, 1, 4, 4, 2, 1])).unwrap();
+        let (pdos, pdo_map) = first().pdo_map(Direction::Receive, &objects(&[2, 1, 4, 4, 2, 1])).unwrap();
         let mapped: Vec<_> = pdos
             .iter()
             .map(|pdo| (pdo.number, pdo.id, pdo.mapping.iter().map(|entry| entry.0).collect()))
@@ -417,20 +417,20 @@ mod tests {
         ];
         assert_eq!(mapped, expected);
         let parts: Vec<_> =
-            spread.parts().iter().map(|part| (part.pdo, part.at, part.from, part.len)).collect();
+            pdo_map.parts().iter().map(|part| (part.pdo, part.at, part.from, part.len)).collect();
         let all = [(0, 0, 0, 2), (0, 2, 2, 1), (0, 3, 3, 4), (1, 0, 7, 4), (1, 4, 11, 2), (0, 7, 13, 1)];
         assert_eq!(parts, all);
-        assert_eq!((spread.numbers(), spread.len()), (&[1, 2][..], 14));
+        assert_eq!((pdo_map.numbers(), pdo_map.len()), (&[1, 2][..], 14));
         assert!(pdos.iter().all(|pdo| pdo.allowed_losses == 3));
     }
 
     #[test]
     fn what_does_not_fit_is_named() {
         let eight = [8; 5];
-        let error = first().spread(Direction::Transmit, &objects(&eight)).unwrap_err();
+        let error = first().pdo_map(Direction::Transmit, &objects(&eight)).unwrap_err();
         assert_eq!(error.to_string(), "6044:00 does not fit: an axis has 4 PDOs of 8 bytes each way");
-        assert_eq!(first().spread(Direction::Transmit, &objects(&[9])).unwrap_err().0.index, 0x6040);
-        assert!(first().spread(Direction::Transmit, &objects(&[8, 8, 8, 8])).is_ok());
+        assert_eq!(first().pdo_map(Direction::Transmit, &objects(&[9])).unwrap_err().0.index, 0x6040);
+        assert!(first().pdo_map(Direction::Transmit, &objects(&[8, 8, 8, 8])).is_ok());
     }
 
     #[test]
@@ -438,10 +438,10 @@ mod tests {
         let node = |number| NodeId::new(number).unwrap();
         let mut spare = SpareIds::new(vec![node(127), node(1)]);
         let second = AxisPdos::new(1, 1, &mut spare).unwrap();
-        let (pdos, _) = second.spread(Direction::Receive, &objects(&[8, 8])).unwrap();
+        let (pdos, _) = second.pdo_map(Direction::Receive, &objects(&[8, 8])).unwrap();
         let ids: Vec<_> = pdos.iter().map(|pdo| (pdo.number, pdo.id)).collect();
         assert_eq!(ids, [(0x41, Some(Id::Standard(0x27E))), (0x42, Some(Id::Standard(0x37E)))]);
-        let (pdos, _) = second.spread(Direction::Transmit, &objects(&[8])).unwrap();
+        let (pdos, _) = second.pdo_map(Direction::Transmit, &objects(&[8])).unwrap();
         assert_eq!(pdos[0].id, Some(Id::Standard(0x1FE)));
         let third = AxisPdos::new(2, 1, &mut spare).unwrap();
         assert_eq!(third.ids.unwrap()[1][3], Id::Standard(0x4FD));
@@ -459,8 +459,8 @@ mod tests {
 
     type Placed = (usize, usize, usize, usize);
 
-    fn parts(spread: &Spread) -> Vec<Placed> {
-        spread.parts().iter().map(|part| (part.pdo, part.at, part.from, part.len)).collect()
+    fn parts(pdo_map: &PdoMap) -> Vec<Placed> {
+        pdo_map.parts().iter().map(|part| (part.pdo, part.at, part.from, part.len)).collect()
     }
 
     #[test]
@@ -472,19 +472,19 @@ mod tests {
             // A gap of a byte, which is of type UNSIGNED8.
             found(3, &[0x0005_0008, 0x607A_0020, 0x6040_0010]),
         ];
-        let (configs, spread) = first().find(Direction::Receive, &wanted, &pdos).unwrap();
+        let (configs, pdo_map) = first().find(Direction::Receive, &wanted, &pdos).unwrap();
         let numbers: Vec<_> = configs.iter().map(|pdo| (pdo.number, pdo.policy)).collect();
         assert_eq!(numbers, [(2, MappingPolicy::Keep), (3, MappingPolicy::Keep)]);
         // The controlword goes into both.
-        assert_eq!(parts(&spread), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 5, 0, 2), (1, 1, 3, 4)]);
-        assert_eq!((spread.numbers(), spread.len()), (&[2, 3][..], 7));
+        assert_eq!(parts(&pdo_map), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 5, 0, 2), (1, 1, 3, 4)]);
+        assert_eq!((pdo_map.numbers(), pdo_map.len()), (&[2, 3][..], 7));
         // What is told twice is taken once, and what nobody wants is left.
-        let (_, spread) = first().find(Direction::Transmit, &wanted, &pdos).unwrap();
-        assert_eq!(parts(&spread), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 1, 3, 4)]);
+        let (_, pdo_map) = first().find(Direction::Transmit, &wanted, &pdos).unwrap();
+        assert_eq!(parts(&pdo_map), [(0, 0, 0, 2), (0, 2, 2, 1), (1, 1, 3, 4)]);
         let odd = [found(1, &[0x6040_0010, 0x6081_0020]), found(2, &[0x6060_0008, 0x607A_0020])];
-        let (configs, spread) = first().find(Direction::Transmit, &wanted, &odd).unwrap();
+        let (configs, pdo_map) = first().find(Direction::Transmit, &wanted, &odd).unwrap();
         assert_eq!(configs.len(), 2);
-        assert_eq!(parts(&spread), [(0, 0, 0, 2), (1, 0, 2, 1), (1, 1, 3, 4)]);
+        assert_eq!(parts(&pdo_map), [(0, 0, 0, 2), (1, 0, 2, 1), (1, 1, 3, 4)]);
     }
 
     /// Nothing is sent to a drive that nobody has set, and nothing is read where it does not stand.

@@ -9,8 +9,8 @@
 pub mod commissioner;
 pub mod layout;
 pub mod load;
-mod look;
 pub mod lss;
+mod readback;
 mod trial;
 
 use arrayvec::ArrayVec;
@@ -24,12 +24,12 @@ use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{AbortCode, Mux, NodeId};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
-use self::commissioner::{AxisSetup, CommissionerEnd, Done, Job, Run, WINDOW};
-use self::layout::{BYTES_MAX, PDOS_MAX, Spread};
+use self::commissioner::{AxisSetup, CommissionerHandle, Done, Job, Run, WINDOW};
+use self::layout::{BYTES_MAX, PDOS_MAX, PdoMap};
 use self::lss::{Assigner, Assignment};
 use super::backoff::Backoff;
 use super::bus_return::BusReturn;
-use super::outlet::Outlet;
+use super::transmit_queue::TransmitQueue;
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
@@ -66,17 +66,17 @@ enum Stage {
 /// The values of an axis, one way: the row that its program sees.
 #[derive(Debug)]
 struct Values {
-    spread: Spread,
+    pdo_map: PdoMap,
     row: [u8; BYTES_MAX],
 }
 
 impl Values {
     fn new() -> Self {
-        Self { spread: Spread::default(), row: [0; BYTES_MAX] }
+        Self { pdo_map: PdoMap::default(), row: [0; BYTES_MAX] }
     }
 
-    fn take(&mut self, spread: Spread) {
-        *self = Self { spread, row: [0; BYTES_MAX] };
+    fn take(&mut self, pdo_map: PdoMap) {
+        *self = Self { pdo_map, row: [0; BYTES_MAX] };
     }
 }
 
@@ -117,9 +117,9 @@ pub struct CanBus {
     devices: Vec<Device>,
     /// The device of each axis, and the drive there.
     places: Places<(usize, usize)>,
-    commissioner: CommissionerEnd,
+    commissioner: CommissionerHandle,
     cycles_seen: u64,
-    outlet: Outlet,
+    transmit_queue: TransmitQueue,
     back: BusReturn,
     /// It was up since the bus was on last.
     up: bool,
@@ -137,7 +137,7 @@ impl CanBus {
         config: MasterConfig,
         devices: &[(NodeId, Vec<AxisSetup>)],
         assignments: &[Assignment],
-        commissioner: CommissionerEnd,
+        commissioner: CommissionerHandle,
     ) -> Result<Self, ConfigError> {
         let cycle_time = DurationNs(config.sync.map_or(0, |sync| i64::from(sync.period_ns)));
         let master = Master::new(config)?;
@@ -171,7 +171,7 @@ impl CanBus {
             devices,
             commissioner,
             cycles_seen: 0,
-            outlet: Outlet::new(cycle_time),
+            transmit_queue: TransmitQueue::new(cycle_time),
             back: BusReturn::NEVER_LOST,
             up: false,
             stopped: false,
@@ -195,16 +195,16 @@ impl CanBus {
         for device in devices {
             let node = device.node;
             for drive in &mut device.drives {
-                let Values { spread, row } = &mut drive.feedback;
+                let Values { pdo_map, row } = &mut drive.feedback;
                 let consumers: ArrayVec<_, PDOS_MAX> =
-                    spread.numbers().iter().filter_map(|number| master.consumer(node, *number)).collect();
-                let all = consumers.len() == spread.numbers().len() && !consumers.is_empty();
+                    pdo_map.numbers().iter().filter_map(|number| master.consumer(node, *number)).collect();
+                let all = consumers.len() == pdo_map.numbers().len() && !consumers.is_empty();
                 let good = |state| matches!(state, ConsumerState::Good | ConsumerState::Missing);
                 drive.alive = all && consumers.iter().all(|consumer| good(consumer.state));
                 drive.fresh = all && consumers.iter().all(|consumer| consumer.fresh);
                 let own = consumers.iter().filter(|consumer| !consumer.cyclic);
                 drive.at = own.filter_map(|consumer| consumer.at).min();
-                for part in spread.parts() {
+                for part in pdo_map.parts() {
                     let bytes =
                         consumers.get(part.pdo).and_then(|pdo| pdo.data.get(part.at..part.at + part.len));
                     if let (Some(bytes), Some(place)) = (bytes, row.get_mut(part.from..part.from + part.len))
@@ -247,7 +247,7 @@ impl CanBus {
             }
             Event::GaveWay => {
                 self.up = false;
-                self.outlet.clear();
+                self.transmit_queue.clear();
                 self.assigner.abort();
                 for drive in self.devices.iter_mut().flat_map(|device| {
                     device.stage = Stage::Absent;
@@ -259,7 +259,7 @@ impl CanBus {
             }
             Event::BusOff => {
                 self.up = false;
-                self.outlet.clear();
+                self.transmit_queue.clear();
                 for place in 0..self.devices.len() {
                     let node = self.devices[place].node;
                     self.lose(now, system, node, axes);
@@ -465,7 +465,7 @@ impl Device {
 
 impl Bus for CanBus {
     fn cycle_time(&self) -> DurationNs {
-        self.outlet.cycle_time()
+        self.transmit_queue.cycle_time()
     }
 
     fn patience(&self) -> DurationNs {
@@ -474,7 +474,7 @@ impl Bus for CanBus {
 
     fn wake_at(&self) -> Option<MonotonicTime> {
         let own = || self.master.wake_at().into_iter().chain(self.assigner.wake_at()).min();
-        self.outlet.wake_at().or_else(own)
+        self.transmit_queue.wake_at().or_else(own)
     }
 
     fn next_cycle(&self) -> Option<MonotonicTime> {
@@ -544,7 +544,7 @@ impl Bus for CanBus {
         let (device, drive) = self.places.of(axis)?;
         let device = self.devices.get(device).filter(|device| self.is_operational(device))?;
         let drive = device.drives.get(drive)?;
-        let data = drive.feedback.row.get(..drive.feedback.spread.len())?;
+        let data = drive.feedback.row.get(..drive.feedback.pdo_map.len())?;
         Some(Received { data, fresh: drive.fresh, at: drive.at, alive: drive.alive })
     }
 
@@ -617,20 +617,20 @@ impl Bus for CanBus {
         };
         let Self { master, devices, .. } = self;
         let node = devices[device].node;
-        let Values { spread, row } = &mut devices[device].drives[drive].command;
-        let given = fill(row.get_mut(..spread.len()));
+        let Values { pdo_map, row } = &mut devices[device].drives[drive].command;
+        let given = fill(row.get_mut(..pdo_map.len()));
         if !given {
-            spread.numbers().iter().for_each(|number| master.withdraw(node, *number));
+            pdo_map.numbers().iter().for_each(|number| master.withdraw(node, *number));
             return;
         }
-        for part in spread.parts() {
-            let pdo = spread.numbers().get(part.pdo).and_then(|number| master.producer(node, *number));
+        for part in pdo_map.parts() {
+            let pdo = pdo_map.numbers().get(part.pdo).and_then(|number| master.producer(node, *number));
             let place = pdo.and_then(|pdo| pdo.get_mut(part.at..part.at + part.len));
             if let (Some(place), Some(bytes)) = (place, row.get(part.from..part.from + part.len)) {
                 place.copy_from_slice(bytes);
             }
         }
-        for number in spread.numbers() {
+        for number in pdo_map.numbers() {
             master.commit(node, *number);
         }
     }
@@ -659,12 +659,12 @@ impl Bus for CanBus {
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().syncs;
         loop {
-            let waiting = self.outlet.take();
+            let waiting = self.transmit_queue.take();
             let next = waiting
                 .or_else(|| self.master.poll(now).map(|Output::Transmit(frame)| (frame, now)))
                 .or_else(|| self.assigner.poll(now).map(|frame| (frame, now)));
             let Some((frame, made)) = next else { break };
-            match self.outlet.send(now, *port, frame, made) {
+            match self.transmit_queue.send(now, *port, frame, made) {
                 CanSent::Sent => {}
                 CanSent::Full => break,
                 CanSent::Failed => {
@@ -686,7 +686,7 @@ impl Bus for CanBus {
         // The devices have been told, or cannot be.
         self.stopped
             && !self.master.is_running()
-            && (self.master.wake_at().is_none() && self.outlet.is_empty())
+            && (self.master.wake_at().is_none() && self.transmit_queue.is_empty())
     }
 }
 

@@ -23,7 +23,7 @@ use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::backoff::Backoff;
 use super::bus_return::BusReturn;
-use super::outlet::Outlet;
+use super::transmit_queue::TransmitQueue;
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
@@ -104,7 +104,7 @@ pub struct DevicenetBus {
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
-    outlet: Outlet,
+    transmit_queue: TransmitQueue,
     /// When the frames that wait were made.
     made_at: MonotonicTime,
     /// It is on, or tries to be.
@@ -145,7 +145,7 @@ impl DevicenetBus {
             drives,
             cycles_seen: 0,
             refused: 0,
-            outlet: Outlet::new(cycle),
+            transmit_queue: TransmitQueue::new(cycle),
             made_at: MonotonicTime::ZERO,
             started: false,
             backoff: Backoff::NONE,
@@ -331,7 +331,7 @@ impl Bus for DevicenetBus {
     }
 
     fn wake_at(&self) -> Option<MonotonicTime> {
-        self.outlet.wake_at().or_else(|| self.master.wake_at())
+        self.transmit_queue.wake_at().or_else(|| self.master.wake_at())
     }
 
     fn next_cycle(&self) -> Option<MonotonicTime> {
@@ -370,7 +370,7 @@ impl Bus for DevicenetBus {
                 Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
                 Some(CanInput::BusOff) => {
                     if self.back.lose(now) {
-                        self.outlet.clear();
+                        self.transmit_queue.clear();
                         self.master.handle_bus_off(now);
                         self.drives.iter_mut().for_each(|drive| drive.tried = true);
                     }
@@ -500,14 +500,15 @@ impl Bus for DevicenetBus {
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().cycles;
         loop {
-            if self.outlet.is_empty() && self.master.is_drained() {
+            if self.transmit_queue.is_empty() && self.master.is_drained() {
                 // What comes now is made now; all of it has the same age.
                 self.made_at = now;
             }
             let made = self.made_at;
-            let next = self.outlet.take().or_else(|| self.master.poll(now).map(|frame| (frame, made)));
+            let next =
+                self.transmit_queue.take().or_else(|| self.master.poll(now).map(|frame| (frame, made)));
             let Some((frame, made)) = next else { break };
-            match self.outlet.send(now, *port, frame, made) {
+            match self.transmit_queue.send(now, *port, frame, made) {
                 CanSent::Sent => {}
                 CanSent::Full => break,
                 CanSent::Failed => sent.failures += 1,
@@ -525,6 +526,6 @@ impl Bus for DevicenetBus {
 
     fn is_stopped(&self) -> bool {
         // The drives have been given back, or cannot be.
-        self.stopped && self.master.is_drained() && self.outlet.is_empty()
+        self.stopped && self.master.is_drained() && self.transmit_queue.is_empty()
     }
 }

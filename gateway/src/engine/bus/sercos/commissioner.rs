@@ -65,12 +65,12 @@ pub enum Done {
 
 /// The cycle thread's end.
 #[derive(Debug)]
-pub struct CommissionerEnd {
+pub struct CommissionerHandle {
     jobs: rtrb::Producer<Job>,
     done: rtrb::Consumer<Done>,
 }
 
-impl CommissionerEnd {
+impl CommissionerHandle {
     /// Hands a job over; `false` when there is no room, and it is dropped.
     pub fn push(&mut self, job: Job) -> bool {
         self.jobs.push(job).is_ok()
@@ -123,7 +123,7 @@ impl Commissioner {
         mapping: Mapping,
         allowed_losses: u16,
         drives: impl IntoIterator<Item = (usize, u16, SercosAxis)>,
-    ) -> (Self, CommissionerEnd) {
+    ) -> (Self, CommissionerHandle) {
         let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
         let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
         let work = |(axis, address, needs)| Work {
@@ -141,7 +141,7 @@ impl Commissioner {
         let waiting = std::collections::VecDeque::new();
         (
             Self { mapping, allowed_losses, drives, jobs, done, waiting },
-            CommissionerEnd { jobs: jobs_in, done: done_out },
+            CommissionerHandle { jobs: jobs_in, done: done_out },
         )
     }
 

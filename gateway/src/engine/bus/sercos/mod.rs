@@ -24,7 +24,7 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use self::commissioner::{CommissionerEnd, Done, Job, Run};
+use self::commissioner::{CommissionerHandle, Done, Job, Run};
 use self::commissioning::{Commissioning, StepFailure};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
@@ -157,7 +157,7 @@ pub struct SercosBus {
     /// The bus goes down because the box wants it to: that is no fault of any axis.
     planned: bool,
     /// Who commissions drives that come later.
-    commissioner: CommissionerEnd,
+    commissioner: CommissionerHandle,
     /// Room for a frame.
     buffer: Box<[u8; FRAME_MAX]>,
 }
@@ -171,7 +171,7 @@ impl SercosBus {
     pub fn new(
         config: MasterConfig,
         drives: Vec<(usize, u16, SercosAxis)>,
-        commissioner: CommissionerEnd,
+        commissioner: CommissionerHandle,
     ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
         let later: Vec<_> = config

@@ -10,14 +10,14 @@ use super::layout::{AxisPdos, FoundPdo, FoundPdos};
 
 /// The reading: what is to be asked, what is under way, what came.
 #[derive(Debug)]
-pub struct Look {
+pub struct Readback {
     pdos: AxisPdos,
     ask: VecDeque<Mux>,
     sent: VecDeque<Mux>,
     told: BTreeMap<Mux, u32>,
 }
 
-impl Look {
+impl Readback {
     /// Of the PDOs that may belong to an axis.
     pub fn new(pdos: AxisPdos) -> Self {
         let objects = |number: u16| {

@@ -19,12 +19,12 @@ struct Held {
 
 /// Hands frames to the transmit queue in their order, and keeps the one for which there is no room.
 #[derive(Debug)]
-pub(super) struct Outlet {
+pub(super) struct TransmitQueue {
     cycle_time: DurationNs,
     held: Option<Held>,
 }
 
-impl Outlet {
+impl TransmitQueue {
     /// Of a bus with this cycle: what has waited for longer than one is not sent any more.
     pub(super) const fn new(cycle_time: DurationNs) -> Self {
         Self { cycle_time, held: None }
@@ -106,21 +106,25 @@ mod tests {
     #[test]
     fn a_frame_without_room_waits_and_is_not_sent_once_it_is_old() {
         let frame = Frame::new(Id::Standard(0x205), &[6, 0]).unwrap();
-        let (mut outlet, mut queue) = (Outlet::new(DurationNs::from_millis(4)), Queue(Vec::new(), 0));
-        assert_eq!((outlet.is_empty(), outlet.wake_at(), outlet.take()), (true, None, None));
-        assert_eq!(outlet.send(us(1_000), &mut queue, frame, us(900)), CanSent::Full);
-        assert_eq!((outlet.is_empty(), outlet.wake_at()), (false, Some(us(1_200))));
+        let (mut transmit_queue, mut queue) =
+            (TransmitQueue::new(DurationNs::from_millis(4)), Queue(Vec::new(), 0));
+        assert_eq!(
+            (transmit_queue.is_empty(), transmit_queue.wake_at(), transmit_queue.take()),
+            (true, None, None)
+        );
+        assert_eq!(transmit_queue.send(us(1_000), &mut queue, frame, us(900)), CanSent::Full);
+        assert_eq!((transmit_queue.is_empty(), transmit_queue.wake_at()), (false, Some(us(1_200))));
         // It keeps the age that it had.
-        let (held, made) = outlet.take().unwrap();
-        assert_eq!((held, made, outlet.is_empty()), (frame, us(900), true));
+        let (held, made) = transmit_queue.take().unwrap();
+        assert_eq!((held, made, transmit_queue.is_empty()), (frame, us(900), true));
         queue.1 = 1;
-        assert_eq!(outlet.send(us(4_901), &mut queue, frame, us(900)), CanSent::Failed);
-        assert_eq!((queue.0.len(), outlet.is_empty()), (0, true));
-        assert_eq!(outlet.send(us(4_900), &mut queue, frame, us(900)), CanSent::Sent);
+        assert_eq!(transmit_queue.send(us(4_901), &mut queue, frame, us(900)), CanSent::Failed);
+        assert_eq!((queue.0.len(), transmit_queue.is_empty()), (0, true));
+        assert_eq!(transmit_queue.send(us(4_900), &mut queue, frame, us(900)), CanSent::Sent);
         assert_eq!(queue.0, [frame]);
         queue.1 = 0;
-        outlet.send(us(5_000), &mut queue, frame, us(5_000));
-        outlet.clear();
-        assert!(outlet.is_empty());
+        transmit_queue.send(us(5_000), &mut queue, frame, us(5_000));
+        transmit_queue.clear();
+        assert!(transmit_queue.is_empty());
     }
 }

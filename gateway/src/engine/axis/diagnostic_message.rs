@@ -1,4 +1,4 @@
-//! What the drive says in its own words of a fault or warning that has come: a number and a text for people, read over the
+//! The diagnostic message of a drive: a number and a text for people that come with a fault or warning, read over the
 //! service channel one after the other.
 
 use arrayvec::ArrayString;
@@ -17,7 +17,7 @@ const NUMBER_LEN: usize = 4;
 
 /// What a drive says.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct OwnWords {
+pub struct DiagnosticMessage {
     /// Its number of the diagnosis.
     pub number: Option<u32>,
     /// Its text; empty when it has none, or one that is too long to be read here.
@@ -32,9 +32,9 @@ pub(super) struct Reading {
     /// Place of what is read, in the order of the program.
     place: Option<usize>,
     asked: Option<(Item, MonotonicTime)>,
-    said: OwnWords,
+    said: DiagnosticMessage,
     /// What it said last; that is told once as long as something is there.
-    told: OwnWords,
+    told: DiagnosticMessage,
 }
 
 impl Reading {
@@ -46,8 +46,8 @@ impl Reading {
 impl AxisChannel {
     /// What should be read now, so that people are told what the drive says.
     #[must_use]
-    pub fn wants_own_words(&self, now: MonotonicTime) -> Option<Item> {
-        let Reading { wanted, place, asked, .. } = self.own_words;
+    pub fn wanted_diagnostic(&self, now: MonotonicTime) -> Option<Item> {
+        let Reading { wanted, place, asked, .. } = self.diagnostic_message;
         let waits = asked.is_some_and(|(_, since)| now.since(since) < ANSWER_TIME_OUT);
         if waits || (place.is_none() && !wanted) {
             return None;
@@ -56,8 +56,8 @@ impl AxisChannel {
     }
 
     /// What was wanted is on its way.
-    pub fn own_words_asked(&mut self, now: MonotonicTime, item: Item) {
-        let reading = &mut self.own_words;
+    pub fn diagnostic_requested(&mut self, now: MonotonicTime, item: Item) {
+        let reading = &mut self.diagnostic_message;
         if reading.place.is_none() {
             *reading = Reading { place: Some(0), told: reading.told, ..Reading::default() };
         }
@@ -66,11 +66,11 @@ impl AxisChannel {
 
     /// The drive has answered, or has nothing to say. Returns all that it said when that was the last of it, and the fault or
     /// warning is still there.
-    pub fn own_words_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<OwnWords> {
-        self.own_words.asked.take_if(|(asked, _)| *asked == item)?;
-        let place = self.own_words.place? + 1;
+    pub fn diagnostic_message_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<DiagnosticMessage> {
+        self.diagnostic_message.asked.take_if(|(asked, _)| *asked == item)?;
+        let place = self.diagnostic_message.place? + 1;
         let last = self.south().is_none_or(|program| place >= program.diagnosis().len());
-        let said = &mut self.own_words.said;
+        let said = &mut self.diagnostic_message.said;
         let number = data.filter(|data| place == 1 && matches!(data.len(), 2 | NUMBER_LEN));
         match (number, data) {
             (Some(data), _) => said.number = Some(little_endian(data)),
@@ -78,18 +78,18 @@ impl AxisChannel {
             (None, None) => {}
         }
         let said = *said;
-        self.own_words.place = (!last).then_some(place);
+        self.diagnostic_message.place = (!last).then_some(place);
         let there = self.shows_error() || self.shows_warning();
-        if !last || !there || said == OwnWords::default() || said == self.own_words.told {
+        if !last || !there || said == DiagnosticMessage::default() || said == self.diagnostic_message.told {
             return None;
         }
-        self.own_words.told = said;
+        self.diagnostic_message.told = said;
         Some(said)
     }
 
     /// What the drive showed is over: it will be told again when it comes again.
-    pub(super) fn end_own_words(&mut self) {
-        self.own_words.told = OwnWords::default();
+    pub(super) fn end_diagnostic_message(&mut self) {
+        self.diagnostic_message.told = DiagnosticMessage::default();
     }
 }
 

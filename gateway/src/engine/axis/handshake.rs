@@ -14,7 +14,7 @@ use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// How long a drive may take to answer.
-pub const HANDOVER_TIME_OUT: DurationNs = DurationNs::from_secs(1);
+pub const HANDSHAKE_TIME_OUT: DurationNs = DurationNs::from_secs(1);
 
 /// Where to, and how.
 type Target = (Position, Velocity, Acceleration, Acceleration);
@@ -31,14 +31,14 @@ enum Stage {
 
 /// The targets of one axis.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Handover {
+pub struct Handshake {
     stage: Stage,
     /// What stands in the telegram.
     placed: Option<Target>,
     since: MonotonicTime,
 }
 
-impl Handover {
+impl Handshake {
     /// Goes on once before each telegram. `answers` is whether the drive, which is in operation and shows a mode that takes
     /// targets over, shows its answer; `None` of any other. Returns `false` when it has taken too long for it.
     pub fn go_on(&mut self, now: MonotonicTime, answers: Option<bool>, wanted: Option<&AxisCommand>) -> bool {
@@ -61,7 +61,7 @@ impl Handover {
         if std::mem::replace(&mut self.stage, next) != next {
             self.since = now;
         }
-        self.stage == Stage::Resting || now.since(self.since) <= HANDOVER_TIME_OUT
+        self.stage == Stage::Resting || now.since(self.since) <= HANDSHAKE_TIME_OUT
     }
 
     /// Whether the bit stands.
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_target_stands_before_the_bit_and_until_the_answer_is_gone() {
-        let mut unit = Handover::default();
+        let mut unit = Handshake::default();
         let mut steps = Vec::new();
         // The drive answers two telegrams late, both ways; another target comes while the first one is handed over.
         let shown = [false, false, false, true, true, false, false, false, true, false, false];
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn an_answer_to_somebody_else_is_waited_for() {
-        let mut unit = Handover::default();
+        let mut unit = Handshake::default();
         for step in 0..5 {
             assert!(unit.go_on(AT(step), Some(true), Some(&to(1))));
             assert!(!unit.asks());
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_drive_that_does_not_answer_is_told_of_and_one_that_leaves_forgets() {
-        let mut unit = Handover::default();
+        let mut unit = Handshake::default();
         assert!(unit.go_on(AT(0), Some(false), Some(&to(1))));
         assert!(unit.go_on(AT(1), Some(false), Some(&to(1))));
         assert!(unit.go_on(AT(1_001), Some(false), Some(&to(1))));
