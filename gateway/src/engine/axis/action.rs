@@ -133,11 +133,11 @@ impl AxisChannel {
 
     pub(super) fn begin_reset(&mut self, now: MonotonicTime, system: SystemTime, id: u32) {
         self.reset = Some(Reset { id, since: now, begun: false });
-        self.go_on_with_reset(now, system);
+        self.advance_reset(now, system);
     }
 
     /// A stop under way is not interrupted: faults are reset once the axis is without torque.
-    pub(super) fn go_on_with_reset(&mut self, now: MonotonicTime, system: SystemTime) {
+    pub(super) fn advance_reset(&mut self, now: MonotonicTime, system: SystemTime) {
         if self.reset.is_some() {
             self.end_hold(now, system);
         }

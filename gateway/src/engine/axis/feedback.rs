@@ -101,7 +101,7 @@ impl AxisChannel {
         let report = self.feedback.report;
         let moved = self.may_move();
         self.report(now, system, report);
-        self.go_on_with_procedure(now);
+        self.advance_procedure(now);
         self.judge_position(now, system, sampled);
         self.watch(system);
         self.watch_software_limits(system, moved);
@@ -109,7 +109,7 @@ impl AxisChannel {
     }
 
     /// Begins, carries on with or ends the procedure that the chosen mode stands for.
-    fn go_on_with_procedure(&mut self, now: MonotonicTime) {
+    fn advance_procedure(&mut self, now: MonotonicTime) {
         let zero_speed = self.stop_settings.times.zero_speed.get().unsigned_abs();
         let around = Surroundings {
             now,
@@ -193,8 +193,8 @@ impl AxisChannel {
         }
         // Nothing but how often its words are read depends on it.
         self.cause_wanted.take_if(|since| now.since(*since) > CAUSE_TIME_OUT);
-        self.go_on_with_sequence(now, system);
-        self.go_on_with_reset(now, system);
+        self.advance_sequence(now, system);
+        self.advance_reset(now, system);
         self.feedback.state = self.state();
         self.feedback.inhibits = self.drive.machine.conditions().inhibits;
         self.feedback.fault = self.fault;

@@ -41,7 +41,12 @@ pub struct Handshake {
 impl Handshake {
     /// Goes on once before each telegram. `answers` is whether the drive, which is in operation and shows a mode that takes
     /// targets over, shows its answer; `None` of any other. Returns `false` when it has taken too long for it.
-    pub fn go_on(&mut self, now: MonotonicTime, answers: Option<bool>, wanted: Option<&AxisCommand>) -> bool {
+    pub fn advance(
+        &mut self,
+        now: MonotonicTime,
+        answers: Option<bool>,
+        wanted: Option<&AxisCommand>,
+    ) -> bool {
         let (Some(answers), Some(wanted)) = (answers, wanted) else {
             *self = Self::default();
             return true;
@@ -65,7 +70,7 @@ impl Handshake {
     }
 
     /// Whether the bit stands.
-    pub fn asks(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         self.stage == Stage::Asked
     }
 
@@ -111,8 +116,12 @@ mod tests {
         let shown = [false, false, false, true, true, false, false, false, true, false, false];
         for (step, answers) in (0_i64..).zip(shown) {
             let wanted = to(if step < 3 { 7 } else { 9 });
-            assert!(unit.go_on(AT(step), Some(answers), Some(&wanted)));
-            steps.push((unit.asks(), unit.apply(&wanted).target_position.get(), unit.is_done(&wanted)));
+            assert!(unit.advance(AT(step), Some(answers), Some(&wanted)));
+            steps.push((
+                unit.is_requested(),
+                unit.apply(&wanted).target_position.get(),
+                unit.is_done(&wanted),
+            ));
         }
         let expected = [
             (false, 7, false),
@@ -134,23 +143,23 @@ mod tests {
     fn an_answer_to_somebody_else_is_waited_for() {
         let mut unit = Handshake::default();
         for step in 0..5 {
-            assert!(unit.go_on(AT(step), Some(true), Some(&to(1))));
-            assert!(!unit.asks());
+            assert!(unit.advance(AT(step), Some(true), Some(&to(1))));
+            assert!(!unit.is_requested());
         }
-        unit.go_on(AT(5), Some(false), Some(&to(1)));
-        assert!(unit.asks());
+        unit.advance(AT(5), Some(false), Some(&to(1)));
+        assert!(unit.is_requested());
     }
 
     #[test]
     fn a_drive_that_does_not_answer_is_told_of_and_one_that_leaves_forgets() {
         let mut unit = Handshake::default();
-        assert!(unit.go_on(AT(0), Some(false), Some(&to(1))));
-        assert!(unit.go_on(AT(1), Some(false), Some(&to(1))));
-        assert!(unit.go_on(AT(1_001), Some(false), Some(&to(1))));
-        assert!(!unit.go_on(AT(1_002), Some(false), Some(&to(1))));
-        assert!(unit.go_on(AT(1_003), None, Some(&to(1))));
-        assert!(!unit.asks() && !unit.is_done(&to(1)));
-        assert!(unit.go_on(AT(1_004), Some(false), None), "nothing is wanted");
+        assert!(unit.advance(AT(0), Some(false), Some(&to(1))));
+        assert!(unit.advance(AT(1), Some(false), Some(&to(1))));
+        assert!(unit.advance(AT(1_001), Some(false), Some(&to(1))));
+        assert!(!unit.advance(AT(1_002), Some(false), Some(&to(1))));
+        assert!(unit.advance(AT(1_003), None, Some(&to(1))));
+        assert!(!unit.is_requested() && !unit.is_done(&to(1)));
+        assert!(unit.advance(AT(1_004), Some(false), None), "nothing is wanted");
         assert_eq!(unit.apply(&to(3)), to(3));
     }
 }

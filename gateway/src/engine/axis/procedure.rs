@@ -159,7 +159,7 @@ impl ProcedureUnit {
                 }
             }
             Stage::Cancel(..) => {}
-            Stage::Enter | Stage::Run { .. } | Stage::Leave(..) => self.go_on_by_mode(same, around),
+            Stage::Enter | Stage::Run { .. } | Stage::Leave(..) => self.advance_mode(same, around),
             Stage::Clear(at) | Stage::Start(at) | Stage::Process(at) | Stage::Stand(at) => {
                 match (same, self.stage) {
                     (None, _) => self.end(at, End::Dropped),
@@ -185,7 +185,7 @@ impl ProcedureUnit {
     }
 
     /// A procedure that is a mode of its own.
-    fn go_on_by_mode(&mut self, wanted: Option<&Procedure>, around: &Surroundings) {
+    fn advance_mode(&mut self, wanted: Option<&Procedure>, around: &Surroundings) {
         let mode = wanted.and_then(|procedure| match &procedure.by {
             ProcedureBy::Mode(mode) => Some(mode),
             ProcedureBy::Commands(_) => None,
@@ -237,7 +237,7 @@ impl ProcedureUnit {
     }
 
     /// Whether the drive is asked to carry the procedure out.
-    pub fn asks(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         matches!(self.stage, Stage::Run { .. })
     }
 

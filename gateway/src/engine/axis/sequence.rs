@@ -104,7 +104,7 @@ impl AxisChannel {
     }
 
     /// Time passes in a start or stop.
-    pub(super) fn go_on_with_sequence(&mut self, now: MonotonicTime, system: SystemTime) {
+    pub(super) fn advance_sequence(&mut self, now: MonotonicTime, system: SystemTime) {
         let late = now.since(self.sequencer.since()) > START_TIME_OUT;
         if self.sequencer.step() == SequenceStep::Energizing && self.state() == DriveState::Operating && late
         {

@@ -230,7 +230,7 @@ impl AxisChannel {
         let order = Order {
             action,
             told: self.procedure.told(),
-            asks: self.procedure.asks() || self.handshake.asks(),
+            asks: self.procedure.is_requested() || self.handshake.is_requested(),
         };
         let command = self.handshake.apply(&self.command);
         let control = program.encode(&command, order, self.control, self.status, telegram, &mut conversions);
@@ -258,7 +258,7 @@ impl AxisChannel {
             .and_then(|program| program.handshake(selection))
             .map(|handshake| handshake.taken.matches(self.status));
         let wanted = self.command.present.contains(CommandSet::TARGET_POSITION) && self.sequence.is_some();
-        if !self.handshake.go_on(now, answers, wanted.then_some(&self.command)) {
+        if !self.handshake.advance(now, answers, wanted.then_some(&self.command)) {
             // It goes on to the target of before, or nowhere.
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
         }

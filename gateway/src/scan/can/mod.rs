@@ -155,7 +155,7 @@ impl Probe {
     }
 
     /// Takes what has come; `true` when everything is asked.
-    fn go_on(&mut self, now: MonotonicTime) -> bool {
+    fn advance(&mut self, now: MonotonicTime) -> bool {
         let Some(outcome) = self.client.take_outcome() else { return false };
         let object = outcome.object;
         let data = outcome.result.map(|()| outcome.data.as_slice().to_vec());
@@ -256,7 +256,7 @@ impl Scanner {
         self.send(now, port);
         let Self { probes, found, .. } = self;
         probes.retain_mut(|probe| {
-            let done = probe.go_on(now);
+            let done = probe.advance(now);
             if done && !probe.found.answers.is_empty() {
                 found.push(probe.found.clone());
             }

@@ -185,7 +185,7 @@ fn check_list(
     fits
 }
 
-pub(super) fn go_on(
+pub(super) fn advance(
     step: &Step,
     run: &mut Run,
     cx: &mut Context<'_>,

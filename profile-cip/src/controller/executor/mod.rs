@@ -146,7 +146,7 @@ impl Node {
             Progress::Running(run) => *run,
             _ => leaf::start(&self.step, cx)?,
         };
-        let finished = leaf::go_on(&self.step, &mut run, cx, self.time_out)?;
+        let finished = leaf::advance(&self.step, &mut run, cx, self.time_out)?;
         self.progress = Progress::Running(run);
         Ok(finished)
     }

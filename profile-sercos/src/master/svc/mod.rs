@@ -284,7 +284,7 @@ impl ServiceChannel {
             Answer::Through(info) => {
                 self.missing_cycles = 0;
                 self.busy_since = None;
-                self.go_on(now, info);
+                self.advance(now, info);
             }
             Answer::Busy => {
                 self.missing_cycles = 0;
@@ -373,7 +373,7 @@ impl ServiceChannel {
     }
 
     /// The channel is through with the last step: take its answer and put the next step on the wire.
-    fn go_on(&mut self, now: MonotonicTime, mut info: Result<u32, SvcError>) {
+    fn advance(&mut self, now: MonotonicTime, mut info: Result<u32, SvcError>) {
         let timeout = self.limits.command_timeout;
         while let Some((index, transfer, on_wire)) = &mut self.active {
             let data = &mut self.slots[*index].request.data;

@@ -409,7 +409,7 @@ impl MotionDrive {
         if self.mode != TORQUE_MODE || self.state != RUNNING {
             self.torque = 100.0 * self.acceleration / settings.acceleration.max(1e-9);
         }
-        self.go_on(settings);
+        self.step(settings);
     }
 
     fn ramp(&mut self, goal: f64, step: f64) {
@@ -418,7 +418,7 @@ impl MotionDrive {
     }
 
     /// The transitions that time brings.
-    fn go_on(&mut self, settings: &Settings) {
+    fn step(&mut self, settings: &Settings) {
         let passed_ms = (self.now_us - self.since_us) / 1000;
         match self.state {
             PRE_CHARGE if passed_ms >= u64::from(settings.precharge_ms) => {

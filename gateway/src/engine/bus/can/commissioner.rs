@@ -319,7 +319,7 @@ impl Work {
             Ok(steps) => {
                 self.at = Some((place, Task::Plan(plan)));
                 self.steps = steps.into();
-                self.go_on(context);
+                self.advance(context);
             }
             Err(error) => self.fail(place, error.into(), context),
         }
@@ -345,7 +345,7 @@ impl Work {
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.
-    fn go_on(&mut self, context: &mut Context) {
+    fn advance(&mut self, context: &mut Context) {
         if let Some((_, Task::Readback(readback))) = &mut self.at {
             while readback.under_way() < WINDOW
                 && let Some(object) = readback.next()
@@ -381,7 +381,7 @@ impl Work {
             Task::Plan(Plan::Ask) => return self.learn_modes(place, context),
             Task::Plan(_) if self.axes[place].pdos.kept || self.falls_back => {
                 self.at = Some((place, Task::Readback(Readback::new(self.axes[place].pdos))));
-                return self.go_on(context);
+                return self.advance(context);
             }
             Task::Plan(_) => None,
             Task::Readback(readback) => Some(readback.found()),
@@ -498,7 +498,7 @@ impl Work {
         if let Some((place, Task::Readback(readback))) = &mut self.at {
             let place = *place;
             return match readback.handle(outcome) {
-                Ok(()) => self.go_on(context),
+                Ok(()) => self.advance(context),
                 Err((object, failure)) => {
                     let object = Object { index: object.index, sub: object.sub };
                     self.break_off(place, StepFailure { what: "reading", object, failure }, context);
@@ -536,7 +536,7 @@ impl Work {
                 self.passed_over.push(failure);
             }
         }
-        self.go_on(context);
+        self.advance(context);
     }
 }
 

@@ -170,7 +170,7 @@ impl Commissioner {
                 }
                 Job::Spent(_) | Job::Unused(_) => {}
             }
-            self.go_on();
+            self.advance();
         }
         while let Some(done) = self.waiting.pop_front() {
             if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
@@ -198,7 +198,7 @@ impl Commissioner {
     }
 
     /// The next request of each plan, and what follows from those that are through.
-    fn go_on(&mut self) {
+    fn advance(&mut self) {
         let Self { mapping, drives, waiting, allowed_losses, .. } = self;
         for work in drives {
             let (run, Some(plan)) = (work.run, &mut work.plan) else { continue };

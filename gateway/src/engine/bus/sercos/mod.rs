@@ -719,7 +719,7 @@ impl Bus for SercosBus {
             return None;
         }
         let [_, feedback] = drive.connections;
-        let consumer = self.master.consumer(drive.there()?, feedback)?;
+        let consumer = self.master.consumer(drive.present_slave()?, feedback)?;
         // Without the ATs of this cycle what is there is that of the last one.
         Some(Received {
             data: consumer.data,
@@ -731,7 +731,7 @@ impl Bus for SercosBus {
 
     fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool) {
         let drive = self.drive_of(axis);
-        let there = drive.and_then(|drive| Some((drive.there()?, drive.connections)));
+        let there = drive.and_then(|drive| Some((drive.present_slave()?, drive.connections)));
         let Some((slave, [command, _])) = there else {
             fill(None);
             return;
@@ -747,7 +747,7 @@ impl Bus for SercosBus {
         let Some(request) = request(access) else { return false };
         let Some(place) = self.places.of(axis) else { return false };
         let drive = &mut self.drives[place];
-        let Some(slave) = drive.there().filter(|_| !drive.accesses.is_full()) else { return false };
+        let Some(slave) = drive.present_slave().filter(|_| !drive.accesses.is_full()) else { return false };
         match self.master.svc_submit(slave, request) {
             Ok(ticket) => {
                 drive.accesses.push((ticket, purpose));
@@ -909,7 +909,7 @@ impl Drive {
     }
 
     /// Its slave, where it takes part or is on the way up.
-    fn there(&self) -> Option<SlaveId> {
+    fn present_slave(&self) -> Option<SlaveId> {
         self.slave.filter(|_| !matches!(self.stage, Stage::Joining { .. }))
     }
 
