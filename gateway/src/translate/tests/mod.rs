@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::mapping::Mapping;
 
 fn translator() -> Translator {
-    let config = Config::parse(include_str!("../cli/demo/two-axes.toml"), "demo.toml").unwrap();
+    let config = Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
     Translator::new(Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap())
 }
 
@@ -128,7 +128,7 @@ fn what_cannot_be_translated_says_why() {
 /// A drive whose scaling is another one than that of the simulated drive.
 #[test]
 fn the_values_of_the_machine_count() {
-    let config = Config::parse(include_str!("../cli/demo/two-axes.toml"), "demo.toml").unwrap();
+    let config = Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
     let stage = || Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap();
     assert_eq!(stage().stand_ins().collect::<Vec<_>>(), ["drive-a", "drive-b"]);
     // Rotational position in its own resolution: 3600 counts in a turn.

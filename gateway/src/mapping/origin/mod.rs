@@ -191,7 +191,7 @@ mod tests {
         let mapping = Mapping::embedded().unwrap();
         let origin = mapping.signal_row(Signal::PositionCommand).unwrap();
         assert_eq!((origin.file.as_str(), origin.section), ("generic-sercos.toml", "signal"));
-        let text = include_str!("../../../mappings/generic-sercos.toml");
+        let text = include_str!("../../../../mappings/generic-sercos.toml");
         assert_eq!(text.lines().nth(origin.line - 1), Some("signal = \"position_command\""));
         let origin = mapping.cyclic_row(Signal::PositionActual).unwrap();
         assert_eq!(origin.key, "Actual Position");

@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn the_drives_of_the_demonstration_are_commissioned() {
-        let config = Config::parse(include_str!("../cli/demo/two-axes.toml"), "demo.toml").unwrap();
+        let config = Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
         let stage = Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap();
         let seen: Vec<_> =
             stage.axes.iter().filter_map(|axis| Some((axis.instance, axis.sercos()?))).collect();
