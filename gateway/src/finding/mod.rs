@@ -189,6 +189,11 @@ impl Findings {
         self.list.truncate(FINDINGS_MAX);
     }
 
+    /// Forgets those that are not to be kept.
+    pub(crate) fn retain(&mut self, keep: impl Fn(&Finding) -> bool) {
+        self.list.retain(keep);
+    }
+
     /// All of them.
     #[must_use]
     pub fn list(&self) -> &[Finding] {

@@ -62,9 +62,8 @@ pub(super) fn run(mapping: &Mapping, tables: &Tables, findings: &mut Findings) -
     runner.cia402(mapping);
     // What holds for all drives has to hold for those of a family as well, where it says nothing else. It is one example then.
     for family in mapping.families() {
-        let before = runner.count;
-        let own = runner.cia402(&family.mapping);
-        runner.count = before + own;
+        let count = runner.count;
+        runner.count = count + runner.cia402(&family.mapping);
     }
     runner.count
 }

@@ -305,12 +305,14 @@ impl TableTexts {
         ]
     }
 
-    /// Parses all files and lays over them what is to be laid over them; families of drives have tables of their own. `None` with errors: every file that is no TOML,
+    /// Parses all files and lays over them what is to be laid over them; families of drives have tables of their own.
+    /// `None` with errors: every file that is no TOML,
     /// or has unknown, missing or mistyped keys, with the place.
     pub(super) fn parse(&self, findings: &mut Findings) -> Option<(Tables, Vec<ParsedFamily>)> {
-        let mut all = overlay::layers(&self.families, findings);
-        all.extend(overlay::layers(&self.overlays, findings));
-        let layers: Vec<_> = all.iter().filter(|layer| layer.is_general()).collect();
+        let (shipped, own) =
+            (overlay::layers(&self.families, findings), overlay::layers(&self.overlays, findings));
+        let (layers, of_families): (Vec<_>, Vec<_>) = own.iter().partition(|layer| layer.is_general());
+        let of_families: Vec<_> = shipped.iter().chain(of_families).collect();
         let generic = rows::parse(&self.generic, "generic", &layers, findings);
         let cip_attributes = rows::parse(&self.cip_attributes, "cip-attributes", &layers, findings);
         let cip_enumerations = rows::parse(&self.cip_enumerations, "cip-enumerations", &layers, findings);
@@ -331,7 +333,7 @@ impl TableTexts {
         if findings.has_errors() {
             return None;
         }
-        let families = overlay::parse_families(&self.generic_cia402, &all, findings);
+        let families = overlay::parse_families(&self.generic_cia402, &layers, &of_families, findings);
         let tables = Tables {
             generic: generic?,
             cip_attributes: cip_attributes?,

@@ -272,6 +272,12 @@ impl Cia402Tables {
         }
     }
 
+    /// Whether bit 4 of a drive of which the configuration says nothing tells that there is power.
+    #[cfg(test)]
+    pub(super) fn drive_tells_voltage(&self) -> bool {
+        self.drive.tells.voltage
+    }
+
     /// The operating modes that a controller can lead drives in.
     pub fn modes(&self) -> impl Iterator<Item = ModeSelection> + '_ {
         let first =

@@ -1,7 +1,9 @@
 //! Settings of families of CiA 402 drives: overlays whose rows count for drives with a certain identity.
 
+use std::collections::BTreeSet;
+
 use super::{DrivesHead, Layer, OF_FAMILIES};
-use crate::finding::Findings;
+use crate::finding::{Findings, registry as code};
 use crate::mapping::format::GenericCia402File;
 use crate::mapping::load::{Parsed, TableText};
 use crate::mapping::rows;
@@ -29,59 +31,64 @@ pub(in crate::mapping) struct ParsedFamily {
     pub table: Parsed<GenericCia402File>,
 }
 
-/// The tables of all families that the layers are for. A drive whose product code is named has the rows of that and those that
-/// all drives of its vendor have.
+/// The tables of all families that overlays are for, with their rows over those for all drives. A drive whose product code is
+/// named has the rows of that and those that all drives of its vendor have.
 pub(in crate::mapping) fn parse(
     table: &TableText,
-    layers: &[Layer<'_>],
+    general: &[&Layer<'_>],
+    of_families: &[&Layer<'_>],
     findings: &mut Findings,
 ) -> Vec<ParsedFamily> {
-    let heads = || layers.iter().filter_map(|layer| layer.drives.as_ref());
-    let mut vendors: Vec<u32> = heads().map(|head| head.vendor_id).collect();
-    vendors.sort_unstable();
-    vendors.dedup();
     let mut families = Vec::new();
-    for vendor in vendors {
-        let of_vendor = heads().filter(|head| head.vendor_id == vendor);
-        let mut products: Vec<_> =
-            of_vendor.flat_map(|head| &head.product_codes).map(|code| Some(*code)).collect();
-        products.sort_unstable();
-        products.dedup();
-        // Which layers each product has; products with the same ones are one family.
-        let mut groups: Vec<(Vec<usize>, Vec<u32>)> = Vec::new();
-        for product in products.into_iter().chain([None]) {
-            let own: Vec<usize> =
-                (0..layers.len()).filter(|at| includes(&layers[*at], vendor, product)).collect();
-            match groups.iter_mut().find(|(known, _)| *known == own) {
-                Some((_, codes)) => codes.extend(product),
-                None => groups.push((own, product.into_iter().collect())),
-            }
+    for (vendor, products, own) in groups(of_families) {
+        let names: Vec<_> = own.iter().map(|layer| layer.name.as_str()).collect();
+        let layers: Vec<_> = general.iter().copied().chain(own.iter().copied()).collect();
+        let mut found = Findings::default();
+        let parsed = rows::parse(table, OF_FAMILIES, &layers, &mut found);
+        if general.iter().any(|layer| layer.touches(OF_FAMILIES)) {
+            // A family says nothing wrong where all drives are what it says already.
+            let said = [code::OVERLAY_NO_EFFECT, code::OVERLAY_REMOVES_NOTHING];
+            found.retain(|finding| !said.contains(&finding.code));
         }
-        for (own, products) in groups {
-            let names: Vec<_> = own
-                .iter()
-                .filter(|at| !layers[**at].is_general())
-                .map(|at| layers[*at].name.as_str())
-                .collect();
-            if names.is_empty() {
-                continue;
-            }
-            let own: Vec<_> = own.iter().map(|at| &layers[*at]).collect();
-            let parsed = rows::parse(table, OF_FAMILIES, &own, findings);
-            families.extend(parsed.map(|table| ParsedFamily {
-                name: names.join(", "),
-                vendor,
-                products,
-                table,
-            }));
-        }
+        findings.extend(found);
+        let name = names.join(", ");
+        families.extend(parsed.map(|table| ParsedFamily { name, vendor, products, table }));
     }
     families
 }
 
+/// A family: vendor-ID, product codes, and the layers that count for it.
+type Group<'l, 't> = (u32, Vec<u32>, Vec<&'l Layer<'t>>);
+
+/// Which layers count for each product of each vendor; products with the same ones are one family.
+fn groups<'l, 't>(layers: &[&'l Layer<'t>]) -> Vec<Group<'l, 't>> {
+    let heads = || layers.iter().filter_map(|layer| layer.drives.as_ref());
+    let vendors: BTreeSet<u32> = heads().map(|head| head.vendor_id).collect();
+    let mut groups: Vec<Group<'l, 't>> = Vec::new();
+    for vendor in vendors {
+        let of_vendor = heads().filter(|head| head.vendor_id == vendor);
+        let products: BTreeSet<u32> = of_vendor.flat_map(|head| &head.product_codes).copied().collect();
+        for product in products.into_iter().map(Some).chain([None]) {
+            let own: Vec<_> =
+                layers.iter().copied().filter(|layer| includes(layer, vendor, product)).collect();
+            let same = |(known, _, layers): &&mut Group<'_, '_>| {
+                *known == vendor
+                    && layers.len() == own.len()
+                    && layers.iter().zip(&own).all(|(a, b)| std::ptr::eq(*a, *b))
+            };
+            match groups.iter_mut().find(same) {
+                Some((_, codes, _)) => codes.extend(product),
+                None if own.is_empty() => {}
+                None => groups.push((vendor, product.into_iter().collect(), own)),
+            }
+        }
+    }
+    groups
+}
+
 /// Whether a layer counts for drives with this identity; `None` is a product code that nothing names.
 fn includes(layer: &Layer<'_>, vendor: u32, product: Option<u32>) -> bool {
-    layer.drives.as_ref().is_none_or(|DrivesHead { vendor_id, product_codes, .. }| {
+    layer.drives.as_ref().is_some_and(|DrivesHead { vendor_id, product_codes, .. }| {
         *vendor_id == vendor
             && (product_codes.is_empty() || product.is_some_and(|code| product_codes.contains(&code)))
     })

@@ -196,6 +196,29 @@ fn an_overlay_can_be_for_some_drives_only() {
     );
 }
 
+/// What a machine says of all drives may be what a family says already, or leave nothing for it to take away.
+#[test]
+fn a_family_counts_over_what_is_said_of_all_drives_and_does_not_complain_of_it() {
+    let all = "format = 1\noverlay = \"all\"\n[generic-cia402.drive]\nvoltage_bit = \"dc-link\"\n\
+               [[generic-cia402.scaling]]\nunit = \"velocity\"\n\
+               methods = [{ name = \"position per second by the velocity factor\", remove = true }]\n\
+               examples = []\n";
+    let family = "format = 1\noverlay = \"own\"\ndrives = { vendor_id = 7, source = \"manual\" }\n\
+                  [generic-cia402.drive]\nvoltage_bit = \"ignore\"\n\
+                  [[generic-cia402.scaling]]\nunit = \"velocity\"\n\
+                  methods = [{ name = \"position per second by the velocity factor\", remove = true }]\n";
+    for overlays in [[all, family], [family, all]] {
+        let (mapping, findings) = over(&overlays.map(str::to_owned));
+        assert!(findings.is_empty(), "{findings}");
+        let mapping = mapping.unwrap();
+        let voltage = |vendor| {
+            let facts = drive(vendor, 1, &FACTOR);
+            mapping.of_drive(&facts).cia402.drive_tells_voltage()
+        };
+        assert_eq!([voltage(6), voltage(7), voltage(0x6A)], [true, false, true]);
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_family_is_found_in_its_file() {
     let head = "format = 1\noverlay = \"own\"\ndrives = { vendor_id = 7, source = \"manual\" }\n";
