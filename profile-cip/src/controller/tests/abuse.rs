@@ -1,6 +1,6 @@
 //! Each misbehaviour, and the standard fault that the device answers it with.
 
-use super::against_target::{Pair, configured};
+use super::against_device::{Pair, configured};
 use super::features::{expect, state};
 use crate::controller::condition::{Condition, FaultPattern};
 use crate::controller::{AxisSet, ControllerConfig, Limits, Misbehaviour, Report, Step};

@@ -1,6 +1,6 @@
 //! Every kind of step against the device role of this crate.
 
-use super::against_target::{Pair, assert_good, configured, drive_fault};
+use super::against_device::{Pair, assert_good, configured, drive_fault};
 use super::rig::COUNTS_PER_UNIT;
 use crate::controller::condition::{AlarmPattern, Condition, FaultPattern, Number, ValueCheck};
 use crate::controller::limits::AxisLimits;

@@ -1,6 +1,6 @@
 //! The fixed connection format against the device role of this crate: one axis, 18 bytes each way, services beside it.
 
-use super::against_target::{Pair, configured, drive_fault};
+use super::against_device::{Pair, configured, drive_fault};
 use super::features::{expect, state};
 use super::rig::COUNTS_PER_UNIT;
 use crate::controller::condition::{AlarmPattern, Condition, FaultPattern, Number, ValueCheck};

@@ -1,7 +1,7 @@
 //! Whole runs of the controller in virtual time.
 
 mod abuse;
-mod against_target;
+mod against_device;
 mod failures;
 mod features;
 mod fixed;
