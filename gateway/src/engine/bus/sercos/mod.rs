@@ -24,14 +24,15 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use self::commissioner::{CommissionerHandle, Done, Job, Run};
-use self::commissioning::{Commissioning, StepFailure};
+use self::commissioner::{DriveWork, Made, Order, Progress as SetupProgress, Setup};
+use super::accesses::Accesses;
+use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
-use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError, Step};
+use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -71,7 +72,7 @@ enum Stage {
     /// Not found, failed, or lost.
     Absent,
     /// Working through the plan of CP2 or CP3.
-    Commissioning(Box<Commissioning>),
+    Commissioning,
     /// On its way in by hot plug, commissioned beside the cycle.
     Joining {
         /// The request that is under way.
@@ -86,24 +87,16 @@ enum Stage {
 struct Drive {
     /// Number of the axis.
     axis: usize,
-    address: u16,
-    needs: SercosAxis,
-    /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
-    allowed_losses: u16,
+    setup: Setup<Ticket>,
     slave: Option<SlaveId>,
     /// Numbers of its two connections, to it and from it.
     connections: [u8; 2],
     stage: Stage,
-    facts: DriveFacts,
-    /// It was refused for what it is: trying again does not help, and no command is executed in it.
-    unfit: bool,
     /// It may come later: nothing is missing without it.
     hot_plug: bool,
     /// How often it has come by hot plug.
     runs: u32,
-    /// Steps that it did not take and need not, until they are told.
-    passed_over: Vec<StepFailure>,
-    accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
+    accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
 /// What is said of a phase before CP4 that takes long.
@@ -157,7 +150,7 @@ pub struct SercosBus {
     /// The bus goes down because the box wants it to: that is no fault of any axis.
     planned: bool,
     /// Who commissions drives that come later.
-    commissioner: CommissionerHandle,
+    commissioner: CommissionerHandle<DriveWork>,
     /// Room for a frame.
     buffer: Box<[u8; FRAME_MAX]>,
 }
@@ -171,7 +164,7 @@ impl SercosBus {
     pub fn new(
         config: MasterConfig,
         drives: Vec<(usize, u16, SercosAxis)>,
-        commissioner: CommissionerHandle,
+        commissioner: CommissionerHandle<DriveWork>,
     ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
         let later: Vec<_> = config
@@ -184,18 +177,13 @@ impl SercosBus {
         master.set_target_phase(Phase::CP4);
         let drive = |(axis, address, needs)| Drive {
             axis,
-            address,
-            needs,
-            allowed_losses,
+            setup: Setup::new(axis, address, needs, allowed_losses),
             slave: None,
             connections: [COMMAND_CONNECTION, FEEDBACK_CONNECTION],
             stage: Stage::Absent,
-            facts: DriveFacts::new(),
-            unfit: false,
             hot_plug: later.contains(&address),
             runs: 0,
-            passed_over: Vec::new(),
-            accesses: ArrayVec::new(),
+            accesses: Accesses::new(),
         };
         let drives: Vec<_> = drives.into_iter().map(drive).collect();
         Ok(Self {
@@ -227,7 +215,7 @@ impl SercosBus {
     /// What the drive of an axis is needed for, and what it has told of itself.
     #[must_use]
     pub fn drive(&self, axis: usize) -> Option<(&SercosAxis, &DriveFacts)> {
-        self.drive_of(axis).map(|drive| (&drive.needs, &drive.facts))
+        self.drive_of(axis).map(|drive| (&drive.setup.needs, &drive.setup.facts))
     }
 
     fn drive_of(&self, axis: usize) -> Option<&Drive> {
@@ -272,7 +260,7 @@ impl SercosBus {
             Event::AwaitingApplication { phase } => {
                 self.exclude_refused();
                 for drive in self.drives.iter_mut().filter(|drive| drive.slave.is_some()) {
-                    drive.plan(mapping, phase.0, notice);
+                    drive.plan(mapping, *phase, notice);
                 }
             }
             Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
@@ -296,7 +284,7 @@ impl SercosBus {
                 self.planned = false;
                 self.retry_pause = RETRY_PAUSE;
                 let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
-                fit.for_each(|drive| drive.unfit = false);
+                fit.for_each(|drive| drive.setup.unfit = false);
                 if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
                     self.rescan_pause = RESCAN_PAUSE;
                 } else if self.rescan_pause > RESCAN_PAUSE {
@@ -308,7 +296,7 @@ impl SercosBus {
                 // One that comes back by hot plug needs no new scan.
                 let facts = self.master.slave(*slave).map(|info| info.facts);
                 let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
-                let configured = |drive: &Drive| drive.address == *address && drive.hot_plug;
+                let configured = |drive: &Drive| drive.setup.address == *address && drive.hot_plug;
                 if !has_class && !self.drives.iter().any(configured) {
                     self.lost_since.get_or_insert(now);
                 }
@@ -322,8 +310,8 @@ impl SercosBus {
                 if self.may_be_bare(*slave, *idn) =>
             {
                 for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(*slave)) {
-                    drive.needs.bare = true;
-                    notice(Notice::Bare { axis: index(drive.axis), address: drive.address });
+                    drive.setup.needs.bare = true;
+                    notice(Notice::Bare { axis: index(drive.axis), address: drive.setup.address });
                 }
                 self.refuse(now, system, *slave, axes);
             }
@@ -355,7 +343,7 @@ impl SercosBus {
     /// Whether a slave has refused a configuration list that can do with less.
     fn may_be_bare(&self, slave: SlaveId, idn: Idn) -> bool {
         let list = |instance| idn == Idn::connection(instance, CONFIGURATION_LIST);
-        let full = |drive: &Drive| drive.slave == Some(slave) && !drive.needs.bare;
+        let full = |drive: &Drive| drive.slave == Some(slave) && !drive.setup.needs.bare;
         [COMMAND_CONNECTION, FEEDBACK_CONNECTION].into_iter().any(list) && self.drives.iter().any(full)
     }
 
@@ -400,76 +388,62 @@ impl SercosBus {
     /// Starts the commissioning of a drive in CP2.
     fn begin(&mut self, place: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
         let drive = &mut self.drives[place];
-        let found = self.master.slave_by_address(drive.address);
+        let found = self.master.slave_by_address(drive.setup.address);
         drive.slave = found.filter(|slave| !self.refused.contains(slave));
-        drive.facts = DriveFacts::new();
-        drive.facts.note_fixed_connections(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
-        drive.passed_over.clear();
+        drive.setup.restart(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
         let other = drive.slave.and_then(|slave| self.master.slave(slave)?.facts.fsp_type).and_then(no_drive);
         if let (Some(what), Some(slave)) = (other, drive.slave) {
             let error = SercosError::Profile(what);
-            notice(Notice::Program { axis: index(drive.axis), address: drive.address, error });
+            notice(Notice::Program { axis: index(drive.axis), address: drive.setup.address, error });
             drive.lose();
             let _ = self.refused.try_push(slave);
             let _ = self.master.exclude(slave);
         } else if drive.slave.is_some() {
-            drive.plan(mapping, Phase::CP2.0, notice);
+            drive.plan(mapping, Phase::CP2, notice);
         } else {
             drive.stage = Stage::Absent;
             // One that was refused has been told with the reason.
             if !drive.hot_plug && found.is_none() {
-                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.address });
+                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.setup.address });
             }
         }
     }
 
     fn commission(&mut self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
-        let Some(phase) = self.master.state().awaits() else { return };
+        if self.master.state().awaits().is_none() {
+            return;
+        }
+        let Self { master, drives, refused, .. } = self;
         let mut busy = false;
-        for drive in &mut self.drives {
-            let axis = drive.axis;
-            let (Stage::Commissioning(work), Some(slave)) = (&mut drive.stage, drive.slave) else { continue };
-            work.poll(&mut self.master, slave);
-            if !work.is_done() {
-                busy = true;
-                continue;
-            }
-            let (failure, more) = (work.failure(), work.wants_more());
-            drive.passed_over.append(&mut work.take_passed_over());
-            if more {
-                drive.plan(mapping, phase.0, notice);
-                if matches!(drive.stage, Stage::Commissioning(_)) {
-                    busy = true;
-                } else {
-                    let _ = self.refused.try_push(slave);
-                    let _ = self.master.exclude(slave);
-                }
-                continue;
-            }
+        for drive in drives {
+            let (Stage::Commissioning, Some(slave)) = (&drive.stage, drive.slave) else { continue };
+            let mut submit = |request| master.svc_submit(slave, request).ok();
+            let Some(progress) = drive.setup.poll(mapping, &mut submit, notice) else { continue };
             drive.stage = Stage::Ready;
-            let last = failure.is_some() || phase != Phase::CP2;
-            if last && !drive.passed_over.is_empty() {
-                let failures = std::mem::take(&mut drive.passed_over);
-                notice(Notice::PassedOver { axis: index(axis), failures });
-            }
-            let taken = match failure {
-                Some(failure) => {
-                    notice(Notice::Commissioning { axis: index(axis), address: drive.address, failure });
-                    false
+            let taken = match progress {
+                SetupProgress::Busy => {
+                    drive.stage = Stage::Commissioning;
+                    busy = true;
+                    true
                 }
-                None if phase == Phase::CP2 => drive.connect(mapping, &mut self.master, slave, notice),
-                None => {
-                    for difference in drive.facts.differences(&mapping.dictionaries.sercos) {
-                        notice(Notice::Difference { axis: index(axis), difference });
-                    }
-                    drive.take(mapping, axes, notice)
+                SetupProgress::Connections(connections) => {
+                    drive.connections = numbers(&connections);
+                    master.set_connections(slave, connections).is_ok()
+                }
+                SetupProgress::Program(program) => {
+                    axes[drive.axis].set_south(program);
+                    true
+                }
+                SetupProgress::Failed(failed) => {
+                    notice(failed);
+                    false
                 }
             };
             if !taken {
                 // The others go on without it.
-                drive.unfit = true;
-                let _ = self.refused.try_push(slave);
-                let _ = self.master.exclude(slave);
+                drive.setup.unfit = true;
+                let _ = refused.try_push(slave);
+                let _ = master.exclude(slave);
                 drive.lose();
             }
         }
@@ -486,7 +460,7 @@ impl SercosBus {
 
     /// A slave is on its way in by hot plug: the drive of an axis, or one that nobody asked for.
     fn begin_joining(&mut self, slave: SlaveId, address: u16, phase: Phase) {
-        let Some(place) = self.drives.iter().position(|drive| drive.address == address) else {
+        let Some(place) = self.drives.iter().position(|drive| drive.setup.address == address) else {
             // It takes part without connections.
             let _ = self.master.proceed_hot_plug(slave);
             return;
@@ -500,7 +474,7 @@ impl SercosBus {
         drive.stage = Stage::Joining { ticket: None };
         let run = drive.run(place);
         let fixed = is_fixed(&self.master, slave);
-        if !self.commissioner.push(Job::Begin(run, phase, fixed)) {
+        if !self.commissioner.push(Job::Order(run, Order { phase, fixed })) {
             // It is tried again after a while.
             drive.lose();
             let _ = self.master.exclude(slave);
@@ -515,23 +489,7 @@ impl SercosBus {
         axes: &mut [AxisChannel],
         notice: &mut dyn FnMut(Notice),
     ) {
-        // Each piece of work can make one job.
-        while self.commissioner.has_room()
-            && let Some(done) = self.commissioner.pop()
-        {
-            let run = match &done {
-                Done::Told(_) => None,
-                Done::Submit(run, _)
-                | Done::Connect(run, _)
-                | Done::Program(run, _)
-                | Done::Failed(run, _) => Some(*run),
-            };
-            let Some(run) = run else {
-                if let Done::Told(told) = done {
-                    notice(told);
-                }
-                continue;
-            };
+        while let Some((run, done)) = self.commissioner.pop(notice) {
             let place = usize::from(run.place);
             let joining = self.drives.get(place).filter(|drive| {
                 drive.run(place) == run && matches!(drive.stage, Stage::Joining { ticket: None })
@@ -551,11 +509,11 @@ impl SercosBus {
                     }
                     continue;
                 }
-                Done::Connect(_, connections) => {
+                Done::Made(_, Made::Connections(connections)) => {
                     self.drives[place].connections = numbers(&connections);
                     self.master.set_connections(slave, connections).is_ok()
                 }
-                Done::Program(_, program) => {
+                Done::Made(_, Made::Program(program)) => {
                     axes[axis].set_south(program);
                     true
                 }
@@ -584,7 +542,7 @@ impl SercosBus {
         reason: HotPlugRefusal,
         axes: &mut [AxisChannel],
     ) {
-        let Some(drive) = self.drives.iter_mut().find(|drive| drive.address == address) else { return };
+        let Some(drive) = self.drives.iter_mut().find(|drive| drive.setup.address == address) else { return };
         if matches!(drive.stage, Stage::Joining { .. }) {
             drive.lose();
             axes[drive.axis].leave_south(now, system);
@@ -604,7 +562,7 @@ impl SercosBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
         // An access may be answered only after its drive was lost.
-        let asked = |drive: &Drive| drive.accesses.iter().any(|(known, _)| *known == ticket);
+        let asked = |drive: &Drive| drive.accesses.contains(ticket);
         let own = |drive: &Drive| drive.slave == Some(ticket.slave);
         let place = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
         let Some(place) = place else { return };
@@ -618,16 +576,13 @@ impl SercosBus {
             self.commissioner.push(Job::Outcome(run, outcome));
             return;
         }
-        if let Stage::Commissioning(work) = &mut drive.stage
-            && work.handle(ticket, &outcome, &mut drive.facts)
-        {
+        if drive.setup.handle(ticket, &outcome) {
             return;
         }
-        let Some(asked) = drive.accesses.iter().position(|(known, _)| *known == ticket) else {
+        let Some((purpose, _)) = drive.accesses.take(ticket) else {
             self.commissioner.push(Job::Spent(outcome));
             return;
         };
-        let (_, purpose) = drive.accesses.remove(asked);
         answer(axes, Answer { axis: drive.axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
     }
 }
@@ -746,15 +701,10 @@ impl Bus for SercosBus {
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let Some(request) = request(access) else { return false };
         let Some(place) = self.places.of(axis) else { return false };
-        let drive = &mut self.drives[place];
-        let Some(slave) = drive.present_slave().filter(|_| !drive.accesses.is_full()) else { return false };
-        match self.master.svc_submit(slave, request) {
-            Ok(ticket) => {
-                drive.accesses.push((ticket, purpose));
-                true
-            }
-            Err(_) => false,
-        }
+        let Self { master, drives, .. } = self;
+        let drive = &mut drives[place];
+        let Some(slave) = drive.present_slave() else { return false };
+        drive.accesses.submit(access.item, purpose, || master.svc_submit(slave, request).ok())
     }
 
     fn run(
@@ -822,7 +772,7 @@ impl Bus for SercosBus {
             let due = *self.retry_at.get_or_insert(now + self.retry_pause);
             if now >= due {
                 self.retry_at = None;
-                if self.drives.iter().any(|drive| drive.unfit) {
+                if self.drives.iter().any(|drive| drive.setup.unfit) {
                     self.retry_pause = (self.retry_pause * 2).min(RESCAN_PAUSE_MAX);
                 }
                 notice(Notice::Retry);
@@ -849,61 +799,18 @@ fn limitations(
 }
 
 impl Drive {
-    /// Gives the axis the program of its drive, once all is known of it.
-    fn take(&self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
-        match mapping.sercos_program(&self.needs, &self.facts) {
-            Ok(program) => {
-                let axis = index(self.axis);
-                limitations(mapping, axis, self.address, &self.needs, &self.facts, &program)
-                    .into_iter()
-                    .for_each(notice);
-                axes[self.axis].set_south(program);
-                true
-            }
-            Err(error) => {
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
-                false
-            }
-        }
-    }
-
     fn lose(&mut self) {
         self.slave = None;
         self.stage = Stage::Absent;
+        self.setup.give_up();
     }
 
-    fn plan(&mut self, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
-        match mapping.commissioning(&self.needs, phase, &self.facts) {
-            Ok(mut plan) => {
-                if self.unfit {
-                    plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
-                }
-                self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan)));
-            }
-            Err(error) => {
-                self.unfit = true;
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
+    fn plan(&mut self, mapping: &Mapping, phase: Phase, notice: &mut dyn FnMut(Notice)) {
+        match self.setup.begin(mapping, phase) {
+            Ok(()) => self.stage = Stage::Commissioning,
+            Err(misfit) => {
+                notice(misfit);
                 self.lose();
-            }
-        }
-    }
-
-    /// Sets up the two connections of the drive from what it has told in CP2.
-    fn connect(
-        &mut self,
-        mapping: &Mapping,
-        master: &mut Master,
-        slave: SlaveId,
-        notice: &mut dyn FnMut(Notice),
-    ) -> bool {
-        match connections(mapping, &self.needs, &self.facts, self.allowed_losses) {
-            Ok(connections) => {
-                self.connections = numbers(&connections);
-                master.set_connections(slave, connections).is_ok()
-            }
-            Err(error) => {
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
-                false
             }
         }
     }
@@ -915,7 +822,7 @@ impl Drive {
 
     /// Its work for the commissioner, from its place among the drives.
     fn run(&self, place: usize) -> Run {
-        Run { place: index(place), number: self.runs }
+        Run::new(place, self.runs)
     }
 }
 
