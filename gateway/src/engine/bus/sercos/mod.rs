@@ -6,6 +6,8 @@
 
 pub mod commissioner;
 pub mod commissioning;
+mod progress;
+mod recovery;
 
 use arrayvec::ArrayVec;
 use profile_generic::state::Report;
@@ -25,6 +27,8 @@ use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
 use self::commissioner::{DriveWork, Made, Order, Progress as SetupProgress, Setup};
+use self::progress::PhaseProgress;
+use self::recovery::Recovery;
 use super::accesses::Accesses;
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
@@ -42,20 +46,6 @@ const CONFIGURATION_LIST: u8 = 6;
 
 /// The connection in the AT.
 pub const FEEDBACK_CONNECTION: u8 = 1;
-
-/// Pause before the bus is brought up anew for a lost drive while nobody uses the others; it doubles with every vain
-/// attempt.
-const RESCAN_PAUSE: DurationNs = DurationNs::from_secs(10);
-
-/// Longest such pause.
-const RESCAN_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
-
-/// Pause before a failed phase-up is tried again; it doubles, up to [`RESCAN_PAUSE_MAX`], while a drive is refused that only another
-/// configuration can help.
-const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
-
-/// How often is said what a long phase waits for.
-const PROGRESS: DurationNs = DurationNs::from_secs(5);
 
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
 const REFUSED_MAX: usize = 64;
@@ -99,33 +89,6 @@ struct Drive {
     accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
-/// What is said of a phase before CP4 that takes long.
-#[derive(Debug, Default)]
-struct Telling {
-    phase: Option<Phase>,
-    since: MonotonicTime,
-    told: i64,
-}
-
-impl Telling {
-    /// What is to be said: every [`PROGRESS`] that the bus is in the same phase on its way up.
-    fn tell(&mut self, now: MonotonicTime, master: &Master) -> Option<Notice> {
-        let phase = master.phase();
-        if phase != self.phase {
-            *self = Self { phase, since: now, told: 0 };
-        }
-        // On the way down, and in a pause before the next try, nobody waits for anything.
-        let phase = phase.filter(|phase| *phase < Phase::CP4 && master.target_phase() == Some(Phase::CP4))?;
-        let times = now.since(self.since).0 / PROGRESS.0;
-        if times <= self.told {
-            return None;
-        }
-        self.told = times;
-        let seconds = u16::try_from(now.since(self.since).0 / 1_000_000_000).unwrap_or(u16::MAX);
-        Some(Notice::Progress { phase, seconds, with: master.waits_for() })
-    }
-}
-
 /// The bus.
 #[derive(Debug)]
 pub struct SercosBus {
@@ -133,22 +96,11 @@ pub struct SercosBus {
     drives: Vec<Drive>,
     /// The drive of each axis.
     places: Places<usize>,
-    retry_at: Option<MonotonicTime>,
-    retry_pause: DurationNs,
-    progress: Telling,
-    wanted: Option<Phase>,
+    recovery: Recovery,
+    progress: PhaseProgress,
     cycles_seen: u64,
     /// Slaves that stand in the way of the others; left out until the next scan.
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
-    /// Since when a drive is lost that was there.
-    lost_since: Option<MonotonicTime>,
-    /// A slave hangs and was left out. Phase 0 cannot get past it: a new scan would find nobody.
-    isolated: bool,
-    rescan_pause: DurationNs,
-    /// No controller is connected.
-    idle: bool,
-    /// The bus goes down because the box wants it to: that is no fault of any axis.
-    planned: bool,
     /// Who commissions drives that come later.
     commissioner: CommissionerHandle<DriveWork>,
     /// Room for a frame.
@@ -190,17 +142,10 @@ impl SercosBus {
             master,
             places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.axis, place))),
             drives,
-            retry_at: None,
-            retry_pause: RETRY_PAUSE,
-            progress: Telling::default(),
-            wanted: Some(Phase::CP4),
+            recovery: Recovery::new(),
+            progress: PhaseProgress::default(),
             cycles_seen: 0,
             refused: ArrayVec::new(),
-            lost_since: None,
-            isolated: false,
-            rescan_pause: RESCAN_PAUSE,
-            idle: true,
-            planned: false,
             commissioner,
             buffer: Box::new([0; FRAME_MAX]),
         })
@@ -239,16 +184,16 @@ impl SercosBus {
             Event::SlaveReturned { .. }
                 if self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive)) =>
             {
-                self.lost_since = None;
+                self.recovery.find_all();
             }
-            Event::Isolated { .. } => self.isolated = true,
+            Event::Isolated { .. } => self.recovery.isolate(),
             Event::OtherMaster(_) => {
                 for drive in &self.drives {
                     axes[drive.axis].doubt_south(now, system);
                 }
             }
             Event::GaveWay => {
-                self.planned = true;
+                self.recovery.give_way();
                 self.lose_all(now, system, axes);
             }
             Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
@@ -267,8 +212,8 @@ impl SercosBus {
             Event::HotPlugged { slave, .. } => {
                 let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(*slave));
                 drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
-                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
-                    (self.lost_since, self.rescan_pause) = (None, RESCAN_PAUSE);
+                if self.is_complete() {
+                    self.recovery.complete();
                 }
             }
             Event::HotPlugRefused { address: Some(address), reason } => {
@@ -281,16 +226,10 @@ impl SercosBus {
             | Event::CheckFailed { slave, .. }
                 if self.is_joining(*slave) => {}
             Event::Phase(phase) if *phase == Phase::CP4 => {
-                self.planned = false;
-                self.retry_pause = RETRY_PAUSE;
                 let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
                 fit.for_each(|drive| drive.setup.unfit = false);
-                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
-                    self.rescan_pause = RESCAN_PAUSE;
-                } else if self.rescan_pause > RESCAN_PAUSE {
-                    // It was there once and is missing after a new scan: looked for again, ever more rarely.
-                    self.lost_since = Some(now);
-                }
+                let is_complete = self.is_complete();
+                self.recovery.reach_cp4(now, is_complete);
             }
             Event::SlaveLost { slave, address, phase } => {
                 // One that comes back by hot plug needs no new scan.
@@ -298,7 +237,7 @@ impl SercosBus {
                 let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
                 let configured = |drive: &Drive| drive.setup.address == *address && drive.hot_plug;
                 if !has_class && !self.drives.iter().any(configured) {
-                    self.lost_since.get_or_insert(now);
+                    self.recovery.miss(now);
                 }
                 // In CP4 it may hear every word and be back in a moment: it is told to stop as long as its place is kept. That
                 // it is not heard its connection says.
@@ -324,12 +263,19 @@ impl SercosBus {
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
             Event::Phase(phase) if *phase < Phase::CP2 => {
-                self.isolated &= *phase != Phase::CP0;
+                if *phase == Phase::CP0 {
+                    self.recovery.begin_scan();
+                }
                 self.lose_all(now, system, axes);
             }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
+    }
+
+    /// Whether every drive is there that cannot come later.
+    fn is_complete(&self) -> bool {
+        self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug)
     }
 
     /// Goes on without a slave.
@@ -377,7 +323,7 @@ impl SercosBus {
         for drive in &mut self.drives {
             drive.lose();
             let axis = &mut axes[drive.axis];
-            if self.planned {
+            if self.recovery.is_planned() {
                 axis.leave_south(now, system);
             } else {
                 axis.lose_south(now, system);
@@ -550,7 +496,7 @@ impl SercosBus {
         use HotPlugRefusal as R;
         if matches!(reason, R::Misfit(_) | R::Several | R::NoTelegram) {
             // Nothing but a new scan brings it in.
-            self.lost_since.get_or_insert(now);
+            self.recovery.miss(now);
         }
     }
 
@@ -651,11 +597,11 @@ impl Bus for SercosBus {
     }
 
     fn set_idle(&mut self, idle: bool) {
-        self.idle = idle;
+        self.recovery.set_idle(idle);
     }
 
     fn stop(&mut self, _now: MonotonicTime) {
-        self.wanted = None;
+        self.recovery.end();
         self.master.stop();
     }
 
@@ -735,17 +681,12 @@ impl Bus for SercosBus {
         let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
         let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
         let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = self.idle
-            && !self.isolated
-            && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
         let led = |drive: &Drive| axes[drive.axis].may_have_torque();
         if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
             self.master.give_way(now);
-        } else if alone || (free && rescan) {
-            self.lost_since = None;
+        } else if alone || (free && self.recovery.wants_scan(now)) {
             // Of drives that are all lost nobody knows that they stand.
-            self.planned = !alone;
-            self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
+            self.recovery.take_down(!alone);
             for (slave, [command, _]) in
                 self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
             {
@@ -765,19 +706,15 @@ impl Bus for SercosBus {
                 self.master.reset_consumer(slave, feedback);
             }
         }
-        if let Some(progress) = self.progress.tell(now, &self.master) {
+        if let Some(progress) = self.progress.report(now, &self.master) {
             notice(progress);
         }
-        if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
-            let due = *self.retry_at.get_or_insert(now + self.retry_pause);
-            if now >= due {
-                self.retry_at = None;
-                if self.drives.iter().any(|drive| drive.setup.unfit) {
-                    self.retry_pause = (self.retry_pause * 2).min(RESCAN_PAUSE_MAX);
-                }
-                notice(Notice::Retry);
-                self.master.set_target_phase(Phase::CP4);
-            }
+        let unfit = |drive: &Drive| drive.setup.unfit;
+        if self.master.target_phase() != Some(Phase::CP4)
+            && self.recovery.wants_up(now, self.drives.iter().any(unfit))
+        {
+            notice(Notice::Retry);
+            self.master.set_target_phase(Phase::CP4);
         }
     }
 }
