@@ -500,6 +500,43 @@ impl SercosBus {
         }
     }
 
+    /// Takes the bus down for another master, because nobody is left, or to look for a drive that is missing.
+    fn take_down(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        let cyclic = self.master.phase() == Some(Phase::CP4);
+        let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
+        let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
+        let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
+        let led = |drive: &Drive| axes[drive.axis].may_have_torque();
+        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
+            self.master.give_way(now);
+        } else if alone || (free && self.recovery.wants_scan(now)) {
+            // Of drives that are all lost nobody knows that they stand.
+            self.recovery.take_down(!alone);
+            for (slave, [command, _]) in
+                self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
+            {
+                self.master.withdraw(slave, command);
+            }
+            self.lose_all(now, system, axes);
+            self.master.set_target_phase(Phase::CP0);
+        }
+    }
+
+    /// Takes the data of drives again that were lost, once their axes know.
+    fn listen_again(&mut self, axes: &[AxisChannel]) {
+        for drive in &self.drives {
+            // Not before the axis knows: it stops, whatever is heard from now on, and is the sooner usable the sooner the drive
+            // says that it stands.
+            let noticed = axes[drive.axis].feedback().report == Report::Silent;
+            let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
+            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
+            let [_, feedback] = drive.connections;
+            if self.master.consumer(slave, feedback).is_some_and(failed) {
+                self.master.reset_consumer(slave, feedback);
+            }
+        }
+    }
+
     fn outcome(
         &mut self,
         ticket: Ticket,
@@ -677,35 +714,8 @@ impl Bus for SercosBus {
             let axis = self.drives[place].axis;
             ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
         }
-        let cyclic = self.master.phase() == Some(Phase::CP4);
-        let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
-        let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
-        let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
-        let led = |drive: &Drive| axes[drive.axis].may_have_torque();
-        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
-            self.master.give_way(now);
-        } else if alone || (free && self.recovery.wants_scan(now)) {
-            // Of drives that are all lost nobody knows that they stand.
-            self.recovery.take_down(!alone);
-            for (slave, [command, _]) in
-                self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
-            {
-                self.master.withdraw(slave, command);
-            }
-            self.lose_all(now, system, axes);
-            self.master.set_target_phase(Phase::CP0);
-        }
-        for drive in &self.drives {
-            // Not before the axis knows: it stops, whatever is heard from now on, and is the sooner usable the sooner the drive
-            // says that it stands.
-            let noticed = axes[drive.axis].feedback().report == Report::Silent;
-            let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
-            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
-            let [_, feedback] = drive.connections;
-            if self.master.consumer(slave, feedback).is_some_and(failed) {
-                self.master.reset_consumer(slave, feedback);
-            }
-        }
+        self.take_down(now, system, axes);
+        self.listen_again(axes);
         if let Some(progress) = self.progress.report(now, &self.master) {
             notice(progress);
         }
