@@ -59,7 +59,8 @@ impl Axis {
         let rig = Rig::ready(Settings::default());
         let axis = &rig.engine.axes()[0];
         let south = axis.south().expect("it is commissioned").clone();
-        Self::new(axis.north().clone(), south, *axis.feedback(), 0)
+        let north = rig.engine.cip_program(0).expect("an axis of a device").clone();
+        Self::new(north, south, *axis.feedback(), 0)
     }
 
     /// The same on a CiA 402 drive.

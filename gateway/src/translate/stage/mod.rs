@@ -238,7 +238,7 @@ impl Stage {
                 stands_in: !drive.set_scaling,
                 scaling,
                 attributes,
-                north: channel.north().clone(),
+                north: engine.cip_program(number).ok_or_else(unready)?.clone(),
                 south: south.clone(),
             };
             axes.push((number, on_sercos));

@@ -1,99 +1,88 @@
-//! From the controller to the axis: actions and resets.
+//! From a north side to the axis: what it wants of the drive, as a level, and resets.
 
-use super::{AxisChannel, Loss, RESET_CYCLES, RESET_TIME_OUT, Reset};
-use profile_cip::device::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, Withheld};
-use profile_generic::fault::{Fault, FaultCause};
-use profile_generic::fault_set::{ActiveFault, Origin};
+use super::{AxisChannel, RESET_CYCLES, RESET_TIME_OUT, Reset};
+use profile_generic::fault::FaultCause;
+use profile_generic::fault_set::Origin;
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{MonotonicTime, SystemTime};
 
+/// What a north side wants the axis to be: it holds until the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Intent {
+    /// Nothing: without torque.
+    #[default]
+    Standby,
+    /// In operation.
+    Enable,
+    /// In a test, with torque where the test needs it.
+    Test,
+    /// Stopped as configured.
+    Disable,
+    /// Shut down.
+    Shutdown,
+    /// Stopped for a fault.
+    Abort,
+}
+
+/// An intent, and the request to the generic state machine by which it is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wish {
+    /// What the axis shall be.
+    pub intent: Intent,
+    /// The request; `None` when nothing is asked of the drive.
+    pub request: Option<Request>,
+}
+
 impl AxisChannel {
-    /// Takes what the motion device says about this axis; to be called in every cycle after [`Self::from_drive`]. `target` is the
-    /// instant at which its set-points shall be reached, where controller and device share a clock.
-    pub fn from_controller(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        image: &AxisCommandImage,
-        target: Option<MonotonicTime>,
-    ) {
-        // Before the action: a lost command stops the axis as its configuration says, whatever the device asks for then.
-        if let Command::Withheld(why) = image.command
-            && matches!(why, Withheld::Stale | Withheld::ConnectionLost | Withheld::NodeFault)
-        {
-            self.lose_command(now, system, Loss::Withheld(why));
-        }
-        self.take_test(now, image.test);
-        // Before the action: a stop that is ordered in a particular way is under way when the action asks for any.
-        self.take_abort(now, system, image.abort);
-        if image.action_id != self.action_id {
-            self.action_id = image.action_id;
-            self.north_action = image.action;
-            self.enable_pending = false;
-            self.take_action(now, system, image.action);
-        }
+    /// Takes another wish of the north side.
+    pub fn take_wish(&mut self, now: MonotonicTime, system: SystemTime, wish: Wish) {
+        self.wish = wish;
+        self.enable_pending = false;
+        self.carry_out_wish(now, system);
+    }
+
+    /// An enable that came in the very cycle in which the drive was not ready is still asked for; to be called in every cycle.
+    pub fn retry_wish(&mut self, now: MonotonicTime, system: SystemTime) {
         if self.enable_pending && self.state() == DriveState::Ready {
-            // The enable came in the very cycle in which the drive was not ready; the controller still asks for it.
             self.enable_pending = false;
-            self.take_action(now, system, self.north_action);
-        }
-        if image.reset_id != self.reset_id && self.reset.is_none_or(|reset| reset.id != image.reset_id) {
-            self.begin_reset(now, system, image.reset_id);
-        }
-        match image.command {
-            Command::Follow(set_points) => self.take_set_points(now, system, &set_points, target),
-            Command::Withheld(_) => self.sequence = None,
+            self.carry_out_wish(now, system);
         }
     }
 
-    pub(super) fn take_action(&mut self, now: MonotonicTime, system: SystemTime, action: DriveAction) {
-        if !matches!(action, DriveAction::Enable | DriveAction::Abort) {
+    fn carry_out_wish(&mut self, now: MonotonicTime, system: SystemTime) {
+        let Wish { intent, request } = self.wish;
+        if !matches!(intent, Intent::Enable | Intent::Abort) {
             self.end_hold(now, system);
         }
-        if action == DriveAction::Enable && self.state() == DriveState::Operating {
+        if intent == Intent::Enable && self.state() == DriveState::Operating {
             // Out of a hold, or of a stop that has not ended: the torque is there already.
             self.prepare_start(now);
         }
-        let request = match action {
-            DriveAction::Enable if !self.moves => None,
+        let request = match intent {
+            Intent::Enable if !self.moves => None,
             // What a test is led by is torque: it ends by the drive's own deceleration, not by a ramp of the box.
-            DriveAction::None | DriveAction::PowerUp | DriveAction::Disable
-                if self.started_for_test && self.may_have_torque() =>
-            {
-                self.north.drive_request(DriveAction::Disable)
+            Intent::Standby | Intent::Disable if self.started_for_test && self.may_have_torque() => {
+                Some(Request::Disable)
             }
-            DriveAction::Disable if self.may_have_torque() => {
+            Intent::Disable if self.may_have_torque() => {
                 self.begin_stop(now, system, self.stop_settings.plan);
                 None
             }
             // Neither a connection that is gone nor a standby state of the axis leaves it with torque.
-            DriveAction::None | DriveAction::PowerUp if self.may_have_torque() => {
+            Intent::Standby if self.may_have_torque() => {
                 self.begin_stop(now, system, StopPlan::default());
                 None
             }
-            // Without torque there is nothing to abort; the motion device keeps the fault.
-            DriveAction::Abort if !self.may_have_torque() => None,
+            // Without torque there is nothing to abort; the north side keeps the fault.
+            Intent::Abort if !self.may_have_torque() => None,
             // A test that has ended before it began needs no torque.
-            DriveAction::Test if !self.tests_with_torque() => None,
-            action => self.north.drive_request(action),
+            Intent::Test if !self.tests_with_torque() => None,
+            _ => request,
         };
         if let Some(request) = request {
             self.request(now, system, request);
         }
-    }
-
-    /// The motion device wants the axis stopped for a fault, or stopped harder than before.
-    fn take_abort(&mut self, now: MonotonicTime, system: SystemTime, order: Option<AbortOrder>) {
-        let new = order.filter(|order| self.abort.is_none_or(|known| known.action != order.action));
-        self.abort = order;
-        let Some(order) = new.filter(|_| self.may_have_torque()) else { return };
-        let there = |active: &&ActiveFault| {
-            self.north.fault(active.fault.cause).is_some_and(|fault| fault.is(order.fault_type.0, order.code))
-        };
-        let cause = self.faults.iter().find(there).map(|active| active.fault);
-        let fault = cause.unwrap_or_else(|| Fault::new(FaultCause::CONTROLLER_ABORT, system));
-        self.take_fault(now, system, fault.with_reaction(self.north.reaction(order.action)));
     }
 
     pub(super) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
@@ -105,7 +94,8 @@ impl AxisChannel {
     }
 
     /// Whether the drive stands with torque because the reaction to a fault is to hold the position.
-    pub(super) fn holds(&self) -> bool {
+    #[must_use]
+    pub fn holds(&self) -> bool {
         self.state() == DriveState::FaultReaction
             && self.action == Action::Halt
             && self.feedback.report == Report::Halted
@@ -129,6 +119,19 @@ impl AxisChannel {
         let transition = self.drive.machine.clear_faults();
         self.follow(now, system, transition);
         self.request(now, system, Request::FaultReset);
+    }
+
+    /// The north side wants this reset of faults, unless it was carried out or is under way.
+    pub fn want_reset(&mut self, now: MonotonicTime, system: SystemTime, id: u32) {
+        if id != self.reset_id && self.reset.is_none_or(|reset| reset.id != id) {
+            self.begin_reset(now, system, id);
+        }
+    }
+
+    /// The reset that was carried out last.
+    #[must_use]
+    pub fn reset_id(&self) -> u32 {
+        self.reset_id
     }
 
     pub(super) fn begin_reset(&mut self, now: MonotonicTime, system: SystemTime, id: u32) {
