@@ -33,6 +33,7 @@ pub mod finding;
 mod fixed_connections;
 pub mod format;
 mod generic_names;
+mod groups;
 mod item;
 mod load;
 mod numbers;
@@ -170,6 +171,12 @@ impl Mapping {
             Some(mapping) => Ok(mapping),
             None => Err(findings),
         }
+    }
+
+    /// The dictionaries in these texts, also where a row of them is wrong; `None` where a file cannot be read into rows.
+    pub fn dictionaries_of(texts: &TableTexts, findings: &mut Findings) -> Option<Dictionaries> {
+        let (tables, _) = texts.parse(findings)?;
+        Some(Dictionaries::resolve(&tables, findings))
     }
 
     /// The tables in these texts, and everything that is found in them; `None` with errors.
