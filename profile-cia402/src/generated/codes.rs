@@ -44,58 +44,58 @@ open_code! {
         TIMEOUT = 0x05040000 => "SDO protocol timed out",
         /// Command specifier not valid or unknown.
         COMMAND = 0x05040001 => "command specifier not valid or unknown",
-        /// Block size not valid.
-        BLOCK_SIZE = 0x05040002 => "block size not valid",
-        /// Sequence number not valid.
-        SEQUENCE = 0x05040003 => "sequence number not valid",
+        /// Invalid block size.
+        BLOCK_SIZE = 0x05040002 => "invalid block size",
+        /// Invalid sequence number.
+        SEQUENCE = 0x05040003 => "invalid sequence number",
         /// CRC error.
         CRC = 0x05040004 => "CRC error",
         /// Out of memory.
         OUT_OF_MEMORY = 0x05040005 => "out of memory",
-        /// Access not supported.
-        ACCESS = 0x06010000 => "access not supported",
-        /// Read of a write-only object.
-        WRITE_ONLY = 0x06010001 => "read of a write-only object",
-        /// Write to a read-only object.
-        READ_ONLY = 0x06010002 => "write to a read-only object",
+        /// Unsupported access to an object.
+        ACCESS = 0x06010000 => "unsupported access to an object",
+        /// Attempt to read a write-only object.
+        WRITE_ONLY = 0x06010001 => "attempt to read a write-only object",
+        /// Attempt to write a read-only object.
+        READ_ONLY = 0x06010002 => "attempt to write a read-only object",
         /// Object does not exist.
         NO_OBJECT = 0x06020000 => "object does not exist",
-        /// Object cannot be mapped.
-        NOT_MAPPABLE = 0x06040041 => "object cannot be mapped",
-        /// PDO length exceeded.
-        PDO_LENGTH = 0x06040042 => "PDO length exceeded",
-        /// Parameter incompatibility.
-        PARAMETER = 0x06040043 => "parameter incompatibility",
-        /// Internal incompatibility.
-        INTERNAL_INCOMPATIBILITY = 0x06040047 => "internal incompatibility",
-        /// Hardware error.
-        HARDWARE = 0x06060000 => "hardware error",
-        /// Length does not match.
-        LENGTH = 0x06070010 => "length does not match",
-        /// Length too high.
-        TOO_LONG = 0x06070012 => "length too high",
-        /// Length too low.
-        TOO_SHORT = 0x06070013 => "length too low",
+        /// Object cannot be mapped to a PDO.
+        NOT_MAPPABLE = 0x06040041 => "object cannot be mapped to a PDO",
+        /// Objects to be mapped exceed the length of the PDO.
+        PDO_LENGTH = 0x06040042 => "objects to be mapped exceed the length of the PDO",
+        /// General parameter incompatibility.
+        PARAMETER = 0x06040043 => "general parameter incompatibility",
+        /// General internal incompatibility in the device.
+        GENERAL_INTERNAL_INCOMPATIBILITY_IN_THE_DEVICE = 0x06040047 => "general internal incompatibility in the device",
+        /// Access failed due to a hardware error.
+        HARDWARE = 0x06060000 => "access failed due to a hardware error",
+        /// Length of the data type does not match.
+        LENGTH = 0x06070010 => "length of the data type does not match",
+        /// Length of the data type is too high.
+        TOO_LONG = 0x06070012 => "length of the data type is too high",
+        /// Length of the data type is too low.
+        TOO_SHORT = 0x06070013 => "length of the data type is too low",
         /// Sub-index does not exist.
         NO_SUB_INDEX = 0x06090011 => "sub-index does not exist",
-        /// Value not valid.
-        VALUE = 0x06090030 => "value not valid",
+        /// Value out of range.
+        VALUE = 0x06090030 => "value out of range",
         /// Value too high.
         TOO_HIGH = 0x06090031 => "value too high",
         /// Value too low.
         TOO_LOW = 0x06090032 => "value too low",
-        /// Maximum below minimum.
-        MAXIMUM_BELOW_MINIMUM = 0x06090036 => "maximum below minimum",
-        /// Resource not available.
-        RESOURCE_NOT_AVAILABLE = 0x060A0023 => "resource not available",
+        /// Maximum value is less than minimum value.
+        MAXIMUM_VALUE_IS_LESS_THAN_MINIMUM_VALUE = 0x06090036 => "maximum value is less than minimum value",
+        /// Resource not available: SDO connection.
+        RESOURCE_NOT_AVAILABLE_SDO_CONNECTION = 0x060A0023 => "resource not available: SDO connection",
         /// General error.
         GENERAL = 0x08000000 => "general error",
         /// Data cannot be transferred or stored.
         STORE = 0x08000020 => "data cannot be transferred or stored",
-        /// Data cannot be transferred: local control.
-        LOCAL_CONTROL = 0x08000021 => "data cannot be transferred: local control",
-        /// Data cannot be transferred: device state.
-        DEVICE_STATE = 0x08000022 => "data cannot be transferred: device state",
+        /// Data cannot be transferred or stored: local control.
+        LOCAL_CONTROL = 0x08000021 => "data cannot be transferred or stored: local control",
+        /// Data cannot be transferred or stored: device state.
+        DEVICE_STATE = 0x08000022 => "data cannot be transferred or stored: device state",
         /// No object dictionary.
         NO_OBJECT_DICTIONARY = 0x08000023 => "no object dictionary",
         /// No data available.
@@ -106,18 +106,18 @@ open_code! {
 open_code! {
     /// Error status of a boot-up: a letter (CiA 302-2).
     pub struct BootStatus(u8) {
-        /// Not in the list of slaves: letter A.
-        NOT_IN_THE_LIST_OF_SLAVES = 0x41 => "A: not in the list of slaves",
-        /// No answer to the device type: letter B.
-        NO_ANSWER = 0x42 => "B: no answer to the device type",
-        /// Other device type: letter C.
-        DEVICE_TYPE = 0x43 => "C: other device type",
-        /// Other vendor: letter D.
-        VENDOR = 0x44 => "D: other vendor",
+        /// Not in the list of devices: letter A.
+        NOT_IN_THE_LIST_OF_DEVICES = 0x41 => "A: not in the list of devices",
+        /// No answer to device type: letter B.
+        NO_ANSWER = 0x42 => "B: no answer to device type",
+        /// Another device type: letter C.
+        DEVICE_TYPE = 0x43 => "C: another device type",
+        /// Another vendor: letter D.
+        VENDOR = 0x44 => "D: another vendor",
         /// Heartbeat lost: letter E.
         HEARTBEAT_LOST = 0x45 => "E: heartbeat lost",
-        /// Guarding failed: letter F.
-        GUARDING = 0x46 => "F: guarding failed",
+        /// No answer to node guarding: letter F.
+        GUARDING = 0x46 => "F: no answer to node guarding",
         /// Program download not configured: letter G; or its objects contradict each other.
         PROGRAM_VERSION = 0x47 => "G: program download not configured",
         /// Program update not allowed: letter H; by the configuration or by the state.
@@ -130,12 +130,12 @@ open_code! {
         NO_HEARTBEAT = 0x4B => "K: no heartbeat while starting",
         /// Was operational already: letter L.
         ALREADY_OPERATIONAL = 0x4C => "L: was operational already",
-        /// Other product code: letter M.
-        PRODUCT = 0x4D => "M: other product code",
-        /// Other revision: letter N.
-        REVISION = 0x4E => "N: other revision",
-        /// Other serial number: letter O.
-        SERIAL = 0x4F => "O: other serial number",
+        /// Another product code: letter M.
+        PRODUCT = 0x4D => "M: another product code",
+        /// Another revision: letter N.
+        REVISION = 0x4E => "N: another revision",
+        /// Another serial number: letter O.
+        SERIAL = 0x4F => "O: another serial number",
     }
 }
 

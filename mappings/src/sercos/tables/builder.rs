@@ -16,7 +16,6 @@ use super::{
     Elements, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule, SercosTables,
     SignalRule, SlotRule, StatusRule, StepKind, StepRule,
 };
-use crate::captures::{CaptureBy, CaptureRule};
 use crate::cip_tables::{CipTables, ExceptionRow};
 use crate::dictionary::{Dictionaries, IdnFormat, IdnUnit, SercosIdn, Word, quantity};
 use crate::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
@@ -33,7 +32,8 @@ use crate::generic_names::{
 };
 use crate::load::Parsed;
 use crate::resolver::{Resolver, over};
-use crate::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
+use crate::sercos::captures::{CaptureBy, CaptureRule};
+use crate::sercos::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
 
 impl SercosTables {
     pub(crate) fn resolve(
@@ -618,7 +618,7 @@ impl<'a> Builder<'a> {
                 return None;
             }
         };
-        let is_sequence = crate::captures::sequence(kind).is_some();
+        let is_sequence = crate::sercos::captures::sequence(kind).is_some();
         let by = match (by, value, word, counter, enable) {
             (0, Some(value), Some((word, pattern)), None, Some(enable)) => CaptureBy::Latch {
                 value: value.idn,
