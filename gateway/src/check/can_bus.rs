@@ -130,16 +130,16 @@ mod tests {
         plan(&master, config.can[0].bit_rate, &traffic).check().is_ok()
     }
 
-    /// What the guide promises is what the plan lets pass, to the drive.
+    /// What the documentation promises is what the plan lets pass, to the drive.
     #[test]
-    fn the_guide_says_how_many_drives_fit_a_bus() {
+    fn the_documentation_says_how_many_drives_fit_a_bus() {
         let mapping = Mapping::embedded().expect("the shipped tables are sound");
         let most =
             |cycle_ms| (1..=16).take_while(|drives| fits(&mapping, *drives, cycle_ms)).last().unwrap_or(0);
         let counts = [1, 2, 4].map(|cycle_ms| (cycle_ms, most(cycle_ms)));
         let [(_, one), (_, two), (_, four)] = counts;
         let sentence = format!("there is room for {one} drives at 1 ms, {two} at 2 ms and {four} at 4 ms");
-        let guide = include_str!("../../../docs/guide.md").replace('\n', " ");
-        assert!(guide.contains(&sentence), "{sentence}");
+        let page = include_str!("../../../docs/tasks/connect-canopen-drives.md").replace('\n', " ");
+        assert!(page.contains(&sentence), "{sentence}");
     }
 }

@@ -1,4 +1,4 @@
-//! `axisbridge check`: reads tables, overlays and a configuration as a lawyer would.
+//! `axisbridge check`: reads tables, overlays and a configuration, and reports everything that is wrong with them.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;

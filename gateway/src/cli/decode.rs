@@ -41,7 +41,7 @@ fn print(arguments: &DecodeArguments, out: &mut dyn Write) -> Result<ExitCode, C
         (outcome, _) => outcome.map(|_| ()),
     };
     match outcome {
-        // Whoever reads has seen enough, as `head` has.
+        // The reader has closed the pipe, as `head` does: it has seen enough.
         Err(DecodeError::Write(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
         Err(DecodeError::Read(error)) => Err(format!("{file}: {error}").into()),
         Err(error @ DecodeError::Write(_)) => Err(error.into()),

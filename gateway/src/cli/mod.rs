@@ -1,6 +1,6 @@
 //! The command line: a contract, since scripts depend on it.
 //!
-//! Data goes to standard output, errors and progress to standard error. Exit status 0 is good, 1 findings or failure, 2 usage.
+//! Data goes to standard output, errors and progress to standard error. Exit status 0 is success, 1 findings or failure, 2 usage.
 
 mod check;
 mod decode;
@@ -28,7 +28,7 @@ use profile_generic::time::DurationNs;
 
 use crate::simulate::clock::{ClockPlan, ClockStep};
 
-/// Motion protocol gateway: to a controller it is CIP Motion drives; behind it, it masters the real ones.
+/// Motion protocol gateway: a CIP Motion controller on one side, SERCOS III, CANopen and DeviceNet drives on the other.
 #[derive(Debug, Parser)]
 #[command(name = "axisbridge", version, max_term_width = 100)]
 struct Cli {
@@ -38,27 +38,27 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run the whole chain in one process: controller, gateway and two simulated SERCOS III drives.
+    /// Run the whole chain in one process: controller, gateway and simulated drives.
     Demo(DemoArguments),
-    /// Run the gateway box.
+    /// Run the gateway.
     Run(RunArguments),
-    /// Check mapping tables, overlays and a configuration, and explain what is found.
+    /// Check mapping tables, overlays and a configuration, and explain the findings.
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
-    /// Look at this host: is it fit for the box, and for its cycles.
+    /// Check whether this host is fit for the gateway and its cycles.
     Doctor(DoctorArguments),
-    /// Look at the south bus: who is there, and a configuration to begin with.
+    /// List the drives on a bus, and print a first configuration.
     Scan(ScanArguments),
-    /// Print the frames of a capture file as an indented tree.
+    /// Print the frames of a recording as an indented tree.
     Decode(DecodeArguments),
-    /// Print what the mapping tables make of frames, and which row made each value.
+    /// Show how the mapping tables translate frames, and which row made each value.
     Translate(TranslateArguments),
     /// Compare translated frames with the golden texts next to them.
     Snapshot(SnapshotArguments),
-    /// Print what a profile has: attributes, parameters, codes, services.
+    /// Print the attributes, parameters, codes and services of a profile.
     Dictionary(DictionaryArguments),
-    /// Run the other side of a protocol as a process of its own.
+    /// Run simulated drives or a simulated controller.
     #[command(subcommand)]
     Simulate(Simulate),
 }
@@ -75,10 +75,10 @@ struct DemoArguments {
     /// Address on which the gateway's EtherNet/IP side listens (TCP and UDP 44818, UDP 2222).
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.2")]
     listen: std::net::Ipv4Addr,
-    /// What is behind the box, one axis on each; the last kind has the rest of the two axes, a third kind has a third axis.
+    /// Buses of the two axes, separated by commas: the first axis is on the first bus. A third bus has a third axis.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
-    /// Where to write the recording of both sides.
+    /// Write the recording of both sides to this file.
     #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
     capture: PathBuf,
 }
@@ -86,10 +86,10 @@ struct DemoArguments {
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 struct RunArguments {
-    /// The configuration of the box (TOML).
+    /// The configuration of the gateway (TOML).
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Record both sides into this file (pcapng).
+    /// Record both sides to this file (pcapng).
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
 }
@@ -97,23 +97,23 @@ struct RunArguments {
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 struct CheckArguments {
-    /// The configuration of a box (TOML), with the tables and overlays that it names.
+    /// Check this configuration (TOML), with the tables and overlays that it names.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A folder of tables in place of the built-in ones, an overlay, or a folder of overlays; may be given several times, and
-    /// comes after those of the configuration.
+    /// An overlay, a folder of overlays, or a folder of tables to use instead of the built-in ones. Can be repeated; applied
+    /// after those of the configuration.
     #[arg(long, value_name = "PATH")]
     mappings: Vec<PathBuf>,
-    /// How to print it.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = CheckFormat::Text)]
     format: CheckFormat,
-    /// Show notes as well (JSON has them anyway).
+    /// Show notes as well (JSON always has them).
     #[arg(long)]
     notes: bool,
-    /// Write the tables and what was found as a page for a browser.
+    /// Write the tables and the findings as a page for a browser.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Print the JSON Schema of a kind of file and check nothing; without NAME, the names of all.
+    /// Print the JSON Schema of a kind of file, and check nothing. Without NAME, list the names.
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["config", "mappings", "notes", "list", "explain"])]
     schema: Option<String>,
     /// Explain a code, such as AX0012, and check nothing.
@@ -130,22 +130,22 @@ enum CheckFormat {
     /// Each finding with its line.
     #[value(alias = "human")]
     Text,
-    /// One object, for programs.
+    /// One JSON object, for programs.
     Json,
-    /// Of `--list` only: the page of the documentation.
+    /// With `--list` only: the page of the documentation.
     Markdown,
 }
 
 /// Arguments of `eds`.
 #[derive(Debug, Args)]
 struct EdsArguments {
-    /// The configuration of the box (TOML).
+    /// The configuration of the gateway (TOML).
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Only the device with this name.
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
-    /// Write each sheet into this folder as NAME.eds; without it the one sheet goes to standard output.
+    /// Write each sheet into this folder as NAME.eds. Without it, a single sheet goes to standard output.
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -153,10 +153,10 @@ struct EdsArguments {
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
 struct DoctorArguments {
-    /// The configuration of the box (TOML): its cycles, interfaces, addresses and real-time settings are tried.
+    /// Try the cycles, interfaces, addresses and real-time settings of this configuration (TOML).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// How long each cycle is tried, in seconds (1 to 3600).
+    /// How long to try each cycle, in seconds (1 to 3600).
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
     /// Print one JSON object on standard output.
@@ -168,10 +168,10 @@ struct DoctorArguments {
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("bus").required(true).args(["config", "interface"])))]
 struct ScanArguments {
-    /// Look at the bus of this configuration, and say where it is another one.
+    /// Scan the bus of this configuration, and show the differences.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Look at what hangs on this network interface.
+    /// Scan the bus on this network interface.
     #[arg(long, value_name = "IF")]
     interface: Option<String>,
     /// The interface at the other end of the ring, or of a second line.
@@ -186,20 +186,20 @@ struct ScanArguments {
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("frames").required(true).args(["file", "hex"])))]
 struct TranslateArguments {
-    /// A recording (pcapng or pcap), or a list of frames as text: one a line, in hexadecimal.
+    /// A recording (pcapng or pcap), or a text file with one frame a line, in hexadecimal.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// One frame: an Ethernet frame, a class 1 datagram, a CIP Motion update, or a line of a list.
     #[arg(long, value_name = "BYTES")]
     hex: Option<String>,
-    /// Axes, drives and tables of this configuration; without it, those of the demonstration.
+    /// Use axes, drives and tables of this configuration instead of those of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// The drives of the demonstration, as `demo` takes them.
+    /// Drives of the demonstration, as for `demo`.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES, conflicts_with = "config")]
     drives: Vec<demo::DriveKind>,
-    /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
-    /// drives stand in for them.
+    /// Values that the drives of the machine have, above all their scaling: a list of `idn` and `object` lines. Without it, the
+    /// values are those of simulated drives.
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
     /// Print one JSON object on standard output.
@@ -213,17 +213,17 @@ struct SnapshotArguments {
     /// The folder with the frames: lists (*.hex) and recordings (*.pcapng, *.pcap).
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Axes, drives and tables of this configuration; without it, those of DIR/config.toml, or of the demonstration.
+    /// Use axes, drives and tables of this configuration instead of those of DIR/config.toml or of the demonstration.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// The drives of the demonstration, as `demo` takes them.
+    /// Drives of the demonstration, as for `demo`.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES, conflicts_with = "config")]
     drives: Vec<demo::DriveKind>,
-    /// What the drives of the machine hold, their scaling before all: a list of `idn` and `object` lines. Without it simulated
-    /// drives stand in for them.
+    /// Values that the drives of the machine have, above all their scaling: a list of `idn` and `object` lines. Without it, the
+    /// values are those of simulated drives.
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
-    /// Make what is found now the golden texts.
+    /// Make the present translation the golden texts.
     #[arg(long)]
     accept: bool,
 }
@@ -242,10 +242,10 @@ struct DecodeArguments {
     /// Print frames of this side only.
     #[arg(long, value_enum)]
     only: Option<Side>,
-    /// Tells CANopen and DeviceNet apart by the interfaces of this configuration. Recordings of the box tell it themselves.
+    /// Tell CANopen and DeviceNet apart by the interfaces of this configuration. Recordings of Axisbridge need none.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// What CAN interfaces have that nothing else tells of; without it they are read as CANopen, and the tree says so.
+    /// Protocol of CAN interfaces that nothing else describes. Without it, they are read as CANopen, and the tree says so.
     #[arg(long, value_enum)]
     can: Option<CanKind>,
 }
@@ -273,18 +273,17 @@ enum Side {
 /// Arguments of `dictionary`.
 #[derive(Debug, Args)]
 struct DictionaryArguments {
-    /// Whose dictionary.
+    /// Which dictionary.
     #[arg(value_enum)]
     profile: DictionaryProfile,
-    /// How to print it.
+    /// Output format.
     #[arg(long, value_enum, default_value_t = DictionaryFormat::Csv)]
     format: DictionaryFormat,
-    /// What of it. cip has instance (when it is not given), class, enums, services, networks, faults; sercos has idns and
-    /// communication (both when it is not given), bits, codes; cia402 has objects (when it is not given), codes; generic has
-    /// instance.
+    /// Part of the dictionary. cip: instance (default), class, enums, services, networks, faults. sercos: idns and communication
+    /// (default: both), bits, codes. cia402: objects (default), codes. generic: instance.
     #[arg(long, value_enum)]
     part: Option<DictionaryPart>,
-    /// A folder of mapping tables; a file that is not there is taken from the binary.
+    /// A folder of mapping tables. A file that is missing there comes from the binary.
     #[arg(long, value_name = "DIR")]
     mappings: Option<PathBuf>,
 }
@@ -305,16 +304,16 @@ enum DictionaryProfile {
 /// How `dictionary` prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum DictionaryFormat {
-    /// Comma separated values, with the names of the columns first.
+    /// Comma separated values; the first line has the names of the columns.
     Csv,
-    /// An array of objects with the names of the columns as keys.
+    /// An array of objects whose keys are the names of the columns.
     Json,
 }
 
 /// What `dictionary` prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum DictionaryPart {
-    /// cip: attributes of an axis; generic: parameters and signals.
+    /// cip: attributes of an axis. generic: parameters and signals.
     Instance,
     /// Attributes of instance 0.
     Class,
@@ -332,7 +331,7 @@ enum DictionaryPart {
     Communication,
     /// Words and their bits.
     Bits,
-    /// sercos: codes; cia402: codes, bits and states.
+    /// sercos: codes. cia402: codes, bits and states.
     Codes,
     /// Objects.
     Objects,
@@ -359,45 +358,45 @@ impl DictionaryPart {
 
 #[derive(Debug, Subcommand)]
 enum Simulate {
-    /// A line of simulated SERCOS III drives on a network interface.
+    /// Simulate a line of SERCOS III drives on a network interface.
     SercosDrive(SercosDriveArguments),
-    /// A simulated CiA 402 drive on a CAN interface.
+    /// Simulate a CANopen drive (CiA 402) on a CAN interface.
     CanDrive(CanDriveArguments),
-    /// A drive on a CAN interface that speaks DeviceNet.
+    /// Simulate a DeviceNet drive on a CAN interface.
     DevicenetDrive(DevicenetDriveArguments),
-    /// A CIP Motion controller that configures, enables and moves the axes of a device.
+    /// Simulate a CIP Motion controller that configures, enables and moves the axes of a device, or runs a script.
     Controller(ControllerArguments),
 }
 
 /// Arguments of `simulate sercos-drive`.
 #[derive(Debug, Args)]
 struct SercosDriveArguments {
-    /// The network interface, such as eth1; it leads to the master's port 1.
+    /// Network interface, such as eth1, connected to port 1 of the master.
     #[arg(long, value_name = "IF")]
     interface: String,
-    /// A second interface, where the line goes on to other drives or the ring closes.
+    /// Second interface, connected to further drives, or to the master to close the ring.
     #[arg(long, value_name = "IF2")]
     ring: Option<String>,
-    /// How many drives hang on the line.
+    /// Number of drives on the line.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
     slaves: u16,
-    /// SERCOS address of the first drive; the others count up from it.
+    /// SERCOS address of the first drive. The others count up from it.
     #[arg(long, value_name = "ADDRESS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=511))]
     address: u16,
-    /// Addresses of the drives that slide instead of turning, separated by commas.
+    /// Addresses of the linear drives, separated by commas. The others are rotary.
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     linear: Vec<u16>,
-    /// They can be plugged in while the bus runs (SCP_HP).
+    /// The drives can be plugged in while the bus runs (SCP_HP).
     #[arg(long)]
     hot_plug: bool,
-    /// Their telegrams are fixed (SCP_FixCFG): parameters that are sent to each of them, and that each sends, separated by commas, such as
-    /// S-0-0134,S-0-0036 S-0-0135,S-0-0051,S-0-0040
+    /// The telegrams of the drives are fixed (SCP_FixCFG): parameters sent to each drive, and parameters that each drive sends,
+    /// separated by commas, such as S-0-0134,S-0-0036 S-0-0135,S-0-0051,S-0-0040
     #[arg(long, value_names = ["TO", "FROM"], num_args = 2, conflicts_with = "hot_plug")]
     fixed_lists: Vec<String>,
-    /// Events to play, one a line; the same can be typed while the drives run ("help" lists them).
+    /// File of events, one a line. You can also type them while the drives run ("help" lists them).
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// End by itself after this many seconds.
+    /// End after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
 }
@@ -405,28 +404,28 @@ struct SercosDriveArguments {
 /// Arguments of `simulate can-drive`.
 #[derive(Debug, Args)]
 struct CanDriveArguments {
-    /// The CAN interface, such as can0; its bit rate is set already.
+    /// CAN interface, such as can0. Its bit rate has to be set already.
     #[arg(long, value_name = "IF")]
     interface: String,
-    /// Node-id; without one the drive waits until LSS gives it one.
+    /// Node-id. Without it, the drive waits until LSS assigns one.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
-    /// Serial number, by which LSS tells drives without a node-id apart [default: the node-id, or the number of the process]
+    /// Serial number, by which LSS tells drives without a node-id apart [default: the node-id, or the process number]
     #[arg(long, value_name = "N")]
     serial: Option<u32>,
-    /// How many axes the drive has.
+    /// Number of axes.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     axes: u8,
-    /// How many cycles may pass without a SYNC until the drive stops.
+    /// Number of cycles without a SYNC after which the drive stops.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
     sync_losses: u16,
-    /// Where to write the drive's electronic data sheet.
+    /// Write the electronic data sheet of the drive to this file.
     #[arg(long, value_name = "FILE")]
     eds: Option<PathBuf>,
-    /// Events to play, one a line; the same can be typed while the drive runs ("help" lists them).
+    /// File of events, one a line. You can also type them while the drive runs ("help" lists them).
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// End by itself after this many seconds.
+    /// End after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
 }
@@ -434,13 +433,13 @@ struct CanDriveArguments {
 /// Arguments of `simulate devicenet-drive`.
 #[derive(Debug, Args)]
 struct DevicenetDriveArguments {
-    /// The CAN interface, such as can0; its bit rate is set already.
+    /// CAN interface, such as can0. Its bit rate has to be set already.
     #[arg(long, value_name = "IF")]
     interface: String,
     /// MAC ID of the drive.
     #[arg(long, value_name = "MAC", value_parser = clap::value_parser!(u8).range(0..=63))]
     mac: u8,
-    /// What it is.
+    /// Kind of drive.
     #[arg(long, value_enum, default_value_t = DevicenetDriveKind::Motion)]
     kind: DevicenetDriveKind,
     /// Position counts of a CIP Motion drive in a revolution.
@@ -449,10 +448,10 @@ struct DevicenetDriveArguments {
     /// Output assembly of a velocity drive: 20, 21, 22 or 23.
     #[arg(long, value_name = "N", default_value_t = 21, value_parser = clap::value_parser!(u8).range(20..=23))]
     assembly: u8,
-    /// Events to play, one a line; the same can be typed while the drive runs ("help" lists them).
+    /// File of events, one a line. You can also type them while the drive runs ("help" lists them).
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// End by itself after this many seconds.
+    /// End after this many seconds.
     #[arg(long, value_name = "N")]
     seconds: Option<u64>,
 }
@@ -469,41 +468,40 @@ enum DevicenetDriveKind {
 /// Arguments of `simulate controller`.
 #[derive(Debug, Args)]
 struct ControllerArguments {
-    /// The device's address.
+    /// Address of the device.
     #[arg(long, value_name = "ADDR", required_unless_present = "script")]
     target: Option<std::net::Ipv4Addr>,
-    /// This controller's own address; the class 1 data arrive there on UDP 2222.
+    /// Address of this controller. It uses UDP port 2222 of it.
     #[arg(long, value_name = "ADDR")]
     bind: Option<std::net::Ipv4Addr>,
-    /// Run this script instead of the usual motion; it says everything about connection, axes and steps.
+    /// Run this script instead of the usual motion. It describes connection, axes and steps.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["axes", "update_period_us", "counts_per_unit", "speed", "seconds"])]
     script: Option<PathBuf>,
-    /// Only check the script and print what it would do; nothing is sent.
+    /// Only check the script and print what it would do. Nothing is sent.
     #[arg(long, requires = "script")]
     check: bool,
-    /// How many axes the device has.
+    /// Number of axes of the device.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
     axes: u8,
     /// Controller update period (the connection's RPI) in microseconds.
     #[arg(long, value_name = "US", default_value_t = 8000, value_parser = clap::value_parser!(u32).range(250..=1_000_000))]
     update_period_us: u32,
-    /// Counts in a unit of each axis, separated by commas; the last one counts for the axes that follow.
+    /// Counts in a unit of each axis, separated by commas. The last one is used for all further axes.
     #[arg(long, value_name = "COUNTS", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..))]
     counts_per_unit: Vec<u32>,
-    /// About how fast each axis moves, in units per second, separated by commas; the last one counts for the axes that
-    /// follow.
+    /// Approximate speed of each axis, in units per second, separated by commas. The last one is used for all further axes.
     #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = positive)]
     speed: Vec<f64>,
     /// How long the axes move, in seconds.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
-    /// By how much the controller's clock is ahead of the host's, in milliseconds.
+    /// How far the controller's clock is ahead of the host's, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 0, allow_negative_numbers = true)]
     clock_offset: i32,
     /// What the controller's clock gains, in parts per million.
     #[arg(long, value_name = "PPM", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-5_000..=5_000))]
     clock_drift: i32,
-    /// Step the controller's clock after so many seconds by so many milliseconds, such as 3:-50; may be given several times.
+    /// After S seconds, step the controller's clock by MS milliseconds, such as 3:-50. Can be repeated.
     #[arg(long, value_name = "S:MS")]
     clock_step: Vec<ClockStep>,
     /// Print the result as one JSON object on standard output.
@@ -566,7 +564,7 @@ fn print(data: impl AsRef<[u8]>, code: ExitCode) -> Result<ExitCode, CliError> {
     let mut out = io::stdout().lock();
     match out.write_all(data.as_ref()).and_then(|()| out.flush()) {
         Ok(()) => Ok(code),
-        // Whoever reads has seen enough, as `head` has.
+        // The reader has closed the pipe, as `head` does: it has seen enough.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(code),
         Err(error) => Err(format!("cannot write: {error}").into()),
     }

@@ -481,8 +481,8 @@ fn paths_count_from_the_file() {
 }
 
 #[test]
-fn the_guide_describes_every_key() {
-    let guide = include_str!("../../../docs/guide.md");
+fn the_reference_describes_every_key() {
+    let page = include_str!("../../../docs/reference/configuration.md");
     let keys =
         include_str!("file.rs").lines().filter_map(|line| line.strip_prefix("    pub ")?.split(':').next());
     for key in keys {
@@ -494,6 +494,6 @@ fn the_guide_describes_every_key() {
             "south" => "`[south]`".to_owned(),
             key => format!("`{key}`"),
         };
-        assert!(guide.contains(&shown), "docs/guide.md does not describe {shown}");
+        assert!(page.contains(&shown), "docs/reference/configuration.md does not describe {shown}");
     }
 }

@@ -43,7 +43,7 @@ fn print(arguments: &DictionaryArguments, out: &mut dyn Write) -> Result<ExitCod
     };
     match written.and_then(|()| out.flush()) {
         Ok(()) => Ok(ExitCode::SUCCESS),
-        // Whoever reads has seen enough, as `head` has.
+        // The reader has closed the pipe, as `head` does: it has seen enough.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
         Err(error) => Err(format!("cannot write: {error}").into()),
     }

@@ -31,7 +31,7 @@ const PERIODS: f64 = 6.0;
 const ARRIVALS: usize = 64;
 
 /// What operation without a shared clock may add to the velocity, as a part of it: what is promised at an arrival jitter
-/// of a tenth of a period (docs/guide.md), and in proportion beyond that.
+/// of a tenth of a period (docs/tasks/configure-axes.md), and in proportion beyond that.
 const RIPPLE: f64 = 0.02;
 const RIPPLE_JITTER: f64 = 0.1;
 
