@@ -10,11 +10,11 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
 use super::cip_tables::CipTables;
-use super::compile_sercos::{Compiler, unit_of};
 use super::format::{
     Cia402ExampleRow, CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow,
 };
 use super::load::Tables;
+use super::sercos::compile::{Compiler, unit_of};
 use super::{
     AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
     Mapping, ObjectFacts, Rated, Reference, SercosAxis,

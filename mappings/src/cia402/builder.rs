@@ -31,7 +31,7 @@ use crate::generic_names::{
 };
 use crate::item::Item;
 use crate::load::Parsed;
-use crate::resolver::Resolver;
+use crate::resolver::{Resolver, over};
 
 /// Where the error code is.
 const ERROR_CODE: Object = Object { index: 0x603F, sub: 0 };
@@ -413,7 +413,7 @@ impl<'a> Builder<'a> {
         let bits = &self.set(set)?.codes;
         let place = |text: &str| {
             let bit = bits.iter().find(|bit| bit.name == text)?;
-            Some((u32::try_from(bit.code).ok()?, bit.last?))
+            Some(((u32::try_from(bit.code).ok()?, bit.last?), [].as_slice()))
         };
         self.resolver.pattern(rows, place, bits.iter().map(|bit| bit.name.as_str()))
     }
@@ -427,8 +427,18 @@ impl<'a> Builder<'a> {
         let states = &self.set(set)?.codes;
         let find = |text: &str| states.iter().find(|state| state.name == text);
         let names = states.iter().map(|state| state.name.as_str());
-        let state = self.resolver.name(key, name, "a state of the drive", find, names)?;
+        let what = if set == "Command" { "a command of the profile" } else { "a state of the drive" };
+        let state = self.resolver.name(key, name, what, find, names)?;
         Some(BitPattern::new(state.mask?, u32::try_from(state.code).ok()?))
+    }
+
+    /// The controlword of a command: the bits that it names, and 0 in the others that mean the same in every mode.
+    fn command(&mut self, name: &Name) -> Option<BitPattern> {
+        let command = self.coded_state("Command", "send", name)?;
+        let bits = self.set("Controlword")?.codes.iter().filter(|bit| bit.modes.is_empty());
+        let single = bits.filter(|bit| bit.last == u32::try_from(bit.code).ok());
+        let mask = single.filter_map(|bit| bit.last).fold(command.mask, |mask, bit| mask | 1 << bit);
+        Some(BitPattern::new(mask, command.value))
     }
 
     fn states(&mut self, rows: &GenericCia402File) {
@@ -441,7 +451,14 @@ impl<'a> Builder<'a> {
                 },
                 None => None,
             };
-            let Some(pattern) = self.pattern("Controlword", &row.pattern) else { continue };
+            let sent = match &row.send {
+                Some(name) => self.command(name),
+                None => Some(BitPattern::new(0, 0)),
+            };
+            let (Some(sent), Some(pattern)) = (sent, self.pattern("Controlword", &row.pattern)) else {
+                continue;
+            };
+            let pattern = over(pattern, sent);
             if self.tables.actions.iter().any(|known| known.action == action && known.when == when) {
                 self.resolver.error(code::TWICE, row.action.span(), "action", "the action is there twice");
             }

@@ -20,7 +20,7 @@ use crate::drive_program::{
     PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
 use crate::item::Item;
-use crate::scaling::AxisUnits;
+use crate::sercos::scaling::AxisUnits;
 
 /// Octets of a mode of operation.
 const MODE_BYTES: u16 = 1;

@@ -43,8 +43,9 @@ use super::resolver::Resolver;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 
-/// Signals and parameters of the generic model, as the generic dictionary lists them. The catalogue in code
-/// decides; the dictionary must say the same.
+/// Signals and parameters of the generic model, as the generic dictionary lists them. The signals are the fields of the
+/// process image, and the constants of the parameters are generated from the shipped dictionary: another one that says
+/// otherwise is refused.
 #[derive(Debug, Clone, Default)]
 pub struct GenericDictionary {
     signals: Vec<Signal>,
@@ -76,6 +77,18 @@ impl GenericDictionary {
             let what = "a parameter of the generic model";
             let find = |name: &str| Parameter::from_name(name).and_then(Parameter::row);
             let Some(known) = resolver.name("name", &row.name, what, find, names) else { continue };
+            if let Some(number) = row.number.as_ref().filter(|number| *number.get_ref() != known.parameter.0)
+            {
+                let (expected, got) = (known.parameter.0, number.get_ref());
+                let message = format!("expected 0x{expected:04X}, got 0x{got:04X}");
+                resolver.error(code::CONTRADICTS_CATALOGUE, number.span(), "number", message);
+            }
+            if let Some(element) = &row.element {
+                same(&mut resolver, "element", element, known.element.name());
+            }
+            if let Some(about) = &row.about {
+                same(&mut resolver, "about", about, known.description);
+            }
             same(&mut resolver, "quantity", &row.quantity, known.quantity.name());
             same(&mut resolver, "type", &row.data_type, known.kind.name());
             same(&mut resolver, "access", &row.access, known.access.name());
@@ -109,7 +122,7 @@ impl GenericDictionary {
     }
 }
 
-/// Checks that a dictionary repeats what the catalogue says.
+/// Checks that a dictionary says what the program was built with.
 fn same(resolver: &mut Resolver<'_>, key: &str, name: &Name, expected: &str) {
     if name.get_ref() != expected {
         resolver.error(

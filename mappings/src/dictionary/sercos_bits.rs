@@ -135,6 +135,12 @@ impl Word {
         if let [bits] = found.parts.as_slice() { Some(*bits) } else { None }
     }
 
+    /// The named values of the field with this name.
+    pub fn values(&self, name: &str) -> &[FieldValue] {
+        let found = self.fields.iter().find(|field| field.name.as_deref() == Some(name));
+        found.map_or(&[], |field| field.values.as_slice())
+    }
+
     /// The names of all fields.
     pub fn field_names(&self) -> impl Iterator<Item = &str> + Clone {
         self.fields.iter().filter_map(|field| field.name.as_deref())

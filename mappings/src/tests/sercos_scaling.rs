@@ -125,7 +125,14 @@ fn lsb(axis: &SercosAxis, facts: &DriveFacts, quantity: usize) -> Result<Lsb, Se
         Signal::TorqueCommand,
     ];
     let dictionary = &mapping.dictionaries.sercos;
-    compile_sercos::unit_of(&mapping.sercos, dictionary, axis.units, facts, idn, of[quantity].quantity())
+    crate::sercos::compile::unit_of(
+        &mapping.sercos,
+        dictionary,
+        axis.units,
+        facts,
+        idn,
+        of[quantity].quantity(),
+    )
 }
 
 fn ratio_of(lsb: Lsb) -> f64 {

@@ -4,15 +4,15 @@ use profile_generic::program::Width;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
-use super::capture_program::CaptureMode;
 use super::captures;
-use super::compile_sercos::{Compiler, SercosAxis, SercosError};
-use super::dictionary::SercosDictionary;
-use super::drive_facts::DriveFacts;
-use super::drive_program::Telegram;
-use super::item::Item;
-use super::sercos_tables::{Elements, SercosTables, StepKind, StepRule};
+use super::compile::{Compiler, SercosAxis, SercosError};
+use super::facts::DriveFacts;
 use super::survey::{Survey, survey};
+use super::tables::{Elements, SercosTables, StepKind, StepRule};
+use crate::capture_program::CaptureMode;
+use crate::dictionary::SercosDictionary;
+use crate::drive_program::Telegram;
+use crate::item::Item;
 
 /// Elements that say what a value means.
 const DESCRIPTION: [Element; 4] = [Element::Attribute, Element::Unit, Element::Minimum, Element::Maximum];
@@ -74,7 +74,7 @@ impl CommissioningPlan {
     ///
     /// # Errors
     /// A mode has no row, a parameter has no scaling yet, or its value does not fit the drive.
-    pub(super) fn compile(
+    pub(crate) fn compile(
         tables: &SercosTables,
         dictionary: &SercosDictionary,
         axis: &SercosAxis,

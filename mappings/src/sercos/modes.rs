@@ -8,13 +8,13 @@ use profile_generic::mode::ModeSelection;
 use profile_sercos::wire::idn::Idn;
 
 use super::captures;
-use super::compile_sercos::{Compiler, SercosError};
+use super::compile::{Compiler, SercosError};
 use super::fixed_connections::FixedConnections;
 use super::scaling::ScalingError;
-use super::sercos_tables::{ModeRule, SlotRule};
+use super::tables::{ModeRule, SlotRule};
 
 /// The modes of an axis.
-pub(super) struct Modes<'t> {
+pub(crate) struct Modes<'t> {
     /// Those that it has, each with the parameter that keeps it.
     pub chosen: Vec<(&'t ModeRule, &'t SlotRule)>,
     /// Those that it does without, and why.
@@ -22,7 +22,7 @@ pub(super) struct Modes<'t> {
 }
 
 /// Values with the IDNs that carry them.
-pub(super) type Signals = Vec<(Signal, Idn)>;
+pub(crate) type Signals = Vec<(Signal, Idn)>;
 
 impl<'t> Compiler<'t> {
     /// The rows of the modes that the drive can have by what it lists, in the order of their parameters, and those that it

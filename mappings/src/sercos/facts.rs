@@ -7,7 +7,7 @@ use profile_generic::program::Width;
 use profile_sercos::wire::attribute::{Attribute, Format, ItemLength};
 use profile_sercos::wire::idn::Idn;
 
-use super::dictionary::{IdnFormat, IdnUnit, SercosDictionary};
+use crate::dictionary::{IdnFormat, IdnUnit, SercosDictionary};
 
 /// What a drive has said about itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -16,14 +16,13 @@ use super::{
     Elements, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule, SercosTables,
     SignalRule, SlotRule, StatusRule, StepKind, StepRule,
 };
-use crate::captures::{CaptureBy, CaptureRule};
 use crate::cip_tables::{CipTables, ExceptionRow};
 use crate::dictionary::{Dictionaries, IdnFormat, IdnUnit, SercosIdn, Word, quantity};
 use crate::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
-use crate::finding::Findings;
 use crate::finding::registry as code;
+use crate::finding::{Findings, Spanned};
 use crate::format::{
-    CommissionRow, DiagnosisRow, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow,
+    CommissionRow, DiagnosisRow, FieldIs, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow,
     ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow,
     SercosSignalRow, UnboundRow,
 };
@@ -32,8 +31,9 @@ use crate::generic_names::{
     signal, status_bit, unit_kind,
 };
 use crate::load::Parsed;
-use crate::resolver::Resolver;
-use crate::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
+use crate::resolver::{Resolver, over};
+use crate::sercos::captures::{CaptureBy, CaptureRule};
+use crate::sercos::scaling::{GearRule, Method, ModuloRule, Reference, ScalingRule, Term};
 
 impl SercosTables {
     pub(crate) fn resolve(
@@ -146,7 +146,17 @@ impl<'a> Builder<'a> {
     }
 
     fn pattern(&mut self, word: &Word, rows: &[FieldValueRow]) -> Option<BitPattern> {
-        self.resolver.pattern(rows, |text| word.field(text), word.field_names())
+        self.resolver.pattern(rows, |text| Some((word.field(text)?, word.values(text))), word.field_names())
+    }
+
+    /// Mask and value that the dictionary has under a name for a whole word.
+    fn named_value(&mut self, word: &Word, key: &str, name: &Name) -> Option<BitPattern> {
+        let find = |text: &str| word.patterns.iter().find(|pattern| pattern.value.name == text);
+        let names = word.patterns.iter().map(|pattern| pattern.value.name.as_str());
+        let found = self.resolver.name(key, name, "a named value of the control word", find, names)?;
+        let (low, high) = found.bits;
+        let mask = (low..=high).fold(0, |mask, bit| mask | 1 << bit);
+        Some(BitPattern::new(mask, found.value.value << low))
     }
 
     fn units(&mut self, rows: &GenericSercosFile) {
@@ -438,7 +448,8 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::ROW_MISSING, rows.words.control.span(), "control", message);
         };
         for row in &rows.mode_slot {
-            let value = |field: &Name| [FieldValueRow { field: field.clone(), is: row.slot.clone() }];
+            let is = || Spanned::new(row.slot.span(), FieldIs::Number(*row.slot.get_ref()));
+            let value = |field: &Name| [FieldValueRow { field: field.clone(), is: is() }];
             let control = self.pattern(control, &value(&rows.words.mode_control));
             let status = self.pattern(status, &value(&rows.words.mode_status));
             let idn = self.idn("idn", &row.idn);
@@ -448,7 +459,12 @@ impl<'a> Builder<'a> {
         }
         for row in &rows.action {
             let action = action(&mut self.resolver, &row.action);
+            let sent = match &row.send {
+                None => Some(BitPattern::new(0, 0)),
+                Some(name) => self.named_value(control, "send", name),
+            };
             let pattern = self.pattern(control, &row.pattern);
+            let pattern = sent.zip(pattern).map(|(sent, pattern)| over(pattern, sent));
             let command = match &row.command {
                 None => None,
                 Some(name) => match self.idn("command", name) {
@@ -602,7 +618,7 @@ impl<'a> Builder<'a> {
                 return None;
             }
         };
-        let is_sequence = crate::captures::sequence(kind).is_some();
+        let is_sequence = crate::sercos::captures::sequence(kind).is_some();
         let by = match (by, value, word, counter, enable) {
             (0, Some(value), Some((word, pattern)), None, Some(enable)) => CaptureBy::Latch {
                 value: value.idn,

@@ -15,12 +15,12 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
 use super::captures::CaptureRule;
-use super::dictionary::{Dictionaries, IdnUnit};
-use super::drive_program::FaultRow;
 use super::scaling::ScalingRule;
+use crate::dictionary::{Dictionaries, IdnUnit};
+use crate::drive_program::FaultRow;
 
 #[derive(Debug, Clone)]
-pub(super) struct SignalRule {
+pub(crate) struct SignalRule {
     pub signal: Signal,
     pub idn: Idn,
     /// Whether an axis cannot work without it.
@@ -31,14 +31,14 @@ pub(super) struct SignalRule {
 
 /// A bit of a polarity parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Polarity {
+pub(crate) struct Polarity {
     pub idn: Idn,
     pub bit: u32,
 }
 
 /// A fixed unit and how drives spell it.
 #[derive(Debug, Clone)]
-pub(super) struct FixedUnit {
+pub(crate) struct FixedUnit {
     pub unit: String,
     pub texts: Vec<String>,
     pub quantity: Quantity,
@@ -53,7 +53,7 @@ impl FixedUnit {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct ModeRule {
+pub(crate) struct ModeRule {
     pub selection: ModeSelection,
     /// Whether an axis can do without it.
     pub optional: bool,
@@ -63,7 +63,7 @@ pub(super) struct ModeRule {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SlotRule {
+pub(crate) struct SlotRule {
     pub control: BitPattern,
     pub status: BitPattern,
     pub idn: Idn,
@@ -71,7 +71,7 @@ pub(super) struct SlotRule {
 
 /// A mode that is a sequence of procedure commands.
 #[derive(Debug, Clone)]
-pub(super) struct ProcedureRule {
+pub(crate) struct ProcedureRule {
     pub selection: ModeSelection,
     /// The mode in which the controller moves the axis meanwhile.
     pub led_in: Option<ModeSelection>,
@@ -93,7 +93,7 @@ pub struct ReportRule {
 
 /// A status bit in a word of the drive's telegram.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct StatusRule {
+pub(crate) struct StatusRule {
     pub word: Idn,
     pub pattern: BitPattern,
     pub bit: StatusBits,
@@ -102,7 +102,7 @@ pub(super) struct StatusRule {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ParameterRule {
+pub(crate) struct ParameterRule {
     pub parameter: Parameter,
     pub quantity: Quantity,
     pub idn: Idn,
@@ -115,7 +115,7 @@ pub(super) struct ParameterRule {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum StepKind {
+pub(crate) enum StepKind {
     WriteValue(Idn, i64),
     WriteParameter(Parameter),
     WriteModes,
@@ -129,10 +129,10 @@ pub(super) enum StepKind {
 }
 
 /// Elements of a data block.
-pub(super) type Elements = ArrayVec<Element, 5>;
+pub(crate) type Elements = ArrayVec<Element, 5>;
 
 #[derive(Debug, Clone)]
-pub(super) struct StepRule {
+pub(crate) struct StepRule {
     pub phase: u8,
     pub kind: StepKind,
     pub axis: Option<UnitKind>,
@@ -147,41 +147,41 @@ pub(super) struct StepRule {
 /// The mapping of the generic model to SERCOS.
 #[derive(Debug, Clone, Default)]
 pub struct SercosTables {
-    pub(super) units: Vec<FixedUnit>,
-    pub(super) scalings: Vec<ScalingRule>,
+    pub(crate) units: Vec<FixedUnit>,
+    pub(crate) scalings: Vec<ScalingRule>,
     /// The polarity whose sign is that of the axis.
-    pub(super) direction: Option<Polarity>,
-    pub(super) control: Idn,
-    pub(super) status_word: Idn,
-    pub(super) signals: Vec<SignalRule>,
-    pub(super) modes: Vec<ModeRule>,
-    pub(super) slots: Vec<SlotRule>,
+    pub(crate) direction: Option<Polarity>,
+    pub(crate) control: Idn,
+    pub(crate) status_word: Idn,
+    pub(crate) signals: Vec<SignalRule>,
+    pub(crate) modes: Vec<ModeRule>,
+    pub(crate) slots: Vec<SlotRule>,
     /// The drive's list of its operation modes.
-    pub(super) supported_modes: Idn,
-    pub(super) procedures: Vec<ProcedureRule>,
-    pub(super) actions: Vec<(Action, BitPattern)>,
-    pub(super) commands: Vec<(Action, Idn)>,
-    pub(super) reports: Vec<ReportRule>,
-    pub(super) status: Vec<StatusRule>,
-    pub(super) faults: Vec<FaultRow>,
+    pub(crate) supported_modes: Idn,
+    pub(crate) procedures: Vec<ProcedureRule>,
+    pub(crate) actions: Vec<(Action, BitPattern)>,
+    pub(crate) commands: Vec<(Action, Idn)>,
+    pub(crate) reports: Vec<ReportRule>,
+    pub(crate) status: Vec<StatusRule>,
+    pub(crate) faults: Vec<FaultRow>,
     /// The diagnostic message that the drive has for them: number and text.
-    pub(super) diagnosis: Option<[Idn; 2]>,
-    pub(super) parameters: Vec<ParameterRule>,
-    pub(super) captures: Vec<CaptureRule>,
+    pub(crate) diagnosis: Option<[Idn; 2]>,
+    pub(crate) parameters: Vec<ParameterRule>,
+    pub(crate) captures: Vec<CaptureRule>,
     /// The drive's lists of what its telegram, and the master's, may carry.
-    pub(super) configurable: [Idn; 2],
-    pub(super) steps: Vec<StepRule>,
+    pub(crate) configurable: [Idn; 2],
+    pub(crate) steps: Vec<StepRule>,
     /// IDNs of the drive profile that no row binds, and why.
     pub unbound: Vec<(Idn, String)>,
 }
 
 impl SercosTables {
-    pub(super) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
+    pub(crate) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
         self.signals.iter().find(|rule| rule.signal == signal)
     }
 
     /// The words with status bits beside the status word, once.
-    pub(super) fn status_words(&self) -> Vec<Idn> {
+    pub(crate) fn status_words(&self) -> Vec<Idn> {
         let mut words: Vec<Idn> = Vec::new();
         for rule in self.status.iter().filter(|rule| rule.word != self.status_word) {
             if !words.contains(&rule.word) {
@@ -193,17 +193,17 @@ impl SercosTables {
 
     /// Those of them that are put into the telegram for their status bits. The input of a capture is there where captures are
     /// wanted, and its status bits with it.
-    pub(super) fn added_words(&self) -> Vec<Idn> {
+    pub(crate) fn added_words(&self) -> Vec<Idn> {
         let input = |idn: Idn| self.captures.iter().any(|rule| rule.input() == Some(idn));
         self.status_words().into_iter().filter(|idn| !input(*idn)).collect()
     }
 
-    pub(super) fn procedure(&self, selection: ModeSelection) -> Option<&ProcedureRule> {
+    pub(crate) fn procedure(&self, selection: ModeSelection) -> Option<&ProcedureRule> {
         self.procedures.iter().find(|rule| rule.selection == selection)
     }
 
     /// Every polarity parameter, once.
-    pub(super) fn polarity_idns(&self) -> Vec<Idn> {
+    pub(crate) fn polarity_idns(&self) -> Vec<Idn> {
         let mut idns: Vec<Idn> =
             self.signals.iter().filter_map(|rule| rule.polarity).map(|bit| bit.idn).collect();
         idns.extend(self.direction.map(|bit| bit.idn));
@@ -213,7 +213,7 @@ impl SercosTables {
     }
 
     /// A rule that only converts a value of this IDN, both ways, to the quantity that its scaling gives.
-    pub(super) fn plain_rule(&self, idn: Idn, dictionaries: &Dictionaries) -> Option<ParameterRule> {
+    pub(crate) fn plain_rule(&self, idn: Idn, dictionaries: &Dictionaries) -> Option<ParameterRule> {
         let IdnUnit::Scaled(scaling) = &dictionaries.sercos.idn(idn)?.unit else { return None };
         let rule = self.scalings.iter().find(|rule| rule.scaling == *scaling)?;
         let quantity = rule.methods.first()?.quantity;

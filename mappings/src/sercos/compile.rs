@@ -10,18 +10,19 @@ use profile_generic::ratio::{Ratio, Rounding};
 use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
 use profile_sercos::wire::idn::Idn;
 
-use super::capture_program::CaptureMode;
 use super::captures;
-use super::dictionary::{IdnUnit, SercosDictionary};
-use super::drive_facts::DriveFacts;
-use super::drive_program::{
+use super::facts::DriveFacts;
+use super::fixed_connections::FixedConnections;
+use super::modes::Signals;
+use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
+use super::tables::{ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
+use crate::capture_program::CaptureMode;
+use crate::dictionary::{IdnUnit, SercosDictionary};
+use crate::drive_program::{
     DriveProgram, MAX_MODES, ModeEntry, PROCEDURE_COMMANDS_MAX, PROCEDURES_MAX, ParameterEntry, Procedure,
     ProcedureBy, StatusRow, Telegram, WORD_BYTES,
 };
-use super::fixed_connections::FixedConnections;
-use super::item::Item;
-use super::scaling::{AxisUnits, Lsb, ScalingError, ScalingSource, above_zero, power_of_ten};
-use super::sercos_tables::{ParameterRule, Polarity, ReportRule, SercosTables, SlotRule};
+use crate::item::Item;
 
 /// Wraps of a position that does not work modulo: the range of its 32 bits.
 const FULL_RANGE: i64 = 1 << 32;
@@ -224,32 +225,59 @@ impl Telegram {
     ///
     /// # Errors
     /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
-    pub(super) fn compile(
+    pub(crate) fn compile(
         tables: &SercosTables,
         dictionary: &SercosDictionary,
         axis: &SercosAxis,
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
-        let mut telegram = Telegram::default();
-        let (command, actual) = Compiler { tables, dictionary, axis, facts }.signals()?;
-        if let Some(fixed) = FixedConnections::of(tables, facts)? {
-            let unfilled =
-                |idn: &&Idn| **idn != tables.control && !command.iter().any(|(_, known)| known == *idn);
-            if let Some(&idn) = fixed.command.idns.iter().find(unfilled) {
-                return Err(SercosError::FixedUnfilled { list: fixed.command.list(), idn });
-            }
-            for (idns, items, bytes) in [
-                (fixed.command.idns, &mut telegram.command, &mut telegram.command_bytes),
-                (fixed.feedback.idns, &mut telegram.feedback, &mut telegram.feedback_bytes),
-            ] {
-                for idn in idns {
-                    let width = facts.width(idn, dictionary).ok_or(SercosError::Length(idn))?;
-                    items.push(idn.into());
-                    *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
-                }
-            }
-            return Ok(telegram);
+        let compiler = Compiler { tables, dictionary, axis, facts };
+        let signals = compiler.signals()?;
+        match FixedConnections::of(tables, facts)? {
+            Some(fixed) => compiler.fixed_telegram(&signals.0, &fixed),
+            None => compiler.own_telegram(signals),
         }
+    }
+}
+
+impl Compiler<'_> {
+    fn width(&self, idn: Idn) -> Result<Width, SercosError> {
+        self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))
+    }
+
+    /// Bytes of a value in a telegram.
+    fn bytes(&self, idn: Idn) -> Result<u16, SercosError> {
+        u16::try_from(self.width(idn)?.bytes()).map_err(|_| SercosError::Length(idn))
+    }
+
+    /// The telegrams of a drive that has its own lists. Every value of the command has to be one that the axis gives.
+    fn fixed_telegram(
+        &self,
+        command: &[(Signal, Idn)],
+        fixed: &FixedConnections,
+    ) -> Result<Telegram, SercosError> {
+        let mut telegram = Telegram::default();
+        let unfilled =
+            |idn: &&Idn| **idn != self.tables.control && !command.iter().any(|(_, known)| known == *idn);
+        if let Some(&idn) = fixed.command.idns.iter().find(unfilled) {
+            return Err(SercosError::FixedUnfilled { list: fixed.command.list(), idn });
+        }
+        for (idns, items, bytes) in [
+            (&fixed.command.idns, &mut telegram.command, &mut telegram.command_bytes),
+            (&fixed.feedback.idns, &mut telegram.feedback, &mut telegram.feedback_bytes),
+        ] {
+            for &idn in idns {
+                items.push(idn.into());
+                *bytes += self.bytes(idn)?;
+            }
+        }
+        Ok(telegram)
+    }
+
+    /// The telegrams of a drive that takes the lists of the axis: words, signals, words of the status, captures.
+    fn own_telegram(&self, (command, actual): (Signals, Signals)) -> Result<Telegram, SercosError> {
+        let Self { tables, dictionary, axis, facts } = *self;
+        let mut telegram = Telegram::default();
         for (word, signals, idns, bytes) in [
             (tables.control, command, &mut telegram.command, &mut telegram.command_bytes),
             (tables.status_word, actual, &mut telegram.feedback, &mut telegram.feedback_bytes),
@@ -257,9 +285,8 @@ impl Telegram {
             idns.push(word.into());
             *bytes = WORD_BYTES;
             for (_, idn) in signals {
-                let width = facts.width(idn, dictionary).ok_or(SercosError::Length(idn))?;
                 idns.push(idn.into());
-                *bytes += u16::try_from(width.bytes()).map_err(|_| SercosError::Length(idn))?;
+                *bytes += self.bytes(idn)?;
             }
         }
         for idn in tables.added_words() {
@@ -275,7 +302,7 @@ impl Telegram {
     }
 }
 
-impl super::Mapping {
+impl crate::Mapping {
     /// Bytes with C-CON, even, of the longest connections that a drive for this axis can need, whatever it tells: to the
     /// drive and from it.
     #[must_use]
@@ -287,7 +314,7 @@ impl super::Mapping {
 impl Telegram {
     /// Bytes with C-CON, even, of the longest telegrams that a drive for this axis can need, to it and from it: every
     /// value that it may have, in four bytes where the dictionary does not say.
-    pub(super) fn room(
+    pub(crate) fn room(
         tables: &SercosTables,
         dictionary: &SercosDictionary,
         axis: &SercosAxis,
@@ -320,7 +347,7 @@ impl Telegram {
 }
 
 /// What the values of an IDN measure, and generic units in one count.
-pub(super) fn unit_of(
+pub(crate) fn unit_of(
     tables: &SercosTables,
     dictionary: &SercosDictionary,
     units: AxisUnits,
@@ -397,125 +424,30 @@ impl DriveProgram {
     ///
     /// # Errors
     /// As [`Telegram::compile`], and when the scaling was not read or has no row.
-    pub(super) fn compile(
+    pub(crate) fn compile(
         tables: &SercosTables,
         dictionary: &SercosDictionary,
         axis: &SercosAxis,
         facts: &DriveFacts,
     ) -> Result<Self, SercosError> {
         let compiler = Compiler { tables, dictionary, axis, facts };
-        let (command_signals, actual_signals) = compiler.signals()?;
+        let signals = compiler.signals()?;
         let telegram = Telegram::compile(tables, dictionary, axis, facts)?;
         let mut program = Self::new(telegram, !axis.silent);
-        if command_signals.iter().any(|(signal, _)| *signal == Signal::PositionCommand) {
-            program.position_step = compiler.position_step()?;
-        }
-        program.words_at = [
-            compiler.offset(tables.control, &program.telegram.command)?,
-            compiler.offset(tables.status_word, &program.telegram.feedback)?,
-        ];
-        program.carriers = Some([
-            command_signals.iter().map(|(_, idn)| Item::from(*idn)).collect(),
-            actual_signals.iter().map(|(_, idn)| Item::from(*idn)).collect(),
-        ]);
-        for (signal, idn) in command_signals {
-            let field = compiler.field(signal, idn, compiler.offset(idn, &program.telegram.command)?)?;
-            program.command.push(field).map_err(|_| SercosError::Full("the master's telegram"))?;
-        }
-        for (signal, idn) in actual_signals {
-            let field = compiler.field(signal, idn, compiler.offset(idn, &program.telegram.feedback)?)?;
-            program.feedback.push(field).map_err(|_| SercosError::Full("the drive's telegram"))?;
-        }
-        for (action, pattern) in &tables.actions {
-            program.actions.set(*action, *pattern);
-        }
-        let fits = |wanted: &Option<bool>| wanted.is_none_or(|wanted| wanted != axis.silent);
-        for rule in tables.reports.iter().filter(|rule| fits(&rule.acknowledges)) {
-            let ReportRule { pattern, report, procedure, .. } = *rule;
-            let fits = (procedure == Some(true) || program.reports.push(pattern, report))
-                && (procedure == Some(false) || program.led_reports.push(pattern, report));
-            if !fits {
-                return Err(SercosError::Full("the table of reports"));
-            }
-        }
-        for (rule, slot) in compiler.modes()?.chosen {
-            let SlotRule { control, status, .. } = *slot;
-            let refuse = |signal: &&Signal| tables.signal(**signal).is_some_and(|row| row.refuse);
-            let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
-            let fields = || program.command.fields().map(|field| field.signal);
-            let there = |signal: &&Signal| fields().any(|known| known == **signal);
-            let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
-            let entry = ModeEntry {
-                selection: rule.selection,
-                control,
-                status,
-                bits: BitPattern::default(),
-                handshake: None,
-                needs,
-                carried,
-            };
-            program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
-        }
-        for rule in axis.modes.iter().filter_map(|mode| tables.procedure(*mode)) {
-            if let Some(led_in) = rule.led_in
-                && !axis.modes.contains(&led_in)
-            {
-                return Err(SercosError::LedIn { procedure: rule.selection, led_in });
-            }
-            if rule.commands.iter().any(|idn| facts.is_missing(*idn)) {
-                continue;
-            }
-            let commands = rule.commands.iter().copied().map(Item::from).take(PROCEDURE_COMMANDS_MAX);
-            let procedure = Procedure {
-                selection: rule.selection,
-                led_in: rule.led_in,
-                by: ProcedureBy::Commands(commands.collect()),
-            };
-            program
-                .procedures
-                .try_push(procedure)
-                .map_err(|_| SercosError::Full("the table of procedures"))?;
-        }
-        for idn in tables.status_words() {
-            let place =
-                compiler.place(idn, &program.telegram.feedback).filter(|place| place.offset.is_some());
-            // The builder has counted them.
-            place.map(|place| program.status_words.try_push(place));
-        }
-        for rule in tables.status.iter().filter(|rule| fits(&rule.acknowledges)) {
-            let word = Some(rule.word).filter(|word| *word != tables.status_word).map(Item::from);
-            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.item == word)) {
-                continue;
-            }
-            let row = StatusRow { word, pattern: rule.pattern, bit: rule.bit };
-            program.status.try_push(row).map_err(|_| SercosError::Full("the table of status bits"))?;
-            program.known_status |= rule.bit;
-        }
-        for row in &tables.faults {
-            program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
-        }
-        let diagnostic_message = tables.diagnosis.into_iter().flatten();
-        program.diagnosis.extend(diagnostic_message.filter(|idn| !facts.is_missing(*idn)).map(Item::from));
-        for (action, idn) in &tables.commands {
-            program
-                .commands
-                .try_push((*action, Item::from(*idn)))
-                .map_err(|_| SercosError::Full("the table of commands"))?;
-        }
-        for rule in &tables.parameters {
-            match compiler.parameter(rule)? {
-                Some(entry) => program.parameters.push(entry),
-                None if rule.reject => program.rejected.push(rule.parameter),
-                None => {}
-            }
-        }
-        program.parameters.sort_by_key(|entry| entry.parameter);
+        compiler.add_signals(&mut program, signals)?;
+        compiler.add_actions(&mut program)?;
+        compiler.add_reports(&mut program)?;
+        compiler.add_modes(&mut program)?;
+        compiler.add_procedures(&mut program)?;
+        compiler.add_status(&mut program)?;
+        compiler.add_faults(&mut program)?;
+        compiler.add_parameters(&mut program)?;
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
 }
 
-pub(super) struct Compiler<'t> {
+pub(crate) struct Compiler<'t> {
     pub tables: &'t SercosTables,
     pub dictionary: &'t SercosDictionary,
     pub axis: &'t SercosAxis,
@@ -532,8 +464,149 @@ impl Compiler<'_> {
         self.place(idn, telegram).and_then(|place| place.offset).ok_or(SercosError::Length(idn))
     }
 
+    /// Words and signals with their places in the telegrams.
+    fn add_signals(
+        &self,
+        program: &mut DriveProgram,
+        (command, actual): (Signals, Signals),
+    ) -> Result<(), SercosError> {
+        if command.iter().any(|(signal, _)| *signal == Signal::PositionCommand) {
+            program.position_step = self.position_step()?;
+        }
+        program.words_at = [
+            self.offset(self.tables.control, &program.telegram.command)?,
+            self.offset(self.tables.status_word, &program.telegram.feedback)?,
+        ];
+        let carriers = |signals: &Signals| signals.iter().map(|(_, idn)| Item::from(*idn)).collect();
+        program.carriers = Some([carriers(&command), carriers(&actual)]);
+        for (signal, idn) in command {
+            let field = self.field(signal, idn, self.offset(idn, &program.telegram.command)?)?;
+            program.command.push(field).map_err(|_| SercosError::Full("the master's telegram"))?;
+        }
+        for (signal, idn) in actual {
+            let field = self.field(signal, idn, self.offset(idn, &program.telegram.feedback)?)?;
+            program.feedback.push(field).map_err(|_| SercosError::Full("the drive's telegram"))?;
+        }
+        Ok(())
+    }
+
+    /// Values of the control word and procedure commands of the actions.
+    fn add_actions(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for (action, pattern) in &self.tables.actions {
+            program.actions.set(*action, *pattern);
+        }
+        for (action, idn) in &self.tables.commands {
+            let command = (*action, Item::from(*idn));
+            program.commands.try_push(command).map_err(|_| SercosError::Full("the table of commands"))?;
+        }
+        Ok(())
+    }
+
+    /// Whether a row counts for this drive, which acknowledges command values or does not.
+    fn counts(&self, acknowledges: Option<bool>) -> bool {
+        acknowledges.is_none_or(|wanted| wanted != self.axis.silent)
+    }
+
+    fn add_reports(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for rule in self.tables.reports.iter().filter(|rule| self.counts(rule.acknowledges)) {
+            let ReportRule { pattern, report, procedure, .. } = *rule;
+            let fits = (procedure == Some(true) || program.reports.push(pattern, report))
+                && (procedure == Some(false) || program.led_reports.push(pattern, report));
+            if !fits {
+                return Err(SercosError::Full("the table of reports"));
+            }
+        }
+        Ok(())
+    }
+
+    fn add_modes(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for (rule, slot) in self.modes()?.chosen {
+            let SlotRule { control, status, .. } = *slot;
+            let refuse = |signal: &&Signal| self.tables.signal(**signal).is_some_and(|row| row.refuse);
+            let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
+            let fields = || program.command.fields().map(|field| field.signal);
+            let there = |signal: &&Signal| fields().any(|known| known == **signal);
+            let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
+            let entry = ModeEntry {
+                selection: rule.selection,
+                control,
+                status,
+                bits: BitPattern::default(),
+                handshake: None,
+                needs,
+                carried,
+            };
+            program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
+        }
+        Ok(())
+    }
+
+    /// What the drive does by itself on a procedure command; without the command it is left out.
+    fn add_procedures(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for rule in self.axis.modes.iter().filter_map(|mode| self.tables.procedure(*mode)) {
+            if let Some(led_in) = rule.led_in
+                && !self.axis.modes.contains(&led_in)
+            {
+                return Err(SercosError::LedIn { procedure: rule.selection, led_in });
+            }
+            if rule.commands.iter().any(|idn| self.facts.is_missing(*idn)) {
+                continue;
+            }
+            let commands = rule.commands.iter().copied().map(Item::from).take(PROCEDURE_COMMANDS_MAX);
+            let procedure = Procedure {
+                selection: rule.selection,
+                led_in: rule.led_in,
+                by: ProcedureBy::Commands(commands.collect()),
+            };
+            let full = |_| SercosError::Full("the table of procedures");
+            program.procedures.try_push(procedure).map_err(full)?;
+        }
+        Ok(())
+    }
+
+    /// Status bits, of the words that are in the telegram.
+    fn add_status(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for idn in self.tables.status_words() {
+            let place = self.place(idn, &program.telegram.feedback).filter(|place| place.offset.is_some());
+            // The builder has counted them.
+            place.map(|place| program.status_words.try_push(place));
+        }
+        for rule in self.tables.status.iter().filter(|rule| self.counts(rule.acknowledges)) {
+            let word = Some(rule.word).filter(|word| *word != self.tables.status_word).map(Item::from);
+            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.item == word)) {
+                continue;
+            }
+            let row = StatusRow { word, pattern: rule.pattern, bit: rule.bit };
+            program.status.try_push(row).map_err(|_| SercosError::Full("the table of status bits"))?;
+            program.known_status |= rule.bit;
+        }
+        Ok(())
+    }
+
+    /// Faults, and where the drive keeps its diagnostic message.
+    fn add_faults(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for row in &self.tables.faults {
+            program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
+        }
+        let diagnosis = self.tables.diagnosis.into_iter().flatten();
+        program.diagnosis.extend(diagnosis.filter(|idn| !self.facts.is_missing(*idn)).map(Item::from));
+        Ok(())
+    }
+
+    fn add_parameters(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
+        for rule in &self.tables.parameters {
+            match self.parameter(rule)? {
+                Some(entry) => program.parameters.push(entry),
+                None if rule.reject => program.rejected.push(rule.parameter),
+                None => {}
+            }
+        }
+        program.parameters.sort_by_key(|entry| entry.parameter);
+        Ok(())
+    }
+
     fn field(&self, signal: Signal, idn: Idn, offset: u16) -> Result<Field, SercosError> {
-        let width = self.facts.width(idn, self.dictionary).ok_or(SercosError::Length(idn))?;
+        let width = self.width(idn)?;
         let lsb = self.unit(idn, signal.quantity())?;
         let absolute = signal.quantity() == Quantity::Position
             && !matches!(signal, Signal::FollowingError | Signal::PositionOffset);

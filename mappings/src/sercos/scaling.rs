@@ -13,8 +13,8 @@ use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
-use super::dictionary::SercosDictionary;
-use super::drive_facts::DriveFacts;
+use super::facts::DriveFacts;
+use crate::dictionary::SercosDictionary;
 
 /// The largest power of ten in a scaling; S-0-0046 and its like go from -32 to 32, 64 bits hold 10^18.
 pub const MAX_EXPONENT: u32 = 18;
@@ -137,13 +137,13 @@ pub enum ScalingError {
 
 /// A number that stands in the table or in the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Term {
+pub(crate) enum Term {
     Fixed(i64),
     Drive(Idn),
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Method {
+pub(crate) struct Method {
     pub pattern: BitPattern,
     pub kind: Option<UnitKind>,
     pub quantity: Quantity,
@@ -157,7 +157,7 @@ pub(super) struct Method {
 
 /// What lies between motor and load.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct GearRule {
+pub(crate) struct GearRule {
     /// The scaling type that refers to the load.
     pub pattern: BitPattern,
     /// Turns of the motor.
@@ -170,7 +170,7 @@ pub(super) struct GearRule {
 
 /// How positions wrap.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ModuloRule {
+pub(crate) struct ModuloRule {
     pub pattern: BitPattern,
     pub range: Idn,
     pub divider: Option<Idn>,
@@ -179,17 +179,17 @@ pub(super) struct ModuloRule {
 /// How the unit of one quantity follows from the drive's scaling parameters.
 #[derive(Debug, Clone)]
 pub struct ScalingRule {
-    pub(super) scaling: String,
-    pub(super) word: Idn,
-    pub(super) gear: Option<GearRule>,
-    pub(super) feed: Option<Idn>,
-    pub(super) exact: bool,
-    pub(super) modulo: Option<ModuloRule>,
-    pub(super) methods: Vec<Method>,
+    pub(crate) scaling: String,
+    pub(crate) word: Idn,
+    pub(crate) gear: Option<GearRule>,
+    pub(crate) feed: Option<Idn>,
+    pub(crate) exact: bool,
+    pub(crate) modulo: Option<ModuloRule>,
+    pub(crate) methods: Vec<Method>,
 }
 
 /// Where the scaling finds what it needs to know.
-pub(super) struct ScalingSource<'a> {
+pub(crate) struct ScalingSource<'a> {
     pub axis: AxisUnits,
     pub facts: &'a DriveFacts,
     pub dictionary: &'a SercosDictionary,
@@ -233,7 +233,7 @@ impl ScalingRule {
     ///
     /// # Errors
     /// A parameter was not read or holds what no row knows, or the exact ratio does not fit 64 bits.
-    pub(super) fn lsb(&self, source: &ScalingSource<'_>) -> Result<Lsb, ScalingError> {
+    pub(crate) fn lsb(&self, source: &ScalingSource<'_>) -> Result<Lsb, ScalingError> {
         let value = source.read(self.word)?;
         let unknown = ScalingError::Type { idn: self.word, value };
         let word = u32::try_from(value).map_err(|_| unknown.clone())?;
@@ -333,7 +333,7 @@ impl ScalingRule {
     }
 }
 
-pub(super) fn above_zero(idn: Idn, value: i64) -> Result<i64, ScalingError> {
+pub(crate) fn above_zero(idn: Idn, value: i64) -> Result<i64, ScalingError> {
     if value > 0 { Ok(value) } else { Err(ScalingError::Value { idn, expected: "a number above 0", value }) }
 }
 
@@ -342,7 +342,7 @@ fn above_one(idn: Idn, value: i64) -> Result<i64, ScalingError> {
 }
 
 /// 10^exponent.
-pub(super) fn power_of_ten(idn: Idn, exponent: i64) -> Result<Ratio, ScalingError> {
+pub(crate) fn power_of_ten(idn: Idn, exponent: i64) -> Result<Ratio, ScalingError> {
     let magnitude = u32::try_from(exponent.unsigned_abs()).ok().filter(|power| *power <= MAX_EXPONENT);
     let magnitude = magnitude.and_then(|power| 10_i64.checked_pow(power));
     let power =

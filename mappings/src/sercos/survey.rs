@@ -2,12 +2,12 @@
 
 use profile_sercos::wire::idn::Idn;
 
-use super::drive_facts::DriveFacts;
+use super::facts::DriveFacts;
 use super::fixed_connections;
-use super::sercos_tables::SercosTables;
+use super::tables::SercosTables;
 
 /// The next questions.
-pub(super) enum Survey {
+pub(crate) enum Survey {
     /// S-0-1050.x.1, which may be missing, and S-0-1050.x.6.
     Lists(Vec<(Idn, Idn)>),
     /// What the values of the lists are.
@@ -17,7 +17,7 @@ pub(super) enum Survey {
 }
 
 /// The next questions; `None` when all is known.
-pub(super) fn survey(tables: &SercosTables, facts: &DriveFacts) -> Option<Survey> {
+pub(crate) fn survey(tables: &SercosTables, facts: &DriveFacts) -> Option<Survey> {
     if let Some(survey) = fixed_connections::survey(facts) {
         return Some(survey);
     }

@@ -9,10 +9,10 @@ use profile_generic::image::Signal;
 use profile_sercos::wire::connection::ConnectionSetup;
 use profile_sercos::wire::idn::Idn;
 
-use super::compile_sercos::SercosError;
-use super::drive_facts::DriveFacts;
-use super::sercos_tables::SercosTables;
+use super::compile::SercosError;
+use super::facts::DriveFacts;
 use super::survey::Survey;
+use super::tables::SercosTables;
 
 /// Connections of a slave with SCP_FixCFG, x of S-0-1050.x.
 const INSTANCES: [u8; 2] = [0, 1];
@@ -54,7 +54,7 @@ impl FixedConnections {
     ///
     /// # Errors
     /// No list carries the control word or the status word, an IDN stands in a list twice, or S-0-1050.x.1 contradicts.
-    pub(super) fn of(tables: &SercosTables, facts: &DriveFacts) -> Result<Option<Self>, SercosError> {
+    pub(crate) fn of(tables: &SercosTables, facts: &DriveFacts) -> Result<Option<Self>, SercosError> {
         if !facts.has_fixed_connections() {
             return Ok(None);
         }
@@ -64,7 +64,7 @@ impl FixedConnections {
     }
 
     /// The connection that a signal belongs into.
-    pub(super) fn of_signal(&self, signal: Signal) -> &FixedConnection {
+    pub(crate) fn of_signal(&self, signal: Signal) -> &FixedConnection {
         if signal.is_command() { &self.command } else { &self.feedback }
     }
 }
@@ -106,7 +106,7 @@ fn show(connections: &[FixedConnection]) -> String {
 }
 
 /// What has to be asked next of the fixed connections of a drive; `None` when all is known, or nothing is fixed.
-pub(super) fn survey(facts: &DriveFacts) -> Option<Survey> {
+pub(crate) fn survey(facts: &DriveFacts) -> Option<Survey> {
     if !facts.has_fixed_connections() {
         return None;
     }

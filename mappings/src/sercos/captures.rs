@@ -10,21 +10,21 @@ use profile_generic::program::{BitPattern, Conversion};
 use profile_generic::quantity::Quantity;
 use profile_sercos::wire::idn::Idn;
 
-use super::capture_program::{
+use super::compile::{Compiler, SercosAxis};
+use super::facts::DriveFacts;
+use super::tables::SercosTables;
+use crate::capture_program::{
     CaptureMode, CaptureProgram, Counter, Gate, Input, Latch, Place, Sequence, Stored, WORDS_MAX,
 };
-use super::compile_sercos::{Compiler, SercosAxis};
-use super::dictionary::{SercosDictionary, SercosIdn};
-use super::drive_facts::DriveFacts;
-use super::drive_program::Telegram;
-use super::item::Item;
-use super::sercos_tables::SercosTables;
+use crate::dictionary::{SercosDictionary, SercosIdn};
+use crate::drive_program::Telegram;
+use crate::item::Item;
 
 /// Values that a telegram of the master has room for.
 const CONNECTION_IDNS_MAX: usize = profile_sercos::master::config::CONNECTION_IDNS_MAX;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CaptureBy {
+pub(crate) enum CaptureBy {
     Latch { value: Idn, word: Idn, pattern: BitPattern, enable: Idn, command: Option<Idn> },
     Counter { value: Idn, counter: Idn },
     Input { word: Idn, pattern: BitPattern },
@@ -32,7 +32,7 @@ pub(super) enum CaptureBy {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CaptureRule {
+pub(crate) struct CaptureRule {
     pub kind: CaptureKind,
     pub by: CaptureBy,
 }
@@ -46,7 +46,7 @@ impl CaptureRule {
     }
 
     /// The word of an input that is looked at in every cycle.
-    pub(super) fn input(&self) -> Option<Idn> {
+    pub(crate) fn input(&self) -> Option<Idn> {
         match self.by {
             CaptureBy::Input { word, .. } => Some(word),
             _ => None,
@@ -69,7 +69,7 @@ impl CaptureRule {
 }
 
 /// Every IDN that a capture of the tables needs, once.
-pub(super) fn idns(tables: &SercosTables) -> Vec<Idn> {
+pub(crate) fn idns(tables: &SercosTables) -> Vec<Idn> {
     let mut idns = Vec::new();
     for idn in tables.captures.iter().flat_map(CaptureRule::idns) {
         if !idns.contains(&idn) {
@@ -80,7 +80,7 @@ pub(super) fn idns(tables: &SercosTables) -> Vec<Idn> {
 }
 
 /// The home switch edge and the marker edge that make up a sequence.
-pub(super) fn sequence(kind: CaptureKind) -> Option<[CaptureKind; 2]> {
+pub(crate) fn sequence(kind: CaptureKind) -> Option<[CaptureKind; 2]> {
     let marker = match kind.source {
         CaptureSource::HomeSwitchMarkerPositive => CaptureEdge::Positive,
         CaptureSource::HomeSwitchMarkerNegative => CaptureEdge::Negative,
@@ -96,7 +96,7 @@ fn usable<'t>(tables: &'t SercosTables, facts: &'t DriveFacts) -> impl Iterator<
 }
 
 /// Whether the drive lists an IDN as configurable.
-pub(super) fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
+pub(crate) fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
     let wide = facts.attribute(list).is_none_or(|attribute| attribute.item_length().bytes() == 4);
     let data = facts.data(list).unwrap_or_default();
     if wide {
@@ -108,13 +108,13 @@ pub(super) fn is_listed(list: Idn, idn: Idn, facts: &DriveFacts) -> bool {
 
 /// Whether a value that an axis can do without may stand in a telegram: the drive has it, and the list of what it takes
 /// there, if it has one, names it.
-pub(super) fn may_be_cyclic(tables: &SercosTables, facts: &DriveFacts, idn: Idn, to_drive: bool) -> bool {
+pub(crate) fn may_be_cyclic(tables: &SercosTables, facts: &DriveFacts, idn: Idn, to_drive: bool) -> bool {
     let list = tables.configurable[usize::from(to_drive)];
     !facts.is_missing(idn) && (facts.data(list).is_none() || is_listed(list, idn, facts))
 }
 
 /// Puts what the drive allows into the telegrams.
-pub(super) fn extend(
+pub(crate) fn extend(
     telegram: &mut Telegram,
     tables: &SercosTables,
     dictionary: &SercosDictionary,
@@ -145,12 +145,12 @@ pub(super) fn extend(
 }
 
 /// The place of an IDN among others, at the end when it is new; `None` when it has no room.
-pub(super) fn index_of(places: &mut ArrayVec<Place, WORDS_MAX>, place: Place) -> Option<usize> {
+pub(crate) fn index_of(places: &mut ArrayVec<Place, WORDS_MAX>, place: Place) -> Option<usize> {
     let known = places.iter().position(|known| known.item == place.item);
     known.or_else(|| places.try_push(place).ok().map(|()| places.len() - 1))
 }
 
-pub(super) fn compile(compiler: &Compiler<'_>, telegram: &Telegram) -> CaptureProgram {
+pub(crate) fn compile(compiler: &Compiler<'_>, telegram: &Telegram) -> CaptureProgram {
     let mut program = CaptureProgram::default();
     if compiler.axis.captures == CaptureMode::Off {
         return program;
