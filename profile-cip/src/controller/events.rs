@@ -161,7 +161,7 @@ impl Controller {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::event_channel::EventChannel;
+    use crate::device::axis::event_channel::EventChannel;
     use crate::wire::motion::codes::EventType;
     use crate::wire::motion::event::Window;
     use proptest::prelude::*;
