@@ -3,7 +3,8 @@
 //! A value that is set is stored at once and used after the next start.
 
 use super::object::Object;
-use crate::device::config::{DSCP_MAX, QosConfig};
+pub use crate::device::config::DSCP_MAX;
+use crate::device::config::QosConfig;
 use crate::wire::network_parameters::Priority;
 use crate::wire::status::GeneralStatus;
 

@@ -6,7 +6,8 @@
 use core::net::Ipv4Addr;
 
 use super::object::Object;
-use crate::device::config::{INACTIVITY_TIMEOUT_MAX_S, InterfaceConfig};
+pub use crate::device::config::INACTIVITY_TIMEOUT_MAX_S;
+use crate::device::config::InterfaceConfig;
 use crate::wire::status::GeneralStatus;
 
 /// Class code of the TCP/IP Interface object.
