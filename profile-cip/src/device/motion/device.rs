@@ -15,55 +15,37 @@
 //!
 //! Nothing is allocated after construction.
 
-pub use crate::device::axis::SequenceSettings;
-pub use crate::device::motion_link::SyncState;
 use arrayvec::ArrayVec;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
-use super::cyclic_list::{CyclicLists, Direction};
-use super::explicit_queue::ExplicitQueue;
+use super::engine::Engine;
+use super::explicit::ExplicitSide;
 use super::fixed::with_services_alone;
-use super::indication::StartupProgress;
 use super::io_connection::{IoConnection, Mode};
 use super::io_counters::MotionCounters;
-use super::node::NodeHealth;
-use super::service_channel::ServiceChannel;
-use super::time_offset::OffsetCompensation;
-use crate::device::attribute::worker::{AttributeAccess, AttributeSpace};
-use crate::device::attribute::{AttributeDefinition, AttributeStore, AttributeTable, Scope, TableError, id};
-use crate::device::axis::drive_link::{AxisCommandImage, DriveImage, Trims};
+use super::{indication, service};
+use crate::device::attribute::worker::AttributeAccess;
+use crate::device::attribute::{AttributeDefinition, Scope, TableError};
+pub use crate::device::axis::SequenceSettings;
+use crate::device::axis::drive_link::{AxisCommandImage, DriveImage};
 use crate::device::axis::event_channel::EventCounters;
-use crate::device::axis::exception::ExceptionActions;
 use crate::device::axis::fault_log::{FaultLog, LogEntry};
 use crate::device::axis::refused::RefusedRequest;
-use crate::device::axis::reported::Reported;
 use crate::device::axis::state::AxisState;
-use crate::device::axis::{Axis, AxisConfig, Context, FaultWords, PositionView};
-use crate::device::motion_link::{CloseParameters, MotionReply, MotionRequest, OpenParameters, OpenRefusal};
+use crate::device::axis::{AxisConfig, FaultWords, PositionView};
+pub use crate::device::motion_link::SyncState;
+use crate::device::motion_link::{MotionReply, MotionRequest, OpenParameters};
+use crate::device::objects::identity::ModuleState;
+use crate::device::visualization::display::{self, Line, NodeCondition};
+use crate::device::visualization::{self, AxisCondition, Indication};
 use crate::wire::Error;
-use crate::wire::motion::codes::{
-    ControlMode, EventChecking, EventType, FaultType, NodeAlarm, NodeControl, NodeFault,
-};
+use crate::wire::motion::Format;
+use crate::wire::motion::codes::{ControlMode, EventChecking, EventType, FaultType, NodeAlarm, NodeFault};
 use crate::wire::motion::event::ExtendedEventData;
-use crate::wire::motion::{FORMAT_REVISION, Format, WriteBlock};
 use crate::wire::status::GeneralStatus;
 
 /// Most axes of a device: what the EtherNet/IP part of the standard allows.
 pub const AXES_MAX: usize = 16;
-/// Instances of an update: the class and the axes.
-pub(in crate::device) const INSTANCES_MAX: usize = AXES_MAX + 1;
-/// Replies that wait to be taken; requests are refused before this overflows.
-const REPLIES_MAX: usize = 16;
-/// Octets of the class-1 sequence count.
-pub(in crate::device) const SEQUENCE_LEN: usize = 2;
-
-/// Extended status of a refused Forward_Open: the connection has an owner.
-const OWNERSHIP_CONFLICT: u16 = 0x0106;
-/// Extended status of a refused Forward_Open: the interval is not acceptable.
-const INTERVAL_NOT_ACCEPTABLE: u16 = 0x0111;
-/// Extended status of a refused Forward_Open: the connection point is not one of ours.
-const INVALID_CONNECTION_POINT: u16 = 0x012F;
-
 /// What the device is made of.
 #[derive(Debug, Clone)]
 pub struct DeviceConfig {
@@ -121,53 +103,10 @@ impl From<TableError> for DeviceError {
     }
 }
 
-/// What the last C-to-D update asked to hear about one instance.
-#[derive(Debug, Clone, Copy, Default)]
-pub(in crate::device) struct Echo {
-    pub number: u8,
-    pub cyclic: bool,
-    /// Write block ID, read block ID and status of the write data.
-    pub lists: Option<(u8, u8, GeneralStatus)>,
-}
-
-/// An axis with its attributes and channels.
-pub(in crate::device) struct Slot {
-    pub axis: Axis,
-    pub store: AttributeStore,
-    pub service: ServiceChannel,
-    pub write_lists: CyclicLists,
-    pub read_lists: CyclicLists,
-}
-
-/// The class with its attributes and channel.
-pub(in crate::device) struct Class {
-    pub store: AttributeStore,
-    pub service: ServiceChannel,
-}
-
 /// A CIP Motion device.
 pub struct MotionDevice {
-    pub(in crate::device) config: DeviceConfig,
-    pub(in crate::device) class_table: AttributeTable,
-    pub(in crate::device) axis_table: AttributeTable,
-    pub(in crate::device) class: Class,
-    pub(in crate::device) slots: Vec<Slot>,
-    pub(in crate::device) connection: Option<IoConnection>,
-    pub(in crate::device) node: NodeHealth,
-    pub(in crate::device) compensation: OffsetCompensation,
-    pub(in crate::device) sync: SyncState,
-    pub(in crate::device) progress: StartupProgress,
-    pub(in crate::device) counters: MotionCounters,
-    pub(in crate::device) last_error: Option<Error>,
-    /// Lost and late updates of this connection, modulo 256.
-    pub(in crate::device) diagnostics: (u8, u8),
-    pub(in crate::device) reported_diagnostics: Reported<(u8, u8)>,
-    pub(in crate::device) reported_offset: Reported<i64>,
-    pub(in crate::device) echo: ArrayVec<Echo, INSTANCES_MAX>,
-    pub(in crate::device) explicit: ExplicitQueue,
-    pub(in crate::device) replies: ArrayVec<MotionReply, REPLIES_MAX>,
-    pub(in crate::device) tickets: u32,
-    pub(in crate::device) idle_header: Option<[u8; 8]>,
+    pub(super) engine: Engine,
+    explicit: ExplicitSide,
 }
 
 impl MotionDevice {
@@ -191,42 +130,7 @@ impl MotionDevice {
             Format::Variable => config,
             Format::Fixed => DeviceConfig { attributes: with_services_alone(config.attributes), ..config },
         };
-        let class_table = AttributeTable::new(Scope::Class, &config.attributes)?;
-        let axis_table = AttributeTable::new(Scope::Instance, &config.attributes)?;
-        let class = Class { store: AttributeStore::new(&class_table), service: ServiceChannel::default() };
-        let slots = config
-            .axes
-            .iter()
-            .map(|axis| Slot {
-                axis: Axis::new(*axis),
-                store: AttributeStore::new(&axis_table),
-                service: ServiceChannel::default(),
-                write_lists: CyclicLists::default(),
-                read_lists: CyclicLists::default(),
-            })
-            .collect();
-        Ok(Self {
-            config,
-            class_table,
-            axis_table,
-            class,
-            slots,
-            connection: None,
-            node: NodeHealth::default(),
-            compensation: OffsetCompensation::default(),
-            sync: SyncState::default(),
-            progress: StartupProgress::default(),
-            counters: MotionCounters::default(),
-            last_error: None,
-            diagnostics: (0, 0),
-            reported_diagnostics: Reported::known((0, 0)),
-            reported_offset: Reported::new(),
-            echo: ArrayVec::new(),
-            explicit: ExplicitQueue::default(),
-            replies: ArrayVec::new(),
-            tickets: 0,
-            idle_header: None,
-        })
+        Ok(Self { engine: Engine::new(config)?, explicit: ExplicitSide::default() })
     }
 
     // -- getters ------------------------------------------------------------------------------------------------
@@ -234,25 +138,25 @@ impl MotionDevice {
     /// Number of axes; `axis` arguments count from 0, instance numbers from 1.
     #[must_use]
     pub fn axis_count(&self) -> usize {
-        self.slots.len()
+        self.engine.instances.axis_count()
     }
 
     /// State of an axis, or `None` if there is no such axis.
     #[must_use]
     pub fn axis_state(&self, axis: usize) -> Option<AxisState> {
-        self.slots.get(axis).map(|slot| slot.axis.state())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.state())
     }
 
     /// Exceptions, faults and alarms of an axis.
     #[must_use]
     pub fn fault_words(&self, axis: usize) -> Option<&FaultWords> {
-        self.slots.get(axis).map(|slot| slot.axis.fault_words())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.fault_words())
     }
 
     /// Control Mode of the last update of an axis, or `None` if there is no such axis.
     #[must_use]
     pub fn control_mode(&self, axis: usize) -> Option<ControlMode> {
-        self.slots.get(axis).map(|slot| ControlMode(slot.axis.block().control_mode.0 & 0x0F))
+        self.engine.instances.slots.get(axis).map(|slot| ControlMode(slot.axis.block().control_mode.0 & 0x0F))
     }
 
     /// Axis Faults (attribute 657) of an axis.
@@ -264,75 +168,71 @@ impl MotionDevice {
     /// The log of faults and alarms of an axis.
     #[must_use]
     pub fn fault_log(&self, axis: usize) -> Option<&FaultLog> {
-        self.slots.get(axis).map(|slot| slot.axis.log())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.log())
     }
 
     /// The next entry that came into the log of an axis or ended there.
     pub fn poll_fault_log(&mut self, axis: usize) -> Option<LogEntry> {
-        self.slots.get_mut(axis).and_then(|slot| slot.axis.faults.log.poll())
+        self.engine.instances.slots.get_mut(axis).and_then(|slot| slot.axis.faults.log.poll())
     }
 
     /// The next request of an axis that was refused.
     pub fn poll_refused(&mut self, axis: usize) -> Option<RefusedRequest> {
-        self.slots.get_mut(axis)?.axis.refused.pop_at(0)
+        self.engine.instances.slots.get_mut(axis)?.axis.refused.pop_at(0)
     }
 
     /// Fault and alarm records of an axis that were lost because the controller did not take them.
     #[must_use]
     pub fn dropped_records(&self, axis: usize) -> Option<u32> {
-        self.slots.get(axis).map(|slot| slot.axis.dropped_records())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.dropped_records())
     }
 
     /// Active node fault.
     #[must_use]
     pub fn node_fault(&self) -> NodeFault {
-        self.node.fault()
+        self.engine.node.fault()
     }
 
     /// Active node alarm.
     #[must_use]
     pub fn node_alarm(&self) -> NodeAlarm {
-        self.node.alarm()
+        self.engine.node.alarm()
     }
 
     /// What the connection has seen.
     #[must_use]
     pub fn counters(&self) -> &MotionCounters {
-        &self.counters
+        &self.engine.statistics.counters
     }
 
     /// Why the last malformed update was refused.
     #[must_use]
     pub fn last_error(&self) -> Option<Error> {
-        self.last_error
+        self.engine.statistics.last_error
     }
 
     /// The open connection.
     #[must_use]
     pub fn connection(&self) -> Option<&OpenParameters> {
-        self.connection.as_ref().map(|c| &c.parameters)
+        self.engine.connection.as_ref().map(|c| &c.parameters)
     }
 
     /// Whether the device produces its updates synchronously.
     #[must_use]
     pub fn is_synchronous(&self) -> bool {
-        self.connection.as_ref().is_some_and(|c| c.mode == Mode::Synchronous)
+        self.engine.connection.as_ref().is_some_and(|c| c.mode == Mode::Synchronous)
     }
 
     /// The attributes of a scope in the order of their IDs.
     pub fn attributes(&self, scope: Scope) -> impl Iterator<Item = &AttributeDefinition> {
-        let table = match scope {
-            Scope::Class => &self.class_table,
-            Scope::Instance => &self.axis_table,
-        };
-        table.iter()
+        self.engine.instances.table(scope).iter()
     }
 
     /// When to call [`MotionDevice::poll`] or [`MotionDevice::poll_transmit`] again at the latest; `None` while
     /// nothing is connected.
     #[must_use]
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        self.connection.as_ref().map(IoConnection::wake_at)
+        self.engine.connection.as_ref().map(IoConnection::wake_at)
     }
 
     /// Events that are to be looked for on an axis now, with the parameters of extended checking. Watch positions and
@@ -340,39 +240,20 @@ impl MotionDevice {
     /// looking for.
     #[must_use]
     pub fn armed_events(&self, axis: usize) -> Option<(EventChecking, &ExtendedEventData)> {
-        self.slots.get(axis).map(|slot| (slot.axis.events.armed(), slot.axis.events.parameters()))
-    }
-
-    pub(in crate::device) fn high_limit(&self) -> u64 {
-        self.class.store.unsigned(&self.class_table, id::UPDATE_DELAY_HIGH_LIMIT).unwrap_or(0)
-    }
-
-    pub(in crate::device) fn low_limit(&self) -> u64 {
-        self.class.store.unsigned(&self.class_table, id::UPDATE_DELAY_LOW_LIMIT).unwrap_or(0)
-    }
-
-    pub(in crate::device) fn step_threshold(&self) -> i64 {
-        let threshold = self.class.store.unsigned(&self.class_table, id::STEP_THRESHOLD).unwrap_or(0);
-        i64::try_from(threshold).unwrap_or(i64::MAX)
-    }
-
-    pub(in crate::device) fn context(&self, system_time: Option<SystemTime>) -> Context {
-        let control = self.connection.as_ref().map_or(NodeControl::empty(), IoConnection::node_control);
-        Context {
-            connected: self.connection.is_some(),
-            remote: control.contains(NodeControl::REMOTE_CONTROL),
-            node_fault: self.node.is_faulted(),
-            system_time: system_time.map_or(0, |t| t.0),
-        }
+        self.engine
+            .instances
+            .slots
+            .get(axis)
+            .map(|slot| (slot.axis.events.armed(), slot.axis.events.parameters()))
     }
 
     /// What the drive of an axis has to do at `now`; `None` if there is no such axis.
     #[must_use]
     pub fn command(&self, axis: usize, now: MonotonicTime) -> Option<AxisCommandImage> {
-        let slot = self.slots.get(axis)?;
-        let period = self.connection.as_ref().map_or(0, IoConnection::period);
-        let limit = u32::try_from(self.high_limit()).unwrap_or(u32::MAX);
-        Some(slot.axis.command(now, &self.context(None), period, limit))
+        let slot = self.engine.instances.slots.get(axis)?;
+        let period = self.engine.connection.as_ref().map_or(0, IoConnection::period);
+        let limit = u32::try_from(self.engine.instances.high_limit()).unwrap_or(u32::MAX);
+        Some(slot.axis.command(now, &self.engine.context(None), period, limit))
     }
 
     // -- drive side ---------------------------------------------------------------------------------------------
@@ -385,20 +266,20 @@ impl MotionDevice {
     /// What the drive of an axis reported last, or `None` if there is no such axis.
     #[must_use]
     pub fn drive(&self, axis: usize) -> Option<&DriveImage> {
-        self.slots.get(axis).map(|slot| slot.axis.drive())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.drive())
     }
 
     /// As [`MotionDevice::set_drive`], without a copy: `fill` gets what the drive reported before and has to write all of
     /// it anew ([`DriveImage::clear`] is where to begin). It is not called without such an axis.
     pub fn update_drive(&mut self, axis: usize, fill: impl FnOnce(&mut DriveImage)) {
-        if let Some(slot) = self.slots.get_mut(axis) {
+        if let Some(slot) = self.engine.instances.slots.get_mut(axis) {
             slot.axis.update_drive(fill);
         }
     }
 
     /// Says how the drive of an axis starts and stops from now on.
     pub fn set_sequence(&mut self, axis: usize, settings: SequenceSettings) {
-        if let Some(slot) = self.slots.get_mut(axis) {
+        if let Some(slot) = self.engine.instances.slots.get_mut(axis) {
             slot.axis.set_sequence(settings);
         }
     }
@@ -407,18 +288,17 @@ impl MotionDevice {
     /// stays until the controller resets it. Under a fault that is there already it is a consequence of that one, as a command
     /// that is withheld for a node fault is, and changes nothing.
     pub fn raise_node_fault(&mut self, fault: NodeFault) {
-        if !self.node.is_faulted() {
-            self.node.raise(fault);
+        if !self.engine.node.is_faulted() {
+            self.engine.node.raise(fault);
         }
     }
 
     /// Tells the state of the device's clock. A new offset moves the time stamps of events that were not told yet.
     pub fn set_sync(&mut self, sync: SyncState) {
-        let step = sync.offset.saturating_sub(self.sync.offset);
+        let step = self.engine.clock.set(sync);
         if step != 0 {
-            self.slots.iter_mut().for_each(|slot| slot.axis.events.shift(step));
+            self.engine.instances.slots.iter_mut().for_each(|slot| slot.axis.events.shift(step));
         }
-        self.sync = sync;
     }
 
     /// An event that the drive was armed for has occurred, or cannot be found for the reason `status`, which is then not
@@ -432,7 +312,9 @@ impl MotionDevice {
         position: i64,
         time_stamp: u64,
     ) -> bool {
-        self.slots
+        self.engine
+            .instances
+            .slots
             .get_mut(axis)
             .is_some_and(|slot| slot.axis.notify_event(event, status, position, time_stamp))
     }
@@ -440,7 +322,7 @@ impl MotionDevice {
     /// What the event channel of an axis has counted since construction.
     #[must_use]
     pub fn event_counters(&self, axis: usize) -> Option<EventCounters> {
-        self.slots.get(axis).map(|slot| slot.axis.events.counters())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.events.counters())
     }
 
     /// Publishes the value of a stored attribute of an axis, for example a signal. Access and range do not count.
@@ -448,9 +330,7 @@ impl MotionDevice {
     /// # Errors
     /// There is no such axis or attribute, or the octets are not those of the whole value.
     pub fn put_attribute(&mut self, axis: usize, id: u16, value: &[u8]) -> Result<(), GeneralStatus> {
-        let slot = self.slots.get_mut(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
-        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
-        slot.store.put(entry, entry.whole(), value)
+        self.engine.instances.put(axis, id, value)
     }
 
     /// Publishes the signals of an axis that its cyclic read lists hold, before [`MotionDevice::poll_transmit`] of the same
@@ -461,15 +341,13 @@ impl MotionDevice {
         axis: usize,
         value: &mut dyn FnMut(u16, &mut [u8; 8]) -> Option<usize>,
     ) {
-        if let Some(slot) = self.slots.get_mut(axis) {
-            slot.read_lists.publish(&self.axis_table, &mut slot.store, value);
-        }
+        self.engine.instances.publish_signals(axis, value);
     }
 
     /// How the controller sees the positions of an axis now.
     #[must_use]
     pub fn position_view(&self, axis: usize) -> Option<PositionView> {
-        self.slots.get(axis).map(|slot| slot.axis.position_view())
+        self.engine.instances.slots.get(axis).map(|slot| slot.axis.position_view())
     }
 
     /// The value of an attribute of an axis as it is stored in the device.
@@ -477,44 +355,29 @@ impl MotionDevice {
     /// # Errors
     /// There is no such axis or attribute.
     pub fn attribute(&self, axis: usize, id: u16) -> Result<&[u8], GeneralStatus> {
-        let slot = self.slots.get(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
-        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
-        slot.store.get(entry, entry.whole())
+        self.engine.instances.get(axis, id)
     }
 
     /// A number that is another one after an attribute of an axis has changed, or `None` if there is no such axis. What was made
     /// of [`MotionDevice::attribute`] may be kept as long as it is the same.
     #[must_use]
     pub fn attribute_changes(&self, axis: usize) -> Option<u64> {
-        self.slots.get(axis).map(|slot| slot.store.changes())
+        self.engine.instances.slots.get(axis).map(|slot| slot.store.changes())
     }
 
     /// The next access to an attribute that lives in the drive.
     pub fn poll_attribute_access(&mut self) -> Option<AttributeAccess> {
-        let channels = self.slots.iter_mut().map(|slot| &mut slot.service.worker);
-        let mut workers = channels.chain([&mut self.class.service.worker, &mut self.explicit.worker]);
-        workers.find_map(crate::device::attribute::worker::AttributeWorker::take_access)
+        self.engine.instances.take_access().or_else(|| self.explicit.take_access())
     }
 
     /// Answers an access: the octets of a Read, no octets for a Write, or why it failed.
     ///
     /// Answers to accesses that nobody waits for any more are ignored.
     pub fn complete_attribute(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) {
-        for number in 0..self.slots.len() {
-            let slot = &mut self.slots[number];
-            let mut space = AttributeSpace {
-                table: &self.axis_table,
-                store: &mut slot.store,
-                instance: u8::try_from(number + 1).unwrap_or(u8::MAX),
-                running: slot.axis.is_running(),
-                tickets: &mut self.tickets,
-            };
-            if slot.service.worker.complete(ticket, answer, &mut space) {
-                self.run_service(number + 1);
-                return;
-            }
+        match self.engine.instances.complete(ticket, answer) {
+            Some(instance) => service::run(&mut self.engine, instance),
+            None => self.explicit.complete(&mut self.engine, ticket, answer),
         }
-        self.complete_explicit(ticket, answer);
     }
 
     // -- connection ---------------------------------------------------------------------------------------------
@@ -523,185 +386,132 @@ impl MotionDevice {
     pub fn request(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, request: MotionRequest) {
         match request {
             MotionRequest::Open(parameters) => {
-                let outcome = self.open(now, system_time, parameters);
-                self.reply(MotionReply::Opened { token: parameters.token, outcome });
+                let outcome = self.engine.open(now, system_time, parameters);
+                if outcome.is_ok() {
+                    self.explicit.break_off_foreign(parameters.originator);
+                }
+                self.explicit.reply(MotionReply::Opened { token: parameters.token, outcome });
             }
             MotionRequest::Close(parameters) => {
-                self.close(system_time, &parameters);
-                self.reply(MotionReply::Closed { token: parameters.token });
+                self.engine.close(system_time, &parameters);
+                self.explicit.reply(MotionReply::Closed { token: parameters.token });
             }
-            MotionRequest::Explicit(request) => self.queue_explicit(request),
+            MotionRequest::Explicit(request) => {
+                let queued = self.explicit.queue(request);
+                self.engine.statistics.counters.explicit_overflow += u64::from(!queued);
+            }
             MotionRequest::PrepareReset(token) => {
-                self.reply(MotionReply::ResetPrepared { token, granted: !self.is_in_use() });
+                let granted = !self.engine.is_in_use();
+                self.explicit.reply(MotionReply::ResetPrepared { token, granted });
             }
         }
-        self.run_explicit(now, system_time);
+        self.explicit.run(&mut self.engine, now, system_time);
     }
 
     /// The next reply to the explicit side.
     pub fn poll_reply(&mut self) -> Option<MotionReply> {
-        (!self.replies.is_empty()).then(|| self.replies.remove(0))
+        self.explicit.poll_reply()
     }
 
-    pub(in crate::device) fn reply(&mut self, reply: MotionReply) {
-        // Open, Close and loss alternate and explicit requests are limited, so there is room unless nobody takes the
-        // replies; the oldest then has nobody waiting for it.
-        if self.replies.is_full() {
-            self.replies.remove(0);
-        }
-        self.replies.push(reply);
+    // -- updates ------------------------------------------------------------------------------------------------
+
+    /// Takes the data of a C-to-D packet: the class-1 sequence count and the update.
+    ///
+    /// `system_time` is `None` if the device has no synchronized time. The packet must be of this connection; whose it
+    /// is stands in the datagram around it. Returns whether it was taken: its form was right, and it was not older than the
+    /// last one.
+    pub fn handle_io(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, packet: &[u8]) -> bool {
+        self.engine.handle_packet(now, now, system_time, packet)
     }
 
-    fn open(
+    /// The same for a packet that arrived at `arrival`, before it could be looked at. The controller's update clock is estimated from
+    /// the arrivals (asynchronous operation); everything else goes by `now`.
+    pub fn handle_io_arrived(
+        &mut self,
+        now: MonotonicTime,
+        arrival: MonotonicTime,
+        system_time: Option<SystemTime>,
+        packet: &[u8],
+    ) -> bool {
+        self.engine.handle_packet(now, arrival, system_time, packet)
+    }
+
+    /// Takes a C-to-D update of a network that puts no sequence count in front of it, as DeviceNet does: the 16
+    /// octets of the fixed format, or an update of the variable one. The Update ID alone tells what is new.
+    pub fn handle_unsequenced(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, update: &[u8]) {
+        self.engine.handle_unsequenced(now, system_time, update);
+    }
+
+    /// If a D-to-C update is due at `now`, writes its data (class-1 sequence count and update) and returns the octets.
+    ///
+    /// `out` should hold the T-to-O connection size; more of it is not used.
+    pub fn poll_transmit(
         &mut self,
         now: MonotonicTime,
         system_time: Option<SystemTime>,
-        parameters: OpenParameters,
-    ) -> Result<(), OpenRefusal> {
-        let refuse = |extended_status| {
-            Err(OpenRefusal { general_status: GeneralStatus::CONNECTION_FAILURE.0, extended_status })
-        };
-        if self.connection.is_some() {
-            return refuse(OWNERSHIP_CONFLICT);
-        }
-        if parameters.format_revision != FORMAT_REVISION {
-            return refuse(INVALID_CONNECTION_POINT);
-        }
-        self.check_format(&parameters)?;
-        if parameters.rpi_us == 0 || parameters.timeout_us == 0 {
-            return refuse(INTERVAL_NOT_ACCEPTABLE);
-        }
-        self.connection = Some(IoConnection::new(parameters, self.config.poll_interval_ns, now));
-        self.break_off_foreign();
-        self.start_over();
-        let system_time = system_time.map_or(0, |t| t.0);
-        self.slots.iter_mut().for_each(|slot| slot.axis.open(system_time));
-        Ok(())
+        out: &mut [u8],
+    ) -> Option<usize> {
+        self.poll(now, system_time);
+        self.engine.transmit(now, system_time, out)
     }
 
-    fn close(&mut self, system_time: Option<SystemTime>, parameters: &CloseParameters) {
-        let same = self.connection.as_ref().is_some_and(|c| {
-            c.parameters.triad == parameters.triad && c.parameters.o_to_t_id == parameters.o_to_t_id
-        });
-        if same {
-            self.connection = None;
-            self.start_over();
-            let system_time = system_time.map_or(0, |t| t.0);
-            self.slots.iter_mut().for_each(|slot| slot.axis.close(system_time));
-        }
+    /// As [`MotionDevice::poll_transmit`], for a network that puts no sequence count in front of an update: `out` gets the
+    /// update alone.
+    pub fn poll_unsequenced(
+        &mut self,
+        now: MonotonicTime,
+        system_time: Option<SystemTime>,
+        out: &mut [u8],
+    ) -> Option<usize> {
+        self.poll(now, system_time);
+        self.engine.transmit_unsequenced(now, system_time, out)
     }
-
-    /// Factory defaults and idle channels: a connection begins or ends.
-    fn start_over(&mut self) {
-        self.node.clear();
-        self.progress = StartupProgress::default();
-        self.compensation.reset();
-        self.diagnostics = (0, 0);
-        self.reported_diagnostics = Reported::known((0, 0));
-        self.reported_offset = Reported::new();
-        self.echo.clear();
-        self.idle_header = None;
-        self.class.store.reset(&self.class_table);
-        self.class.service.reset();
-        for slot in &mut self.slots {
-            slot.store.reset(&self.axis_table);
-            slot.service.reset();
-            slot.write_lists = CyclicLists::default();
-            slot.read_lists = CyclicLists::default();
-        }
-    }
-
-    fn lose(&mut self, now: MonotonicTime) {
-        let Some(connection) = self.connection.take() else { return };
-        self.counters.connection_losses += 1;
-        self.node.raise(NodeFault::CONNECTION_LOSS);
-        self.progress = StartupProgress { connection_lost: true, ..StartupProgress::default() };
-        self.echo.clear();
-        self.class.service.reset();
-        for slot in &mut self.slots {
-            slot.axis.lose();
-            slot.service.reset();
-        }
-        self.reply(MotionReply::ConnectionLost {
-            o_to_t_id: connection.parameters.o_to_t_id,
-            silent_us: connection.silence(now) / 1000,
-        });
-    }
-
-    // -- time ---------------------------------------------------------------------------------------------------
 
     /// Lets time pass: time-outs, missed updates, alarms, state machines.
     pub fn poll(&mut self, now: MonotonicTime, system_time: Option<SystemTime>) {
-        self.node.tick(now);
-        if self.connection.as_ref().is_some_and(|c| c.is_timed_out(now)) {
-            self.lose(now);
+        if let Some(lost) = self.engine.poll(now, system_time) {
+            self.explicit.reply(lost);
         }
-        if let Some(connection) = &self.connection {
-            let missed = connection.missed(now);
-            let synchronous = connection.mode == Mode::Synchronous;
-            if missed > self.high_limit() {
-                self.node.raise(NodeFault::CONNECTION_UPDATE);
-            } else if missed > self.low_limit() {
-                self.node.post(NodeAlarm::CONNECTION_UPDATE, now);
-            }
-            if synchronous {
-                self.node.synchronization(self.sync.synchronized, now);
-            }
-        }
-        self.step(system_time);
-        self.run_explicit(now, system_time);
+        self.explicit.run(&mut self.engine, now, system_time);
     }
 
-    pub(in crate::device) fn step(&mut self, system_time: Option<SystemTime>) {
-        let context = self.context(system_time);
-        for slot in &mut self.slots {
-            // They are looked up only where there is something that they say anything about.
-            let nothing = slot.axis.drive().conditions.as_slice().is_empty() && !slot.axis.has_found();
-            let actions = match nothing {
-                true => ExceptionActions::NONE,
-                false => ExceptionActions::of(&self.axis_table, &slot.store),
-            };
-            slot.axis.step(&context, &actions);
-        }
-    }
-}
+    // -- what is shown ------------------------------------------------------------------------------------------
 
-impl Slot {
-    /// Applies cyclic write data and says what to tell about it. What they add to the set-points goes into `trims`.
-    pub(in crate::device) fn cyclic_write(
-        &mut self,
-        table: &AttributeTable,
-        block: &WriteBlock<'_>,
-        refused: bool,
-        trims: &mut Trims,
-    ) -> (u8, u8, GeneralStatus) {
-        let written = if refused {
-            Err(GeneralStatus::OBJECT_STATE_CONFLICT)
-        } else {
-            let running = self.axis.is_running();
-            self.write_lists.write(table, &mut self.store, block.write_block_id, block.data, running)
-        };
-        let status = match written {
-            Ok(written) => {
-                *trims = written;
-                GeneralStatus::SUCCESS
-            }
-            Err(status) => status,
-        };
-        (block.write_block_id, block.read_block_id, status)
+    /// The node as it shows.
+    #[must_use]
+    pub fn node_condition(&self) -> NodeCondition {
+        let startup = indication::startup(&self.engine);
+        NodeCondition { startup, fault: self.node_fault(), alarm: self.node_alarm() }
     }
 
-    /// Carries out a Set_Cyclic_Write_List or Set_Cyclic_Read_List.
-    pub(in crate::device) fn configure_list(
-        &mut self,
-        table: &AttributeTable,
-        direction: Direction,
-        body: &[u8],
-        response: &mut [u8],
-    ) -> (GeneralStatus, usize) {
-        match direction {
-            Direction::Write => self.write_lists.configure(table, direction, body, response),
-            Direction::Read => self.read_lists.configure(table, direction, body, response),
-        }
+    /// An axis as it shows, or `None` if there is no such axis.
+    #[must_use]
+    pub fn axis_condition(&self, axis: usize) -> Option<AxisCondition> {
+        self.engine.instances.slots.get(axis).map(|slot| indication::condition(&slot.axis))
+    }
+
+    /// State of the device as the Identity object and the Module Status LED have it.
+    #[must_use]
+    pub fn module_state(&self) -> ModuleState {
+        let axes = self.engine.instances.slots.iter().map(|slot| indication::condition(&slot.axis));
+        visualization::module_state(axes.collect::<ArrayVec<_, AXES_MAX>>().iter())
+    }
+
+    /// The Axis Status LED of an axis; dark without such an axis.
+    #[must_use]
+    pub fn axis_indication(&self, axis: usize) -> Indication {
+        self.axis_condition(axis).map_or(Indication::OFF, |axis| visualization::axis_status(&axis))
+    }
+
+    /// The line of the display for an axis; empty without such an axis.
+    #[must_use]
+    pub fn display_line(&self, axis: usize) -> Line {
+        self.axis_condition(axis).map_or(Line::default(), |axis| display::line(&self.node_condition(), &axis))
+    }
+
+    /// Whether the motion connection was lost and nobody has opened it since.
+    #[must_use]
+    pub fn is_connection_lost(&self) -> bool {
+        self.engine.progress.connection_lost
     }
 }

@@ -16,18 +16,21 @@
 //! Attributes 89 and 92 are `Set*`: set by the connection where it carries them and by a service where it does not
 //! (footnote of Table 5-2.16).
 
-use profile_generic::time::{MonotonicTime, SystemTime};
+use profile_generic::time::MonotonicTime;
 
-use super::device::{Echo, MotionDevice};
 use super::receive::Verdict;
-use crate::device::attribute::{Access, AttributeDefinition, DataType, DefaultValue, Scope, id};
+use super::slot::Slot;
+use crate::device::attribute::{
+    Access, AttributeDefinition, AttributeTable, DataType, DefaultValue, Scope, id,
+};
 use crate::device::axis::drive_link::Trims;
+use crate::device::axis::{Axis, Context};
 use crate::device::config::MOTION_SIZE_FIXED;
 use crate::device::motion_link::{OpenParameters, OpenRefusal};
 use crate::wire::Writer;
-use crate::wire::motion::Format;
 use crate::wire::motion::codes::{CommandTarget, ControlStatus, NodeStatus};
 use crate::wire::motion::fixed::{self, FixedActual, FixedCommand};
+use crate::wire::motion::{ActualBlock, Format};
 use crate::wire::status::{ConnectionStatus, GeneralStatus};
 
 /// Command Control with a DINT position: Immediate, Extrapolate, Interpolate (Table 6-2.24).
@@ -36,9 +39,7 @@ const COMMAND_CONTROL: (u8, u8) = (0b0100, 0b0110);
 const TARGET_MASK: u8 = 0b11;
 
 /// The attributes with those of the engine that a service sets, because the connection does not.
-pub(in crate::device) fn with_services_alone(
-    mut attributes: Vec<AttributeDefinition>,
-) -> Vec<AttributeDefinition> {
+pub(super) fn with_services_alone(mut attributes: Vec<AttributeDefinition>) -> Vec<AttributeDefinition> {
     let replaced = [id::CONTROL_STATUS, id::COMMAND_CONTROL];
     attributes.retain(|one| one.scope != Scope::Instance || !replaced.contains(&one.id));
     let settable = |id, name| AttributeDefinition {
@@ -55,73 +56,62 @@ pub(in crate::device) fn with_services_alone(
     attributes
 }
 
-impl MotionDevice {
-    /// Checks that an accepted connection can carry the format of this device.
-    pub(in crate::device) fn check_format(&self, open: &OpenParameters) -> Result<(), OpenRefusal> {
-        let variable = self.config.format == Format::Variable;
-        let size = |octets| !variable && octets != MOTION_SIZE_FIXED;
-        let refusals = [
-            (open.o_to_t_variable != variable, ConnectionStatus::INVALID_O_TO_T_FIXED_VARIABLE),
-            (open.t_to_o_variable != variable, ConnectionStatus::INVALID_T_TO_O_FIXED_VARIABLE),
-            (size(open.o_to_t_size), ConnectionStatus::INVALID_O_TO_T_SIZE),
-            (size(open.t_to_o_size), ConnectionStatus::INVALID_T_TO_O_SIZE),
-        ];
-        match refusals.iter().find(|(wrong, _)| *wrong) {
-            None => Ok(()),
-            Some((_, status)) => Err(OpenRefusal {
-                general_status: GeneralStatus::CONNECTION_FAILURE.0,
-                extended_status: status.0,
-            }),
-        }
+/// Checks that an accepted connection can carry the format of the device.
+pub(super) fn check_format(format: Format, open: &OpenParameters) -> Result<(), OpenRefusal> {
+    let variable = format == Format::Variable;
+    let size = |octets| !variable && octets != MOTION_SIZE_FIXED;
+    let refusals = [
+        (open.o_to_t_variable != variable, ConnectionStatus::INVALID_O_TO_T_FIXED_VARIABLE),
+        (open.t_to_o_variable != variable, ConnectionStatus::INVALID_T_TO_O_FIXED_VARIABLE),
+        (size(open.o_to_t_size), ConnectionStatus::INVALID_O_TO_T_SIZE),
+        (size(open.t_to_o_size), ConnectionStatus::INVALID_T_TO_O_SIZE),
+    ];
+    match refusals.iter().find(|(wrong, _)| *wrong) {
+        None => Ok(()),
+        Some((_, status)) => Err(OpenRefusal {
+            general_status: GeneralStatus::CONNECTION_FAILURE.0,
+            extended_status: status.0,
+        }),
     }
+}
 
-    /// Hands a judged update of the fixed format to the axis.
-    pub(in crate::device) fn apply_fixed(
-        &mut self,
-        now: MonotonicTime,
-        system_time: Option<SystemTime>,
-        command: &FixedCommand,
-        verdict: &Verdict,
-    ) {
-        self.echo.clear();
-        self.echo.push(Echo { number: 1, cyclic: true, lists: None });
-        let context = self.context(system_time);
-        // Without remote control the device acts on nothing that the controller sends.
-        let Some(slot) = self.slots.first_mut().filter(|_| context.remote) else { return };
-        let held = slot.axis.block();
-        let block = command.block(held.control_status, held.target);
-        match verdict {
-            Verdict::Fresh(times) => slot.axis.handle_block(&block, Trims::default(), *times, now, &context),
-            Verdict::CommandsRefused => slot.axis.handle_status_request(&block),
-        }
+/// Hands a judged update to the axis.
+pub(super) fn apply(
+    axis: &mut Axis,
+    now: MonotonicTime,
+    context: &Context,
+    command: &FixedCommand,
+    verdict: &Verdict,
+) {
+    let held = axis.block();
+    let block = command.block(held.control_status, held.target);
+    match verdict {
+        Verdict::Fresh(times) => axis.handle_block(&block, Trims::default(), *times, now, context),
+        Verdict::CommandsRefused => axis.handle_status_request(&block),
     }
+}
 
-    /// Takes over what a service has set of the cyclic block.
-    pub(in crate::device) fn adopt_fixed(&mut self) {
-        let Some(slot) = self.slots.first_mut() else { return };
-        let octet = |id| {
-            let value = slot.store.unsigned(&self.axis_table, id).unwrap_or(0);
-            u8::try_from(value).unwrap_or(0)
-        };
-        let (status, control) = (octet(id::CONTROL_STATUS), octet(id::COMMAND_CONTROL));
-        slot.axis.block.control_status = ControlStatus::from_bits_retain(status);
-        slot.axis.block.target = CommandTarget(control & TARGET_MASK);
-    }
+/// Takes over what a service has set of the cyclic block.
+pub(super) fn adopt(slot: &mut Slot, table: &AttributeTable) {
+    let octet = |id| {
+        let value = slot.store.unsigned(table, id).unwrap_or(0);
+        u8::try_from(value).unwrap_or(0)
+    };
+    let (status, control) = (octet(id::CONTROL_STATUS), octet(id::COMMAND_CONTROL));
+    slot.axis.block.control_status = ControlStatus::from_bits_retain(status);
+    slot.axis.block.target = CommandTarget(control & TARGET_MASK);
+}
 
-    /// Writes a D-to-C update of the fixed format. Before the controller's data are valid only its head says something.
-    pub(in crate::device) fn write_fixed(
-        &mut self,
-        update: &mut [u8; fixed::LEN],
-        update_id: u8,
-    ) -> Option<usize> {
-        let node_status = self.node_status();
-        let valid = node_status.contains(NodeStatus::DATA_VALID);
-        let context = self.context(None);
-        let axis = self.slots.first_mut().filter(|_| valid).map(|slot| &mut slot.axis);
-        let block = axis.map(|axis| axis.actual_block(update_id, None, &context)).unwrap_or_default();
-        let actual = FixedActual { update_id, node_status, ..FixedActual::from(&block) };
-        let mut writer = Writer::new(update);
-        actual.emit(&mut writer).ok()?;
-        Some(writer.written())
-    }
+/// Writes a D-to-C update; `block` is the axis's, the default before the controller's data are valid: then only the head
+/// of the update says something.
+pub(super) fn write(
+    update: &mut [u8; fixed::LEN],
+    update_id: u8,
+    node_status: NodeStatus,
+    block: &ActualBlock,
+) -> Option<usize> {
+    let actual = FixedActual { update_id, node_status, ..FixedActual::from(block) };
+    let mut writer = Writer::new(update);
+    actual.emit(&mut writer).ok()?;
+    Some(writer.written())
 }

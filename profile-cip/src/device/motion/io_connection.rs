@@ -77,6 +77,8 @@ pub(in crate::device) struct IoConnection {
     early: u64,
     /// Sequence count of the last D-to-C packet.
     pub transmit_sequence: u16,
+    /// Head of the last D-to-C update if it had nothing to say.
+    idle_header: Option<[u8; 8]>,
     /// Update ID of the last D-to-C update.
     sent_update_id: u8,
     /// Update ID that the next D-to-C update answers, if a C-to-D update has triggered it.
@@ -105,6 +107,7 @@ impl IoConnection {
             next_transmit: MonotonicTime(now.0.saturating_add(period)),
             early: poll_interval_ns / 2,
             transmit_sequence: 0,
+            idle_header: None,
             sent_update_id: 0,
             answer: None,
             received_at: 0,
@@ -287,6 +290,15 @@ impl IoConnection {
         let off = planned.saturating_sub(in_ns).rem_euclid(period);
         let correction = if off > period / 2 { period - off } else { -off };
         self.next_transmit = MonotonicTime(self.next_transmit.0.saturating_add_signed(correction));
+    }
+
+    /// An update was produced; `idle` is the head of one that has nothing to say. While there is nothing to say, the same
+    /// packet is repeated to keep the connection alive (clause 7-1.1).
+    pub fn transmitted(&mut self, idle: Option<[u8; 8]>) {
+        if idle.is_none() || self.has_data() || idle != self.idle_header {
+            self.transmit_sequence = self.transmit_sequence.wrapping_add(1);
+        }
+        self.idle_header = idle;
     }
 
     /// Goes back to asynchronous operation.

@@ -8,14 +8,13 @@
 //! The documents leave this to the device maker; status 0x0F is that of a permission which the requester lacks. With no
 //! connection open there is no owner, and whoever configures the device may set what can be set.
 
-use super::device::MotionDevice;
-use super::explicit_queue::Current;
-use crate::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply};
+use core::net::Ipv4Addr;
+
+use crate::device::motion_link::ExplicitRequest;
 use crate::wire::motion::codes::MotionService;
-use crate::wire::status::GeneralStatus;
 
 /// Services of explicit messages alone, by their CIP codes.
-pub(in crate::device) mod common {
+pub(super) mod common {
     pub const GET_ATTRIBUTES_ALL: u8 = 0x01;
     pub const GET_ATTRIBUTE_LIST: u8 = 0x03;
     pub const SET_ATTRIBUTE_LIST: u8 = 0x04;
@@ -24,7 +23,7 @@ pub(in crate::device) mod common {
 }
 
 /// Whether a service does nothing but read. What is not known to be harmless counts as a change.
-fn reads(service: u8) -> bool {
+pub(super) fn reads(service: u8) -> bool {
     let common = [common::GET_ATTRIBUTES_ALL, common::GET_ATTRIBUTE_LIST, common::GET_ATTRIBUTE_SINGLE]
         .contains(&service);
     common
@@ -37,31 +36,7 @@ fn reads(service: u8) -> bool {
         )
 }
 
-impl MotionDevice {
-    /// Whether a request is not its sender's to make now.
-    pub(in crate::device) fn is_foreign(&self, request: &ExplicitRequest) -> bool {
-        let owner = self.connection.as_ref().map(|connection| connection.parameters.originator);
-        owner.is_some_and(|owner| owner != request.originator) && !reads(request.service)
-    }
-
-    /// The request that is worked on, to be kept until its end.
-    pub(in crate::device) fn current(request: &ExplicitRequest, instance: usize) -> Current {
-        let (token, originator) = (request.token, request.originator);
-        Current { token, instance, originator, changes: !reads(request.service) }
-    }
-
-    /// A connection was opened: a list of another client that is being set ends here, because the rest of it would be
-    /// set under the new owner.
-    pub(in crate::device) fn break_off_foreign(&mut self) {
-        let Some(owner) = self.connection.as_ref().map(|connection| connection.parameters.originator) else {
-            return;
-        };
-        if let Some(foreign) =
-            self.explicit.current.take_if(|current| current.changes && current.originator != owner)
-        {
-            self.explicit.worker.abandon();
-            let status = GeneralStatus::PRIVILEGE_VIOLATION.0;
-            self.reply(MotionReply::Explicit(ExplicitReply::status(foreign.token, status)));
-        }
-    }
+/// Whether a request is not its sender's to make while `owner` has the motion connection.
+pub(super) fn is_foreign(owner: Option<Ipv4Addr>, request: &ExplicitRequest) -> bool {
+    owner.is_some_and(|owner| owner != request.originator) && !reads(request.service)
 }

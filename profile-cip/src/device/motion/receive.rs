@@ -3,12 +3,12 @@
 
 use profile_generic::time::{MonotonicTime, SystemTime};
 
-use super::device::{Echo, INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
+use super::clock::Clock;
+use super::engine::{Echo, Engine, INSTANCES_MAX, SEQUENCE_LEN};
 use super::io_connection::{Age, Mode, Packet, Update};
-use super::time_offset::Offsets;
+use super::{fixed, service};
 use crate::device::attribute::id;
 use crate::device::axis::UpdateTimes;
-use crate::device::axis::drive_link::Trims;
 use crate::wire::motion::codes::{MotionService, NodeAlarm, NodeControl, NodeFault};
 use crate::wire::motion::fixed::FixedCommand;
 use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, Format};
@@ -42,28 +42,16 @@ impl Checked<'_> {
 }
 
 /// How an update with data goes on.
-pub(in crate::device) enum Verdict {
+pub(super) enum Verdict {
     /// Applied as the newest command.
     Fresh(UpdateTimes),
     /// Its services and acknowledgements count, its commands do not.
     CommandsRefused,
 }
 
-impl MotionDevice {
-    // -- C-to-D -------------------------------------------------------------------------------------------------
-
-    /// Takes the data of a C-to-D packet: the class-1 sequence count and the update.
-    ///
-    /// `system_time` is `None` if the device has no synchronized time. The packet must be of this connection; whose it
-    /// is stands in the datagram around it. Returns whether it was taken: its form was right, and it was not older than the
-    /// last one.
-    pub fn handle_io(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, packet: &[u8]) -> bool {
-        self.handle_io_arrived(now, now, system_time, packet)
-    }
-
-    /// The same for a packet that arrived at `arrival`, before it could be looked at. The controller's update clock is estimated from
-    /// the arrivals (asynchronous operation); everything else goes by `now`.
-    pub fn handle_io_arrived(
+impl Engine {
+    /// [`MotionDevice::handle_io_arrived`](super::device::MotionDevice::handle_io_arrived).
+    pub fn handle_packet(
         &mut self,
         now: MonotonicTime,
         arrival: MonotonicTime,
@@ -71,27 +59,27 @@ impl MotionDevice {
         packet: &[u8],
     ) -> bool {
         let Some(connection) = &mut self.connection else {
-            self.counters.unconnected += 1;
+            self.statistics.counters.unconnected += 1;
             return false;
         };
         if packet.len() > usize::from(connection.parameters.o_to_t_size) {
-            self.counters.oversize += 1;
+            self.statistics.counters.oversize += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
             return false;
         }
         let Some((sequence, update)) = packet.split_first_chunk::<SEQUENCE_LEN>() else {
-            self.counters.malformed += 1;
+            self.statistics.counters.malformed += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
             return false;
         };
         let sequence = u16::from_le_bytes(*sequence);
         let taken = match connection.packet(sequence) {
             Packet::Old => {
-                self.counters.out_of_order += 1;
+                self.statistics.counters.out_of_order += 1;
                 false
             }
             Packet::Refresh => {
-                self.counters.refreshes += 1;
+                self.statistics.counters.refreshes += 1;
                 connection.heard(Some(sequence), now);
                 true
             }
@@ -108,11 +96,11 @@ impl MotionDevice {
     /// octets of the fixed format, or an update of the variable one. The Update ID alone tells what is new.
     pub fn handle_unsequenced(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, update: &[u8]) {
         let Some(connection) = &self.connection else {
-            self.counters.unconnected += 1;
+            self.statistics.counters.unconnected += 1;
             return;
         };
         if update.len() + SEQUENCE_LEN > usize::from(connection.parameters.o_to_t_size) {
-            self.counters.oversize += 1;
+            self.statistics.counters.oversize += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
         } else if let Some(checked) = self.check(update) {
             self.handle_update((now, now), system_time, None, &checked);
@@ -131,15 +119,14 @@ impl MotionDevice {
         let checked = match parsed {
             Ok(checked) => checked,
             Err(error) => {
-                self.last_error = Some(error);
-                self.counters.malformed += 1;
+                self.statistics.malformed(error);
                 self.node.raise(NodeFault::DATA_FORMAT);
                 return None;
             }
         };
-        match checked.is_known_and_finite(self.slots.len()) {
-            (false, _) => self.counters.unknown_instance += 1,
-            (true, false) => self.counters.not_finite += 1,
+        match checked.is_known_and_finite(self.instances.axis_count()) {
+            (false, _) => self.statistics.counters.unknown_instance += 1,
+            (true, false) => self.statistics.counters.not_finite += 1,
             (true, true) => return Some(checked),
         }
         self.node.raise(NodeFault::DATA_FORMAT);
@@ -163,7 +150,7 @@ impl MotionDevice {
             connection.invalid();
             connection.header = Some(header);
             connection.answer(header.update_id, now);
-            self.counters.not_valid += 1;
+            self.statistics.counters.not_valid += 1;
             self.echo.clear();
             self.node_control(before, header.node_control);
             return;
@@ -171,11 +158,11 @@ impl MotionDevice {
         let lost = match connection.update(header.update_id) {
             Update::Repeated => {
                 connection.heard(sequence, now);
-                self.counters.repeated += 1;
+                self.statistics.counters.repeated += 1;
                 return;
             }
             Update::Old => {
-                self.counters.out_of_order += 1;
+                self.statistics.counters.out_of_order += 1;
                 return;
             }
             Update::New(lost) => lost,
@@ -185,19 +172,26 @@ impl MotionDevice {
         connection.received_at = system_time.map_or(0, |t| t.0);
         let paced_at = connection.arrive(arrival, lost);
         self.node_control(before, header.node_control);
-        self.counters.lost_updates += u64::from(lost);
-        self.diagnostics.0 = self.diagnostics.0.wrapping_add(lost);
-        if u64::from(lost) > self.high_limit() {
+        self.statistics.lost(lost);
+        if u64::from(lost) > self.instances.high_limit() {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
         }
         let verdict = self.judge(now, (arrival, paced_at), system_time, &header);
         match checked {
             Checked::Variable(frame) => self.apply(now, system_time, frame, &verdict),
-            Checked::Fixed(command) => self.apply_fixed(now, system_time, command, &verdict),
+            Checked::Fixed(command) => {
+                self.echo.clear();
+                self.echo.push(Echo { number: 1, cyclic: true, lists: None });
+                let context = self.context(system_time);
+                // Without remote control the device acts on nothing that the controller sends.
+                if let Some(slot) = self.instances.slots.first_mut().filter(|_| context.remote) {
+                    fixed::apply(&mut slot.axis, now, &context, command, &verdict);
+                }
+            }
         }
         let fresh = matches!(verdict, Verdict::Fresh(_));
         if fresh {
-            self.counters.applied += 1;
+            self.statistics.counters.applied += 1;
             self.node.fresh_update();
         }
         if let Some(connection) = &mut self.connection {
@@ -227,21 +221,16 @@ impl MotionDevice {
         system_time: Option<SystemTime>,
         header: &CommandHeader,
     ) -> Verdict {
-        let (low, high, threshold) = (self.low_limit(), self.high_limit(), self.step_threshold());
+        let instances = &mut self.instances;
+        let (low, high, threshold) =
+            (instances.low_limit(), instances.high_limit(), instances.step_threshold());
         let Some(connection) = &mut self.connection else { return Verdict::CommandsRefused };
         let period = connection.period();
         if let Some(controller) = header.time_offset {
-            self.class.store.publish(
-                &self.class_table,
-                id::CONTROLLER_TIME_OFFSET,
-                controller.cast_unsigned(),
-            );
+            instances.publish_class(&[(id::CONTROLLER_TIME_OFFSET, controller.cast_unsigned())]);
         }
-        let controller =
-            self.class.store.unsigned(&self.class_table, id::CONTROLLER_TIME_OFFSET).unwrap_or(0);
-        let offsets = Offsets { device: self.sync.offset, controller: controller.cast_signed() };
         if header.time_stamp.is_some() {
-            self.compensation.update(offsets, threshold, i64::try_from(period).unwrap_or(i64::MAX));
+            self.clock.update(instances.class_value(id::CONTROLLER_TIME_OFFSET), threshold, period);
         }
         let synchronous =
             self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
@@ -250,17 +239,16 @@ impl MotionDevice {
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
         let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
-            self.counters.untimed += 1;
+            self.statistics.counters.untimed += 1;
             return Verdict::CommandsRefused;
         };
-        let time_stamp = self.compensation.compensate(received);
+        let time_stamp = self.clock.compensate(received);
         let age = connection.age(time_stamp, system_time, low, high);
-        // A stamp of the future, or of more than two periods ago (clause 7-1.3).
-        let skewed = time_stamp.saturating_add(period).abs_diff(system_time) > period;
+        let skewed = Clock::is_skewed(time_stamp, period, system_time);
         if connection.mode == Mode::Asynchronous {
             connection.forget_stamps();
             self.node.skew(skewed, now);
-            if !skewed && self.sync.synchronized {
+            if !skewed && self.clock.is_synchronized() {
                 let start = time_stamp.saturating_add(period.saturating_mul(2));
                 let in_ns =
                     start.saturating_sub(system_time).saturating_sub(self.config.transmission_processing_ns);
@@ -269,11 +257,9 @@ impl MotionDevice {
             // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
-        // On the local clock, so that a step of the device's own is none of the controller's.
-        let local = time_stamp.wrapping_sub(self.sync.offset.cast_unsigned());
-        if !connection.follows(local, header.update_id, arrival) {
+        if !connection.follows(self.clock.to_local(time_stamp), header.update_id, arrival) {
             // A clock was set and the offsets do not say so, or do not yet: the update counts as one that did not come.
-            self.counters.stamp_jumps += 1;
+            self.statistics.counters.stamp_jumps += 1;
             return Verdict::CommandsRefused;
         }
         let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
@@ -285,21 +271,19 @@ impl MotionDevice {
             Age::OnTime if cycle > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
             Age::OnTime => {}
             Age::Late | Age::Alarming => {
-                self.counters.late_updates += 1;
-                self.diagnostics.1 = self.diagnostics.1.wrapping_add(1);
+                self.statistics.late();
                 if age == Age::Alarming {
                     self.node.post(NodeAlarm::CONNECTION_UPDATE, now);
                 }
             }
             Age::TooLate => {
-                self.counters.late_updates += 1;
-                self.counters.too_late += 1;
-                self.diagnostics.1 = self.diagnostics.1.wrapping_add(1);
+                self.statistics.late();
+                self.statistics.counters.too_late += 1;
                 self.node.raise(NodeFault::CONNECTION_UPDATE);
                 return Verdict::CommandsRefused;
             }
             Age::Ahead => {
-                self.counters.ahead_of_time += 1;
+                self.statistics.counters.ahead_of_time += 1;
                 self.node.post(NodeAlarm::CLOCK_SKEW, now);
                 return Verdict::CommandsRefused;
             }
@@ -317,8 +301,8 @@ impl MotionDevice {
         verdict: &Verdict,
     ) {
         let received = frame.header().last_received_id;
-        self.reported_diagnostics.acknowledge(received);
-        self.reported_offset.acknowledge(received);
+        self.statistics.acknowledge(received);
+        self.clock.acknowledge(received);
         self.echo.clear();
         let context = self.context(system_time);
         let mut asked = [false; INSTANCES_MAX];
@@ -326,25 +310,12 @@ impl MotionDevice {
             let number = usize::from(instance.number);
             asked[number] = true;
             let mut echo = Echo { number: instance.number, cyclic: false, lists: None };
-            if let Some(slot) = number.checked_sub(1).and_then(|axis| self.slots.get_mut(axis)) {
+            if let Some((slot, table)) = self.instances.axis(number) {
                 slot.axis.acknowledge(received);
                 echo.cyclic = instance.cyclic.is_some();
                 // Without remote control the device acts on nothing in the cyclic and service channels.
                 if context.remote {
-                    let refused = context.node_fault || matches!(verdict, Verdict::CommandsRefused);
-                    let mut trims = Trims::default();
-                    echo.lists = instance
-                        .write
-                        .map(|block| slot.cyclic_write(&self.axis_table, &block, refused, &mut trims));
-                    slot.axis.events.handle(instance.events.as_ref());
-                    if let Some(block) = &instance.cyclic {
-                        match verdict {
-                            Verdict::Fresh(times) => {
-                                slot.axis.handle_block(block, trims, *times, now, &context)
-                            }
-                            Verdict::CommandsRefused => slot.axis.handle_status_request(block),
-                        }
-                    }
+                    echo.lists = slot.apply(table, &instance, verdict, now, &context);
                 }
             }
             if context.remote {
@@ -354,15 +325,8 @@ impl MotionDevice {
         }
         // An instance that the update does not mention has no request standing.
         for (number, _) in asked.iter().enumerate().filter(|(_, asked)| !**asked) {
-            match number.checked_sub(1) {
-                None => {
-                    self.class.service.handle(None);
-                }
-                Some(axis) => {
-                    if let Some(slot) = self.slots.get_mut(axis) {
-                        slot.service.handle(None);
-                    }
-                }
+            if let Some(channel) = self.instances.channel(number) {
+                channel.handle(None);
             }
         }
     }
@@ -376,13 +340,7 @@ impl MotionDevice {
         verdict: &Verdict,
     ) {
         let number = usize::from(instance.number);
-        let channel = match number.checked_sub(1) {
-            None => &mut self.class.service,
-            Some(axis) => match self.slots.get_mut(axis) {
-                Some(slot) => &mut slot.service,
-                None => return,
-            },
-        };
+        let Some(channel) = self.instances.channel(number) else { return };
         if channel.handle(instance.service.as_ref())
             && let Some(request) = &instance.service
         {
@@ -391,7 +349,7 @@ impl MotionDevice {
                 channel.answer(GeneralStatus::DEVICE_STATE_CONFLICT, &[]);
                 return;
             }
-            self.execute_service(number, request, system_time);
+            service::execute(self, number, request, system_time);
         }
     }
 }

@@ -4,14 +4,16 @@ use arrayvec::ArrayVec;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::cyclic_list::CYCLIC_DATA_MAX;
-use super::device::{INSTANCES_MAX, MotionDevice, SEQUENCE_LEN};
+use super::engine::{Engine, INSTANCES_MAX, SEQUENCE_LEN};
+use super::fixed;
 use super::io_connection::Mode;
+use super::service_channel::ServiceChannel;
 use crate::wire::Writer;
 use crate::wire::motion::codes::{NodeControl, NodeStatus, TimeDataSet};
 use crate::wire::motion::event::NOTIFICATION_LEN;
 use crate::wire::motion::{
     ActualBlock, ActualEvents, ActualHeader, ActualInstance, ActualWriter, Format, ReadBlock,
-    ServiceResponse, TimeDiagnostics, UpdateDiagnostics,
+    ServiceResponse, TimeDiagnostics,
 };
 use crate::wire::status::GeneralStatus;
 
@@ -69,9 +71,9 @@ fn fit_notifications(parts: &mut [Part], room: usize) {
     }
 }
 
-impl MotionDevice {
+impl Engine {
     /// Node Status, class attribute 15.
-    pub(in crate::device) fn node_status(&self) -> NodeStatus {
+    pub(super) fn node_status(&self) -> NodeStatus {
         let Some(connection) = &self.connection else { return NodeStatus::empty() };
         let control = connection.node_control();
         let mut status = NodeStatus::empty();
@@ -83,41 +85,36 @@ impl MotionDevice {
         status
     }
 
-    /// If a D-to-C update is due at `now`, writes its data (class-1 sequence count and update) and returns the octets.
-    ///
-    /// `out` should hold the T-to-O connection size; more of it is not used.
-    pub fn poll_transmit(
+    /// Writes the update that is due behind its sequence count.
+    pub fn transmit(
         &mut self,
         now: MonotonicTime,
         system_time: Option<SystemTime>,
         out: &mut [u8],
     ) -> Option<usize> {
-        let size = self.prepare(now, system_time)?.min(out.len());
+        let size = self.transmit_size()?.min(out.len());
         let (sequence, update) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
         let len = self.produce(now, system_time, update)?;
         *sequence = self.connection.as_ref()?.transmit_sequence.to_le_bytes();
         Some(SEQUENCE_LEN + len)
     }
 
-    /// As [`MotionDevice::poll_transmit`], for a network that puts no sequence count in front of an update: `out` gets the
-    /// update alone.
-    pub fn poll_unsequenced(
+    /// Writes the update that is due alone.
+    pub fn transmit_unsequenced(
         &mut self,
         now: MonotonicTime,
         system_time: Option<SystemTime>,
         out: &mut [u8],
     ) -> Option<usize> {
-        let size = self.prepare(now, system_time)?.checked_sub(SEQUENCE_LEN)?.min(out.len());
+        let size = self.transmit_size()?.checked_sub(SEQUENCE_LEN)?.min(out.len());
         self.produce(now, system_time, &mut out[..size])
     }
 
-    /// Does what is due, and gives the size of the connection, which counts a sequence count in any case.
-    fn prepare(&mut self, now: MonotonicTime, system_time: Option<SystemTime>) -> Option<usize> {
-        self.poll(now, system_time);
+    /// Size of the connection, which counts a sequence count in any case.
+    fn transmit_size(&self) -> Option<usize> {
         Some(usize::from(self.connection.as_ref()?.parameters.t_to_o_size))
     }
 
-    /// Writes the update that is due.
     fn produce(
         &mut self,
         now: MonotonicTime,
@@ -125,19 +122,20 @@ impl MotionDevice {
         update: &mut [u8],
     ) -> Option<usize> {
         let update_id = self.connection.as_mut()?.take_transmit(now)?;
-        let valid = self.node_status().contains(NodeStatus::DATA_VALID);
+        let node_status = self.node_status();
+        let valid = node_status.contains(NodeStatus::DATA_VALID);
         let len = match self.config.format {
             Format::Variable => self.write_update(update, update_id, system_time)?,
-            Format::Fixed => self.write_fixed(update.first_chunk_mut()?, update_id)?,
+            Format::Fixed => {
+                let context = self.context(None);
+                let slot = self.instances.slots.first_mut().filter(|_| valid);
+                let block = slot.map(|slot| slot.axis.actual_block(update_id, None, &context));
+                fixed::write(update.first_chunk_mut()?, update_id, node_status, &block.unwrap_or_default())?
+            }
         };
         let idle = update.first_chunk::<8>().copied().filter(|_| !valid);
-        let connection = self.connection.as_mut()?;
-        // While there is nothing to say, the same packet is repeated to keep the connection alive (clause 7-1.1).
-        if idle.is_none() || connection.has_data() || idle != self.idle_header {
-            connection.transmit_sequence = connection.transmit_sequence.wrapping_add(1);
-        }
-        self.idle_header = idle;
-        self.counters.transmitted += 1;
+        self.connection.as_mut()?.transmitted(idle);
+        self.statistics.counters.transmitted += 1;
         Some(len)
     }
 
@@ -150,9 +148,9 @@ impl MotionDevice {
         let time = system_time.filter(|_| supported).map_or(0, |t| t.0);
         let stamp = self.time_stamp(system_time).unwrap_or(0);
         let stamped = asked.contains(TimeDataSet::TIME_STAMP);
-        let offset = (stamped && supported).then(|| self.reported_offset.due(self.sync.offset, update_id));
+        let offset = (stamped && supported).then(|| self.clock.due(update_id));
         let diagnostics = asked.contains(TimeDataSet::UPDATE_DIAGNOSTICS);
-        let diagnostics = diagnostics.then(|| self.reported_diagnostics.due(self.diagnostics, update_id));
+        let diagnostics = diagnostics.then(|| self.statistics.due(update_id));
         let received_at = if supported { connection.received_at } else { 0 };
         Some(ActualHeader {
             update_id,
@@ -163,9 +161,7 @@ impl MotionDevice {
             last_received_id: connection.last_received_id(),
             time_stamp: stamped.then_some(stamp),
             time_offset: offset.flatten(),
-            update_diagnostics: diagnostics
-                .flatten()
-                .map(|(lost_updates, late_updates)| UpdateDiagnostics { lost_updates, late_updates }),
+            update_diagnostics: diagnostics.flatten(),
             time_diagnostics: asked
                 .contains(TimeDataSet::TIME_DIAGNOSTICS)
                 .then_some(TimeDiagnostics { received_at, transmitted_at: time }),
@@ -185,7 +181,7 @@ impl MotionDevice {
             return None;
         }
         let axes = self.echo.iter().filter_map(|echo| usize::from(echo.number).checked_sub(1));
-        let newest = axes.filter_map(|axis| self.slots.get(axis)?.axis.captured_at()).max();
+        let newest = axes.filter_map(|axis| self.instances.slots.get(axis)?.axis.captured_at()).max();
         newest.or(system_time.map(|time| time.0))
     }
 
@@ -198,15 +194,13 @@ impl MotionDevice {
     ) {
         let stamp = self.time_stamp(system_time);
         let context = self.context(system_time);
-        for number in 1..=self.slots.len() {
+        for number in 1..=self.instances.axis_count() {
             if self.echo.iter().any(|e| usize::from(e.number) == number && e.lists.is_some()) {
                 self.publish(number);
             }
         }
-        let (echoes, slots, table) = (&self.echo, &mut self.slots, &self.axis_table);
-        for echo in echoes {
-            let axis = usize::from(echo.number).checked_sub(1);
-            let Some(slot) = axis.and_then(|axis| slots.get_mut(axis)) else {
+        for echo in &self.echo {
+            let Some((slot, table)) = self.instances.axis(usize::from(echo.number)) else {
                 parts.push(Part { number: echo.number, cyclic: None, read: None, events: None });
                 continue;
             };
@@ -248,11 +242,8 @@ impl MotionDevice {
         let mut left = room;
         let mut writer = ActualWriter::new(update, &header).ok()?;
         for part in &parts {
-            let channel = match usize::from(part.number).checked_sub(1) {
-                None => Some(&self.class.service),
-                Some(axis) => self.slots.get(axis).map(|slot| &slot.service),
-            };
-            let mut service = channel.and_then(super::service_channel::ServiceChannel::response);
+            let channel = self.instances.channel_of(part.number);
+            let mut service = channel.and_then(ServiceChannel::response);
             if let Some(response) = &mut service
                 && response.buffer_len() > room
             {
@@ -267,7 +258,7 @@ impl MotionDevice {
             }
             // Instance numbers follow each other without a gap, so the first that does not fit ends the update.
             if writer.instance(&part.instance(service)).is_err() {
-                self.counters.left_out += 1;
+                self.statistics.counters.left_out += 1;
                 break;
             }
         }

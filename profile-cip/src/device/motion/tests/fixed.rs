@@ -438,7 +438,7 @@ fn lost_repeated_and_reordered_updates_are_told_apart() {
     assert_eq!(rig.device.node_fault(), NodeFault::NONE);
     // More in a row than the high limit allows: the node faults, the axis stops, and a reset does not help.
     let limit = rig.explicit(GET, 0, 21, &[]);
-    let skipped = u8::try_from(rig.device.high_limit()).expect("an octet") + 1;
+    let skipped = u8::try_from(rig.device.engine.instances.high_limit()).expect("an octet") + 1;
     assert_eq!(limit, (0, vec![skipped - 1]));
     rig.command.update_id = rig.command.update_id.wrapping_add(skipped);
     rig.cycle();

@@ -120,7 +120,7 @@ fn class_and_axes_may_be_configured_in_the_same_update() {
         let [low, high] = id.to_le_bytes();
         assert_eq!(rig.response(instance), Some((1, 0, vec![1, 0, 0, 0, low, high, 0, 0])), "{instance}");
     }
-    assert_eq!(rig.device.high_limit(), 9);
+    assert_eq!(rig.device.engine.instances.high_limit(), 9);
     assert_eq!(rig.device.attribute(0, 461), Ok(&1.5_f32.to_le_bytes()[..]));
     assert_eq!(rig.device.attribute(1, 610), Ok(&[2][..]));
     assert_ne!(rig.device.attribute(0, 610), Ok(&[2][..]), "of its own instance alone");

@@ -410,7 +410,7 @@ fn the_devices_time_offset_is_told_when_it_changes_and_its_time_diagnostics_when
     let expected = TimeDiagnostics { received_at, transmitted_at: received_at + 1_000 };
     assert_eq!(rig.header().time_diagnostics, Some(expected));
     // A device without synchronized time answers zeros and has no offset to tell.
-    rig.device.config.supports_sync = false;
+    rig.device.engine.config.supports_sync = false;
     rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::TIME_DIAGNOSTICS;
     rig.now += PERIOD;
     rig.cycle();
