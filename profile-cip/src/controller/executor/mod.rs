@@ -1,8 +1,14 @@
 //! Runs the steps of a program, once per update period.
 
+mod attributes;
+mod connection;
+mod events;
 mod expect;
 mod leaf;
+mod motion;
 mod request;
+mod services;
+mod settings;
 
 use self::leaf::Run;
 use super::axis::Axis;

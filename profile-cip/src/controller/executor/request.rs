@@ -3,6 +3,7 @@
 use super::Context;
 use super::leaf::Run;
 use crate::controller::failure::Failure;
+use crate::controller::program::Step;
 use crate::wire::motion::codes::{AxisControl, AxisStateCode};
 use profile_generic::time::DurationNs;
 
@@ -13,8 +14,32 @@ fn in_transit(state: Option<AxisStateCode>) -> bool {
         || state.is_none()
 }
 
+pub(super) fn advance(
+    step: &Step,
+    run: &mut Run,
+    cx: &mut Context<'_>,
+    time_out: Option<DurationNs>,
+) -> Result<bool, Failure> {
+    match step {
+        Step::Ask { axes, request } => {
+            // It has been sent once before the next step can take it back.
+            if !run.done {
+                for instance in axes.iter() {
+                    cx.axis(instance)?.handshake.request(*request);
+                }
+            }
+            Ok(core::mem::replace(&mut run.done, true))
+        }
+        Step::Refused { request, status, .. } => await_refusal(*request, *status, run, cx, time_out),
+        _ => match step.request() {
+            Some((_, request)) => ask(request, run, cx, time_out),
+            None => Ok(true),
+        },
+    }
+}
+
 /// Asks every axis of the step and waits for all of them.
-pub(super) fn ask(
+fn ask(
     request: AxisControl,
     run: &mut Run,
     cx: &mut Context<'_>,
@@ -59,7 +84,7 @@ pub(super) fn ask(
 }
 
 /// Asks every axis of the step and waits until all of them have said no.
-pub(super) fn await_refusal(
+fn await_refusal(
     request: AxisControl,
     expected: Option<u8>,
     run: &mut Run,
