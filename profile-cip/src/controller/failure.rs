@@ -504,10 +504,9 @@ impl fmt::Display for Failure {
             Self::CyclicRefused { axis, status: s } => {
                 write!(f, "axis {axis}: cyclic data refused with {}", status(s))
             }
-            Self::ScalingUnknown { axis, configuration: Some(found) } => write!(
-                f,
-                "axis {axis}: expected the device to scale (attribute 45 is 1), found {found}"
-            ),
+            Self::ScalingUnknown { axis, configuration: Some(found) } => {
+                write!(f, "axis {axis}: expected the device to scale (attribute 45 is 1), found {found}")
+            }
             Self::ScalingUnknown { axis, configuration: None } => write!(
                 f,
                 "axis {axis}: expected the device to scale (attribute 45 is 1), found no such attribute"
