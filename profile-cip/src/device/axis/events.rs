@@ -1,7 +1,8 @@
 //! Events of an axis: what the device evaluates itself, and the positions that the controller gets to see.
 
-use super::Axis;
 use super::drive_link::DriveImage;
+use super::event_channel::EventChannel;
+use super::reference::References;
 use crate::wire::motion::codes::{EventChecking, EventType};
 
 /// Watch events: number of the watch position, whether it is passed forward, event type.
@@ -51,51 +52,44 @@ impl Sample {
     }
 }
 
-impl Axis {
-    /// An event that the drive was looking for; `position` is in the reference system of power-up.
-    pub fn notify_event(&mut self, event: EventType, status: u8, position: i64, time_stamp: u64) -> bool {
-        let position = self.seen_by_controller(position).dint();
-        self.events.notify(event, status, position, time_stamp)
-    }
+/// The events that the device evaluates itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Watch {
+    /// Since when the torque is beyond the Home Torque Threshold, system time in ns.
+    torque_since: Option<u64>,
+}
 
+impl Watch {
     /// New actual values are there: tells the event channel what is being looked for, and looks for what the device
     /// evaluates itself. Values of `before` that the controller armed after do not count.
-    pub(super) fn check_events(&mut self, before: &Sample) {
-        let now = Sample::of(&self.drive);
-        let (events, events_checking) = (self.drive.events, self.drive.events_checking);
-        self.events.support(if now.online { events } else { EventChecking::empty() });
+    pub fn check(
+        &mut self,
+        events: &mut EventChannel,
+        before: &Sample,
+        drive: &DriveImage,
+        references: &References,
+    ) {
+        let now = Sample::of(drive);
+        events.support(if now.online { drive.events } else { EventChecking::empty() });
         let timed = now.online && now.captured_at != 0;
         if timed && before.online && before.captured_at != 0 && now.captured_at > before.captured_at {
-            self.watch(before, &now);
-            self.watch_torque(&now);
+            watch_positions(events, before, &now, references);
+            self.watch_torque(events, &now, references);
         }
-        let mut checking = if now.online { events_checking } else { EventChecking::empty() };
+        let mut checking = if now.online { drive.events_checking } else { EventChecking::empty() };
         checking -= EventChecking::WATCHES | EventChecking::HOME_TORQUE;
         checking.set(EventChecking::WATCHES, timed);
         checking.set(EventChecking::HOME_TORQUE, timed && now.torque.is_some());
-        self.events.confirm(checking);
-    }
-
-    fn watch(&mut self, before: &Sample, now: &Sample) {
-        let (from, to) = (self.references.actual(before.position), self.references.actual(now.position));
-        let range = now.unwind.map_or(DINT_RANGE, u64::from);
-        let marks = self.events.parameters().watch_positions;
-        for (number, forward, event) in WATCHES {
-            let Some(mark) = marks[number].filter(|_| self.events.is_checking(event)) else { continue };
-            if let Some(gap) = distance_to(mark, from, to, range, forward) {
-                let at = instant(before.captured_at, now.captured_at, gap, to.abs_diff(from));
-                self.events.notify(event, 0, mark, at);
-            }
-        }
+        events.confirm(checking);
     }
 
     /// The torque counts by its magnitude: an axis is driven against a stop in either direction. The threshold has to be
     /// exceeded in every update for the Home Torque Time, zero if the controller gives none.
-    fn watch_torque(&mut self, now: &Sample) {
-        let parameters = self.events.parameters();
+    fn watch_torque(&mut self, events: &mut EventChannel, now: &Sample, references: &References) {
+        let parameters = events.parameters();
         let limit = parameters.home_torque_threshold.map_or(f32::INFINITY, f32::abs);
         let seconds = f64::from(parameters.home_torque_time.unwrap_or(0.0));
-        let checking = self.events.is_checking(EventType::HOME_TORQUE);
+        let checking = events.is_checking(EventType::HOME_TORQUE);
         if !checking || now.torque.is_none_or(|torque| torque.abs() <= limit) {
             self.torque_since = None;
             return;
@@ -104,8 +98,21 @@ impl Axis {
         let lasted = core::time::Duration::from_nanos(now.captured_at.saturating_sub(since));
         if lasted.as_secs_f64() >= seconds {
             self.torque_since = None;
-            let position = self.seen_by_controller(now.position).dint();
-            self.events.notify(EventType::HOME_TORQUE, 0, position, now.captured_at);
+            let position = references.see(now.position, now.unwind).dint();
+            events.notify(EventType::HOME_TORQUE, 0, position, now.captured_at);
+        }
+    }
+}
+
+fn watch_positions(events: &mut EventChannel, before: &Sample, now: &Sample, references: &References) {
+    let (from, to) = (references.actual(before.position), references.actual(now.position));
+    let range = now.unwind.map_or(DINT_RANGE, u64::from);
+    let marks = events.parameters().watch_positions;
+    for (number, forward, event) in WATCHES {
+        let Some(mark) = marks[number].filter(|_| events.is_checking(event)) else { continue };
+        if let Some(gap) = distance_to(mark, from, to, range, forward) {
+            let at = instant(before.captured_at, now.captured_at, gap, to.abs_diff(from));
+            events.notify(event, 0, mark, at);
         }
     }
 }

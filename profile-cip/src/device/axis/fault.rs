@@ -1,16 +1,17 @@
 //! Faults and alarms of an axis: from the conditions that are there to words of bits, records and the log.
 
 use super::drive_link::DriveImage;
-use super::events::Sample;
 use super::exception::{DriveCondition, ExceptionAction, ExceptionActions, worst_action};
 use super::fault_log::{FaultLog, LogEntry, LogKind};
-use super::refused::RefusalReason;
 use super::reported::RecordLog;
-use super::state::{AxisEvent, AxisState};
-use super::{Axis, RAMP_AND_DISABLE, STATE_CHANGE_SHUTDOWN, fault_code};
-use crate::wire::motion::codes::{AlarmType, AxisControl, ClearingEvent, FaultType};
+use super::state::AxisState;
+use super::{RAMP_AND_DISABLE, fault_code};
+use crate::wire::motion::codes::{AlarmType, ClearingEvent, FaultType};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
-use crate::wire::status::GeneralStatus;
+use arrayvec::ArrayVec;
+
+/// Exceptions that an axis can find in one update.
+const FOUND_MAX: usize = 4;
 
 /// Fault types with a word of bits: Initialization, Axis, APR and Axis Safety, each with one of the manufacturer.
 const FAULT_WORDS: usize = 8;
@@ -61,6 +62,8 @@ pub(in crate::device) struct Faults {
     pub fault_records: RecordLog<FaultRecord>,
     pub alarm_records: RecordLog<AlarmRecord>,
     pub log: FaultLog,
+    /// Exceptions that the axis has found itself and that are events: for the next look at the conditions.
+    pub found: ArrayVec<DriveCondition, FOUND_MAX>,
 }
 
 /// Place of a fault type among the words.
@@ -108,6 +111,7 @@ impl Faults {
             fault_records: RecordLog::new(),
             alarm_records: RecordLog::new(),
             log: FaultLog::new(),
+            found: ArrayVec::new_const(),
         }
     }
 
@@ -129,6 +133,7 @@ impl Faults {
         self.fault_records.clear();
         self.alarm_records.clear();
         self.newest_alarm = AlarmRecord::default();
+        self.found.clear();
     }
 
     /// A reset clears what it can clear; what is still there is latched again by the next look at the conditions.
@@ -157,6 +162,28 @@ impl Faults {
 
     pub fn words(&self) -> &FaultWords {
         &self.words
+    }
+
+    /// The axis has found an exception, an event. What follows from it the controller has set.
+    pub fn find(&mut self, code: u8, sub_code: u8, action: u8, system_time: u64) {
+        let condition = DriveCondition {
+            fault_type: FaultType::AXIS,
+            code,
+            sub_code,
+            detail: 0,
+            action,
+            least: ExceptionAction::IGNORE,
+            at: system_time,
+        };
+        // One of a kind is enough.
+        if !self.found.iter().any(|known| known.code == code) {
+            let _ = self.found.try_push(condition);
+        }
+    }
+
+    /// Whether exceptions wait to be looked at.
+    pub fn has_found(&self) -> bool {
+        !self.found.is_empty()
     }
 
     /// Whether any fault is latched, major or minor.
@@ -196,7 +223,7 @@ impl Faults {
     }
 
     /// Latches a fault; a fault that is latched as minor may become major.
-    fn latch(&mut self, condition: &DriveCondition, major: bool, state: AxisState) {
+    pub(super) fn latch(&mut self, condition: &DriveCondition, major: bool, state: AxisState) {
         let (condition, place, bit) = with_bit(*condition);
         let known = self.words.faults[place] & bit != 0 && (!major || self.majors[place] & bit != 0);
         if known {
@@ -239,7 +266,7 @@ impl Faults {
 
     /// Looks at what is there now. While the axis is Initializing only initialization faults are latched: the controller
     /// has not said yet what is to be done about the others.
-    fn look(
+    pub(super) fn look(
         &mut self,
         image: &DriveImage,
         found: &[DriveCondition],
@@ -326,90 +353,4 @@ impl Faults {
 fn alarms_of(place: usize, word: u64) -> impl Iterator<Item = (AlarmType, u8)> {
     let alarm_type = AlarmType(u8::try_from(place + 1).unwrap_or(0));
     (0..64_u8).filter(move |code| word & 1 << code != 0).map(move |code| (alarm_type, code))
-}
-
-impl Axis {
-    /// What the drive reports is written over what it reported before: `fill` has to leave nothing of that.
-    pub fn update_drive(&mut self, fill: impl FnOnce(&mut DriveImage)) {
-        let before = Sample::of(&self.drive);
-        fill(&mut self.drive);
-        self.watch_scaling(&before);
-        self.check_events(&before);
-    }
-
-    /// Raises a fault of the device itself: an event, not a condition that lasts. All of them are fundamental to the axis
-    /// and major.
-    pub(super) fn raise(&mut self, code: u8, sub_code: u8, action: u8, system_time: u64) {
-        let condition = DriveCondition {
-            fault_type: FaultType::AXIS,
-            code,
-            sub_code,
-            detail: 0,
-            action,
-            least: ExceptionAction::MAJOR_FAULT,
-            at: system_time,
-        };
-        self.faults.latch(&condition, true, self.state);
-        self.follow_major_faults();
-    }
-
-    /// The axis has found an exception, an event. What follows from it the controller has set.
-    pub(super) fn find(&mut self, code: u8, sub_code: u8, action: u8, system_time: u64) {
-        let condition = DriveCondition {
-            fault_type: FaultType::AXIS,
-            code,
-            sub_code,
-            detail: 0,
-            action,
-            least: ExceptionAction::IGNORE,
-            at: system_time,
-        };
-        // One of a kind is enough.
-        if !self.found.iter().any(|known| known.code == code) {
-            let _ = self.found.try_push(condition);
-        }
-    }
-
-    /// Whether exceptions wait to be looked at.
-    pub fn has_found(&self) -> bool {
-        !self.found.is_empty()
-    }
-
-    /// Answers an Abort Request that the controller wants no stop from.
-    fn end_abort(&mut self, found: &[DriveCondition], actions: &ExceptionActions<'_>) {
-        let abort = found.iter().find(|condition| condition.code == fault_code::CONTROLLER_INITIATED);
-        let Some(action) = abort.map(|abort| actions.action(abort)) else { return };
-        if self.handshake.executing() != Some(AxisControl::ABORT) {
-            return;
-        }
-        match action {
-            ExceptionAction::MAJOR_FAULT => {}
-            ExceptionAction::IGNORE => self.refuse(RefusalReason::Ignored),
-            _ => self.handshake.complete(GeneralStatus::SUCCESS),
-        }
-    }
-
-    /// Takes the conditions of the drive into account.
-    pub(super) fn look_at_conditions(&mut self, actions: &ExceptionActions<'_>, system_time: u64) {
-        let found = core::mem::take(&mut self.found);
-        self.faults.look(&self.drive, &found, actions, self.state, system_time);
-        self.end_abort(&found, actions);
-        if self.state == AxisState::Initializing {
-            if self.faults.any_unrecoverable() {
-                self.fire(AxisEvent::InitializationFault);
-            }
-        } else {
-            self.follow_major_faults();
-        }
-    }
-
-    fn follow_major_faults(&mut self) {
-        if !self.faults.any_major() {
-            return;
-        }
-        if self.faults.abort().is_some_and(|abort| abort.action >> 4 == STATE_CHANGE_SHUTDOWN) {
-            self.shutdown = true;
-        }
-        self.fire(AxisEvent::MajorFault);
-    }
 }

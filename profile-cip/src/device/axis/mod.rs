@@ -26,21 +26,23 @@ pub(in crate::device) use fault::Faults;
 pub use reference::PositionView;
 use reference::References;
 
-use self::drive_link::{DriveAction, DriveImage, SetPoints};
+use self::drive_link::{AxisCommandImage, DriveAction, DriveImage, SetPoints};
 use self::event_channel::EventChannel;
+use self::events::{Sample, Watch};
 use self::exception::DriveCondition;
 use self::fault_log::FaultLog;
 use self::handshake::AxisControlHandshake;
 use self::refused::RefusedRequest;
 use self::reported::Reported;
 use self::state::{AxisConditions, AxisEvent, AxisState, ControlKind};
+use self::test::AxisTest;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, FeedbackMode, FeedbackSource,
-    TestStatus,
+    AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventType, FeedbackMode,
+    FeedbackSource, TestStatus,
 };
 use crate::wire::motion::test_service::HookupTestData;
-use crate::wire::motion::{CommandBlock, CommandValues};
+use crate::wire::motion::{ActualBlock, CommandBlock, CommandValues};
 use arrayvec::ArrayVec;
 use profile_generic::time::MonotonicTime;
 
@@ -65,8 +67,6 @@ mod sub_code {
     pub const DRIVE_LOST: u8 = 1;
 }
 
-/// Exceptions that an axis can find in one update.
-const FOUND_MAX: usize = 4;
 /// Refusals between two looks at them; the first ones count.
 const REFUSED_MAX: usize = 4;
 
@@ -140,47 +140,120 @@ pub(in crate::device) struct UpdateTimes {
     pub paced_at: MonotonicTime,
 }
 
-/// An instance of the Motion Device Axis Object.
-pub(in crate::device) struct Axis {
-    pub(in crate::device) config: AxisConfig,
-    pub(in crate::device) state: AxisState,
-    pub(in crate::device) shutdown: bool,
-    pub(in crate::device) faults: Faults,
-    pub(in crate::device) drive: DriveImage,
-    pub(in crate::device) handshake: AxisControlHandshake,
-    pub(in crate::device) block: CommandBlock,
-    pub(in crate::device) held: Option<Held>,
+/// The cyclic block of the controller.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::device) struct Commanded {
+    /// The last one.
+    pub block: CommandBlock,
+    /// Set-points of the newest good one.
+    pub held: Option<Held>,
+    /// Counts the set-points.
     sequence: u32,
-    sequence_settings: SequenceSettings,
-    /// Stopped with torque: a category 2 stop has ended.
-    holding: bool,
-    pub(in crate::device) action: DriveAction,
-    pub(in crate::device) action_id: u32,
-    pub(in crate::device) reset_id: u32,
+    /// Feedback Mode with which the axis was enabled.
+    feedback_source: FeedbackSource,
+}
+
+/// The handshake of Axis Control.
+#[derive(Debug, Clone, Default)]
+pub(in crate::device) struct Requests {
+    handshake: AxisControlHandshake,
+    /// Requests that were refused and not reported yet.
+    pub refused: ArrayVec<RefusedRequest, REFUSED_MAX>,
+}
+
+/// What the drive is ordered to do.
+#[derive(Debug, Clone, Copy, Default)]
+struct Orders {
+    action: DriveAction,
+    action_id: u32,
+    reset_id: u32,
     /// Fault Reset or Shutdown Reset that waits for the drive.
     reset: Option<AxisControl>,
     /// A connection began or ended, and the drive has not been asked to reset its faults since.
     connection_reset: bool,
+}
+
+impl Orders {
+    /// Puts another action in force; the drive sees by the number that it is another one.
+    fn set_action(&mut self, action: DriveAction) {
+        if action != self.action {
+            self.action = action;
+            self.action_id = self.action_id.wrapping_add(1);
+        }
+    }
+
+    /// Has the drive reset its faults.
+    fn ask_reset(&mut self) {
+        self.reset_id = self.reset_id.wrapping_add(1);
+    }
+}
+
+/// The state of the axis and what goes with it.
+#[derive(Debug, Clone, Copy)]
+struct Machine {
+    state: AxisState,
+    /// The state table that it follows: of its kind, or that of a feedback device while Control Mode is 0.
+    kind: ControlKind,
+    /// A shutdown is latched.
+    shutdown: bool,
+    /// Stopped with torque: a category 2 stop has ended.
+    holding: bool,
     /// The axis left an energized state without a stop of its own and has not stopped yet.
     winding_down: bool,
-    pub(in crate::device) references: References,
-    /// Feedback Mode with which the axis was enabled.
-    feedback_source: FeedbackSource,
-    pub(in crate::device) axis_status: Reported<(AxisStatus, u32)>,
-    pub(in crate::device) io_status: Reported<(AxisIoStatus, u32)>,
-    pub(in crate::device) safety: Reported<SafetyStatus>,
-    pub(in crate::device) events: EventChannel,
-    /// Since when the torque is beyond the Home Torque Threshold, system time in ns.
-    torque_since: Option<u64>,
-    test: Option<test::ActiveTest>,
-    test_id: u32,
-    hookup: Option<HookupTestData>,
-    /// The state table that it follows: of its kind, or that of a feedback device while Control Mode is 0.
-    pub(in crate::device) kind: ControlKind,
-    /// Exceptions that the axis has found itself and that are events: for the next look at the conditions.
-    found: ArrayVec<DriveCondition, FOUND_MAX>,
-    /// Requests that were refused and not told yet.
-    pub(in crate::device) refused: ArrayVec<RefusedRequest, REFUSED_MAX>,
+}
+
+impl Machine {
+    /// Follows the state table. Returns whether the event had an effect.
+    fn fire(&mut self, event: AxisEvent, conditions: &AxisConditions, power_enabled: bool) -> bool {
+        let Some(next) = self.state.next(self.kind, event, conditions) else { return false };
+        // Close and loss take an axis out of motion, and a new connection out of a hold, without a Stopping state of its own.
+        let unconnected =
+            matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss | AxisEvent::Reconnection);
+        let energized = self.state.is_energized() || power_enabled;
+        self.winding_down |= unconnected && energized && self.kind == ControlKind::Active;
+        // A category 2 stop ends with the power structure on, and the drive goes on doing what Disable asked for.
+        self.holding = event == AxisEvent::StopComplete && next == AxisState::Stopped && power_enabled;
+        self.state = next;
+        true
+    }
+}
+
+/// Status values on their way to the controller.
+struct ReportedStatus {
+    axis_status: Reported<(AxisStatus, u32)>,
+    io_status: Reported<(AxisIoStatus, u32)>,
+    safety: Reported<SafetyStatus>,
+}
+
+impl Default for ReportedStatus {
+    fn default() -> Self {
+        Self { axis_status: Reported::new(), io_status: Reported::new(), safety: Reported::new() }
+    }
+}
+
+impl ReportedStatus {
+    fn acknowledge(&mut self, received: u8) {
+        self.axis_status.acknowledge(received);
+        self.io_status.acknowledge(received);
+        self.safety.acknowledge(received);
+    }
+}
+
+/// An instance of the Motion Device Axis Object.
+pub(in crate::device) struct Axis {
+    pub config: AxisConfig,
+    sequence_settings: SequenceSettings,
+    machine: Machine,
+    pub faults: Faults,
+    drive: DriveImage,
+    pub requests: Requests,
+    pub command: Commanded,
+    orders: Orders,
+    references: References,
+    reported: ReportedStatus,
+    pub events: EventChannel,
+    watch: Watch,
+    test: AxisTest,
 }
 
 /// Whether the command values hold the one that the mode needs.
@@ -197,37 +270,27 @@ fn has_set_point(mode: ControlMode, values: &CommandValues) -> bool {
 impl Axis {
     /// An axis after its self test: Initializing.
     pub fn new(config: AxisConfig) -> Self {
+        let machine = Machine {
+            state: AxisState::Initializing,
+            kind: config.kind,
+            shutdown: false,
+            holding: false,
+            winding_down: false,
+        };
         Self {
             config,
-            state: AxisState::Initializing,
-            shutdown: false,
+            sequence_settings: SequenceSettings { flying_start: false, abort: RAMP_AND_DISABLE },
+            machine,
             faults: Faults::new(),
             drive: DriveImage::default(),
-            handshake: AxisControlHandshake::default(),
-            block: CommandBlock::default(),
-            held: None,
-            sequence: 0,
-            sequence_settings: SequenceSettings { flying_start: false, abort: RAMP_AND_DISABLE },
-            holding: false,
-            action: DriveAction::None,
-            action_id: 0,
-            reset_id: 0,
-            reset: None,
-            connection_reset: false,
-            winding_down: false,
+            requests: Requests::default(),
+            command: Commanded::default(),
+            orders: Orders::default(),
             references: References::default(),
-            feedback_source: FeedbackSource::default(),
-            axis_status: Reported::new(),
-            io_status: Reported::new(),
-            safety: Reported::new(),
+            reported: ReportedStatus::default(),
             events: EventChannel::default(),
-            torque_since: None,
-            test: None,
-            test_id: 0,
-            hookup: None,
-            kind: config.kind,
-            found: ArrayVec::new(),
-            refused: ArrayVec::new(),
+            watch: Watch::default(),
+            test: AxisTest::default(),
         }
     }
 
@@ -235,8 +298,13 @@ impl Axis {
         self.sequence_settings = settings;
     }
 
+    /// The state table that it follows.
+    pub fn kind(&self) -> ControlKind {
+        self.machine.kind
+    }
+
     pub fn state(&self) -> AxisState {
-        self.state
+        self.machine.state
     }
 
     /// Exceptions, faults and alarms.
@@ -254,12 +322,12 @@ impl Axis {
     }
 
     pub fn block(&self) -> &CommandBlock {
-        &self.block
+        &self.command.block
     }
 
     /// Command Target Time, attribute 93.
     pub fn target_time(&self) -> u64 {
-        self.held.and_then(|held| held.set_points.target_time).unwrap_or(0)
+        self.command.held.and_then(|held| held.set_points.target_time).unwrap_or(0)
     }
 
     /// Records lost because a log was full.
@@ -269,12 +337,12 @@ impl Axis {
 
     /// Whether attributes are limited to those of Table 5-2.110.
     pub fn is_running(&self) -> bool {
-        matches!(self.state, AxisState::Starting | AxisState::Running | AxisState::Testing)
+        matches!(self.machine.state, AxisState::Starting | AxisState::Running | AxisState::Testing)
     }
 
     /// Whether a Fault Reset has something to reset; minor faults count, they are latched as well.
     fn has_fault(&self) -> bool {
-        match self.state {
+        match self.machine.state {
             AxisState::Initializing => false,
             AxisState::MajorFaulted | AxisState::Aborting => true,
             _ => self.faults.any() || self.drive.conditions.as_slice().iter().any(DriveCondition::stops),
@@ -284,8 +352,8 @@ impl Axis {
     fn conditions(&self) -> AxisConditions {
         AxisConditions {
             bus_up: self.drive.bus_up,
-            shutdown: self.shutdown,
-            in_process: self.is_testing(),
+            shutdown: self.machine.shutdown,
+            in_process: self.test.is_energizing(),
             start_inhibited: self.inhibited(),
             flying_start: self.sequence_settings.flying_start,
         }
@@ -297,28 +365,19 @@ impl Axis {
 
     /// Follows the state table. Returns whether the event had an effect.
     fn fire(&mut self, event: AxisEvent) -> bool {
-        let Some(next) = self.state.next(self.kind, event, &self.conditions()) else { return false };
-        // Close and loss take an axis out of motion, and a new connection out of a hold, without a Stopping state of its own.
-        let unconnected =
-            matches!(event, AxisEvent::ConnectionClose | AxisEvent::ConnectionLoss | AxisEvent::Reconnection);
-        let energized = self.state.is_energized() || self.drive.power_enabled;
-        self.winding_down |= unconnected && energized && self.kind == ControlKind::Active;
-        // A category 2 stop ends with the power structure on, and the drive goes on doing what Disable asked for.
-        self.holding =
-            event == AxisEvent::StopComplete && next == AxisState::Stopped && self.drive.power_enabled;
-        self.state = next;
-        true
+        let conditions = self.conditions();
+        self.machine.fire(event, &conditions, self.drive.power_enabled)
     }
 
     /// Whether the drive speaks of the action that is in force.
     pub(in crate::device) fn answers(&self) -> bool {
-        self.drive.online && self.drive.action_id == self.action_id
+        self.drive.online && self.drive.action_id == self.orders.action_id
     }
 
     /// Whether the stop that is in force has ended. Also of a drive that is gone: nobody sees it come to rest, but the
     /// time limit of its stop runs out, and that ends Aborting as well (clause 5-2.6.2.11).
     pub(in crate::device) fn has_stopped(&self) -> bool {
-        self.drive.action_id == self.action_id && self.drive.stop_complete
+        self.drive.action_id == self.orders.action_id && self.drive.stop_complete
     }
 
     // -- connection ---------------------------------------------------------------------------------------------
@@ -343,32 +402,89 @@ impl Axis {
     /// The connection was lost.
     pub fn lose(&mut self) {
         self.fire(AxisEvent::ConnectionLoss);
-        self.break_off_test(TestStatus::ABORTED);
-        self.test = None;
-        self.handshake.reset();
-        self.held = None;
-        self.reset = None;
+        self.test.break_off(TestStatus::ABORTED);
+        self.test.end();
+        self.requests.handshake.reset();
+        self.command.held = None;
+        self.orders.reset = None;
         self.events.handle(None);
         self.update_action();
     }
 
     fn forget(&mut self, system_time: u64) {
-        self.found.clear();
-        self.kind = self.config.kind;
-        self.test = None;
-        self.hookup = None;
-        self.shutdown = false;
+        self.machine.kind = self.config.kind;
+        self.test.forget();
+        self.machine.shutdown = false;
         self.faults.forget(system_time);
-        self.reset = None;
-        self.connection_reset = true;
-        self.handshake.reset();
-        self.block = CommandBlock::default();
-        self.held = None;
+        self.orders.reset = None;
+        self.orders.connection_reset = true;
+        self.requests.handshake.reset();
+        self.command.block = CommandBlock::default();
+        self.command.held = None;
         self.references.reset();
-        self.axis_status = Reported::new();
-        self.io_status = Reported::new();
-        self.safety = Reported::new();
+        self.reported = ReportedStatus::default();
         self.events.reset();
-        self.torque_since = None;
+        self.watch = Watch::default();
+    }
+
+    // -- what it reports ----------------------------------------------------------------------------------------
+
+    /// What the drive reports is written over what it reported before: `fill` has to leave nothing of that.
+    pub fn update_drive(&mut self, fill: impl FnOnce(&mut DriveImage)) {
+        let before = Sample::of(&self.drive);
+        fill(&mut self.drive);
+        // Another scaling or another unwind is in use: positions of before mean nothing in it.
+        if before.scaling_id != self.drive.scaling_id {
+            self.references.reset();
+        }
+        self.watch.check(&mut self.events, &before, &self.drive, &self.references);
+    }
+
+    /// An event that the drive was looking for; `position` is in the reference system of power-up.
+    pub fn notify_event(&mut self, event: EventType, status: u8, position: i64, time_stamp: u64) -> bool {
+        let position = self.references.see(position, self.drive.unwind).dint();
+        self.events.notify(event, status, position, time_stamp)
+    }
+
+    pub fn position_view(&self) -> PositionView {
+        PositionView::new(self.references, self.drive.unwind)
+    }
+
+    /// Get_Hookup_Test_Data: the result of the last test; `None` before the first one.
+    pub fn hookup_test_data(&self) -> Option<HookupTestData> {
+        self.test.data()
+    }
+
+    /// Whether exceptions wait to be looked at.
+    pub fn has_found(&self) -> bool {
+        self.faults.has_found()
+    }
+
+    /// What the drive has to do at `now`. `period_ns` and `limit` judge the age of the set-points.
+    pub fn command(
+        &self,
+        now: MonotonicTime,
+        context: &Context,
+        period_ns: u64,
+        limit: u32,
+    ) -> AxisCommandImage {
+        report::command(self, now, context, period_ns, limit)
+    }
+
+    /// Axis Status, attribute 651.
+    pub fn status(&self, context: &Context) -> AxisStatus {
+        report::status(self, context)
+    }
+
+    /// The cyclic actual block of D-to-C update `update_id`, whose time stamp is `stamp`, system time in ns; `None` for an
+    /// update without one.
+    pub fn actual_block(&mut self, update_id: u8, stamp: Option<u64>, context: &Context) -> ActualBlock {
+        report::actual_block(self, update_id, stamp, context)
+    }
+
+    /// When the actual values were captured, system time in ns; `None` while the drive measures nothing or does not say
+    /// when.
+    pub fn captured_at(&self) -> Option<u64> {
+        report::captured_at(self)
     }
 }

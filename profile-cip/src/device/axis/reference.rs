@@ -12,13 +12,9 @@
 //!
 //! Everything is derived anew from the one unrolled count, so nothing adds up over any number of cycles.
 
-use super::Axis;
-use super::events::Sample;
 use super::refused::RefusalReason;
+use crate::wire::motion::ActualPosition;
 use crate::wire::motion::codes::{AxisControl, ControlMode};
-use crate::wire::motion::{ActualPosition, CommandBlock};
-
-use super::state::AxisState;
 
 /// Reference systems of an axis, position control units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -79,7 +75,29 @@ impl References {
         self.actual == self.command
     }
 
-    fn see(&self, position: i64, unwind: Option<u32>) -> SeenPosition {
+    /// Whether a position may be commanded: the references agree, or another value leads.
+    pub fn allow(&self, mode: ControlMode) -> bool {
+        mode != ControlMode::POSITION || self.agree()
+    }
+
+    /// Displacement of the last Change Actual Position Reference.
+    pub const fn displacement(&self) -> i32 {
+        self.displacement
+    }
+
+    /// Carries out a change of reference. It is complete at once: there is nothing to cancel.
+    pub fn change(&mut self, request: AxisControl, displacement: i32) -> Result<(), RefusalReason> {
+        let of_actual = request == AxisControl::CHANGE_ACTUAL_POSITION;
+        let reference = if of_actual { &mut self.actual } else { &mut self.command };
+        *reference = reference.checked_add(i64::from(displacement)).ok_or(RefusalReason::ValueTooFar)?;
+        if of_actual {
+            self.displacement = displacement;
+        }
+        Ok(())
+    }
+
+    /// A position of the drive as the controller sees it.
+    pub fn see(&self, position: i64, unwind: Option<u32>) -> SeenPosition {
         unwound(self.actual(position), unwind)
     }
 }
@@ -106,6 +124,12 @@ impl PositionView {
     }
 }
 
+impl PositionView {
+    pub(super) const fn new(references: References, unwind: Option<u32>) -> Self {
+        Self { references, unwind }
+    }
+}
+
 /// A position in its cycle.
 fn unwound(position: i64, unwind: Option<u32>) -> SeenPosition {
     match unwind.map(i64::from).filter(|unwind| *unwind > 0) {
@@ -113,64 +137,6 @@ fn unwound(position: i64, unwind: Option<u32>) -> SeenPosition {
             SeenPosition { position: position.rem_euclid(unwind), cycles: Some(position.div_euclid(unwind)) }
         }
         None => SeenPosition { position, cycles: None },
-    }
-}
-
-impl Axis {
-    /// A position of the drive as the controller sees it.
-    pub(in crate::device) fn seen_by_controller(&self, position: i64) -> SeenPosition {
-        self.references.see(position, self.drive.unwind)
-    }
-
-    pub(in crate::device) fn position_view(&self) -> PositionView {
-        PositionView { references: self.references, unwind: self.drive.unwind }
-    }
-
-    /// Position Displacement of the next update: that of the change which is being acknowledged.
-    pub(in crate::device) fn displacement(&self) -> i32 {
-        let acknowledged = self.handshake.response() == (AxisControl::CHANGE_ACTUAL_POSITION, 0);
-        if acknowledged { self.references.displacement } else { 0 }
-    }
-
-    /// Whether a position may be commanded: the references agree, or another value leads.
-    pub(super) fn may_follow(&self, mode: ControlMode) -> bool {
-        mode != ControlMode::POSITION || self.references.agree()
-    }
-
-    /// Carries out a change of reference. It is complete at once: there is nothing to cancel.
-    pub(super) fn change_reference(
-        &mut self,
-        request: AxisControl,
-        block: &CommandBlock,
-    ) -> Result<(), RefusalReason> {
-        if self.state == AxisState::Initializing {
-            // What a count is has not been said yet.
-            return Err(RefusalReason::State(self.state));
-        }
-        let Some(displacement) = block.values.position_displacement else {
-            return Err(RefusalReason::ValueMissing);
-        };
-        let references = &mut self.references;
-        let reference = if request == AxisControl::CHANGE_ACTUAL_POSITION {
-            &mut references.actual
-        } else {
-            &mut references.command
-        };
-        let Some(moved) = reference.checked_add(i64::from(displacement)) else {
-            return Err(RefusalReason::ValueTooFar);
-        };
-        *reference = moved;
-        if request == AxisControl::CHANGE_ACTUAL_POSITION {
-            references.displacement = displacement;
-        }
-        Ok(())
-    }
-
-    /// Another scaling or another unwind is in use: positions of before mean nothing in it.
-    pub(super) fn watch_scaling(&mut self, before: &Sample) {
-        if before.scaling_id != self.drive.scaling_id {
-            self.references.reset();
-        }
     }
 }
 

@@ -178,7 +178,7 @@ impl MotionDevice {
 
     /// The next request of an axis that was refused.
     pub fn poll_refused(&mut self, axis: usize) -> Option<RefusedRequest> {
-        self.engine.instances.slots.get_mut(axis)?.axis.refused.pop_at(0)
+        self.engine.instances.slots.get_mut(axis)?.axis.requests.refused.pop_at(0)
     }
 
     /// Fault and alarm records of an axis that were lost because the controller did not take them.

@@ -98,8 +98,8 @@ pub(super) fn adopt(slot: &mut Slot, table: &AttributeTable) {
         u8::try_from(value).unwrap_or(0)
     };
     let (status, control) = (octet(id::CONTROL_STATUS), octet(id::COMMAND_CONTROL));
-    slot.axis.block.control_status = ControlStatus::from_bits_retain(status);
-    slot.axis.block.target = CommandTarget(control & TARGET_MASK);
+    slot.axis.command.block.control_status = ControlStatus::from_bits_retain(status);
+    slot.axis.command.block.target = CommandTarget(control & TARGET_MASK);
 }
 
 /// Writes a D-to-C update; `block` is the axis's, the default before the controller's data are valid: then only the head

@@ -69,7 +69,7 @@ pub(super) fn condition(axis: &Axis) -> AxisCondition {
         types.into_iter().find_map(|one| lowest_bit(words.alarm(one)).map(|code| (one, code)))
     };
     AxisCondition {
-        kind: axis.kind,
+        kind: axis.kind(),
         state: axis.state(),
         bus_up: axis.drive().bus_up,
         fault: faults
