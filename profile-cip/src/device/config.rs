@@ -307,7 +307,7 @@ const _: () = assert!(MOTION_SIZE_MIN as usize == SEQUENCE_COUNT_LEN + 8);
 const _: () = assert!(MOTION_SIZE_FIXED as usize == SEQUENCE_COUNT_LEN + fixed::LEN);
 
 #[cfg(test)]
-pub(in crate::device) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// A device with two axes, as the tests of this folder use it.

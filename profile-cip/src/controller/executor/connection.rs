@@ -7,7 +7,6 @@ use crate::controller::failure::Failure;
 use crate::controller::misbehaviour::Misbehaviour;
 use crate::controller::program::Step;
 use crate::wire::motion::codes::NodeFault;
-use profile_generic::time::DurationNs;
 
 pub(super) fn start(step: &Step, cx: &mut Context<'_>) {
     if let Step::Misbehave(kind) = step {
@@ -17,12 +16,7 @@ pub(super) fn start(step: &Step, cx: &mut Context<'_>) {
     }
 }
 
-pub(super) fn advance(
-    step: &Step,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     match step {
         Step::NodeFaultReset => {
@@ -31,7 +25,7 @@ pub(super) fn advance(
             }
             let faulted = cx.node.fault != NodeFault::NONE;
             *cx.node_fault_reset = faulted;
-            if faulted && waited > time_out.unwrap_or(cx.config.time_outs.axis_control) {
+            if faulted && waited > run.time_out.unwrap_or(cx.config.time_outs.axis_control) {
                 *cx.node_fault_reset = false;
                 return Err(Failure::NodeFault(cx.node.fault));
             }

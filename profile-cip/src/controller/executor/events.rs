@@ -7,7 +7,6 @@ use crate::controller::failure::Failure;
 use crate::controller::program::Step;
 use crate::wire::motion::codes::EventChecking;
 use crate::wire::motion::event::{ACTUAL_EVENTS_BARE, COMMAND_EVENTS_MAX};
-use profile_generic::time::DurationNs;
 
 pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<(), Failure> {
     match step {
@@ -24,17 +23,12 @@ pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-pub(super) fn advance(
-    step: &Step,
-    run: &Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     match step {
         Step::ArmEvents { axis, checking, .. } => {
             let wanted = *checking & EventChecking::EVENTS;
-            let limit = time_out.unwrap_or(cx.config.time_outs.service);
+            let limit = run.time_out.unwrap_or(cx.config.time_outs.service);
             let axis = cx.axis(*axis)?;
             let armed = axis.events.status().contains(wanted);
             if !armed && waited > limit {
@@ -44,7 +38,7 @@ pub(super) fn advance(
             Ok(armed)
         }
         Step::DisarmEvents { axis, checking } => {
-            let limit = time_out.unwrap_or(cx.config.time_outs.service);
+            let limit = run.time_out.unwrap_or(cx.config.time_outs.service);
             let gone = !cx.axis(*axis)?.events.status().intersects(*checking & EventChecking::EVENTS);
             done_within(gone, waited, limit)
         }

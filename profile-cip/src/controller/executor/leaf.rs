@@ -10,6 +10,8 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
     pub since: MonotonicTime,
+    /// How long the step may take, where the program says so.
+    pub time_out: Option<DurationNs>,
     /// Axes that have not finished.
     pub left: AxisSet,
     /// Axes that have been asked.
@@ -30,9 +32,10 @@ pub(super) struct Run {
 }
 
 /// Begins a step.
-pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<Run, Failure> {
+pub(super) fn start(step: &Step, time_out: Option<DurationNs>, cx: &mut Context<'_>) -> Result<Run, Failure> {
     let mut run = Run {
         since: cx.now,
+        time_out,
         left: step.request().map_or(AxisSet::NONE, |(axes, _)| axes),
         asked: AxisSet::NONE,
         acknowledged: AxisSet::NONE,
@@ -56,21 +59,16 @@ pub(super) fn start(step: &Step, cx: &mut Context<'_>) -> Result<Run, Failure> {
 }
 
 /// Carries a step on; true when it has finished.
-pub(super) fn advance(
-    step: &Step,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     match kind(step) {
-        Kind::Motion => motion::advance(step, run, cx, time_out),
-        Kind::Setting => settings::advance(step, run, cx, time_out),
+        Kind::Motion => motion::advance(step, run, cx),
+        Kind::Setting => settings::advance(step, run, cx),
         Kind::Attributes => attributes::advance(step, run, cx),
-        Kind::Events => events::advance(step, run, cx, time_out),
-        Kind::Service => services::advance(step, run, cx, time_out),
-        Kind::Connection => connection::advance(step, run, cx, time_out),
+        Kind::Events => events::advance(step, run, cx),
+        Kind::Service => services::advance(step, run, cx),
+        Kind::Connection => connection::advance(step, run, cx),
         Kind::Expect => expect::advance(step, run, cx),
-        Kind::Request => request::advance(step, run, cx, time_out),
+        Kind::Request => request::advance(step, run, cx),
     }
 }
 

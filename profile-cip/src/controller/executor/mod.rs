@@ -150,9 +150,9 @@ impl Node {
         }
         let mut run = match &self.progress {
             Progress::Running(run) => *run,
-            _ => leaf::start(&self.step, cx)?,
+            _ => leaf::start(&self.step, self.time_out, cx)?,
         };
-        let finished = leaf::advance(&self.step, &mut run, cx, self.time_out)?;
+        let finished = leaf::advance(&self.step, &mut run, cx)?;
         self.progress = Progress::Running(run);
         Ok(finished)
     }

@@ -45,22 +45,17 @@ pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<
     Ok(())
 }
 
-pub(super) fn advance(
-    step: &Step,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     match step {
         Step::Mode { axis, mode } => {
             let limit = run.length + cx.config.time_outs.motion_margin;
             let axis = cx.axis(*axis)?;
             let done = !axis.is_busy() && axis.seen.mode == Some(*mode);
-            done_within(done, waited, time_out.unwrap_or(limit))
+            done_within(done, waited, run.time_out.unwrap_or(limit))
         }
         Step::RedefinePosition { axis, .. } => {
-            let limit = time_out.unwrap_or(cx.config.time_outs.axis_control);
+            let limit = run.time_out.unwrap_or(cx.config.time_outs.axis_control);
             match cx.axis(*axis)?.take_redefined() {
                 Some(ended) => ended.map(|()| true),
                 None if waited > limit => Err(Failure::StepTimeOut { waited }),

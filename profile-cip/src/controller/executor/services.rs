@@ -27,15 +27,10 @@ pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<
     Ok(())
 }
 
-pub(super) fn advance(
-    step: &Step,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     match step {
         Step::Service { axis, status, .. } => take_raw(*axis, *status, step, run, cx),
-        Step::TestResult { axis, status, .. } => await_test(*axis, *status, step, run, cx, time_out),
+        Step::TestResult { axis, status, .. } => await_test(*axis, *status, step, run, cx),
         Step::Explicit { message, status } => {
             if !run.done {
                 run.done = cx.session.message(cx.now, Asker::Program, message);
@@ -79,7 +74,6 @@ fn await_test(
     step: &Step,
     run: &mut Run,
     cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
 ) -> Result<bool, Failure> {
     let Step::TestResult { service, .. } = step else { return Ok(true) };
     if run.ticket.is_none() && cx.now >= run.again {
@@ -95,7 +89,7 @@ fn await_test(
     let found = data.first().copied().map_or(TestStatus::IN_PROGRESS, TestStatus);
     let waited = cx.now - run.since;
     if found == TestStatus::IN_PROGRESS && expected != found {
-        let late = waited > time_out.unwrap_or(TEST_MAX);
+        let late = waited > run.time_out.unwrap_or(TEST_MAX);
         return if late { Err(Failure::StepTimeOut { waited }) } else { Ok(false) };
     }
     (cx.event)(Event::ServiceAnswered { instance, service: *service, status, data });

@@ -10,7 +10,6 @@ use crate::controller::failure::Failure;
 use crate::controller::program::{CyclicAttribute, CyclicDirection, Step};
 use crate::controller::services::Outcome;
 use crate::wire::motion::Format;
-use profile_generic::time::DurationNs;
 
 pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<(), Failure> {
     match step {
@@ -57,17 +56,12 @@ pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<
     }
 }
 
-pub(super) fn advance(
-    step: &Step,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     match step {
         Step::DataSets { axis, .. } => {
             // In the fixed format another actual value has to be there before a step may count on it.
-            let limit = time_out.unwrap_or(cx.config.time_outs.axis_control);
+            let limit = run.time_out.unwrap_or(cx.config.time_outs.axis_control);
             let there = cx.axis(*axis)?.is_seen();
             done_within(there, waited, limit)
         }

@@ -64,7 +64,7 @@ impl Entry {
     ///
     /// # Errors
     /// The general status and the index of the element that caused it.
-    pub(in crate::device) fn check_value(
+    pub(crate) fn check_value(
         &self,
         part: Part,
         value: &[u8],

@@ -20,7 +20,7 @@ const SET_STATUS_LEN: usize = 4;
 
 /// Which service a job carries out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum ListFormat {
+pub(crate) enum ListFormat {
     /// Get_Axis_Attributes_List, 0x4B.
     AxisGet,
     /// Set_Axis_Attributes_List, 0x4C.
@@ -37,7 +37,7 @@ pub(in crate::device) enum ListFormat {
 
 /// What an item asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::device) struct Item {
+pub(crate) struct Item {
     pub id: u16,
     /// `None` stands for the whole attribute.
     pub selector: Option<AttributeSelector>,
@@ -47,7 +47,7 @@ pub(in crate::device) struct Item {
 
 /// How an item ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Outcome<'a> {
+pub(crate) enum Outcome<'a> {
     /// The octets of a Get.
     Value(&'a [u8]),
     /// A Set was carried out.
@@ -58,7 +58,7 @@ pub(in crate::device) enum Outcome<'a> {
 
 /// A service in progress.
 #[derive(Debug, Clone)]
-pub(in crate::device) struct ListJob {
+pub(crate) struct ListJob {
     format: ListFormat,
     request: ArrayVec<u8, BODY_MAX>,
     at: usize,

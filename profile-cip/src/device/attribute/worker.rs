@@ -37,7 +37,7 @@ pub struct AttributeAccess {
 }
 
 /// The values that a service works on.
-pub(in crate::device) struct AttributeSpace<'a> {
+pub(crate) struct AttributeSpace<'a> {
     pub table: &'a AttributeTable,
     pub store: &'a mut AttributeStore,
     pub instance: u8,
@@ -62,7 +62,7 @@ struct Waiting {
 
 /// One attribute service at a time.
 #[derive(Default)]
-pub(in crate::device) struct AttributeWorker {
+pub(crate) struct AttributeWorker {
     job: Option<ListJob>,
     waiting: Option<Waiting>,
     /// Most octets of the response body.

@@ -49,7 +49,7 @@ impl FaultWords {
 }
 
 /// Faults, alarms and their records.
-pub(in crate::device) struct Faults {
+pub(crate) struct Faults {
     words: FaultWords,
     /// Those of the latched faults that are major.
     majors: [u64; FAULT_WORDS],

@@ -58,7 +58,7 @@ pub struct FaultLog {
 }
 
 impl FaultLog {
-    pub(in crate::device) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { entries: ArrayVec::new_const(), changes: ArrayVec::new_const(), total: 0, untold: 0 }
     }
 
@@ -80,7 +80,7 @@ impl FaultLog {
     }
 
     /// The next entry that came or ended.
-    pub(in crate::device) fn poll(&mut self) -> Option<LogEntry> {
+    pub(crate) fn poll(&mut self) -> Option<LogEntry> {
         (!self.changes.is_empty()).then(|| self.changes.remove(0))
     }
 
@@ -93,7 +93,7 @@ impl FaultLog {
     }
 
     /// Adds an entry; its number and end are filled in.
-    pub(in crate::device) fn add(&mut self, entry: LogEntry) {
+    pub(crate) fn add(&mut self, entry: LogEntry) {
         self.total = self.total.wrapping_add(1);
         let entry = LogEntry { number: self.total, ended: None, ..entry };
         if self.entries.is_full() {
@@ -104,12 +104,7 @@ impl FaultLog {
     }
 
     /// Ends the faults that a reset clears.
-    pub(in crate::device) fn end_faults(
-        &mut self,
-        by: ClearingEvent,
-        at: u64,
-        clears: impl Fn(FaultType) -> bool,
-    ) {
+    pub(crate) fn end_faults(&mut self, by: ClearingEvent, at: u64, clears: impl Fn(FaultType) -> bool) {
         for place in 0..self.entries.len() {
             let entry = &mut self.entries[place];
             let cleared = matches!(entry.kind, LogKind::Fault(kind) if clears(kind));
@@ -122,13 +117,7 @@ impl FaultLog {
     }
 
     /// Ends an alarm, and gives the sub code that it had.
-    pub(in crate::device) fn end_alarm(
-        &mut self,
-        alarm: AlarmType,
-        code: u8,
-        by: ClearingEvent,
-        at: u64,
-    ) -> u8 {
+    pub(crate) fn end_alarm(&mut self, alarm: AlarmType, code: u8, by: ClearingEvent, at: u64) -> u8 {
         let open = |entry: &&mut LogEntry| {
             entry.kind == LogKind::Alarm(alarm) && entry.code == code && entry.ended.is_none()
         };

@@ -22,7 +22,7 @@ mod status;
 mod test;
 
 pub use fault::FaultWords;
-pub(in crate::device) use fault::Faults;
+pub(crate) use fault::Faults;
 pub use reference::PositionView;
 use reference::References;
 
@@ -113,7 +113,7 @@ pub struct SequenceSettings {
 
 /// What surrounds an axis in one step.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::device) struct Context {
+pub(crate) struct Context {
     /// A connection is open.
     pub connected: bool,
     /// The controller has remote control.
@@ -126,14 +126,14 @@ pub(in crate::device) struct Context {
 
 /// The newest good cyclic block.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::device) struct Held {
+pub(crate) struct Held {
     pub set_points: SetPoints,
     pub at: MonotonicTime,
 }
 
 /// Times of an update; the stamp in this device's system time, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::device) struct UpdateTimes {
+pub(crate) struct UpdateTimes {
     pub time_stamp: Option<u64>,
     pub period: u64,
     /// When the update would have arrived on an even network.
@@ -142,7 +142,7 @@ pub(in crate::device) struct UpdateTimes {
 
 /// The cyclic block of the controller.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::device) struct Commanded {
+pub(crate) struct Commanded {
     /// The last one.
     pub block: CommandBlock,
     /// Set-points of the newest good one.
@@ -155,7 +155,7 @@ pub(in crate::device) struct Commanded {
 
 /// The handshake of Axis Control.
 #[derive(Debug, Clone, Default)]
-pub(in crate::device) struct Requests {
+pub(crate) struct Requests {
     handshake: AxisControlHandshake,
     /// Requests that were refused and not reported yet.
     pub refused: ArrayVec<RefusedRequest, REFUSED_MAX>,
@@ -240,7 +240,7 @@ impl ReportedStatus {
 }
 
 /// An instance of the Motion Device Axis Object.
-pub(in crate::device) struct Axis {
+pub(crate) struct Axis {
     pub config: AxisConfig,
     sequence_settings: SequenceSettings,
     machine: Machine,
@@ -370,13 +370,13 @@ impl Axis {
     }
 
     /// Whether the drive speaks of the action that is in force.
-    pub(in crate::device) fn answers(&self) -> bool {
+    pub(crate) fn answers(&self) -> bool {
         self.drive.online && self.drive.action_id == self.orders.action_id
     }
 
     /// Whether the stop that is in force has ended. Also of a drive that is gone: nobody sees it come to rest, but the
     /// time limit of its stop runs out, and that ends Aborting as well (clause 5-2.6.2.11).
-    pub(in crate::device) fn has_stopped(&self) -> bool {
+    pub(crate) fn has_stopped(&self) -> bool {
         self.drive.action_id == self.orders.action_id && self.drive.stop_complete
     }
 

@@ -18,7 +18,7 @@ use crate::wire::motion::codes::{AxisControl, ControlMode};
 
 /// Reference systems of an axis, position control units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::device) struct References {
+pub(crate) struct References {
     /// To be added to a position of the drive.
     actual: i64,
     /// To be subtracted from a commanded position.
@@ -29,7 +29,7 @@ pub(in crate::device) struct References {
 
 /// A position as the controller sees it, position control units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) struct SeenPosition {
+pub(crate) struct SeenPosition {
     /// The position; between 0 and the unwind of a cyclic axis.
     pub position: i64,
     /// Cycles of a cyclic axis, counted down below zero; `None` where nothing is unwound.

@@ -15,7 +15,7 @@ const CORRECTION_MAX_NS: u64 = 1_000_000_000;
 
 /// Updates that should have come within `elapsed` ns since the last one and have not. An update counts as missed when
 /// it is half a period overdue, so that jitter of the network makes no difference.
-pub(in crate::device) fn missed_updates(elapsed: u64, period: u64) -> u64 {
+pub(crate) fn missed_updates(elapsed: u64, period: u64) -> u64 {
     let period = period.max(1);
     elapsed.saturating_sub(period / 2) / period
 }

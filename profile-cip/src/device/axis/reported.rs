@@ -6,7 +6,7 @@
 use arrayvec::ArrayVec;
 
 /// Records that a log keeps for transmission, clause 5-2.3.14.
-pub(in crate::device) const LOG_MAX: usize = 25;
+pub(crate) const LOG_MAX: usize = 25;
 
 /// The unbroken run of updates that carried something, by their Update IDs on the circle of 256.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Flight {
 
 /// A value that is reported when it changes.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::device) struct Reported<T> {
+pub(crate) struct Reported<T> {
     arrived: Option<T>,
     in_flight: Option<(Flight, T)>,
 }
@@ -78,7 +78,7 @@ impl<T: Copy + PartialEq> Reported<T> {
 
 /// A log of records.
 #[derive(Debug, Clone)]
-pub(in crate::device) struct RecordLog<T> {
+pub(crate) struct RecordLog<T> {
     records: ArrayVec<T, LOG_MAX>,
     in_flight: Option<Flight>,
     dropped: u32,

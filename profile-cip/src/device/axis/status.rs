@@ -27,7 +27,7 @@ const DRIVE_ONLY: AxisStatus = LOOPS
     .union(AxisStatus::TORQUE_CONTROL_MODE);
 
 /// The bits that may be set in `state`; `powered` when the drive has torque.
-pub(in crate::device) fn allowed(kind: ControlKind, state: AxisState, powered: bool) -> AxisStatus {
+pub(crate) fn allowed(kind: ControlKind, state: AxisState, powered: bool) -> AxisStatus {
     use AxisStatus as A;
     let forbidden = match state {
         AxisState::Off | AxisState::SelfTest | AxisState::Initializing => {

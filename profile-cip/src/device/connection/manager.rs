@@ -43,7 +43,7 @@ const FIRST_MESSAGE: DurationNs = DurationNs::from_secs(10);
 
 /// The motion connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::device) enum Motion {
+pub(crate) enum Motion {
     #[default]
     Closed,
     Opening(Owner, Asked),
@@ -53,7 +53,7 @@ pub(in crate::device) enum Motion {
 
 /// Who has the motion connection, and on which terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) struct Owner {
+pub(crate) struct Owner {
     pub open: OpenParameters,
     pub peer: SocketAddrV4,
     /// Time-out multiplier code of the Forward_Open.
@@ -62,7 +62,7 @@ pub(in crate::device) struct Owner {
 
 /// What the motion device has been asked, and until when it may answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) struct Asked {
+pub(crate) struct Asked {
     pub token: Token,
     pub deadline: MonotonicTime,
 }
@@ -87,7 +87,7 @@ impl Motion {
 
 /// An explicit (class 3) connection.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::device) struct Explicit {
+pub(crate) struct Explicit {
     /// From 1, the same as long as the connection lives; 0 is the motion connection.
     pub number: u16,
     pub session: SessionSlot,
@@ -114,7 +114,7 @@ pub(in crate::device) struct Explicit {
 
 /// All connections.
 #[derive(Debug)]
-pub(in crate::device) struct ConnectionManager {
+pub(crate) struct ConnectionManager {
     pub motion: Motion,
     /// Whether the last motion connection has timed out, until the next one.
     pub motion_lost: bool,
@@ -246,7 +246,7 @@ fn drawn(number: u32, secret: u64) -> u32 {
 }
 
 /// Interval times multiplier, in nanoseconds; the multiplier has been checked before.
-pub(in crate::device) fn timeout_ns(open: &ForwardOpen<'_>) -> DurationNs {
+pub(crate) fn timeout_ns(open: &ForwardOpen<'_>) -> DurationNs {
     DurationNs::from_micros(i64::from(open.o_to_t_rpi_us)) * i64::from(open.multiplier().unwrap_or(4))
 }
 

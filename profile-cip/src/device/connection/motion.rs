@@ -29,7 +29,7 @@ const CONFIGURATION_POINT_1: u16 = 0x51;
 /// Configuration connection point of block revision 2.
 const CONFIGURATION_POINT_2: u16 = 0x52;
 /// Format revision of the connection data.
-pub(in crate::device) const FORMAT_REVISION: u8 = 2;
+pub(crate) const FORMAT_REVISION: u8 = 2;
 /// I/O connection point, which is the format revision.
 const IO_POINT: u16 = FORMAT_REVISION as u16;
 
@@ -65,7 +65,7 @@ const CLASS_ID_MISMATCH: u16 = 0x04;
 const AXIS_ID_MISMATCH: u16 = 0x05;
 
 /// Checks the connection points and the configuration block.
-pub(in crate::device) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<(), Refusal> {
+pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<(), Refusal> {
     let inconsistent = |found: u16, expected: u16| {
         Refusal::value(ConnectionStatus::INCONSISTENT_PATHS, u32::from(found), u32::from(expected))
     };
@@ -129,10 +129,7 @@ fn power_mismatch(extended: u16, found: u32, expected: Option<u32>) -> Refusal {
 }
 
 /// Checks transport, directions, sizes and intervals.
-pub(in crate::device) fn check_parameters(
-    open: &ForwardOpen<'_>,
-    config: &MotionConfig,
-) -> Result<(), Refusal> {
+pub(crate) fn check_parameters(open: &ForwardOpen<'_>, config: &MotionConfig) -> Result<(), Refusal> {
     check_transport(open.transport)?;
     let variable = config.is_variable();
     check_direction(&open.o_to_t, variable, config.sizes(config.o_to_t_size_max), &O_TO_T)?;

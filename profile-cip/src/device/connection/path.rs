@@ -13,7 +13,7 @@ const POINTS_MAX: usize = 3;
 
 /// What the originator wants to connect to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::device) enum Application<'a> {
+pub(crate) enum Application<'a> {
     /// The Message Router: an explicit connection.
     MessageRouter,
     /// The Motion Device Axis Object class: the motion connection.
@@ -22,7 +22,7 @@ pub(in crate::device) enum Application<'a> {
 
 /// The path to the motion connection (Volume 9 clause 7-1.1).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::device) struct MotionPath<'a> {
+pub(crate) struct MotionPath<'a> {
     /// Connection points in their order: configuration, then consumed and produced data, which are the same
     /// one.
     pub points: ArrayVec<u16, POINTS_MAX>,
@@ -45,10 +45,7 @@ struct Parts<'a> {
 ///
 /// # Errors
 /// The refusal the Forward_Open is to be answered with.
-pub(in crate::device) fn application<'a>(
-    path: &'a [u8],
-    identity: &IdentityConfig,
-) -> Result<Application<'a>, Refusal> {
+pub(crate) fn application<'a>(path: &'a [u8], identity: &IdentityConfig) -> Result<Application<'a>, Refusal> {
     let mut parts = Parts::default();
     let mut consumed = 0;
     for segment in epath::segments(path, Encoding::Padded) {

@@ -7,7 +7,7 @@ use crate::wire::status::{ConnectionStatus, GeneralStatus};
 
 /// A refusal.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::device) struct Refusal {
+pub(crate) struct Refusal {
     pub general: GeneralStatus,
     pub extended: ArrayVec<u16, EXTENDED_STATUS_MAX>,
     /// The value the request had, where the refusal is about one.

@@ -45,7 +45,7 @@ pub const DEVICE_TIMEOUT: DurationNs = DurationNs::from_secs(3);
 /// The explicit side of one device.
 #[derive(Debug)]
 pub struct Adapter {
-    pub(in crate::device) node: Node,
+    pub(crate) node: Node,
     sessions: Vec<Option<Session>>,
     generation: u64,
     next_handle: u32,
@@ -280,15 +280,15 @@ impl Adapter {
         }
     }
 
-    pub(in crate::device) fn session(&self, slot: SessionSlot) -> Option<&Session> {
+    pub(crate) fn session(&self, slot: SessionSlot) -> Option<&Session> {
         self.sessions.get(slot.index)?.as_ref().filter(|session| session.slot == slot)
     }
 
-    pub(in crate::device) fn session_mut(&mut self, slot: SessionSlot) -> Option<&mut Session> {
+    pub(crate) fn session_mut(&mut self, slot: SessionSlot) -> Option<&mut Session> {
         self.sessions.get_mut(slot.index)?.as_mut().filter(|session| session.slot == slot)
     }
 
-    pub(in crate::device) fn send(&mut self, slot: SessionSlot, packet: &[u8]) {
+    pub(crate) fn send(&mut self, slot: SessionSlot, packet: &[u8]) {
         if let Some(session) = self.session_mut(slot) {
             session.send(packet);
         }
@@ -485,7 +485,7 @@ fn status_packet(packet: &Packet<'_>, status: EncapsulationStatus) -> Vec<u8> {
 }
 
 /// A packet as bytes. One that cannot be is sent without data and says so.
-pub(in crate::device) fn packet_bytes(packet: &Packet<'_>) -> Vec<u8> {
+pub(crate) fn packet_bytes(packet: &Packet<'_>) -> Vec<u8> {
     let mut bytes = vec![0; packet.buffer_len()];
     match packet.emit(&mut bytes) {
         Ok(_) => bytes,

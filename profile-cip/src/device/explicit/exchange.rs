@@ -20,7 +20,7 @@ use crate::wire::status::{ConnectionStatus, GeneralStatus, Service};
 use crate::wire::unconnected_send::UnconnectedSend;
 
 impl Adapter {
-    pub(in crate::device) fn reply_max(&self, slot: SessionSlot, reply_to: ReplyTo) -> usize {
+    pub(crate) fn reply_max(&self, slot: SessionSlot, reply_to: ReplyTo) -> usize {
         match reply_to {
             ReplyTo::Unconnected { .. } => UNCONNECTED_REPLY_MAX,
             ReplyTo::Connected { o_to_t_id, .. } => {
@@ -47,7 +47,7 @@ impl Adapter {
     }
 
     /// Starts one message: unwraps an Unconnected_Send, splits a Multiple_Service_Packet, runs anything else.
-    pub(in crate::device) fn begin(
+    pub(crate) fn begin(
         &mut self,
         now: MonotonicTime,
         slot: SessionSlot,
@@ -118,7 +118,7 @@ impl Adapter {
     }
 
     /// Goes on with a request once its part at the motion device is done.
-    pub(in crate::device) fn resume(
+    pub(crate) fn resume(
         &mut self,
         now: MonotonicTime,
         slot: SessionSlot,
@@ -139,13 +139,7 @@ impl Adapter {
     }
 
     /// Sends a reply the way its request came.
-    pub(in crate::device) fn reply(
-        &mut self,
-        slot: SessionSlot,
-        reply_to: ReplyTo,
-        reply: &[u8],
-        opened: bool,
-    ) {
+    pub(crate) fn reply(&mut self, slot: SessionSlot, reply_to: ReplyTo, reply: &[u8], opened: bool) {
         let Some(session_handle) = self.session(slot).and_then(|session| session.handle) else { return };
         let interface = &self.node.config.interface;
         let mut socket = [0; SOCKADDR_LEN];

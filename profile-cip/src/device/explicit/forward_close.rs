@@ -12,7 +12,7 @@ use crate::wire::message_router::Request;
 use crate::wire::status::{ConnectionStatus, GeneralStatus};
 
 /// Runs the service. The triad says which connection; it must have been opened from the same address.
-pub(in crate::device) fn close(node: &mut Node, origin: &Origin, request: &Request<'_>) -> Step {
+pub(crate) fn close(node: &mut Node, origin: &Origin, request: &Request<'_>) -> Step {
     node.counters.close_requests += 1;
     let service = request.service;
     let answer = match ForwardClose::parse(request.data) {
@@ -69,7 +69,7 @@ fn not_found(triad: ConnectionTriad) -> Answer {
 }
 
 /// The answer once the connection is gone.
-pub(in crate::device) fn closed(triad: ConnectionTriad) -> Answer {
+pub(crate) fn closed(triad: ConnectionTriad) -> Answer {
     let reply = ForwardCloseReply { triad, application_reply: &[] };
     let mut data = vec![0; reply.buffer_len()];
     match reply.emit(&mut data) {

@@ -24,7 +24,7 @@ enum Opened {
 }
 
 /// Runs the service.
-pub(in crate::device) fn open(node: &mut Node, origin: &Origin, request: &Request<'_>) -> Step {
+pub(crate) fn open(node: &mut Node, origin: &Origin, request: &Request<'_>) -> Step {
     node.counters.open_requests += 1;
     let service = request.service;
     let open = match ForwardOpen::parse(request.data, service == Service::LARGE_FORWARD_OPEN) {
@@ -142,7 +142,7 @@ fn open_motion(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Resu
 }
 
 /// The answer once the motion device has taken or refused the connection.
-pub(in crate::device) fn opened(
+pub(crate) fn opened(
     node: &mut Node,
     open: &OpenParameters,
     peer: SocketAddrV4,
@@ -171,7 +171,7 @@ fn success(reply: &ForwardOpenReply<'_>) -> Answer {
 }
 
 /// Data of a refusal.
-pub(in crate::device) fn failure(triad: ConnectionTriad, remaining_path_words: u8) -> Vec<u8> {
+pub(crate) fn failure(triad: ConnectionTriad, remaining_path_words: u8) -> Vec<u8> {
     let mut data = vec![0; CONNECTION_FAILURE_LEN];
     match (ConnectionFailure { triad, remaining_path_words }).emit(&mut data) {
         Ok(_) => data,

@@ -14,7 +14,7 @@ use crate::wire::sockaddr::SockaddrInfo;
 
 /// The answer to a List command, or `None` for any other one. It is given at once: the delay a broadcast may
 /// ask for is a maximum.
-pub(in crate::device) fn answer(node: &Node, packet: &Packet<'_>) -> Option<Vec<u8>> {
+pub(crate) fn answer(node: &Node, packet: &Packet<'_>) -> Option<Vec<u8>> {
     let known =
         matches!(packet.command, Command::LIST_SERVICES | Command::LIST_IDENTITY | Command::LIST_INTERFACES);
     if !known {

@@ -42,7 +42,7 @@ const EVENTS_MAX: usize = 64;
 
 /// Who sent a request, and when it came.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::device) struct Origin {
+pub(crate) struct Origin {
     pub now: MonotonicTime,
     pub session: SessionSlot,
     pub peer: SocketAddrV4,
@@ -53,7 +53,7 @@ pub(in crate::device) struct Origin {
 }
 
 /// What a request came to.
-pub(in crate::device) enum Step {
+pub(crate) enum Step {
     /// The reply.
     Done(Vec<u8>),
     /// The motion device has been asked.
@@ -62,14 +62,14 @@ pub(in crate::device) enum Step {
 
 /// What is to be made of the motion device's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) struct Await {
+pub(crate) struct Await {
     pub token: Token,
     pub service: Service,
     pub kind: AwaitKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum AwaitKind {
+pub(crate) enum AwaitKind {
     Open(OpenParameters, SocketAddrV4),
     Close(CloseParameters),
     Explicit,
@@ -78,7 +78,7 @@ pub(in crate::device) enum AwaitKind {
 
 /// Everything the device keeps besides its sessions.
 #[derive(Debug)]
-pub(in crate::device) struct Node {
+pub(crate) struct Node {
     pub config: AdapterConfig,
     /// The code points of the start; those of the configuration are for the next one.
     pub qos_in_use: QosConfig,
@@ -436,6 +436,6 @@ impl Node {
 }
 
 /// Whole microseconds of a time that has passed.
-pub(in crate::device) fn micros(time: DurationNs) -> u64 {
+pub(crate) fn micros(time: DurationNs) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(0) / 1000
 }

@@ -26,7 +26,7 @@ use crate::wire::status::{GeneralStatus, Service};
 
 /// A reset on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::device) enum Reset {
+pub(crate) enum Reset {
     #[default]
     None,
     Asked {
@@ -105,6 +105,6 @@ impl Node {
 }
 
 /// The answer once the device has decided.
-pub(in crate::device) fn prepared(granted: bool) -> Answer {
+pub(crate) fn prepared(granted: bool) -> Answer {
     if granted { Answer::done(Vec::new()) } else { Answer::status(GeneralStatus::DEVICE_STATE_CONFLICT) }
 }

@@ -26,18 +26,18 @@ pub const OUTPUT_HIGH: usize = 2 * INPUT_MAX;
 const GARBLED_MAX: u8 = 8;
 
 /// How long a stream may live without registering a session.
-pub(in crate::device) const UNREGISTERED_TIMEOUT: DurationNs = DurationNs::from_secs(30);
+pub(crate) const UNREGISTERED_TIMEOUT: DurationNs = DurationNs::from_secs(30);
 
 /// How a reply travels back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum ReplyTo {
+pub(crate) enum ReplyTo {
     Unconnected { sender_context: [u8; 8] },
     Connected { sender_context: [u8; 8], o_to_t_id: u32, sequence: u16 },
 }
 
 /// A request that waits for the motion device.
 #[derive(Debug)]
-pub(in crate::device) struct Transaction {
+pub(crate) struct Transaction {
     pub reply_to: ReplyTo,
     pub awaited: Await,
     pub deadline: MonotonicTime,
@@ -50,7 +50,7 @@ pub(in crate::device) struct Transaction {
 
 /// A Multiple_Service_Packet under way.
 #[derive(Debug)]
-pub(in crate::device) struct Multiple {
+pub(crate) struct Multiple {
     /// Service data of the packet.
     pub data: Vec<u8>,
     /// Next service to run.
@@ -62,7 +62,7 @@ pub(in crate::device) struct Multiple {
 }
 
 /// What the input holds next.
-pub(in crate::device) enum Input {
+pub(crate) enum Input {
     /// Not enough yet.
     Wait,
     /// A whole packet.
@@ -73,7 +73,7 @@ pub(in crate::device) enum Input {
 
 /// The stream.
 #[derive(Debug)]
-pub(in crate::device) struct Session {
+pub(crate) struct Session {
     pub slot: SessionSlot,
     pub peer: SocketAddrV4,
     /// Session handle, once registered.

@@ -23,11 +23,11 @@ use crate::wire::status::GeneralStatus;
 /// Most attributes of one list.
 pub const CYCLIC_ATTRIBUTES_MAX: usize = 16;
 /// Most octets of cyclic read data.
-pub(in crate::device) const CYCLIC_DATA_MAX: usize = 256;
+pub(crate) const CYCLIC_DATA_MAX: usize = 256;
 
 /// Direction of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Direction {
+pub(crate) enum Direction {
     Write,
     Read,
 }
@@ -42,7 +42,7 @@ struct Layout {
 
 /// The lists of one direction.
 #[derive(Debug, Clone, Default)]
-pub(in crate::device) struct CyclicLists {
+pub(crate) struct CyclicLists {
     in_use: Layout,
     /// Agreed on and not used yet; empty with ID 0 when there is none.
     next: Layout,

@@ -21,7 +21,7 @@ const STEPS_MIN: u64 = 8;
 
 /// What a packet is, by its sequence count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Packet {
+pub(crate) enum Packet {
     New,
     Refresh,
     Old,
@@ -29,7 +29,7 @@ pub(in crate::device) enum Packet {
 
 /// What an update is, by its Update ID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Update {
+pub(crate) enum Update {
     /// New, after so many lost ones.
     New(u8),
     Repeated,
@@ -38,7 +38,7 @@ pub(in crate::device) enum Update {
 
 /// What an update is, by its time stamp in synchronous operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Age {
+pub(crate) enum Age {
     OnTime,
     /// More than one period old.
     Late,
@@ -52,7 +52,7 @@ pub(in crate::device) enum Age {
 
 /// Timing of the answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::device) enum Mode {
+pub(crate) enum Mode {
     Asynchronous,
     Pending { first_update_id: u8, at: MonotonicTime },
     Synchronous,
@@ -60,7 +60,7 @@ pub(in crate::device) enum Mode {
 
 /// An open connection.
 #[derive(Debug, Clone)]
-pub(in crate::device) struct IoConnection {
+pub(crate) struct IoConnection {
     pub parameters: OpenParameters,
     sequence: Option<u16>,
     last_heard: MonotonicTime,

@@ -15,7 +15,7 @@ const SKEW_FAULT_NS: u64 = 60_000_000_000;
 
 /// Faults and alarms of the node.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::device) struct NodeHealth {
+pub(crate) struct NodeHealth {
     fault: NodeFault,
     /// The fault that only another connection ends, also where another one came first and is the one that shows.
     lasting: NodeFault,

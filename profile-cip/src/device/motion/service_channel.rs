@@ -16,7 +16,7 @@ use crate::wire::status::GeneralStatus;
 
 /// State of the channel.
 #[derive(Default)]
-pub(in crate::device) struct ServiceChannel {
+pub(crate) struct ServiceChannel {
     /// The last transaction, answered or not.
     transaction: Option<(u8, MotionService)>,
     /// The request stands in the last update.

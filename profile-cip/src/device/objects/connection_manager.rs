@@ -39,7 +39,7 @@ const ESTABLISHED: u16 = 3;
 const CLOSING: u16 = 6;
 
 /// Attributes of the Connection Manager.
-pub(in crate::device) struct Statistics<'a> {
+pub(crate) struct Statistics<'a> {
     pub counters: &'a Counters,
     pub connections: &'a ConnectionManager,
 }
@@ -89,7 +89,7 @@ impl Statistics<'_> {
 }
 
 /// Get_Connection_Data: the connection with this number.
-pub(in crate::device) fn get(
+pub(crate) fn get(
     connections: &ConnectionManager,
     interface: &InterfaceConfig,
     client: Ipv4Addr,
@@ -105,7 +105,7 @@ pub(in crate::device) fn get(
 }
 
 /// Search_Connection_Data: the connection of this triad.
-pub(in crate::device) fn search(
+pub(crate) fn search(
     connections: &ConnectionManager,
     interface: &InterfaceConfig,
     client: Ipv4Addr,

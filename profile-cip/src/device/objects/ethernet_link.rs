@@ -68,12 +68,12 @@ impl MediaCounters {
 
 /// Where the counters stood when they were cleared over the network. The host's own go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::device) struct Cleared {
+pub(crate) struct Cleared {
     interface: InterfaceCounters,
     media: MediaCounters,
 }
 
-pub(in crate::device) struct EthernetLink<'a> {
+pub(crate) struct EthernetLink<'a> {
     pub config: &'a LinkConfig,
     pub cleared: &'a mut Cleared,
 }

@@ -75,7 +75,7 @@ impl Upload {
 
 /// The uploads under way.
 #[derive(Debug, Default)]
-pub(in crate::device) struct Uploads(ArrayVec<Upload, SESSIONS_MAX>);
+pub(crate) struct Uploads(ArrayVec<Upload, SESSIONS_MAX>);
 
 impl Uploads {
     /// Ends what a session had begun.
@@ -95,14 +95,14 @@ impl Uploads {
 }
 
 /// Who asks, when, and how long the reply may be.
-pub(in crate::device) struct Asker {
+pub(crate) struct Asker {
     pub session: SessionSlot,
     pub now: MonotonicTime,
     pub reply_max: usize,
 }
 
 /// The object.
-pub(in crate::device) struct File<'a> {
+pub(crate) struct File<'a> {
     pub eds: &'a [u8],
     pub identity: &'a IdentityConfig,
     pub uploads: &'a mut Uploads,

@@ -193,7 +193,7 @@ pub(crate) fn reset_kind(data: &[u8]) -> Result<ResetKind, GeneralStatus> {
 }
 
 /// Appends a SHORT_STRING: length byte and text.
-pub(in crate::device) fn short_string(text: &str, out: &mut Vec<u8>) {
+pub(crate) fn short_string(text: &str, out: &mut Vec<u8>) {
     let bytes = text.as_bytes();
     let length = u8::try_from(bytes.len()).unwrap_or(u8::MAX);
     out.push(length);

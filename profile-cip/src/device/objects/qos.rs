@@ -36,7 +36,7 @@ impl QosConfig {
     }
 }
 
-pub(in crate::device) struct Qos<'a>(pub &'a mut QosConfig);
+pub(crate) struct Qos<'a>(pub &'a mut QosConfig);
 
 impl Object for Qos<'_> {
     const REVISION: u16 = 1;

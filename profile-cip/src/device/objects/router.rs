@@ -20,10 +20,7 @@ pub const CLASS_MOTION_DEVICE_AXIS: u16 = 0x42;
 ///
 /// # Errors
 /// Path segment error for anything else, key failure for a key of another device.
-pub(in crate::device) fn resolve(
-    path: &[u8],
-    identity: &IdentityConfig,
-) -> Result<ObjectPath, GeneralStatus> {
+pub(crate) fn resolve(path: &[u8], identity: &IdentityConfig) -> Result<ObjectPath, GeneralStatus> {
     const BAD: GeneralStatus = GeneralStatus::PATH_SEGMENT_ERROR;
     let (mut class, mut instance, mut attribute, mut member, mut point) = (None, None, None, None, None);
     for segment in epath::segments(path, Encoding::Padded) {
@@ -58,7 +55,7 @@ pub(in crate::device) fn resolve(
 }
 
 /// The Message Router object.
-pub(in crate::device) struct MessageRouter {
+pub(crate) struct MessageRouter {
     /// Connections there can be.
     pub available: u16,
     /// Connections there are.

@@ -27,7 +27,7 @@ const LAST_CONFLICT_LEN: usize = 1 + 6 + 28;
 /// Bytes of a safety network number (attribute 7).
 const SAFETY_NETWORK_NUMBER_LEN: usize = 6;
 
-pub(in crate::device) struct TcpIp<'a>(pub &'a mut InterfaceConfig);
+pub(crate) struct TcpIp<'a>(pub &'a mut InterfaceConfig);
 
 impl Object for TcpIp<'_> {
     const REVISION: u16 = 4;

@@ -128,7 +128,7 @@ impl TimeSyncState {
 }
 
 /// The object as it is at this moment.
-pub(in crate::device) struct TimeSync<'a> {
+pub(crate) struct TimeSync<'a> {
     pub state: &'a TimeSyncState,
     pub config: &'a AdapterConfig,
     pub now: MonotonicTime,

@@ -43,16 +43,16 @@ use crate::wire::motion::{
 };
 
 /// Controller Update Period, ns.
-pub(in crate::device) const PERIOD: u64 = 2_000_000;
+pub(crate) const PERIOD: u64 = 2_000_000;
 /// System time at monotonic time 0, ns.
-pub(in crate::device) const EPOCH: u64 = 1_700_000_000_000_000_000;
-pub(in crate::device) const GRANDMASTER: [u8; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
-pub(in crate::device) const TRIAD: ConnectionTriad =
+pub(crate) const EPOCH: u64 = 1_700_000_000_000_000_000;
+pub(crate) const GRANDMASTER: [u8; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
+pub(crate) const TRIAD: ConnectionTriad =
     ConnectionTriad { connection_serial: 7, originator_vendor: 1, originator_serial: 99 };
 
 /// A drive that obeys after one cycle.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::device) struct FakeDrive {
+pub(crate) struct FakeDrive {
     pub image: DriveImage,
     /// Stays put: neither start nor stop ends.
     pub stuck: bool,
@@ -105,9 +105,9 @@ impl FakeDrive {
 }
 
 /// Service request as owned octets: transaction, code, body.
-pub(in crate::device) type OwnedService = Option<(u8, MotionService, Vec<u8>)>;
+pub(crate) type OwnedService = Option<(u8, MotionService, Vec<u8>)>;
 
-pub(in crate::device) struct Rig {
+pub(crate) struct Rig {
     pub device: MotionDevice,
     pub now: u64,
     pub sequence: u16,
@@ -133,7 +133,7 @@ fn exception_rules() -> Vec<ElementRule> {
     (0..64).map(rule).collect()
 }
 
-pub(in crate::device) fn definitions() -> Vec<AttributeDefinition> {
+pub(crate) fn definitions() -> Vec<AttributeDefinition> {
     let new =
         |id, data_type| AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, "an attribute");
     vec![
