@@ -8,11 +8,9 @@ pub mod decode;
 pub mod doctor;
 pub mod eds;
 pub mod engine;
-pub mod finding;
 pub mod host;
 pub mod latest;
 pub mod log_limit;
-pub mod mapping;
 pub mod modbus;
 pub mod north;
 pub mod runner;
@@ -22,3 +20,7 @@ pub mod simulate;
 pub mod status;
 pub mod sys;
 pub mod translate;
+
+/// The mapping tables and what was found in them, under the names by which the parts here know them.
+pub use mappings as mapping;
+pub use mappings::finding;

@@ -283,7 +283,7 @@ fn a_folder_replaces_the_tables_and_its_errors_are_told() {
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(folder.join("dictionary")).unwrap();
     let file = folder.join("dictionary/cip-services.toml");
-    let shipped = include_str!("../../mappings/dictionary/cip-services.toml");
+    let shipped = include_str!("../../mappings/tables/dictionary/cip-services.toml");
     std::fs::write(&file, shipped.replace("\"Get_Attribute_Single\"", "\"Get_Single\"")).unwrap();
     let place = folder.to_str().unwrap();
     let (_, records) = records(&["cip", "--part", "services", "--mappings", place]);

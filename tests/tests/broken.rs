@@ -91,7 +91,8 @@ fn made(case: &Path) -> PathBuf {
         } else {
             "dictionary"
         };
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mappings").join(below).join(&edit.table);
+        let shipped =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../mappings/tables").join(below).join(&edit.table);
         let text = fs::read_to_string(&shipped).unwrap();
         assert!(text.contains(&edit.from), "{}: {}", edit.table, edit.from);
         let path = place.join("tables").join(below).join(&edit.table);
@@ -136,12 +137,13 @@ fn found(place: &Path) -> Findings {
     mappings.sort();
     mappings.extend(Some(place.join("tables")).filter(|tables| tables.exists()));
     check(&Request { config: Some(config.as_path()).filter(|config| config.exists()), mappings: &mappings })
+        .tables
         .findings
 }
 
 /// What is found without any overlay or configuration.
 fn usual() -> &'static Findings {
-    static USUAL: LazyLock<Findings> = LazyLock::new(|| check(&Request::default()).findings);
+    static USUAL: LazyLock<Findings> = LazyLock::new(|| check(&Request::default()).tables.findings);
     &USUAL
 }
 

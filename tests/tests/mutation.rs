@@ -10,10 +10,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use axisbridge::check;
 use axisbridge::config::Config;
 use axisbridge::finding::Findings;
-use axisbridge::mapping::Mapping;
+use axisbridge::mapping::{Mapping, check};
 use axisbridge::translate::{RowNames, Stage, translate_list};
 use axisbridge_tests::{can_frames, can_led, tables};
 
@@ -25,9 +24,9 @@ const SPLIT: &str = "AXISBRIDGE_TEST_SPLIT";
 
 /// The mapping tables.
 const FILES: [(&str, &str); 3] = [
-    ("cip-generic.toml", include_str!("../../mappings/cip-generic.toml")),
-    ("generic-sercos.toml", include_str!("../../mappings/generic-sercos.toml")),
-    ("generic-cia402.toml", include_str!("../../mappings/generic-cia402.toml")),
+    ("cip-generic.toml", include_str!("../../mappings/tables/cip-generic.toml")),
+    ("generic-sercos.toml", include_str!("../../mappings/tables/generic-sercos.toml")),
+    ("generic-cia402.toml", include_str!("../../mappings/tables/generic-cia402.toml")),
 ];
 
 /// A table with one change.

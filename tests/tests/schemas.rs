@@ -19,7 +19,7 @@ fn every_shipped_file_is_valid_and_broken_ones_are_not() {
     for name in names() {
         let schema = schema(name, &mapping).expect("a schema for each name");
         std::fs::write(folder.join(format!("{name}.json")), format!("{schema:#}")).unwrap();
-        for below in ["mappings", "mappings/dictionary"] {
+        for below in ["mappings/tables", "mappings/tables/dictionary"] {
             let path = root.join(below).join(format!("{name}.toml"));
             if path.exists() {
                 cases.push((path.display().to_string(), name.to_owned(), "good"));
@@ -35,7 +35,9 @@ fn every_shipped_file_is_valid_and_broken_ones_are_not() {
     add("examples/two-axes-can.toml", "config", "good");
     add("examples/two-axes-devicenet.toml", "config", "good");
     add("examples/overlays/line-4.toml", "overlay", "good");
-    for family in root.join("mappings/families").read_dir().expect("the settings of families").flatten() {
+    for family in
+        root.join("mappings/tables/families").read_dir().expect("the settings of families").flatten()
+    {
         add(&family.path().display().to_string(), "overlay", "good");
     }
     // What the program refuses for its form or for a name, the schema refuses too.

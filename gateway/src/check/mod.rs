@@ -1,28 +1,22 @@
 //! What `axisbridge check` does: reads tables, overlays and a configuration, and finds what is wrong with them beyond what
 //! keeps them from being read.
 //!
-//! The loader, the resolvers and the configuration find what is wrong with a row or a key ([`crate::finding`]). What can be seen
-//! only in the whole stands here, one file per question.
+//! The loader, the resolvers and the configuration find what is wrong with a row or a key ([`crate::finding`]); what can be seen
+//! in the tables as a whole, [`crate::mapping::check`] finds. What a configuration makes of them stands here, one file per
+//! question.
 
-mod attributes;
 mod axes;
 mod bus;
 mod can_bus;
 mod devicenet_bus;
-mod faults;
-mod page;
-mod rows;
 pub mod schema;
-mod states;
 
 use std::path::{Path, PathBuf};
-
-pub use page::page;
 
 use crate::config::{Config, Written};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem};
-use crate::mapping::{Mapping, TableTexts};
+use crate::mapping::{self, TableTexts};
 
 /// What is to be checked.
 #[derive(Debug, Default)]
@@ -36,47 +30,27 @@ pub struct Request<'a> {
 /// What was checked, and what was found.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// The texts of the tables, where they could be read.
-    pub texts: Option<TableTexts>,
+    /// What the tables came to, and everything that was found, in the configuration as well.
+    pub tables: mapping::check::Outcome,
     /// The configuration, where there is one without errors.
     pub config: Option<Config>,
-    /// The tables, where they could be resolved.
-    pub mapping: Option<Mapping>,
-    /// What was found.
-    pub findings: Findings,
-    /// How many overlays were laid over the tables.
-    pub overlays: usize,
-    /// How many families of drives have rows of their own.
-    pub families: usize,
-    /// How many worked examples came out or did not.
-    pub examples: usize,
 }
 
 /// Checks.
 #[must_use]
 pub fn check(request: &Request<'_>) -> Outcome {
-    let mut outcome = Outcome::default();
-    let findings = &mut outcome.findings;
-    let written = request.config.and_then(|path| Written::load(path, findings));
-    if let Some(texts) = texts(request, written.as_ref(), findings) {
-        outcome.overlays = texts.overlays.len();
-        outcome.mapping = Mapping::resolve(&texts, findings);
-        outcome.families = outcome.mapping.as_ref().map_or(0, |mapping| mapping.families().len());
-        outcome.texts = Some(texts);
+    let mut findings = Findings::default();
+    let written = request.config.and_then(|path| Written::load(path, &mut findings));
+    let texts = texts(request, written.as_ref(), &mut findings);
+    let mut tables = mapping::check::texts(texts, findings);
+    if let (Some(mapping), Some(written)) = (&tables.mapping, &written) {
+        let findings = &mut tables.findings;
+        axes::check(mapping, written, findings);
+        bus::check(mapping, written, findings);
+        can_bus::check(mapping, written, findings);
+        devicenet_bus::check(mapping, written, findings);
     }
-    if let Some(mapping) = &outcome.mapping {
-        outcome.examples = mapping.run_examples(findings);
-        tables(mapping, findings);
-        mapping.families().iter().for_each(|family| tables(&family.mapping, findings));
-        if let Some(written) = &written {
-            axes::check(mapping, written, findings);
-            bus::check(mapping, written, findings);
-            can_bus::check(mapping, written, findings);
-            devicenet_bus::check(mapping, written, findings);
-        }
-    }
-    outcome.config = written.map(|written| written.config);
-    outcome
+    Outcome { tables, config: written.map(|written| written.config) }
 }
 
 /// The texts of the tables; `None` when some cannot be read.
@@ -110,13 +84,4 @@ fn named(written: &Written, findings: &mut Findings) {
             Problem::new(code::UNREADABLE, name.span()).expected("expected a file or folder that is there"),
         );
     }
-}
-
-/// What can be seen in the tables alone, beyond what keeps them from being read.
-pub fn tables(mapping: &Mapping, findings: &mut Findings) {
-    attributes::check(mapping, findings);
-    faults::check(mapping, findings);
-    states::check(mapping, findings);
-    rows::check(mapping, findings);
-    axes::tables(mapping, findings);
 }

@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use super::{CheckArguments, CheckFormat, CliError, print};
-use crate::check::{Outcome, Request, check, page, schema};
+use crate::check::{Outcome, Request, check, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Severity, json_report};
 use crate::mapping::Mapping;
+use crate::mapping::check::page;
 
 /// Exit status of a wrong command line, as clap has it.
 const USAGE: u8 = 2;
@@ -40,9 +41,10 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     }
     let outcome = check(&Request { config: arguments.config.as_deref(), mappings: &arguments.mappings });
     if let Some(path) = &arguments.report {
-        std::fs::write(path, page(&outcome)).map_err(|error| format!("{}: {error}", path.display()))?;
+        std::fs::write(path, page(&outcome.tables))
+            .map_err(|error| format!("{}: {error}", path.display()))?;
     }
-    let findings = &outcome.findings;
+    let findings = &outcome.tables.findings;
     let bad = findings.has_errors() || findings.count(Severity::Warning) > 0;
     let text = match arguments.format {
         CheckFormat::Json => format!("{:#}\n", json_report(findings)),
@@ -67,7 +69,7 @@ fn schema(name: &str) -> Result<ExitCode, CliError> {
 }
 
 fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
-    let findings = &outcome.findings;
+    let findings = &outcome.tables.findings;
     let mut text = String::new();
     let shown = findings.list().iter().filter(|found| arguments.notes || found.severity() != Severity::Note);
     for finding in shown {
@@ -88,8 +90,8 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
     if notes > 0 && !arguments.notes {
         text.push_str(" (--notes shows them)");
     }
-    let overlays = if outcome.overlays > 0 {
-        format!(", {}", plural(outcome.overlays, "overlay"))
+    let overlays = if outcome.tables.overlays > 0 {
+        format!(", {}", plural(outcome.tables.overlays, "overlay"))
     } else {
         String::new()
     };
@@ -101,8 +103,8 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
     let _ = writeln!(
         text,
         "; checked the tables, those of {}{overlays}{axes} and {}",
-        plural(outcome.families, "family of drives"),
-        plural(outcome.examples, "worked example")
+        plural(outcome.tables.families, "family of drives"),
+        plural(outcome.tables.examples, "worked example")
     );
     text
 }

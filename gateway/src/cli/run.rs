@@ -67,11 +67,11 @@ enum After {
 /// Reads the configuration and its tables, as `check` does.
 fn read(path: &Path) -> Result<(Good, Findings), Findings> {
     let outcome = check(&Request { config: Some(path), mappings: &[] });
-    match (outcome.config, outcome.mapping) {
-        (Some(config), Some(mapping)) if !outcome.findings.has_errors() => {
-            Ok((Good { config, mapping }, outcome.findings))
+    match (outcome.config, outcome.tables.mapping) {
+        (Some(config), Some(mapping)) if !outcome.tables.findings.has_errors() => {
+            Ok((Good { config, mapping }, outcome.tables.findings))
         }
-        _ => Err(outcome.findings),
+        _ => Err(outcome.tables.findings),
     }
 }
 

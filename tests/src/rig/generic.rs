@@ -201,7 +201,7 @@ impl GenericRig {
         let mut line = drives([(ADDRESS, UnitKind::Rotary)], false);
         prepare(&mut needs, &mut line);
         // No drive comes later.
-        let (_, commissioner) = sercos::commissioner::Commissioner::new(mapping(), 0, []);
+        let (_, commissioner) = sercos::commissioner::commissioner(mapping(), 0, []);
         let bus = SercosBus::new(master, vec![(0, ADDRESS, needs)], commissioner)
             .expect("the master's configuration is sound");
         let south = SercosSouth { line, queue: SouthQueue::default() };
@@ -249,7 +249,7 @@ impl GenericCan {
         needs.modes = modes.into_iter().collect();
         prepare(needs, bus.nodes_mut().next().expect("a device"));
         let (commissioner, end) =
-            can::commissioner::Commissioner::new(mapping(), master.clone(), devices.iter().cloned());
+            can::commissioner::commissioner(mapping(), master.clone(), devices.iter().cloned());
         let master = CanBus::new(0, master, &devices, &[], end).expect("the master's configuration is sound");
         let south = CanSouth { bus, commissioner, axis, connected: true };
         Self::on(AnyBus::Can(Box::new(master)), south, limits)

@@ -63,7 +63,8 @@ fn errors(name: &str, crowd: Crowd) -> Vec<String> {
     std::fs::write(&path, crowd.configuration()).expect("a file for the configuration");
     let outcome = check(&Request { config: Some(&path), mappings: &[] });
     std::fs::remove_file(&path).expect("it was there");
-    let errors = outcome.findings.list().iter().filter(|found| found.code.severity() == Severity::Error);
+    let errors =
+        outcome.tables.findings.list().iter().filter(|found| found.code.severity() == Severity::Error);
     errors.map(|found| found.title.clone()).collect()
 }
 

@@ -9,7 +9,7 @@ use profile_generic::mode::{ModeSelection, OperatingMode};
 use super::{BuildError, kind, parameters};
 use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
-use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, pdos};
+use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, commissioner, pdos};
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdo, FoundPdos, SpareIds};
 use crate::engine::bus::can::lss::Assignment;
 use crate::mapping::{AxisUnits, Cia402Axis, Mapping, Reference};
@@ -136,7 +136,7 @@ pub(super) fn bus(
     mapping: &Mapping,
 ) -> Result<(CanBus, Commissioner), BuildError> {
     let Network { master, devices, assignments } = network(config, place, mapping)?;
-    let (commissioner, end) = Commissioner::new(mapping.clone(), master.clone(), devices.iter().cloned());
+    let (commissioner, end) = commissioner(mapping.clone(), master.clone(), devices.iter().cloned());
     let number = u8::try_from(place).unwrap_or(u8::MAX);
     let name = config.can[place].link.interface().unwrap_or("in-process");
     let bus = CanBus::new(number, master, &devices, &assignments, end)

@@ -6,7 +6,7 @@ use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
 use super::{BuildError, Host, kind, parameters};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Drive, Sercos};
-use crate::engine::bus::sercos::commissioner::Commissioner;
+use crate::engine::bus::sercos::commissioner::{Commissioner, commissioner};
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
 use crate::mapping::{AxisUnits, Mapping, Reference, SercosAxis};
 
@@ -54,7 +54,7 @@ pub(super) fn bus(
     }
     let drives: Vec<_> =
         drives.iter().map(|(number, axis, drive)| (*number, drive.address, needs(axis, drive))).collect();
-    let (commissioner, end) = Commissioner::new(mapping.clone(), master.mst_losses, drives.iter().cloned());
+    let (commissioner, end) = commissioner(mapping.clone(), master.mst_losses, drives.iter().cloned());
     Ok((SercosBus::new(master, drives, end)?, commissioner))
 }
 

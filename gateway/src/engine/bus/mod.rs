@@ -1,8 +1,11 @@
 //! The buses behind the engine: what they have in common.
 
+mod accesses;
 mod backoff;
 mod bus_return;
 pub mod can;
+mod can_link;
+pub mod commissioner;
 pub mod devicenet;
 pub mod sercos;
 mod transmit_queue;

@@ -1,15 +1,5 @@
-//! The commissioning of CANopen drives: beside the cycle thread, because it allocates, and because a drive can come while
-//! others move.
-//!
-//! ```text
-//! cycle thread                          commissioner, on a thread of its own
-//!   Begin ---------------------------->  for each axis of the device: what is asked, what follows from that, its program
-//!   <------------------- Submit { request }, several at a time
-//!   Outcome, Unsent ------------------>  where the mapping is kept, its PDOs
-//!   <------------------- Program of each axis, then Pdos; or Failed
-//! ```
-//!
-//! What was made for a device that has gone again comes back as [`Job::Unused`] and is freed here.
+//! The commissioning of CANopen devices: for each axis of a device what it is asked and written, and its program; then the PDOs of
+//! the device. Several requests are under way at a time. Where a device keeps its mapping, its PDOs are read first.
 
 use std::collections::VecDeque;
 
@@ -19,12 +9,12 @@ use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{Mux, NodeId};
 
+use super::super::commissioner::{CommissionerHandle, Done, Run, Work};
 use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, PdoMap, object};
 use super::readback::Readback;
 use super::trial::Trial;
 pub use super::trial::Tried;
 use crate::engine::notice::Notice;
-
 use crate::mapping::{
     Cia402Axis, Cia402Dictionary, Cia402Error, DriveIdentity, DriveProgram, Item, Mapping, Object,
     ObjectFacts, ObjectStep, Plan,
@@ -39,85 +29,23 @@ const UNMAPPED_MAX: usize = 16;
 /// Requests to one device that wait for their answers.
 pub const WINDOW: usize = 8;
 
-/// Which commissioning of which device a message belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run {
-    /// Place of the device among those of the bus.
-    pub device: u8,
-    /// Counts the times that it came; what belongs to an earlier time is not used.
-    pub number: u32,
+/// What the cycle thread orders.
+#[derive(Debug, Clone, Copy)]
+pub enum Order {
+    /// To set up a device, which has this identity.
+    Begin(DriveIdentity),
+    /// To use the PDOs that the device has, because it does not let its mapping be changed; or to try it again.
+    Keep(bool),
 }
 
-/// What the cycle thread wants.
+/// What is ready for a device.
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
-pub enum Job {
-    /// A device can be set up, which has told this of itself.
-    Begin(Run, DriveIdentity),
-    /// The device does not let its mapping be changed, so that the PDOs that it has are to be used; or it is to be tried again.
-    Keep(Run, bool),
-    /// What came of a request.
-    Outcome(Run, SdoOutcome),
-    /// A request that could not be made.
-    Unsent(Run, SdoRequest),
-    /// What came of a request that nobody waits for any more.
-    Spent(SdoOutcome),
-    /// Something that is not needed any more.
-    Unused(Done),
-}
-
-/// What the commissioner has done.
-#[derive(Debug)]
-#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
-pub enum Done {
-    /// A request to the device.
-    Submit(Run, SdoRequest),
+pub enum Made {
     /// The program of an axis, by its place in the device, and how its values are spread over RPDOs and TPDOs.
-    Program(Run, u8, DriveProgram, [PdoMap; 2]),
+    Program(u8, DriveProgram, [PdoMap; 2]),
     /// The RPDOs and TPDOs of the device: it is through. On the way back those that it had.
-    Pdos(Run, PdoSet),
-    /// The device cannot be used.
-    Failed(Run, Notice),
-    /// Something that people should know.
-    Told(Notice),
-}
-
-impl Done {
-    /// What it belongs to.
-    #[must_use]
-    pub fn run(&self) -> Option<Run> {
-        match self {
-            Self::Submit(run, _) | Self::Program(run, ..) | Self::Pdos(run, ..) | Self::Failed(run, _) => {
-                Some(*run)
-            }
-            Self::Told(_) => None,
-        }
-    }
-}
-
-/// The cycle thread's end.
-#[derive(Debug)]
-pub struct CommissionerHandle {
-    jobs: rtrb::Producer<Job>,
-    done: rtrb::Consumer<Done>,
-}
-
-impl CommissionerHandle {
-    /// Hands a job over; `false` when there is no room, and it is dropped.
-    pub fn push(&mut self, job: Job) -> bool {
-        self.jobs.push(job).is_ok()
-    }
-
-    /// Whether a job can be handed over now.
-    #[must_use]
-    pub fn has_room(&self) -> bool {
-        !self.jobs.is_full()
-    }
-
-    /// What is done.
-    pub fn pop(&mut self) -> Option<Done> {
-        self.done.pop().ok()
-    }
+    Pdos(PdoSet),
 }
 
 /// An axis of a device.
@@ -179,7 +107,7 @@ enum Task {
 
 /// One device.
 #[derive(Debug)]
-struct Work {
+pub struct DeviceWork {
     node: NodeId,
     axes: Vec<AxisSetup>,
     run: Run,
@@ -198,291 +126,67 @@ struct Work {
     pdos: [Vec<PdoConfig>; 2],
 }
 
-/// Commissions the drives of a bus.
+/// What the work on every device shares.
 #[derive(Debug)]
-pub struct Commissioner {
-    context: Context,
-    devices: Vec<Work>,
-    jobs: rtrb::Consumer<Job>,
-    done: rtrb::Producer<Done>,
-}
-
-/// What the work on every device needs.
-#[derive(Debug)]
-struct Context {
+pub struct Shared {
     mapping: Mapping,
     /// The network, with the PDOs that its devices have been given.
     network: MasterConfig,
-    /// What is done, until the queue has room for it.
-    waiting: VecDeque<Done>,
 }
 
-impl Commissioner {
-    /// A commissioner for these devices of a network, and the cycle thread's end.
-    #[must_use]
-    pub fn new(
-        mapping: Mapping,
-        network: MasterConfig,
-        devices: impl IntoIterator<Item = (NodeId, Vec<AxisSetup>)>,
-    ) -> (Self, CommissionerHandle) {
-        let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
-        let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
-        let work = |(node, axes)| Work {
-            node,
-            axes,
-            run: Run { device: 0, number: 0 },
-            identity: DriveIdentity::default(),
-            at: None,
-            facts: ObjectFacts::new(),
-            steps: VecDeque::new(),
-            sent: VecDeque::new(),
-            passed_over: Vec::new(),
-            asked_again: false,
-            falls_back: false,
-            pdos: [Vec::new(), Vec::new()],
-        };
-        let devices = devices.into_iter().map(work).collect();
-        let end = CommissionerHandle { jobs: jobs_in, done: done_out };
-        let context = Context { mapping, network, waiting: VecDeque::new() };
-        (Self { context, devices, jobs, done }, end)
-    }
+/// What the work on a device has around it.
+type Context = super::super::commissioner::Context<DeviceWork>;
 
-    /// Whether the cycle thread has gone.
-    #[must_use]
-    pub fn is_abandoned(&self) -> bool {
-        self.jobs.is_abandoned()
-    }
+/// Commissions the drives of a bus.
+pub type Commissioner = super::super::commissioner::Commissioner<DeviceWork>;
 
-    /// Does what there is to do, without waiting.
-    pub fn poll(&mut self) {
-        while let Ok(job) = self.jobs.pop() {
-            let Self { context, devices, .. } = self;
-            match job {
-                Job::Begin(run, identity) => {
-                    if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.begin(run, identity, context);
-                    }
-                }
-                Job::Keep(run, keeps) => {
-                    if let Some(work) = devices.get_mut(usize::from(run.device)) {
-                        work.falls_back = keeps;
-                    }
-                }
-                Job::Outcome(run, outcome) => {
-                    let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
-                    if let Some(work) = work {
-                        work.handle(&outcome, context);
-                    }
-                }
-                Job::Unsent(run, _) => {
-                    let work = devices.get_mut(usize::from(run.device)).filter(|work| work.run == run);
-                    work.into_iter().for_each(Work::give_up);
-                }
-                Job::Spent(_) | Job::Unused(_) => {}
-            }
-        }
-        while let Some(done) = self.context.waiting.pop_front() {
-            if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
-                self.context.waiting.push_front(done);
-                return;
-            }
-        }
-    }
+/// A commissioner for these devices of a network, and the cycle thread's end.
+#[must_use]
+pub fn commissioner(
+    mapping: Mapping,
+    network: MasterConfig,
+    devices: impl IntoIterator<Item = (NodeId, Vec<AxisSetup>)>,
+) -> (Commissioner, CommissionerHandle<DeviceWork>) {
+    let work = |(node, axes)| DeviceWork {
+        node,
+        axes,
+        run: Run::default(),
+        identity: DriveIdentity::default(),
+        at: None,
+        facts: ObjectFacts::new(),
+        steps: VecDeque::new(),
+        sent: VecDeque::new(),
+        passed_over: Vec::new(),
+        asked_again: false,
+        falls_back: false,
+        pdos: [Vec::new(), Vec::new()],
+    };
+    Commissioner::with_queue(QUEUE, Shared { mapping, network }, devices.into_iter().map(work).collect())
 }
 
-impl Work {
-    fn begin(&mut self, run: Run, identity: DriveIdentity, context: &mut Context) {
-        self.give_up();
-        (self.run, self.identity) = (run, identity);
-        if let Some(family) = context.mapping.family_of(&identity) {
-            let (axis, node, name) = (self.number(0), self.node, family.name.clone());
-            context.waiting.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
-        }
-        self.pdos = [Vec::new(), Vec::new()];
-        self.set_out(0, Plan::Ask, context);
+impl Work for DeviceWork {
+    type Order = Order;
+    type Request = SdoRequest;
+    type Outcome = SdoOutcome;
+    type Made = Made;
+    type Shared = Shared;
+
+    fn run(&self) -> Run {
+        self.run
     }
 
-    fn give_up(&mut self) {
-        self.at = None;
-        self.steps.clear();
-        self.sent.clear();
-        self.passed_over.clear();
-    }
-
-    /// Begins a plan of an axis.
-    fn set_out(&mut self, place: usize, plan: Plan, context: &mut Context) {
-        let Some(setup) = self.axes.get(place) else { return };
-        if plan == Plan::Ask {
-            self.facts = ObjectFacts::of(self.identity);
+    fn order(&mut self, run: Run, order: Order, context: &mut Context) {
+        match order {
+            Order::Begin(identity) => self.begin(run, identity, context),
+            Order::Keep(keeps) => self.falls_back = keeps,
         }
-        match context.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
-            Ok(steps) => {
-                self.at = Some((place, Task::Plan(plan)));
-                self.steps = steps.into();
-                self.advance(context);
-            }
-            Err(error) => self.fail(place, error.into(), context),
-        }
-    }
-
-    fn fail(&mut self, place: usize, error: Misfit, context: &mut Context) {
-        let axis = self.number(place);
-        context
-            .waiting
-            .push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
-        self.give_up();
-    }
-
-    /// A step failed that the axis cannot do without.
-    fn break_off(&mut self, place: usize, failure: StepFailure, context: &mut Context) {
-        let (axis, node) = (self.number(place), self.node);
-        context.waiting.push_back(Done::Failed(self.run, Notice::NodeCommissioning { axis, node, failure }));
-        self.give_up();
-    }
-
-    fn number(&self, place: usize) -> u8 {
-        self.axes.get(place).map_or(u8::MAX, |setup| u8::try_from(setup.axis).unwrap_or(u8::MAX))
-    }
-
-    /// Sends what may be sent, and goes on to the next plan when this one is through.
-    fn advance(&mut self, context: &mut Context) {
-        if let Some((_, Task::Readback(readback))) = &mut self.at {
-            while readback.under_way() < WINDOW
-                && let Some(object) = readback.next()
-            {
-                context.waiting.push_back(Done::Submit(self.run, SdoRequest::upload(object)));
-            }
-        }
-        while self.sent.len() < WINDOW
-            && let Some((place, Task::Plan(_))) = self.at
-            && let Some(step) = self.steps.pop_front()
-        {
-            let Some(request) = request(&step, &self.axes[place].needs) else {
-                // A device without this axis has been told of already, by the axis that it does not have.
-                let axis = self.axes[place].needs.axis;
-                self.fail(place, Cia402Error::Axis(axis).into(), context);
-                return;
-            };
-            context.waiting.push_back(Done::Submit(self.run, request));
-            self.sent.push_back(step);
-        }
-        let is_through = match &self.at {
-            Some((_, Task::Readback(readback))) => readback.under_way() == 0,
-            Some((_, Task::Plan(_))) => self.sent.is_empty(),
-            Some((_, Task::Try(_))) | None => false,
-        };
-        if is_through && let Some((place, task)) = self.at.take() {
-            self.through(place, task, context);
-        }
-    }
-
-    fn through(&mut self, place: usize, task: Task, context: &mut Context) {
-        let found = match task {
-            Task::Plan(Plan::Ask) => return self.learn_modes(place, context),
-            Task::Plan(_) if self.axes[place].pdos.kept || self.falls_back => {
-                self.at = Some((place, Task::Readback(Readback::new(self.axes[place].pdos))));
-                return self.advance(context);
-            }
-            Task::Plan(_) => None,
-            Task::Readback(readback) => Some(readback.found()),
-            Task::Try(trial) => return self.tried(place, trial, context),
-        };
-        let axis = self.number(place);
-        if !self.passed_over.is_empty() {
-            let failures = std::mem::take(&mut self.passed_over);
-            context.waiting.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
-        }
-        let mapping = context.mapping.of_drive(&self.facts);
-        let mut unmapped = Vec::new();
-        let made = loop {
-            let setup = &self.axes[place];
-            let made = mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
-            let made =
-                made.and_then(|program| Ok((pdo_map(mapping, setup, &program, found.as_ref())?, program)));
-            match made {
-                // What is in none of the PDOs that it keeps it does not have for the box: perhaps the axis can do without.
-                Err(Misfit::Mapped(lack))
-                    if unmapped.len() < UNMAPPED_MAX
-                        && !unmapped.iter().any(|known: &NotMapped| known.object == lack.object) =>
-                {
-                    let index = Cia402Dictionary::on_first_axis(lack.object.index);
-                    let object = Object { index, ..lack.object };
-                    unmapped.push(lack);
-                    self.facts.note_missing(object);
-                }
-                // It cannot, and the first one of them says it best.
-                Err(Misfit::Program(_) | Misfit::Mapped(_)) if !unmapped.is_empty() => {
-                    break Err(Misfit::Mapped(unmapped.remove(0)));
-                }
-                made => break made,
-            }
-        };
-        if made.is_ok() && !unmapped.is_empty() {
-            let objects = unmapped.iter().map(|lack| lack.object).collect();
-            context.waiting.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
-        }
-        let left_out = mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
-        if !left_out.is_empty() {
-            context.waiting.push_back(Done::Told(Notice::NodeModesLeftOut {
-                axis,
-                node: self.node,
-                modes: left_out,
-            }));
-        }
-        let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
-            Ok(made) => made,
-            Err(error) => return self.fail(place, error, context),
-        };
-        let needs = &self.axes[place].needs;
-        if let Some(found) = mapping.cia402_other_period(needs, &self.facts) {
-            let (node, expected) = (self.node, needs.cycle);
-            context.waiting.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
-        }
-        self.pdos[0].extend(receive);
-        self.pdos[1].extend(transmit);
-        let which = u8::try_from(place).unwrap_or(u8::MAX);
-        context.waiting.push_back(Done::Program(self.run, which, program, [to_drive, from_drive]));
-        if place + 1 < self.axes.len() {
-            self.set_out(place + 1, Plan::Ask, context);
-        } else {
-            let [receive, transmit] = std::mem::take(&mut self.pdos);
-            match PdoSet::new(&context.network, self.node, receive, transmit) {
-                Ok(set) => {
-                    context.network.take_pdos(&set);
-                    context.waiting.push_back(Done::Pdos(self.run, set));
-                }
-                Err(error) => self.fail(place, error.into(), context),
-            }
-        }
-    }
-
-    /// The drive has been asked everything. What it does not tell of its modes stands in the configuration, or is tried.
-    fn learn_modes(&mut self, place: usize, context: &mut Context) {
-        let needs = &self.axes[place].needs;
-        if let Some(words) = context.mapping.of_drive(&self.facts).cia402_modes_untold(needs, &mut self.facts)
-        {
-            let mut trial = Trial::new(words);
-            if let Some(request) = trial.begin() {
-                self.at = Some((place, Task::Try(trial)));
-                context.waiting.push_back(Done::Submit(self.run, request));
-                return;
-            }
-        }
-        self.set_out(place, Plan::Tell, context);
-    }
-
-    fn tried(&mut self, place: usize, trial: Trial, context: &mut Context) {
-        let (axis, node, tried) = (self.number(place), self.node, trial.tried());
-        context.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
-        context.waiting.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
-        self.set_out(place, Plan::Tell, context);
     }
 
     fn handle(&mut self, outcome: &SdoOutcome, context: &mut Context) {
         if let Some((place, Task::Try(trial))) = &mut self.at {
             let place = *place;
             match trial.handle(outcome) {
-                Ok(Some(request)) => context.waiting.push_back(Done::Submit(self.run, request)),
+                Ok(Some(request)) => context.out.push_back(Done::Submit(self.run, request)),
                 Ok(None) => {
                     if let Some((place, task)) = self.at.take() {
                         self.through(place, task, context);
@@ -537,6 +241,194 @@ impl Work {
             }
         }
         self.advance(context);
+    }
+
+    fn give_up(&mut self) {
+        self.at = None;
+        self.steps.clear();
+        self.sent.clear();
+        self.passed_over.clear();
+    }
+}
+
+impl DeviceWork {
+    fn begin(&mut self, run: Run, identity: DriveIdentity, context: &mut Context) {
+        self.give_up();
+        (self.run, self.identity) = (run, identity);
+        if let Some(family) = context.shared.mapping.family_of(&identity) {
+            let (axis, node, name) = (self.number(0), self.node, family.name.clone());
+            context.out.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
+        }
+        self.pdos = [Vec::new(), Vec::new()];
+        self.set_out(0, Plan::Ask, context);
+    }
+
+    /// Begins a plan of an axis.
+    fn set_out(&mut self, place: usize, plan: Plan, context: &mut Context) {
+        let Some(setup) = self.axes.get(place) else { return };
+        if plan == Plan::Ask {
+            self.facts = ObjectFacts::of(self.identity);
+        }
+        match context.shared.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
+            Ok(steps) => {
+                self.at = Some((place, Task::Plan(plan)));
+                self.steps = steps.into();
+                self.advance(context);
+            }
+            Err(error) => self.fail(place, error.into(), context),
+        }
+    }
+
+    fn fail(&mut self, place: usize, error: Misfit, context: &mut Context) {
+        let axis = self.number(place);
+        context.out.push_back(Done::Failed(self.run, Notice::NodeProgram { axis, node: self.node, error }));
+        self.give_up();
+    }
+
+    /// A step failed that the axis cannot do without.
+    fn break_off(&mut self, place: usize, failure: StepFailure, context: &mut Context) {
+        let (axis, node) = (self.number(place), self.node);
+        context.out.push_back(Done::Failed(self.run, Notice::NodeCommissioning { axis, node, failure }));
+        self.give_up();
+    }
+
+    fn number(&self, place: usize) -> u8 {
+        self.axes.get(place).map_or(u8::MAX, |setup| u8::try_from(setup.axis).unwrap_or(u8::MAX))
+    }
+
+    /// Sends what may be sent, and goes on to the next plan when this one is through.
+    fn advance(&mut self, context: &mut Context) {
+        if let Some((_, Task::Readback(readback))) = &mut self.at {
+            while readback.under_way() < WINDOW
+                && let Some(object) = readback.next()
+            {
+                context.out.push_back(Done::Submit(self.run, SdoRequest::upload(object)));
+            }
+        }
+        while self.sent.len() < WINDOW
+            && let Some((place, Task::Plan(_))) = self.at
+            && let Some(step) = self.steps.pop_front()
+        {
+            let Some(request) = request(&step, &self.axes[place].needs) else {
+                // A device without this axis has been told of already, by the axis that it does not have.
+                let axis = self.axes[place].needs.axis;
+                self.fail(place, Cia402Error::Axis(axis).into(), context);
+                return;
+            };
+            context.out.push_back(Done::Submit(self.run, request));
+            self.sent.push_back(step);
+        }
+        let is_through = match &self.at {
+            Some((_, Task::Readback(readback))) => readback.under_way() == 0,
+            Some((_, Task::Plan(_))) => self.sent.is_empty(),
+            Some((_, Task::Try(_))) | None => false,
+        };
+        if is_through && let Some((place, task)) = self.at.take() {
+            self.through(place, task, context);
+        }
+    }
+
+    fn through(&mut self, place: usize, task: Task, context: &mut Context) {
+        let found = match task {
+            Task::Plan(Plan::Ask) => return self.learn_modes(place, context),
+            Task::Plan(_) if self.axes[place].pdos.kept || self.falls_back => {
+                self.at = Some((place, Task::Readback(Readback::new(self.axes[place].pdos))));
+                return self.advance(context);
+            }
+            Task::Plan(_) => None,
+            Task::Readback(readback) => Some(readback.found()),
+            Task::Try(trial) => return self.tried(place, trial, context),
+        };
+        let axis = self.number(place);
+        if !self.passed_over.is_empty() {
+            let failures = std::mem::take(&mut self.passed_over);
+            context.out.push_back(Done::Told(Notice::ObjectsPassedOver { axis, failures }));
+        }
+        let mapping = context.shared.mapping.of_drive(&self.facts);
+        let mut unmapped = Vec::new();
+        let made = loop {
+            let setup = &self.axes[place];
+            let made = mapping.cia402_program(&setup.needs, &self.facts).map_err(Misfit::from);
+            let made =
+                made.and_then(|program| Ok((pdo_map(mapping, setup, &program, found.as_ref())?, program)));
+            match made {
+                // What is in none of the PDOs that it keeps it does not have for the box: perhaps the axis can do without.
+                Err(Misfit::Mapped(lack))
+                    if unmapped.len() < UNMAPPED_MAX
+                        && !unmapped.iter().any(|known: &NotMapped| known.object == lack.object) =>
+                {
+                    let index = Cia402Dictionary::on_first_axis(lack.object.index);
+                    let object = Object { index, ..lack.object };
+                    unmapped.push(lack);
+                    self.facts.note_missing(object);
+                }
+                // It cannot, and the first one of them says it best.
+                Err(Misfit::Program(_) | Misfit::Mapped(_)) if !unmapped.is_empty() => {
+                    break Err(Misfit::Mapped(unmapped.remove(0)));
+                }
+                made => break made,
+            }
+        };
+        if made.is_ok() && !unmapped.is_empty() {
+            let objects = unmapped.iter().map(|lack| lack.object).collect();
+            context.out.push_back(Done::Told(Notice::NotMapped { axis, node: self.node, objects }));
+        }
+        let left_out = mapping.cia402_modes_left_out(&self.axes[place].needs, &self.facts);
+        if !left_out.is_empty() {
+            context.out.push_back(Done::Told(Notice::NodeModesLeftOut {
+                axis,
+                node: self.node,
+                modes: left_out,
+            }));
+        }
+        let ([(receive, to_drive), (transmit, from_drive)], program) = match made {
+            Ok(made) => made,
+            Err(error) => return self.fail(place, error, context),
+        };
+        let needs = &self.axes[place].needs;
+        if let Some(found) = mapping.cia402_other_period(needs, &self.facts) {
+            let (node, expected) = (self.node, needs.cycle);
+            context.out.push_back(Done::Told(Notice::Period { axis, node, expected, found }));
+        }
+        self.pdos[0].extend(receive);
+        self.pdos[1].extend(transmit);
+        let which = u8::try_from(place).unwrap_or(u8::MAX);
+        context.out.push_back(Done::Made(self.run, Made::Program(which, program, [to_drive, from_drive])));
+        if place + 1 < self.axes.len() {
+            self.set_out(place + 1, Plan::Ask, context);
+        } else {
+            let [receive, transmit] = std::mem::take(&mut self.pdos);
+            match PdoSet::new(&context.shared.network, self.node, receive, transmit) {
+                Ok(set) => {
+                    context.shared.network.take_pdos(&set);
+                    context.out.push_back(Done::Made(self.run, Made::Pdos(set)));
+                }
+                Err(error) => self.fail(place, error.into(), context),
+            }
+        }
+    }
+
+    /// The drive has been asked everything. What it does not tell of its modes stands in the configuration, or is tried.
+    fn learn_modes(&mut self, place: usize, context: &mut Context) {
+        let needs = &self.axes[place].needs;
+        if let Some(words) =
+            context.shared.mapping.of_drive(&self.facts).cia402_modes_untold(needs, &mut self.facts)
+        {
+            let mut trial = Trial::new(words);
+            if let Some(request) = trial.begin() {
+                self.at = Some((place, Task::Try(trial)));
+                context.out.push_back(Done::Submit(self.run, request));
+                return;
+            }
+        }
+        self.set_out(place, Plan::Tell, context);
+    }
+
+    fn tried(&mut self, place: usize, trial: Trial, context: &mut Context) {
+        let (axis, node, tried) = (self.number(place), self.node, trial.tried());
+        context.shared.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
+        context.out.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
+        self.set_out(place, Plan::Tell, context);
     }
 }
 

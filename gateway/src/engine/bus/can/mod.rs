@@ -22,32 +22,28 @@ use profile_cia402::master::report::ReportRow;
 use profile_cia402::master::{ConsumerState, Master, Priority};
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{AbortCode, Mux, NodeId};
+use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
-use self::commissioner::{AxisSetup, CommissionerHandle, Done, Job, Run, WINDOW};
+use self::commissioner::{AxisSetup, DeviceWork, Made, Order, WINDOW};
 use self::layout::{BYTES_MAX, PDOS_MAX, PdoMap};
 use self::lss::{Assigner, Assignment};
+use super::accesses::Accesses;
 use super::backoff::Backoff;
-use super::bus_return::BusReturn;
-use super::transmit_queue::TransmitQueue;
+use super::can_link::{CanLink, PATIENCE, Station};
+use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
-use crate::engine::port::{CanInput, CanSent, SouthPort};
+use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
 
 /// Axes of one device.
 const AXES_MAX: usize = 8;
 
-/// Frames taken from the bus in one call: more than a bus at 1 Mbit/s carries in ten milliseconds.
-const FRAMES_PER_CALL: usize = 256;
-
 /// SDO accesses of one axis that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 4;
-
-/// Longest wait for what comes in: answers come at any time.
-const PATIENCE: DurationNs = DurationNs::from_millis(1);
 
 /// Where a device is on its way.
 #[derive(Debug)]
@@ -92,7 +88,7 @@ struct Drive {
     alive: bool,
     /// When they came, where a TPDO does not come at SYNC: the oldest of them.
     at: Option<MonotonicTime>,
-    accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
+    accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
 /// A device, with one drive or several.
@@ -117,10 +113,9 @@ pub struct CanBus {
     devices: Vec<Device>,
     /// The device of each axis, and the drive there.
     places: Places<(usize, usize)>,
-    commissioner: CommissionerHandle,
+    commissioner: CommissionerHandle<DeviceWork>,
     cycles_seen: u64,
-    transmit_queue: TransmitQueue,
-    back: BusReturn,
+    link: CanLink,
     /// It was up since the bus was on last.
     up: bool,
     stopped: bool,
@@ -137,7 +132,7 @@ impl CanBus {
         config: MasterConfig,
         devices: &[(NodeId, Vec<AxisSetup>)],
         assignments: &[Assignment],
-        commissioner: CommissionerHandle,
+        commissioner: CommissionerHandle<DeviceWork>,
     ) -> Result<Self, ConfigError> {
         let cycle_time = DurationNs(config.sync.map_or(0, |sync| i64::from(sync.period_ns)));
         let master = Master::new(config)?;
@@ -148,7 +143,7 @@ impl CanBus {
             fresh: false,
             alive: false,
             at: None,
-            accesses: ArrayVec::new(),
+            accesses: Accesses::new(),
         };
         let device = |(node, axes): &(NodeId, Vec<AxisSetup>)| Device {
             node: *node,
@@ -171,8 +166,7 @@ impl CanBus {
             devices,
             commissioner,
             cycles_seen: 0,
-            transmit_queue: TransmitQueue::new(cycle_time),
-            back: BusReturn::NEVER_LOST,
+            link: CanLink::new(cycle_time),
             up: false,
             stopped: false,
         })
@@ -247,7 +241,7 @@ impl CanBus {
             }
             Event::GaveWay => {
                 self.up = false;
-                self.transmit_queue.clear();
+                self.link.clear();
                 self.assigner.abort();
                 for drive in self.devices.iter_mut().flat_map(|device| {
                     device.stage = Stage::Absent;
@@ -259,20 +253,12 @@ impl CanBus {
             }
             Event::BusOff => {
                 self.up = false;
-                self.transmit_queue.clear();
                 for place in 0..self.devices.len() {
                     let node = self.devices[place].node;
                     self.lose(now, system, node, axes);
                 }
             }
             _ => {}
-        }
-    }
-
-    /// Brings all devices up again once the bus may be used again.
-    fn use_again(&mut self, now: MonotonicTime) {
-        if self.back.take(now) {
-            self.master.bus_on(now);
         }
     }
 
@@ -287,7 +273,7 @@ impl CanBus {
         let device = &mut self.devices[place];
         device.runs = device.runs.wrapping_add(1);
         let run = device.run(place);
-        if self.commissioner.push(Job::Begin(run, DriveIdentity { vendor, product })) {
+        if self.commissioner.push(Job::Order(run, Order::Begin(DriveIdentity { vendor, product }))) {
             device.stage = Stage::Commissioning { tickets: ArrayVec::new() };
         } else {
             self.give_up(now, place);
@@ -323,7 +309,7 @@ impl CanBus {
             let keeps = fixed && !device.keeps;
             let changes = keeps != device.keeps;
             let run = device.run(place);
-            if changes && self.commissioner.push(Job::Keep(run, keeps)) {
+            if changes && self.commissioner.push(Job::Order(run, Order::Keep(keeps))) {
                 device.keeps = keeps;
                 if keeps && self.master.retry(now, node).is_ok() {
                     return;
@@ -352,17 +338,8 @@ impl CanBus {
 
     /// Takes what the commissioner has done.
     fn commission(&mut self, now: MonotonicTime, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
-        // Each piece of work can make one job.
-        while self.commissioner.has_room()
-            && let Some(done) = self.commissioner.pop()
-        {
-            let Some(run) = done.run() else {
-                if let Done::Told(told) = done {
-                    notice(told);
-                }
-                continue;
-            };
-            let place = usize::from(run.device);
+        while let Some((run, done)) = self.commissioner.pop(notice) {
+            let place = usize::from(run.place);
             let wanted = self.devices.get(place).is_some_and(|device| {
                 device.run(place) == run && matches!(device.stage, Stage::Commissioning { .. })
             });
@@ -370,29 +347,27 @@ impl CanBus {
                 self.commissioner.push(Job::Unused(done));
                 continue;
             }
-            let node = self.devices[place].node;
             match done {
                 Done::Submit(run, request) => self.submit(now, place, run, request),
-                Done::Program(_, which, program, [command, feedback]) => {
+                Done::Made(_, Made::Program(which, program, [command, feedback])) => {
                     if let Some(drive) = self.devices[place].drives.get_mut(usize::from(which)) {
                         drive.command.take(command);
                         drive.feedback.take(feedback);
                         axes[drive.axis].set_south(program);
                     }
                 }
-                Done::Pdos(run, set) => self.connect(now, place, run, set),
-                Done::Failed(_, failed) => {
+                Done::Made(run, Made::Pdos(set)) => self.connect(now, place, run, set),
+                Done::Failed(run, failed) => {
                     notice(failed);
                     // The PDOs that it has do not do either: the next try begins as the first one did.
                     let device = &mut self.devices[place];
-                    if device.keeps && self.commissioner.push(Job::Keep(device.run(place), false)) {
+                    if device.keeps && self.commissioner.push(Job::Order(run, Order::Keep(false))) {
                         device.keeps = false;
                     }
                     self.give_up(now, place);
                 }
                 Done::Told(_) => {}
             }
-            debug_assert_eq!(self.devices[place].node, node);
         }
     }
 
@@ -419,7 +394,7 @@ impl CanBus {
             Ok(had) => (true, had),
             Err((_, set)) => (false, set),
         };
-        self.commissioner.push(Job::Unused(Done::Pdos(run, unused)));
+        self.commissioner.push(Job::Unused(Done::Made(run, Made::Pdos(unused))));
         if taken && self.master.node_ready(node).is_ok() {
             self.devices[place].stage = Stage::Ready;
         } else {
@@ -444,8 +419,7 @@ impl CanBus {
                 return;
             }
             for drive in &mut device.drives {
-                if let Some(at) = drive.accesses.iter().position(|(known, _)| *known == ticket) {
-                    let (_, purpose) = drive.accesses.remove(at);
+                if let Some((purpose, _)) = drive.accesses.take(ticket) {
                     let item = Item::object(outcome.object.index, outcome.object.sub);
                     answer(axes, Answer { axis: drive.axis, purpose, item, result: reply(&outcome) });
                     return;
@@ -459,13 +433,13 @@ impl CanBus {
 impl Device {
     /// Its work for the commissioner, from its place among the devices.
     fn run(&self, place: usize) -> Run {
-        Run { device: u8::try_from(place).unwrap_or(u8::MAX), number: self.runs }
+        Run::new(place, self.runs)
     }
 }
 
 impl Bus for CanBus {
     fn cycle_time(&self) -> DurationNs {
-        self.transmit_queue.cycle_time()
+        self.link.cycle_time()
     }
 
     fn patience(&self) -> DurationNs {
@@ -474,7 +448,7 @@ impl Bus for CanBus {
 
     fn wake_at(&self) -> Option<MonotonicTime> {
         let own = || self.master.wake_at().into_iter().chain(self.assigner.wake_at()).min();
-        self.transmit_queue.wake_at().or_else(own)
+        self.link.wake_at().or_else(own)
     }
 
     fn next_cycle(&self) -> Option<MonotonicTime> {
@@ -506,29 +480,8 @@ impl Bus for CanBus {
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
         let SouthPort::Can(port) = port else { return };
-        for _ in 0..FRAMES_PER_CALL {
-            match port.receive(now) {
-                Some(CanInput::Frame(_)) if !self.back.is_used() => {}
-                // A refused frame is counted by the master and changes nothing.
-                Some(CanInput::Frame(frame)) => {
-                    if !self.assigner.handle(now, &frame) {
-                        let _ = self.master.handle_frame(now, &frame);
-                    }
-                }
-                Some(CanInput::BusOff) => {
-                    if self.back.lose(now) {
-                        self.assigner.abort();
-                        self.master.bus_off(now);
-                    }
-                }
-                Some(CanInput::BusOn) => {
-                    self.back.come_back(now);
-                    self.use_again(now);
-                }
-                None => break,
-            }
-        }
-        self.use_again(now);
+        let Self { master, assigner, link, .. } = self;
+        link.receive(now, *port, &mut Stations { master, assigner });
     }
 
     fn take_cycle(&mut self) -> bool {
@@ -639,40 +592,20 @@ impl Bus for CanBus {
         let Some(request) = request(access) else { return false };
         let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
         let Some((device, drive)) = place else { return false };
-        let device = &mut self.devices[device];
+        let Self { master, devices, .. } = self;
+        let device = &mut devices[device];
         let drive = &mut device.drives[drive];
         let priority = if access.urgent { Priority::Urgent } else { Priority::Normal };
-        if drive.accesses.is_full() {
-            return false;
-        }
-        match self.master.sdo_submit(device.node, request, priority) {
-            Ok(ticket) => {
-                drive.accesses.push((ticket, purpose));
-                true
-            }
-            Err(_) => false,
-        }
+        let node = device.node;
+        drive.accesses.submit(access.item, purpose, || master.sdo_submit(node, request, priority).ok())
     }
 
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
         let mut sent = Sent::default();
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().syncs;
-        loop {
-            let waiting = self.transmit_queue.take();
-            let next = waiting
-                .or_else(|| self.master.poll(now).map(|Output::Transmit(frame)| (frame, now)))
-                .or_else(|| self.assigner.poll(now).map(|frame| (frame, now)));
-            let Some((frame, made)) = next else { break };
-            match self.transmit_queue.send(now, *port, frame, made) {
-                CanSent::Sent => {}
-                CanSent::Full => break,
-                CanSent::Failed => {
-                    sent.failures += 1;
-                    self.master.transmit_failed(frame.id());
-                }
-            }
-        }
+        let Self { master, assigner, link, .. } = self;
+        sent.failures = link.send(now, *port, &mut Stations { master, assigner });
         sent.cycle = self.master.statistics().syncs != cycles;
         sent
     }
@@ -686,7 +619,40 @@ impl Bus for CanBus {
         // The devices have been told, or cannot be.
         self.stopped
             && !self.master.is_running()
-            && (self.master.wake_at().is_none() && self.transmit_queue.is_empty())
+            && (self.master.wake_at().is_none() && self.link.is_drained())
+    }
+}
+
+/// The stations that the box is: master, and LSS master for devices without a node-id.
+struct Stations<'a> {
+    master: &'a mut Master,
+    assigner: &'a mut Assigner,
+}
+
+impl Station for Stations<'_> {
+    fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) {
+        if !self.assigner.handle(now, frame) {
+            let _ = self.master.handle_frame(now, frame);
+        }
+    }
+
+    fn handle_bus_off(&mut self, now: MonotonicTime) {
+        self.assigner.abort();
+        self.master.bus_off(now);
+    }
+
+    /// Brings all devices up again.
+    fn handle_bus_on(&mut self, now: MonotonicTime) {
+        self.master.bus_on(now);
+    }
+
+    fn poll(&mut self, now: MonotonicTime) -> Option<(Frame, MonotonicTime)> {
+        let own = self.master.poll(now).map(|Output::Transmit(frame)| frame);
+        own.or_else(|| self.assigner.poll(now)).map(|frame| (frame, now))
+    }
+
+    fn handle_failure(&mut self, id: Id) {
+        self.master.transmit_failed(id);
     }
 }
 

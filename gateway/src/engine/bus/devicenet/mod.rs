@@ -10,39 +10,33 @@ pub mod access;
 pub mod end;
 pub mod setup;
 
-use arrayvec::ArrayVec;
 use profile_cip::devicenet::connection::ConnectionKind;
 use profile_cip::devicenet::master::Master;
 use profile_cip::devicenet::master::config::{ConfigError, MasterConfig};
 use profile_cip::devicenet::master::event::{Event, Outcome, Ticket};
 use profile_cip::devicenet::master::station::Phase;
 use profile_cip::devicenet::wire::MacId;
+use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
+use super::accesses::Accesses;
 use super::backoff::Backoff;
-use super::bus_return::BusReturn;
-use super::transmit_queue::TransmitQueue;
+use super::can_link::{CanLink, PATIENCE, Station};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
-use crate::engine::port::{CanInput, CanSent, SouthPort};
+use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
 use crate::mapping::{DriveProgram, Item, Mapping};
 
 /// The connection that carries the commands.
 const POLL: ConnectionKind = ConnectionKind::Poll;
 
-/// Frames taken from the network in one call: more than it carries in ten milliseconds.
-const FRAMES_PER_CALL: usize = 256;
-
 /// Accesses of one axis that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 2;
-
-/// Longest wait for what comes in: answers come at any time.
-const PATIENCE: DurationNs = DurationNs::from_millis(1);
 
 /// Where a drive is on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +80,7 @@ struct Drive {
     /// It has been tried: nobody waits for it any longer.
     tried: bool,
     backoff: Backoff,
-    accesses: ArrayVec<(Ticket, Purpose, Item), ACCESSES_MAX>,
+    accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
 /// Cycles in which a drive that was taken may have nothing valid to tell.
@@ -104,13 +98,12 @@ pub struct DevicenetBus {
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
-    transmit_queue: TransmitQueue,
+    link: CanLink,
     /// When the frames that wait were made.
     made_at: MonotonicTime,
     /// It is on, or tries to be.
     started: bool,
     backoff: Backoff,
-    back: BusReturn,
     up: bool,
     stopped: bool,
     /// Answers of a drive in a row that may be missing.
@@ -133,7 +126,7 @@ impl DevicenetBus {
             error: None,
             tried: false,
             backoff: Backoff::NONE,
-            accesses: ArrayVec::new(),
+            accesses: Accesses::new(),
         };
         let cycle = config.cycle;
         let allowed_losses = config.slaves.iter().map(|slave| slave.missed_max).max().map_or(0, u16::from);
@@ -145,11 +138,10 @@ impl DevicenetBus {
             drives,
             cycles_seen: 0,
             refused: 0,
-            transmit_queue: TransmitQueue::new(cycle),
+            link: CanLink::new(cycle),
             made_at: MonotonicTime::ZERO,
             started: false,
             backoff: Backoff::NONE,
-            back: BusReturn::NEVER_LOST,
             up: false,
             stopped: false,
             allowed_losses,
@@ -160,6 +152,12 @@ impl DevicenetBus {
     #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
+    }
+
+    /// Exchanges frames with the network.
+    fn exchange<T>(&mut self, with: impl FnOnce(&mut CanLink, &mut dyn Station) -> T) -> T {
+        let Self { master, drives, link, made_at, stopped, .. } = self;
+        with(link, &mut Node { master, drives, made_at, stopped: *stopped })
     }
 
     /// Takes what the drives have answered in the cycle that has ended.
@@ -193,13 +191,6 @@ impl DevicenetBus {
                 let axis = u8::try_from(drive.plan.axis).unwrap_or(u8::MAX);
                 notice(Notice::SlaveAnswers { axis, mac: drive.plan.mac, error: *error });
             }
-        }
-    }
-
-    /// Begins anew once the bus may be used again: whether the MAC ID is still free has to be asked.
-    fn use_again(&mut self, now: MonotonicTime) {
-        if self.back.take(now) && !self.stopped {
-            self.master.start(now);
         }
     }
 
@@ -254,8 +245,7 @@ impl DevicenetBus {
                 }
                 return;
             }
-            if let Some(at) = drive.accesses.iter().position(|(known, ..)| *known == ticket) {
-                let (_, purpose, item) = drive.accesses.remove(at);
+            if let Some((purpose, item)) = drive.accesses.take(ticket) {
                 answer(axes, Answer { axis, purpose, item, result: reply(item, purpose, outcome) });
                 return;
             }
@@ -301,6 +291,42 @@ impl DevicenetBus {
     }
 }
 
+/// The node that the box is.
+struct Node<'a> {
+    master: &'a mut Master,
+    drives: &'a mut [Drive],
+    made_at: &'a mut MonotonicTime,
+    stopped: bool,
+}
+
+impl Station for Node<'_> {
+    fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) {
+        let _ = self.master.handle_frame(now, frame);
+    }
+
+    fn handle_bus_off(&mut self, now: MonotonicTime) {
+        self.master.handle_bus_off(now);
+        self.drives.iter_mut().for_each(|drive| drive.tried = true);
+    }
+
+    /// Begins anew: whether the MAC ID is still free has to be asked.
+    fn handle_bus_on(&mut self, now: MonotonicTime) {
+        if !self.stopped {
+            self.master.start(now);
+        }
+    }
+
+    fn poll(&mut self, now: MonotonicTime) -> Option<(Frame, MonotonicTime)> {
+        if self.master.is_drained() {
+            // What comes now is made now; all of a message has the same age.
+            *self.made_at = now;
+        }
+        self.master.poll(now).map(|frame| (frame, *self.made_at))
+    }
+
+    fn handle_failure(&mut self, _: Id) {}
+}
+
 fn told(axis: usize, mac: MacId, failure: SetupFailure) -> Notice {
     Notice::SlaveSetup { axis: u8::try_from(axis).unwrap_or(u8::MAX), mac, failure }
 }
@@ -331,7 +357,7 @@ impl Bus for DevicenetBus {
     }
 
     fn wake_at(&self) -> Option<MonotonicTime> {
-        self.transmit_queue.wake_at().or_else(|| self.master.wake_at())
+        self.link.wake_at().or_else(|| self.master.wake_at())
     }
 
     fn next_cycle(&self) -> Option<MonotonicTime> {
@@ -363,26 +389,7 @@ impl Bus for DevicenetBus {
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
         let SouthPort::Can(port) = port else { return };
-        for _ in 0..FRAMES_PER_CALL {
-            match port.receive(now) {
-                Some(CanInput::Frame(_)) if !self.back.is_used() => {}
-                // A refused frame is counted by the master and changes nothing.
-                Some(CanInput::Frame(frame)) => drop(self.master.handle_frame(now, &frame)),
-                Some(CanInput::BusOff) => {
-                    if self.back.lose(now) {
-                        self.transmit_queue.clear();
-                        self.master.handle_bus_off(now);
-                        self.drives.iter_mut().for_each(|drive| drive.tried = true);
-                    }
-                }
-                Some(CanInput::BusOn) => {
-                    self.back.come_back(now);
-                    self.use_again(now);
-                }
-                None => break,
-            }
-        }
-        self.use_again(now);
+        self.exchange(|link, node| link.receive(now, *port, node));
     }
 
     fn take_cycle(&mut self) -> bool {
@@ -414,7 +421,7 @@ impl Bus for DevicenetBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
         notice: &mut dyn FnMut(Notice),
     ) {
-        if !self.stopped && self.back.is_used() && (!self.started || self.backoff.take(now)) {
+        if !self.stopped && self.link.is_used() && (!self.started || self.backoff.take(now)) {
             self.started = true;
             self.master.start(now);
         }
@@ -483,37 +490,18 @@ impl Bus for DevicenetBus {
         let Some(request) = request else { return false };
         let Self { master, drives, places, .. } = self;
         let Some(drive) = places.of(axis).and_then(|place| drives.get_mut(place)) else { return false };
-        if drive.stage != Stage::Ready || drive.accesses.is_full() {
+        if drive.stage != Stage::Ready {
             return false;
         }
-        match master.submit(drive.plan.mac, request) {
-            Ok(ticket) => {
-                drive.accesses.push((ticket, purpose, access.item));
-                true
-            }
-            Err(_) => false,
-        }
+        let mac = drive.plan.mac;
+        drive.accesses.submit(access.item, purpose, || master.submit(mac, request).ok())
     }
 
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
         let mut sent = Sent::default();
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().cycles;
-        loop {
-            if self.transmit_queue.is_empty() && self.master.is_drained() {
-                // What comes now is made now; all of it has the same age.
-                self.made_at = now;
-            }
-            let made = self.made_at;
-            let next =
-                self.transmit_queue.take().or_else(|| self.master.poll(now).map(|frame| (frame, made)));
-            let Some((frame, made)) = next else { break };
-            match self.transmit_queue.send(now, *port, frame, made) {
-                CanSent::Sent => {}
-                CanSent::Full => break,
-                CanSent::Failed => sent.failures += 1,
-            }
-        }
+        sent.failures = self.exchange(|link, node| link.send(now, *port, node));
         sent.cycle = self.master.statistics().cycles != cycles;
         sent
     }
@@ -526,6 +514,6 @@ impl Bus for DevicenetBus {
 
     fn is_stopped(&self) -> bool {
         // The drives have been given back, or cannot be.
-        self.stopped && self.master.is_drained() && self.transmit_queue.is_empty()
+        self.stopped && self.master.is_drained() && self.link.is_drained()
     }
 }

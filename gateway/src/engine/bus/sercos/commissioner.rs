@@ -1,14 +1,7 @@
-//! The commissioning of drives that come while others move: beside the cycle thread, because it allocates.
+//! The commissioning of SERCOS drives: what a drive is asked and written in CP2 and in CP3, and what follows from that.
 //!
-//! ```text
-//! cycle thread                            commissioner, on a thread of its own
-//!   Begin { phase } ------------------->  compiles the plan, keeps what the drive tells
-//!   <------------------- Submit { request }
-//!   Outcome, Unsent ------------------->
-//!   <------------------- Connect (CP2), Program (CP3), or Failed
-//! ```
-//!
-//! What was made for a drive that has gone again comes back as [`Job::Unused`] and is freed here.
+//! While the whole bus comes up the cycle thread does this itself, because nothing moves yet ([`Setup::poll`]). A drive that comes
+//! by hot plug is commissioned alongside the cycle ([`DriveWork`]).
 
 use profile_sercos::master::config::Connections;
 use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
@@ -16,248 +9,274 @@ use profile_sercos::wire::header::Phase;
 
 use super::commissioning::{Commissioning, StepFailure};
 use super::{connections, limitations};
+use crate::engine::bus::commissioner::{CommissionerHandle, Context, Done, Run, Work};
 use crate::engine::notice::Notice;
-use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis};
+use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis, SercosError, Step};
 
 /// Messages under way in each direction.
 const QUEUE: usize = 64;
 
-/// Which commissioning of which drive a message belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run {
-    /// Place of the drive among those of the bus.
-    pub place: u8,
-    /// Counts the times that its drive came; what belongs to an earlier time is not used.
-    pub number: u32,
-}
-
-/// What the cycle thread wants.
+/// What the setup of a drive has come to.
 #[derive(Debug)]
-#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
-pub enum Job {
-    /// A drive can be set up as in CP2, or then as in CP3; whether its connections cannot be configured.
-    Begin(Run, Phase, bool),
-    /// What came of a request.
-    Outcome(Run, SvcOutcome),
-    /// A request that could not be made.
-    Unsent(Run, SvcRequest),
-    /// What came of a request that nobody waits for any more.
-    Spent(SvcOutcome),
-    /// Something that is not needed any more.
-    Unused(Done),
-}
-
-/// What the commissioner has done.
-#[derive(Debug)]
-#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
-pub enum Done {
-    /// A request for the drive's service channel; the next one comes when its outcome is known.
-    Submit(Run, SvcRequest),
-    /// The connections of the drive: it is through with CP2.
-    Connect(Run, Connections),
-    /// The program of the drive: it is through with CP3.
-    Program(Run, DriveProgram),
+#[allow(clippy::large_enum_variant, reason = "it is moved into its place at once, and boxing would allocate")]
+pub enum Progress {
+    /// Requests are under way, or can only be made later.
+    Busy,
+    /// The drive is through with CP2.
+    Connections(Connections),
+    /// The drive is through with CP3.
+    Program(DriveProgram),
     /// The drive cannot be used.
-    Failed(Run, Notice),
-    /// Something that people should know.
-    Told(Notice),
+    Failed(Notice),
 }
 
-/// The cycle thread's end.
+/// The setup of one drive. `T` tells its requests apart.
 #[derive(Debug)]
-pub struct CommissionerHandle {
-    jobs: rtrb::Producer<Job>,
-    done: rtrb::Consumer<Done>,
-}
-
-impl CommissionerHandle {
-    /// Hands a job over; `false` when there is no room, and it is dropped.
-    pub fn push(&mut self, job: Job) -> bool {
-        self.jobs.push(job).is_ok()
-    }
-
-    /// Whether a job can be handed over now.
-    #[must_use]
-    pub fn has_room(&self) -> bool {
-        !self.jobs.is_full()
-    }
-
-    /// What is done.
-    pub fn pop(&mut self) -> Option<Done> {
-        self.done.pop().ok()
-    }
-}
-
-/// One drive.
-#[derive(Debug)]
-struct Work {
+pub struct Setup<T> {
     /// Number of its axis.
-    axis: u8,
-    address: u16,
-    needs: SercosAxis,
-    facts: DriveFacts,
-    run: Run,
+    pub axis: u8,
+    /// Its SERCOS address.
+    pub address: u16,
+    /// What the commissioning has to achieve.
+    pub needs: SercosAxis,
+    /// What the drive has reported of itself.
+    pub facts: DriveFacts,
+    /// The drive was refused for what it is: trying again does not help, and no command is executed in it.
+    pub unfit: bool,
+    /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
+    allowed_losses: u16,
     phase: Phase,
-    plan: Option<Commissioning<u32>>,
-    /// Steps that the drive did not take and need not, until they are told.
+    plan: Option<Commissioning<T>>,
+    /// Steps that the drive did not take and need not, until they are reported.
     passed_over: Vec<StepFailure>,
+}
+
+impl<T: Copy + PartialEq> Setup<T> {
+    /// The setup of the drive of an axis.
+    #[must_use]
+    pub fn new(axis: usize, address: u16, needs: SercosAxis, allowed_losses: u16) -> Self {
+        Self {
+            axis: super::index(axis),
+            address,
+            needs,
+            facts: DriveFacts::new(),
+            unfit: false,
+            allowed_losses,
+            phase: Phase::CP2,
+            plan: None,
+            passed_over: Vec::new(),
+        }
+    }
+
+    /// Forgets what the drive has reported; `fixed` tells whether its connections cannot be configured.
+    pub fn restart(&mut self, fixed: bool) {
+        self.facts = DriveFacts::new();
+        self.facts.note_fixed_connections(fixed);
+        self.passed_over.clear();
+    }
+
+    /// Begins the plan of a phase.
+    ///
+    /// # Errors
+    /// The tables make no plan for this drive.
+    pub fn begin(&mut self, mapping: &Mapping, phase: Phase) -> Result<(), Notice> {
+        self.phase = phase;
+        match mapping.commissioning(&self.needs, phase.0, &self.facts) {
+            Ok(mut plan) => {
+                if self.unfit {
+                    plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
+                }
+                self.plan = Some(Commissioning::new(plan));
+                Ok(())
+            }
+            Err(error) => {
+                self.unfit = true;
+                self.plan = None;
+                Err(self.misfit(error))
+            }
+        }
+    }
+
+    /// Whether a request is under way.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.plan.as_ref().is_some_and(Commissioning::is_waiting)
+    }
+
+    /// Ends the plan under way.
+    pub fn give_up(&mut self) {
+        self.plan = None;
+    }
+
+    /// Takes an outcome if it is one of the plan's; `false` when it is another's.
+    pub fn handle(&mut self, ticket: T, outcome: &SvcOutcome) -> bool {
+        self.plan.as_mut().is_some_and(|plan| plan.handle(ticket, outcome, &mut self.facts))
+    }
+
+    /// Submits what is next; when the plan is through, says what follows from it. `None` while there is no plan.
+    pub fn poll(
+        &mut self,
+        mapping: &Mapping,
+        submit: &mut dyn FnMut(SvcRequest) -> Option<T>,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Option<Progress> {
+        let plan = self.plan.as_mut()?;
+        plan.poll(submit);
+        if !plan.is_done() {
+            return Some(Progress::Busy);
+        }
+        let (failure, more) = (plan.failure(), plan.wants_more());
+        self.passed_over.append(&mut plan.take_passed_over());
+        if more {
+            // What the drive has reported leads to further steps of the same phase: they begin with the next call.
+            return Some(self.begin(mapping, self.phase).map_or_else(Progress::Failed, |()| Progress::Busy));
+        }
+        self.plan = None;
+        let last = failure.is_some() || self.phase != Phase::CP2;
+        if last && !self.passed_over.is_empty() {
+            let failures = std::mem::take(&mut self.passed_over);
+            notice(Notice::PassedOver { axis: self.axis, failures });
+        }
+        if let Some(failure) = failure {
+            self.unfit = true;
+            let (axis, address) = (self.axis, self.address);
+            return Some(Progress::Failed(Notice::Commissioning { axis, address, failure }));
+        }
+        let made = if self.phase == Phase::CP2 {
+            connections(mapping, &self.needs, &self.facts, self.allowed_losses).map(Progress::Connections)
+        } else {
+            self.program(mapping, notice)
+        };
+        Some(made.unwrap_or_else(|error| {
+            self.unfit = true;
+            Progress::Failed(self.misfit(error))
+        }))
+    }
+
+    /// The program of the drive, once all is known of it, and what people should know of that.
+    fn program(&self, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) -> Result<Progress, SercosError> {
+        for difference in self.facts.differences(&mapping.dictionaries.sercos) {
+            notice(Notice::Difference { axis: self.axis, difference });
+        }
+        let program = mapping.sercos_program(&self.needs, &self.facts)?;
+        limitations(mapping, self.axis, self.address, &self.needs, &self.facts, &program)
+            .into_iter()
+            .for_each(notice);
+        Ok(Progress::Program(program))
+    }
+
+    fn misfit(&self, error: SercosError) -> Notice {
+        Notice::Program { axis: self.axis, address: self.address, error }
+    }
+}
+
+/// What the cycle thread orders: to set up a drive as in this phase.
+#[derive(Debug, Clone, Copy)]
+pub struct Order {
+    /// CP2, or then CP3.
+    pub phase: Phase,
+    /// Whether the connections of the drive cannot be configured.
+    pub fixed: bool,
+}
+
+/// What is ready for a drive.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
+pub enum Made {
+    /// Its connections: it is through with CP2.
+    Connections(Connections),
+    /// Its program: it is through with CP3.
+    Program(DriveProgram),
+}
+
+/// The commissioning of a drive that comes by hot plug.
+#[derive(Debug)]
+pub struct DriveWork {
+    run: Run,
+    setup: Setup<u32>,
+    /// Number of the last request.
     serial: u32,
 }
 
 /// Commissions drives that come while others move.
-#[derive(Debug)]
-pub struct Commissioner {
+pub type Commissioner = crate::engine::bus::commissioner::Commissioner<DriveWork>;
+
+/// A commissioner for these drives, number, address and needs of each axis, and the cycle thread's end.
+#[must_use]
+pub fn commissioner(
     mapping: Mapping,
     allowed_losses: u16,
-    drives: Vec<Work>,
-    jobs: rtrb::Consumer<Job>,
-    done: rtrb::Producer<Done>,
-    /// What the queue had no room for.
-    waiting: std::collections::VecDeque<Done>,
+    drives: impl IntoIterator<Item = (usize, u16, SercosAxis)>,
+) -> (Commissioner, CommissionerHandle<DriveWork>) {
+    let work = |(axis, address, needs)| DriveWork {
+        run: Run::default(),
+        setup: Setup::new(axis, address, needs, allowed_losses),
+        serial: 0,
+    };
+    Commissioner::with_queue(QUEUE, mapping, drives.into_iter().map(work).collect())
 }
 
-impl Commissioner {
-    /// A commissioner for these drives, number, address and needs of each axis, and the cycle thread's end.
-    #[must_use]
-    pub fn new(
-        mapping: Mapping,
-        allowed_losses: u16,
-        drives: impl IntoIterator<Item = (usize, u16, SercosAxis)>,
-    ) -> (Self, CommissionerHandle) {
-        let (jobs_in, jobs) = rtrb::RingBuffer::new(QUEUE);
-        let (done, done_out) = rtrb::RingBuffer::new(QUEUE);
-        let work = |(axis, address, needs)| Work {
-            axis: u8::try_from(axis).unwrap_or(u8::MAX),
-            address,
-            needs,
-            facts: DriveFacts::new(),
-            run: Run { place: 0, number: 0 },
-            phase: Phase::CP2,
-            plan: None,
-            passed_over: Vec::new(),
-            serial: 0,
-        };
-        let drives = drives.into_iter().map(work).collect();
-        let waiting = std::collections::VecDeque::new();
-        (
-            Self { mapping, allowed_losses, drives, jobs, done, waiting },
-            CommissionerHandle { jobs: jobs_in, done: done_out },
-        )
+impl Work for DriveWork {
+    type Order = Order;
+    type Request = SvcRequest;
+    type Outcome = SvcOutcome;
+    type Made = Made;
+    type Shared = Mapping;
+
+    fn run(&self) -> Run {
+        self.run
     }
 
-    /// Whether the cycle thread has gone.
-    #[must_use]
-    pub fn is_abandoned(&self) -> bool {
-        self.jobs.is_abandoned()
-    }
-
-    /// Does what there is to do, without waiting.
-    pub fn poll(&mut self) {
-        while let Ok(job) = self.jobs.pop() {
-            match job {
-                Job::Begin(run, phase, fixed) => self.begin(run, phase, fixed),
-                Job::Outcome(run, outcome) => {
-                    let work = self.drives.get_mut(usize::from(run.place)).filter(|work| work.run == run);
-                    if let Some(work) = work
-                        && let Some(plan) = &mut work.plan
-                    {
-                        plan.handle(work.serial, &outcome, &mut work.facts);
-                    }
-                }
-                Job::Unsent(run, _) => {
-                    let work = self.drives.get_mut(usize::from(run.place)).filter(|work| work.run == run);
-                    work.into_iter().for_each(|work| work.plan = None);
-                }
-                Job::Spent(_) | Job::Unused(_) => {}
-            }
-            self.advance();
-        }
-        while let Some(done) = self.waiting.pop_front() {
-            if let Err(rtrb::PushError::Full(done)) = self.done.push(done) {
-                self.waiting.push_front(done);
-                return;
-            }
-        }
-    }
-
-    fn begin(&mut self, run: Run, phase: Phase, fixed: bool) {
-        let Some(work) = self.drives.get_mut(usize::from(run.place)) else { return };
-        (work.run, work.phase) = (run, phase);
+    fn order(&mut self, run: Run, Order { phase, fixed }: Order, context: &mut Context<Self>) {
+        self.run = run;
         if phase == Phase::CP2 {
-            work.facts = DriveFacts::new();
-            work.facts.note_fixed_connections(fixed);
-            work.passed_over.clear();
+            self.setup.restart(fixed);
+            self.setup.unfit = false;
         }
-        match self.mapping.commissioning(&work.needs, phase.0, &work.facts) {
-            Ok(plan) => work.plan = Some(Commissioning::new(plan)),
-            Err(error) => {
-                let notice = Notice::Program { axis: work.axis, address: work.address, error };
-                self.waiting.push_back(Done::Failed(run, notice));
-            }
+        match self.setup.begin(&context.shared, phase) {
+            Ok(()) => self.advance(context),
+            Err(misfit) => context.out.push_back(Done::Failed(run, misfit)),
         }
     }
 
-    /// The next request of each plan, and what follows from those that are through.
-    fn advance(&mut self) {
-        let Self { mapping, drives, waiting, allowed_losses, .. } = self;
-        for work in drives {
-            let (run, Some(plan)) = (work.run, &mut work.plan) else { continue };
-            let serial = &mut work.serial;
-            plan.poll_with(|request| {
+    fn handle(&mut self, outcome: &SvcOutcome, context: &mut Context<Self>) {
+        self.setup.handle(self.serial, outcome);
+        self.advance(context);
+    }
+
+    fn give_up(&mut self) {
+        self.setup.give_up();
+    }
+}
+
+impl DriveWork {
+    /// The next request, or what follows from a plan that is through.
+    fn advance(&mut self, context: &mut Context<Self>) {
+        let Self { run, setup, serial } = self;
+        let Context { shared: mapping, out } = context;
+        while !setup.is_waiting() {
+            let (mut request, mut told) = (None, Vec::new());
+            let mut submit = |next| {
                 *serial += 1;
-                waiting.push_back(Done::Submit(run, request));
+                request = Some(next);
                 Some(*serial)
-            });
-            if !plan.is_done() {
-                continue;
-            }
-            let (axis, address) = (work.axis, work.address);
-            let failed = plan.failure();
-            let more = plan.wants_more();
-            work.passed_over.append(&mut plan.take_passed_over());
-            if more {
-                match mapping.commissioning(&work.needs, work.phase.0, &work.facts) {
-                    Ok(next) => {
-                        let next = work.plan.insert(Commissioning::new(next));
-                        next.poll_with(|request| {
-                            *serial += 1;
-                            waiting.push_back(Done::Submit(run, request));
-                            Some(*serial)
-                        });
-                    }
-                    Err(error) => {
-                        work.plan = None;
-                        waiting.push_back(Done::Failed(run, Notice::Program { axis, address, error }));
-                    }
-                }
-                continue;
-            }
-            if (failed.is_some() || work.phase != Phase::CP2) && !work.passed_over.is_empty() {
-                let failures = std::mem::take(&mut work.passed_over);
-                waiting.push_back(Done::Told(Notice::PassedOver { axis, failures }));
-            }
-            work.plan = None;
-            if let Some(failure) = failed {
-                waiting.push_back(Done::Failed(run, Notice::Commissioning { axis, address, failure }));
-                continue;
-            }
-            let done = if work.phase == Phase::CP2 {
-                connections(mapping, &work.needs, &work.facts, *allowed_losses)
-                    .map(|connections| Done::Connect(run, connections))
-            } else {
-                for difference in work.facts.differences(&mapping.dictionaries.sercos) {
-                    waiting.push_back(Done::Told(Notice::Difference { axis, difference }));
-                }
-                let (needs, facts) = (&work.needs, &work.facts);
-                mapping.sercos_program(needs, facts).map(|program| {
-                    let known = limitations(mapping, axis, address, needs, facts, &program);
-                    waiting.extend(known.into_iter().map(Done::Told));
-                    Done::Program(run, program)
-                })
             };
-            waiting.push_back(
-                done.unwrap_or_else(|error| Done::Failed(run, Notice::Program { axis, address, error })),
-            );
+            let Some(progress) = setup.poll(mapping, &mut submit, &mut |notice| told.push(notice)) else {
+                return;
+            };
+            out.extend(request.map(|request| Done::Submit(*run, request)));
+            out.extend(told.into_iter().map(Done::Told));
+            match progress {
+                Progress::Busy => {}
+                Progress::Connections(connections) => {
+                    out.push_back(Done::Made(*run, Made::Connections(connections)));
+                }
+                Progress::Program(program) => out.push_back(Done::Made(*run, Made::Program(program))),
+                Progress::Failed(failed) => {
+                    setup.give_up();
+                    out.push_back(Done::Failed(*run, failed));
+                }
+            }
         }
     }
 }

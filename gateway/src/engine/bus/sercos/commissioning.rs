@@ -4,8 +4,6 @@
 //! says is kept in its [`DriveFacts`], from which the next plan and in the end the drive's program are compiled.
 
 use arrayvec::ArrayVec;
-use profile_sercos::master::Master;
-use profile_sercos::master::event::{SlaveId, Ticket};
 use profile_sercos::master::svc::request::{
     Shape, SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest,
 };
@@ -32,7 +30,7 @@ pub struct StepFailure {
 
 /// One plan under way. `T` tells its requests apart.
 #[derive(Debug)]
-pub struct Commissioning<T = Ticket> {
+pub struct Commissioning<T> {
     plan: CommissioningPlan,
     /// The step under way.
     at: usize,
@@ -78,6 +76,12 @@ impl<T: Copy + PartialEq> Commissioning<T> {
         self.failure.is_some() || self.at >= self.plan.steps.len()
     }
 
+    /// Whether a request is under way.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.ticket.is_some()
+    }
+
     /// Whether the phase is to be planned again, with what the drive has told.
     #[must_use]
     pub fn wants_more(&self) -> bool {
@@ -97,7 +101,7 @@ impl<T: Copy + PartialEq> Commissioning<T> {
     }
 
     /// Submits what is next, when nothing is under way.
-    pub fn poll_with(&mut self, mut submit: impl FnMut(SvcRequest) -> Option<T>) {
+    pub fn poll(&mut self, submit: &mut dyn FnMut(SvcRequest) -> Option<T>) {
         while self.ticket.is_none() && !self.is_done() {
             let Some(request) = self.request() else {
                 self.next_step();
@@ -238,12 +242,5 @@ impl<T: Copy + PartialEq> Commissioning<T> {
                 self.next_step();
             }
         }
-    }
-}
-
-impl Commissioning {
-    /// Submits what is next to a slave of the master, when nothing is under way.
-    pub fn poll(&mut self, master: &mut Master, slave: SlaveId) {
-        self.poll_with(|request| master.svc_submit(slave, request).ok());
     }
 }

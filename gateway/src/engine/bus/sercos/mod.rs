@@ -6,6 +6,8 @@
 
 pub mod commissioner;
 pub mod commissioning;
+mod progress;
+mod recovery;
 
 use arrayvec::ArrayVec;
 use profile_generic::state::Report;
@@ -24,14 +26,17 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use self::commissioner::{CommissionerHandle, Done, Job, Run};
-use self::commissioning::{Commissioning, StepFailure};
+use self::commissioner::{DriveWork, Made, Order, Progress as SetupProgress, Setup};
+use self::progress::PhaseProgress;
+use self::recovery::Recovery;
+use super::accesses::Accesses;
+use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
-use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError, Step};
+use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -41,20 +46,6 @@ const CONFIGURATION_LIST: u8 = 6;
 
 /// The connection in the AT.
 pub const FEEDBACK_CONNECTION: u8 = 1;
-
-/// Pause before the bus is brought up anew for a lost drive while nobody uses the others; it doubles with every vain
-/// attempt.
-const RESCAN_PAUSE: DurationNs = DurationNs::from_secs(10);
-
-/// Longest such pause.
-const RESCAN_PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
-
-/// Pause before a failed phase-up is tried again; it doubles, up to [`RESCAN_PAUSE_MAX`], while a drive is refused that only another
-/// configuration can help.
-const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
-
-/// How often is said what a long phase waits for.
-const PROGRESS: DurationNs = DurationNs::from_secs(5);
 
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
 const REFUSED_MAX: usize = 64;
@@ -71,7 +62,7 @@ enum Stage {
     /// Not found, failed, or lost.
     Absent,
     /// Working through the plan of CP2 or CP3.
-    Commissioning(Box<Commissioning>),
+    Commissioning,
     /// On its way in by hot plug, commissioned beside the cycle.
     Joining {
         /// The request that is under way.
@@ -86,51 +77,16 @@ enum Stage {
 struct Drive {
     /// Number of the axis.
     axis: usize,
-    address: u16,
-    needs: SercosAxis,
-    /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
-    allowed_losses: u16,
+    setup: Setup<Ticket>,
     slave: Option<SlaveId>,
     /// Numbers of its two connections, to it and from it.
     connections: [u8; 2],
     stage: Stage,
-    facts: DriveFacts,
-    /// It was refused for what it is: trying again does not help, and no command is executed in it.
-    unfit: bool,
     /// It may come later: nothing is missing without it.
     hot_plug: bool,
     /// How often it has come by hot plug.
     runs: u32,
-    /// Steps that it did not take and need not, until they are told.
-    passed_over: Vec<StepFailure>,
-    accesses: ArrayVec<(Ticket, Purpose), ACCESSES_MAX>,
-}
-
-/// What is said of a phase before CP4 that takes long.
-#[derive(Debug, Default)]
-struct Telling {
-    phase: Option<Phase>,
-    since: MonotonicTime,
-    told: i64,
-}
-
-impl Telling {
-    /// What is to be said: every [`PROGRESS`] that the bus is in the same phase on its way up.
-    fn tell(&mut self, now: MonotonicTime, master: &Master) -> Option<Notice> {
-        let phase = master.phase();
-        if phase != self.phase {
-            *self = Self { phase, since: now, told: 0 };
-        }
-        // On the way down, and in a pause before the next try, nobody waits for anything.
-        let phase = phase.filter(|phase| *phase < Phase::CP4 && master.target_phase() == Some(Phase::CP4))?;
-        let times = now.since(self.since).0 / PROGRESS.0;
-        if times <= self.told {
-            return None;
-        }
-        self.told = times;
-        let seconds = u16::try_from(now.since(self.since).0 / 1_000_000_000).unwrap_or(u16::MAX);
-        Some(Notice::Progress { phase, seconds, with: master.waits_for() })
-    }
+    accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
 /// The bus.
@@ -140,24 +96,13 @@ pub struct SercosBus {
     drives: Vec<Drive>,
     /// The drive of each axis.
     places: Places<usize>,
-    retry_at: Option<MonotonicTime>,
-    retry_pause: DurationNs,
-    progress: Telling,
-    wanted: Option<Phase>,
+    recovery: Recovery,
+    progress: PhaseProgress,
     cycles_seen: u64,
     /// Slaves that stand in the way of the others; left out until the next scan.
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
-    /// Since when a drive is lost that was there.
-    lost_since: Option<MonotonicTime>,
-    /// A slave hangs and was left out. Phase 0 cannot get past it: a new scan would find nobody.
-    isolated: bool,
-    rescan_pause: DurationNs,
-    /// No controller is connected.
-    idle: bool,
-    /// The bus goes down because the box wants it to: that is no fault of any axis.
-    planned: bool,
     /// Who commissions drives that come later.
-    commissioner: CommissionerHandle,
+    commissioner: CommissionerHandle<DriveWork>,
     /// Room for a frame.
     buffer: Box<[u8; FRAME_MAX]>,
 }
@@ -171,7 +116,7 @@ impl SercosBus {
     pub fn new(
         config: MasterConfig,
         drives: Vec<(usize, u16, SercosAxis)>,
-        commissioner: CommissionerHandle,
+        commissioner: CommissionerHandle<DriveWork>,
     ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
         let later: Vec<_> = config
@@ -184,35 +129,23 @@ impl SercosBus {
         master.set_target_phase(Phase::CP4);
         let drive = |(axis, address, needs)| Drive {
             axis,
-            address,
-            needs,
-            allowed_losses,
+            setup: Setup::new(axis, address, needs, allowed_losses),
             slave: None,
             connections: [COMMAND_CONNECTION, FEEDBACK_CONNECTION],
             stage: Stage::Absent,
-            facts: DriveFacts::new(),
-            unfit: false,
             hot_plug: later.contains(&address),
             runs: 0,
-            passed_over: Vec::new(),
-            accesses: ArrayVec::new(),
+            accesses: Accesses::new(),
         };
         let drives: Vec<_> = drives.into_iter().map(drive).collect();
         Ok(Self {
             master,
             places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.axis, place))),
             drives,
-            retry_at: None,
-            retry_pause: RETRY_PAUSE,
-            progress: Telling::default(),
-            wanted: Some(Phase::CP4),
+            recovery: Recovery::new(),
+            progress: PhaseProgress::default(),
             cycles_seen: 0,
             refused: ArrayVec::new(),
-            lost_since: None,
-            isolated: false,
-            rescan_pause: RESCAN_PAUSE,
-            idle: true,
-            planned: false,
             commissioner,
             buffer: Box::new([0; FRAME_MAX]),
         })
@@ -227,7 +160,7 @@ impl SercosBus {
     /// What the drive of an axis is needed for, and what it has told of itself.
     #[must_use]
     pub fn drive(&self, axis: usize) -> Option<(&SercosAxis, &DriveFacts)> {
-        self.drive_of(axis).map(|drive| (&drive.needs, &drive.facts))
+        self.drive_of(axis).map(|drive| (&drive.setup.needs, &drive.setup.facts))
     }
 
     fn drive_of(&self, axis: usize) -> Option<&Drive> {
@@ -251,16 +184,16 @@ impl SercosBus {
             Event::SlaveReturned { .. }
                 if self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive)) =>
             {
-                self.lost_since = None;
+                self.recovery.find_all();
             }
-            Event::Isolated { .. } => self.isolated = true,
+            Event::Isolated { .. } => self.recovery.isolate(),
             Event::OtherMaster(_) => {
                 for drive in &self.drives {
                     axes[drive.axis].doubt_south(now, system);
                 }
             }
             Event::GaveWay => {
-                self.planned = true;
+                self.recovery.give_way();
                 self.lose_all(now, system, axes);
             }
             Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
@@ -272,15 +205,15 @@ impl SercosBus {
             Event::AwaitingApplication { phase } => {
                 self.exclude_refused();
                 for drive in self.drives.iter_mut().filter(|drive| drive.slave.is_some()) {
-                    drive.plan(mapping, phase.0, notice);
+                    drive.plan(mapping, *phase, notice);
                 }
             }
             Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
             Event::HotPlugged { slave, .. } => {
                 let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(*slave));
                 drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
-                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
-                    (self.lost_since, self.rescan_pause) = (None, RESCAN_PAUSE);
+                if self.is_complete() {
+                    self.recovery.complete();
                 }
             }
             Event::HotPlugRefused { address: Some(address), reason } => {
@@ -293,24 +226,18 @@ impl SercosBus {
             | Event::CheckFailed { slave, .. }
                 if self.is_joining(*slave) => {}
             Event::Phase(phase) if *phase == Phase::CP4 => {
-                self.planned = false;
-                self.retry_pause = RETRY_PAUSE;
                 let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
-                fit.for_each(|drive| drive.unfit = false);
-                if self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug) {
-                    self.rescan_pause = RESCAN_PAUSE;
-                } else if self.rescan_pause > RESCAN_PAUSE {
-                    // It was there once and is missing after a new scan: looked for again, ever more rarely.
-                    self.lost_since = Some(now);
-                }
+                fit.for_each(|drive| drive.setup.unfit = false);
+                let is_complete = self.is_complete();
+                self.recovery.reach_cp4(now, is_complete);
             }
             Event::SlaveLost { slave, address, phase } => {
                 // One that comes back by hot plug needs no new scan.
                 let facts = self.master.slave(*slave).map(|info| info.facts);
                 let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
-                let configured = |drive: &Drive| drive.address == *address && drive.hot_plug;
+                let configured = |drive: &Drive| drive.setup.address == *address && drive.hot_plug;
                 if !has_class && !self.drives.iter().any(configured) {
-                    self.lost_since.get_or_insert(now);
+                    self.recovery.miss(now);
                 }
                 // In CP4 it may hear every word and be back in a moment: it is told to stop as long as its place is kept. That
                 // it is not heard its connection says.
@@ -322,8 +249,8 @@ impl SercosBus {
                 if self.may_be_bare(*slave, *idn) =>
             {
                 for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(*slave)) {
-                    drive.needs.bare = true;
-                    notice(Notice::Bare { axis: index(drive.axis), address: drive.address });
+                    drive.setup.needs.bare = true;
+                    notice(Notice::Bare { axis: index(drive.axis), address: drive.setup.address });
                 }
                 self.refuse(now, system, *slave, axes);
             }
@@ -336,12 +263,19 @@ impl SercosBus {
             // Nothing but another configuration helps; until then the phase-up is tried again and again.
             Event::LayoutRefused(_) => self.master.set_target_phase(Phase::CP0),
             Event::Phase(phase) if *phase < Phase::CP2 => {
-                self.isolated &= *phase != Phase::CP0;
+                if *phase == Phase::CP0 {
+                    self.recovery.begin_scan();
+                }
                 self.lose_all(now, system, axes);
             }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
         }
+    }
+
+    /// Whether every drive is there that cannot come later.
+    fn is_complete(&self) -> bool {
+        self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug)
     }
 
     /// Goes on without a slave.
@@ -355,7 +289,7 @@ impl SercosBus {
     /// Whether a slave has refused a configuration list that can do with less.
     fn may_be_bare(&self, slave: SlaveId, idn: Idn) -> bool {
         let list = |instance| idn == Idn::connection(instance, CONFIGURATION_LIST);
-        let full = |drive: &Drive| drive.slave == Some(slave) && !drive.needs.bare;
+        let full = |drive: &Drive| drive.slave == Some(slave) && !drive.setup.needs.bare;
         [COMMAND_CONNECTION, FEEDBACK_CONNECTION].into_iter().any(list) && self.drives.iter().any(full)
     }
 
@@ -389,7 +323,7 @@ impl SercosBus {
         for drive in &mut self.drives {
             drive.lose();
             let axis = &mut axes[drive.axis];
-            if self.planned {
+            if self.recovery.is_planned() {
                 axis.leave_south(now, system);
             } else {
                 axis.lose_south(now, system);
@@ -400,76 +334,62 @@ impl SercosBus {
     /// Starts the commissioning of a drive in CP2.
     fn begin(&mut self, place: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
         let drive = &mut self.drives[place];
-        let found = self.master.slave_by_address(drive.address);
+        let found = self.master.slave_by_address(drive.setup.address);
         drive.slave = found.filter(|slave| !self.refused.contains(slave));
-        drive.facts = DriveFacts::new();
-        drive.facts.note_fixed_connections(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
-        drive.passed_over.clear();
+        drive.setup.restart(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
         let other = drive.slave.and_then(|slave| self.master.slave(slave)?.facts.fsp_type).and_then(no_drive);
         if let (Some(what), Some(slave)) = (other, drive.slave) {
             let error = SercosError::Profile(what);
-            notice(Notice::Program { axis: index(drive.axis), address: drive.address, error });
+            notice(Notice::Program { axis: index(drive.axis), address: drive.setup.address, error });
             drive.lose();
             let _ = self.refused.try_push(slave);
             let _ = self.master.exclude(slave);
         } else if drive.slave.is_some() {
-            drive.plan(mapping, Phase::CP2.0, notice);
+            drive.plan(mapping, Phase::CP2, notice);
         } else {
             drive.stage = Stage::Absent;
             // One that was refused has been told with the reason.
             if !drive.hot_plug && found.is_none() {
-                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.address });
+                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.setup.address });
             }
         }
     }
 
     fn commission(&mut self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) {
-        let Some(phase) = self.master.state().awaits() else { return };
+        if self.master.state().awaits().is_none() {
+            return;
+        }
+        let Self { master, drives, refused, .. } = self;
         let mut busy = false;
-        for drive in &mut self.drives {
-            let axis = drive.axis;
-            let (Stage::Commissioning(work), Some(slave)) = (&mut drive.stage, drive.slave) else { continue };
-            work.poll(&mut self.master, slave);
-            if !work.is_done() {
-                busy = true;
-                continue;
-            }
-            let (failure, more) = (work.failure(), work.wants_more());
-            drive.passed_over.append(&mut work.take_passed_over());
-            if more {
-                drive.plan(mapping, phase.0, notice);
-                if matches!(drive.stage, Stage::Commissioning(_)) {
-                    busy = true;
-                } else {
-                    let _ = self.refused.try_push(slave);
-                    let _ = self.master.exclude(slave);
-                }
-                continue;
-            }
+        for drive in drives {
+            let (Stage::Commissioning, Some(slave)) = (&drive.stage, drive.slave) else { continue };
+            let mut submit = |request| master.svc_submit(slave, request).ok();
+            let Some(progress) = drive.setup.poll(mapping, &mut submit, notice) else { continue };
             drive.stage = Stage::Ready;
-            let last = failure.is_some() || phase != Phase::CP2;
-            if last && !drive.passed_over.is_empty() {
-                let failures = std::mem::take(&mut drive.passed_over);
-                notice(Notice::PassedOver { axis: index(axis), failures });
-            }
-            let taken = match failure {
-                Some(failure) => {
-                    notice(Notice::Commissioning { axis: index(axis), address: drive.address, failure });
-                    false
+            let taken = match progress {
+                SetupProgress::Busy => {
+                    drive.stage = Stage::Commissioning;
+                    busy = true;
+                    true
                 }
-                None if phase == Phase::CP2 => drive.connect(mapping, &mut self.master, slave, notice),
-                None => {
-                    for difference in drive.facts.differences(&mapping.dictionaries.sercos) {
-                        notice(Notice::Difference { axis: index(axis), difference });
-                    }
-                    drive.take(mapping, axes, notice)
+                SetupProgress::Connections(connections) => {
+                    drive.connections = numbers(&connections);
+                    master.set_connections(slave, connections).is_ok()
+                }
+                SetupProgress::Program(program) => {
+                    axes[drive.axis].set_south(program);
+                    true
+                }
+                SetupProgress::Failed(failed) => {
+                    notice(failed);
+                    false
                 }
             };
             if !taken {
                 // The others go on without it.
-                drive.unfit = true;
-                let _ = self.refused.try_push(slave);
-                let _ = self.master.exclude(slave);
+                drive.setup.unfit = true;
+                let _ = refused.try_push(slave);
+                let _ = master.exclude(slave);
                 drive.lose();
             }
         }
@@ -486,7 +406,7 @@ impl SercosBus {
 
     /// A slave is on its way in by hot plug: the drive of an axis, or one that nobody asked for.
     fn begin_joining(&mut self, slave: SlaveId, address: u16, phase: Phase) {
-        let Some(place) = self.drives.iter().position(|drive| drive.address == address) else {
+        let Some(place) = self.drives.iter().position(|drive| drive.setup.address == address) else {
             // It takes part without connections.
             let _ = self.master.proceed_hot_plug(slave);
             return;
@@ -500,7 +420,7 @@ impl SercosBus {
         drive.stage = Stage::Joining { ticket: None };
         let run = drive.run(place);
         let fixed = is_fixed(&self.master, slave);
-        if !self.commissioner.push(Job::Begin(run, phase, fixed)) {
+        if !self.commissioner.push(Job::Order(run, Order { phase, fixed })) {
             // It is tried again after a while.
             drive.lose();
             let _ = self.master.exclude(slave);
@@ -515,23 +435,7 @@ impl SercosBus {
         axes: &mut [AxisChannel],
         notice: &mut dyn FnMut(Notice),
     ) {
-        // Each piece of work can make one job.
-        while self.commissioner.has_room()
-            && let Some(done) = self.commissioner.pop()
-        {
-            let run = match &done {
-                Done::Told(_) => None,
-                Done::Submit(run, _)
-                | Done::Connect(run, _)
-                | Done::Program(run, _)
-                | Done::Failed(run, _) => Some(*run),
-            };
-            let Some(run) = run else {
-                if let Done::Told(told) = done {
-                    notice(told);
-                }
-                continue;
-            };
+        while let Some((run, done)) = self.commissioner.pop(notice) {
             let place = usize::from(run.place);
             let joining = self.drives.get(place).filter(|drive| {
                 drive.run(place) == run && matches!(drive.stage, Stage::Joining { ticket: None })
@@ -551,11 +455,11 @@ impl SercosBus {
                     }
                     continue;
                 }
-                Done::Connect(_, connections) => {
+                Done::Made(_, Made::Connections(connections)) => {
                     self.drives[place].connections = numbers(&connections);
                     self.master.set_connections(slave, connections).is_ok()
                 }
-                Done::Program(_, program) => {
+                Done::Made(_, Made::Program(program)) => {
                     axes[axis].set_south(program);
                     true
                 }
@@ -584,7 +488,7 @@ impl SercosBus {
         reason: HotPlugRefusal,
         axes: &mut [AxisChannel],
     ) {
-        let Some(drive) = self.drives.iter_mut().find(|drive| drive.address == address) else { return };
+        let Some(drive) = self.drives.iter_mut().find(|drive| drive.setup.address == address) else { return };
         if matches!(drive.stage, Stage::Joining { .. }) {
             drive.lose();
             axes[drive.axis].leave_south(now, system);
@@ -592,7 +496,44 @@ impl SercosBus {
         use HotPlugRefusal as R;
         if matches!(reason, R::Misfit(_) | R::Several | R::NoTelegram) {
             // Nothing but a new scan brings it in.
-            self.lost_since.get_or_insert(now);
+            self.recovery.miss(now);
+        }
+    }
+
+    /// Takes the bus down for another master, because nobody is left, or to look for a drive that is missing.
+    fn take_down(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        let cyclic = self.master.phase() == Some(Phase::CP4);
+        let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
+        let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
+        let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
+        let led = |drive: &Drive| axes[drive.axis].may_have_torque();
+        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
+            self.master.give_way(now);
+        } else if alone || (free && self.recovery.wants_scan(now)) {
+            // Of drives that are all lost nobody knows that they stand.
+            self.recovery.take_down(!alone);
+            for (slave, [command, _]) in
+                self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
+            {
+                self.master.withdraw(slave, command);
+            }
+            self.lose_all(now, system, axes);
+            self.master.set_target_phase(Phase::CP0);
+        }
+    }
+
+    /// Takes the data of drives again that were lost, once their axes know.
+    fn listen_again(&mut self, axes: &[AxisChannel]) {
+        for drive in &self.drives {
+            // Not before the axis knows: it stops, whatever is heard from now on, and is the sooner usable the sooner the drive
+            // says that it stands.
+            let noticed = axes[drive.axis].feedback().report == Report::Silent;
+            let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
+            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
+            let [_, feedback] = drive.connections;
+            if self.master.consumer(slave, feedback).is_some_and(failed) {
+                self.master.reset_consumer(slave, feedback);
+            }
         }
     }
 
@@ -604,7 +545,7 @@ impl SercosBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
         // An access may be answered only after its drive was lost.
-        let asked = |drive: &Drive| drive.accesses.iter().any(|(known, _)| *known == ticket);
+        let asked = |drive: &Drive| drive.accesses.contains(ticket);
         let own = |drive: &Drive| drive.slave == Some(ticket.slave);
         let place = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
         let Some(place) = place else { return };
@@ -618,16 +559,13 @@ impl SercosBus {
             self.commissioner.push(Job::Outcome(run, outcome));
             return;
         }
-        if let Stage::Commissioning(work) = &mut drive.stage
-            && work.handle(ticket, &outcome, &mut drive.facts)
-        {
+        if drive.setup.handle(ticket, &outcome) {
             return;
         }
-        let Some(asked) = drive.accesses.iter().position(|(known, _)| *known == ticket) else {
+        let Some((purpose, _)) = drive.accesses.take(ticket) else {
             self.commissioner.push(Job::Spent(outcome));
             return;
         };
-        let (_, purpose) = drive.accesses.remove(asked);
         answer(axes, Answer { axis: drive.axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
     }
 }
@@ -696,11 +634,11 @@ impl Bus for SercosBus {
     }
 
     fn set_idle(&mut self, idle: bool) {
-        self.idle = idle;
+        self.recovery.set_idle(idle);
     }
 
     fn stop(&mut self, _now: MonotonicTime) {
-        self.wanted = None;
+        self.recovery.end();
         self.master.stop();
     }
 
@@ -746,15 +684,10 @@ impl Bus for SercosBus {
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let Some(request) = request(access) else { return false };
         let Some(place) = self.places.of(axis) else { return false };
-        let drive = &mut self.drives[place];
-        let Some(slave) = drive.present_slave().filter(|_| !drive.accesses.is_full()) else { return false };
-        match self.master.svc_submit(slave, request) {
-            Ok(ticket) => {
-                drive.accesses.push((ticket, purpose));
-                true
-            }
-            Err(_) => false,
-        }
+        let Self { master, drives, .. } = self;
+        let drive = &mut drives[place];
+        let Some(slave) = drive.present_slave() else { return false };
+        drive.accesses.submit(access.item, purpose, || master.svc_submit(slave, request).ok())
     }
 
     fn run(
@@ -781,53 +714,17 @@ impl Bus for SercosBus {
             let axis = self.drives[place].axis;
             ask(now, &mut axes[axis], &mut |access, purpose| self.access(axis, access, purpose));
         }
-        let cyclic = self.master.phase() == Some(Phase::CP4);
-        let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
-        let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
-        let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
-        let rescan = self.idle
-            && !self.isolated
-            && self.lost_since.is_some_and(|since| now.since(since) > self.rescan_pause);
-        let led = |drive: &Drive| axes[drive.axis].may_have_torque();
-        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
-            self.master.give_way(now);
-        } else if alone || (free && rescan) {
-            self.lost_since = None;
-            // Of drives that are all lost nobody knows that they stand.
-            self.planned = !alone;
-            self.rescan_pause = (self.rescan_pause * 2).min(RESCAN_PAUSE_MAX);
-            for (slave, [command, _]) in
-                self.drives.iter().filter_map(|drive| Some((drive.slave?, drive.connections)))
-            {
-                self.master.withdraw(slave, command);
-            }
-            self.lose_all(now, system, axes);
-            self.master.set_target_phase(Phase::CP0);
-        }
-        for drive in &self.drives {
-            // Not before the axis knows: it stops, whatever is heard from now on, and is the sooner usable the sooner the drive
-            // says that it stands.
-            let noticed = axes[drive.axis].feedback().report == Report::Silent;
-            let Some(slave) = drive.slave.filter(|_| noticed) else { continue };
-            let failed = |consumer: Consumer<'_>| consumer.state == ConsumerState::Error;
-            let [_, feedback] = drive.connections;
-            if self.master.consumer(slave, feedback).is_some_and(failed) {
-                self.master.reset_consumer(slave, feedback);
-            }
-        }
-        if let Some(progress) = self.progress.tell(now, &self.master) {
+        self.take_down(now, system, axes);
+        self.listen_again(axes);
+        if let Some(progress) = self.progress.report(now, &self.master) {
             notice(progress);
         }
-        if self.wanted == Some(Phase::CP4) && self.master.target_phase() != Some(Phase::CP4) {
-            let due = *self.retry_at.get_or_insert(now + self.retry_pause);
-            if now >= due {
-                self.retry_at = None;
-                if self.drives.iter().any(|drive| drive.unfit) {
-                    self.retry_pause = (self.retry_pause * 2).min(RESCAN_PAUSE_MAX);
-                }
-                notice(Notice::Retry);
-                self.master.set_target_phase(Phase::CP4);
-            }
+        let unfit = |drive: &Drive| drive.setup.unfit;
+        if self.master.target_phase() != Some(Phase::CP4)
+            && self.recovery.wants_up(now, self.drives.iter().any(unfit))
+        {
+            notice(Notice::Retry);
+            self.master.set_target_phase(Phase::CP4);
         }
     }
 }
@@ -849,61 +746,18 @@ fn limitations(
 }
 
 impl Drive {
-    /// Gives the axis the program of its drive, once all is known of it.
-    fn take(&self, mapping: &Mapping, axes: &mut [AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
-        match mapping.sercos_program(&self.needs, &self.facts) {
-            Ok(program) => {
-                let axis = index(self.axis);
-                limitations(mapping, axis, self.address, &self.needs, &self.facts, &program)
-                    .into_iter()
-                    .for_each(notice);
-                axes[self.axis].set_south(program);
-                true
-            }
-            Err(error) => {
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
-                false
-            }
-        }
-    }
-
     fn lose(&mut self) {
         self.slave = None;
         self.stage = Stage::Absent;
+        self.setup.give_up();
     }
 
-    fn plan(&mut self, mapping: &Mapping, phase: u8, notice: &mut dyn FnMut(Notice)) {
-        match mapping.commissioning(&self.needs, phase, &self.facts) {
-            Ok(mut plan) => {
-                if self.unfit {
-                    plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
-                }
-                self.stage = Stage::Commissioning(Box::new(Commissioning::new(plan)));
-            }
-            Err(error) => {
-                self.unfit = true;
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
+    fn plan(&mut self, mapping: &Mapping, phase: Phase, notice: &mut dyn FnMut(Notice)) {
+        match self.setup.begin(mapping, phase) {
+            Ok(()) => self.stage = Stage::Commissioning,
+            Err(misfit) => {
+                notice(misfit);
                 self.lose();
-            }
-        }
-    }
-
-    /// Sets up the two connections of the drive from what it has told in CP2.
-    fn connect(
-        &mut self,
-        mapping: &Mapping,
-        master: &mut Master,
-        slave: SlaveId,
-        notice: &mut dyn FnMut(Notice),
-    ) -> bool {
-        match connections(mapping, &self.needs, &self.facts, self.allowed_losses) {
-            Ok(connections) => {
-                self.connections = numbers(&connections);
-                master.set_connections(slave, connections).is_ok()
-            }
-            Err(error) => {
-                notice(Notice::Program { axis: index(self.axis), address: self.address, error });
-                false
             }
         }
     }
@@ -915,7 +769,7 @@ impl Drive {
 
     /// Its work for the commissioner, from its place among the drives.
     fn run(&self, place: usize) -> Run {
-        Run { place: index(place), number: self.runs }
+        Run::new(place, self.runs)
     }
 }
 

@@ -1,0 +1,247 @@
+//! The mapping tables as a page for a browser: every row with where it stands, and what was found.
+
+use std::fmt::Write as _;
+
+use toml::de::{DeTable, DeValue};
+
+use super::Outcome;
+use crate::finding::Severity;
+use crate::{IdnPart, Mapping, TableText, TableTexts};
+
+/// The page needs nothing beside itself.
+const STYLE: &str = "body{font:14px/1.45 system-ui,sans-serif;margin:2em;max-width:110em;color:#222}\
+h1{font-size:1.6em}h2{margin-top:2em;border-bottom:1px solid #bbb}h3{margin-bottom:.3em}\
+table{border-collapse:collapse;margin-bottom:1em}th,td{border:1px solid #ccc;padding:2px 8px;vertical-align:top;text-align:left}\
+th{background:#eee;position:sticky;top:0}tr:target{background:#ffc}td.n{color:#777;text-align:right}\
+pre{background:#f6f6f6;padding:.7em;overflow:auto}.Error{color:#a00}.Warning{color:#850}nav a{margin-right:1em}\
+input{font:inherit;padding:.3em;width:30em}";
+
+/// Shows only the rows that have the text.
+const SCRIPT: &str = "const f=document.getElementById('filter');f.addEventListener('input',()=>{\
+const t=f.value.toLowerCase();for(const r of document.querySelectorAll('tbody tr'))\
+r.hidden=!r.textContent.toLowerCase().includes(t)});";
+
+/// The page of what was checked.
+#[must_use]
+pub fn page(outcome: &Outcome) -> String {
+    let embedded;
+    let texts = match &outcome.texts {
+        Some(texts) => texts,
+        None => {
+            embedded = TableTexts::embedded();
+            &embedded
+        }
+    };
+    let files: Vec<&TableText> = vec![&texts.cip_generic, &texts.generic_sercos, &texts.generic_cia402];
+    let mut page = String::from(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>Axisbridge mapping tables</title>\n",
+    );
+    // Writing to a string does not fail.
+    let _ = write!(page, "<style>{STYLE}</style></head>\n<body>\n<h1>Mapping tables</h1>\n<nav>");
+    for file in &files {
+        let _ = write!(page, "<a href=\"#{0}\">{0}</a>", escaped(name(&file.path)));
+    }
+    let overlays = || texts.families.iter().chain(&texts.overlays);
+    for overlay in overlays() {
+        let _ = write!(page, "<a href=\"#{0}\">{0}</a>", escaped(&overlay.path));
+    }
+    page.push_str("</nav>\n");
+    findings(&mut page, outcome);
+    if let Some(mapping) = &outcome.mapping {
+        coverage(&mut page, mapping);
+    }
+    page.push_str(
+        "<p><input id=\"filter\" placeholder=\"show only rows with this text\" aria-label=\"filter\"></p>\n",
+    );
+    for file in files {
+        table(&mut page, name(&file.path), &file.text);
+    }
+    for overlay in overlays() {
+        table(&mut page, &overlay.path, &overlay.text);
+    }
+    let _ = write!(page, "<script>{SCRIPT}</script>\n</body></html>\n");
+    page
+}
+
+fn name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+fn findings(page: &mut String, outcome: &Outcome) {
+    let list = &outcome.findings;
+    let _ = writeln!(
+        page,
+        "<h2>Findings</h2>\n<p>{} errors, {} warnings, {} notes; {} worked examples were run.</p>",
+        list.count(Severity::Error),
+        list.count(Severity::Warning),
+        list.count(Severity::Note),
+        outcome.examples
+    );
+    let mut each = |wanted: Severity| {
+        for finding in list.list().iter().filter(|finding| finding.severity() == wanted) {
+            let _ = writeln!(page, "<pre class=\"{wanted:?}\">{}</pre>", escaped(&finding.to_string()));
+        }
+    };
+    each(Severity::Error);
+    each(Severity::Warning);
+    if list.count(Severity::Note) > 0 {
+        page.push_str("<details><summary>notes</summary>\n");
+        for finding in list.list().iter().filter(|finding| finding.severity() == Severity::Note) {
+            let _ = writeln!(page, "<pre>{}</pre>", escaped(&finding.to_string()));
+        }
+        page.push_str("</details>\n");
+    }
+}
+
+/// How much of the profiles the tables have.
+fn coverage(page: &mut String, mapping: &Mapping) {
+    let all = mapping.dictionaries.cip.attributes().len();
+    let (served, rejected) = (mapping.cip.attributes.len(), mapping.cip.rejected.len());
+    let idns = mapping.dictionaries.sercos.idns().iter().filter(|row| row.part == IdnPart::Profile).count();
+    let unbound = mapping.sercos.unbound.len();
+    let (objects, left) = (mapping.dictionaries.cia402.objects().len(), mapping.cia402.unbound.len());
+    let _ = writeln!(
+        page,
+        "<h2>Coverage</h2>\n<p>Of {all} attributes of an axis {served} are served and {rejected} rejected with a reason. \
+         Of {idns} IDNs of the drive profile {unbound} are bound by no row, with a reason. \
+         Of {objects} objects or families of objects of CiA 402 drives {left} are bound by no row, with a reason.</p>"
+    );
+}
+
+/// The rows of a file, kind by kind in the order of the file.
+fn table(page: &mut String, title: &str, text: &str) {
+    let _ = writeln!(page, "<h2 id=\"{0}\">{0}</h2>", escaped(title));
+    let Ok(tree) = DeTable::parse(text) else {
+        let _ = writeln!(page, "<pre>{}</pre>", escaped(text));
+        return;
+    };
+    let mut sections: Vec<_> = tree.get_ref().iter().collect();
+    sections.sort_by_key(|(key, _)| key.span().start);
+    for (key, value) in sections {
+        section(page, title, text, key.get_ref(), value.get_ref());
+    }
+}
+
+fn section(page: &mut String, file: &str, text: &str, name: &str, value: &DeValue<'_>) {
+    match value {
+        DeValue::Table(row) if row.iter().all(|(_, value)| is_rows(value.get_ref())) && !row.is_empty() => {
+            // An overlay has the rows below the name of their table.
+            let mut inner: Vec<_> = row.iter().collect();
+            inner.sort_by_key(|(key, _)| key.span().start);
+            for (key, value) in inner {
+                section(page, file, text, &format!("{name}.{}", key.get_ref()), value.get_ref());
+            }
+        }
+        DeValue::Table(row) => rows(page, file, text, name, &[row]),
+        DeValue::Array(array) => {
+            let tables: Vec<_> = array
+                .iter()
+                .filter_map(|item| match item.get_ref() {
+                    DeValue::Table(row) => Some(row),
+                    _ => None,
+                })
+                .collect();
+            if !tables.is_empty() {
+                rows(page, file, text, name, &tables);
+            }
+        }
+        other => {
+            let _ = writeln!(page, "<p><b>{}</b> {}</p>", escaped(name), shown(other));
+        }
+    }
+}
+
+fn is_rows(value: &DeValue<'_>) -> bool {
+    matches!(value, DeValue::Array(array) if array.iter().any(|item| matches!(item.get_ref(), DeValue::Table(_))))
+}
+
+fn rows(page: &mut String, file: &str, text: &str, name: &str, rows: &[&DeTable<'_>]) {
+    let mut columns: Vec<(usize, &str)> = Vec::new();
+    for row in rows {
+        for (key, _) in row.iter() {
+            if !columns.iter().any(|(_, known)| *known == key.get_ref().as_ref()) {
+                columns.push((key.span().start, key.get_ref().as_ref()));
+            }
+        }
+    }
+    columns.sort_unstable();
+    let _ = write!(page, "<h3>{}</h3>\n<table><thead><tr><th>line</th>", escaped(name));
+    for (_, column) in &columns {
+        let _ = write!(page, "<th>{}</th>", escaped(column));
+    }
+    page.push_str("</tr></thead><tbody>\n");
+    for row in rows {
+        let at = row.iter().map(|(key, _)| key.span().start).min().unwrap_or_default();
+        let line = text.get(..at).map_or(0, |before| before.matches('\n').count() + 1);
+        let _ = write!(
+            page,
+            "<tr id=\"{0}-{line}\"><td class=\"n\"><a href=\"#{0}-{line}\">{line}</a></td>",
+            escaped(file)
+        );
+        for (_, column) in &columns {
+            let value = row.get(*column).map_or_else(String::new, |value| shown(value.get_ref()));
+            let _ = write!(page, "<td>{value}</td>");
+        }
+        page.push_str("</tr>\n");
+    }
+    page.push_str("</tbody></table>\n");
+}
+
+/// A value as people read it.
+fn shown(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => escaped(text),
+        DeValue::Integer(number) => escaped(&number.to_string()),
+        DeValue::Float(number) => escaped(&number.to_string()),
+        DeValue::Boolean(flag) => flag.to_string(),
+        DeValue::Datetime(time) => escaped(&time.to_string()),
+        DeValue::Array(items) => {
+            let lines = items.iter().any(|item| matches!(item.get_ref(), DeValue::Table(_)));
+            let items: Vec<_> = items.iter().map(|item| shown(item.get_ref())).collect();
+            items.join(if lines { "<br>" } else { ", " })
+        }
+        DeValue::Table(table) => {
+            let mut pairs: Vec<_> = table.iter().collect();
+            pairs.sort_by_key(|(key, _)| key.span().start);
+            let pairs = pairs
+                .iter()
+                .map(|(key, value)| format!("{} {}", escaped(key.get_ref()), shown(value.get_ref())));
+            pairs.collect::<Vec<_>>().join("; ")
+        }
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Overlay;
+    use crate::check::check;
+
+    #[test]
+    fn every_row_stands_on_the_page_and_text_is_no_markup() {
+        let mut texts = TableTexts::embedded();
+        let overlay = "format = 1\noverlay = \"a < b\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"reject\"\n";
+        texts.overlays.push(Overlay::new("own.toml", overlay));
+        let outcome = Outcome { texts: Some(texts.clone()), ..check(None, &[]) };
+        let page = page(&outcome);
+        let rows = texts.cip_generic.text.matches("\n[[").count()
+            + texts.generic_sercos.text.matches("\n[[").count()
+            + texts.generic_cia402.text.matches("\n[[").count();
+        assert!(page.matches("<tr id=").count() > rows, "{}", page.matches("<tr id=").count());
+        assert!(page.contains("a &lt; b") && !page.contains("a < b"));
+        assert!(page.contains("<h3>generic-sercos.parameter</h3>"));
+        let line = texts
+            .generic_sercos
+            .text
+            .lines()
+            .position(|line| line == "signal = \"position_command\"")
+            .unwrap()
+            + 1;
+        assert!(page.contains(&format!("id=\"generic-sercos.toml-{line}\"")), "{line}");
+        assert!(page.contains("0 errors"));
+    }
+}

@@ -1,0 +1,49 @@
+//! Rows of the generic dictionary.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::finding::Spanned;
+
+use super::Name;
+
+/// `mappings/tables/dictionary/generic.toml`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GenericFile {
+    /// Version of the file format.
+    pub format: Spanned<u32>,
+    /// `generic`.
+    pub profile: Name,
+    /// Values of the process image.
+    pub signal: Vec<SignalRow>,
+    /// Parameters outside the process image.
+    pub parameter: Vec<ParameterRow>,
+}
+
+/// A signal of the generic model.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SignalRow {
+    /// Name in snake case.
+    pub name: Name,
+    /// What it measures.
+    pub quantity: Name,
+    /// `command` or `feedback`.
+    pub access: Name,
+}
+
+/// A parameter of the generic model.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterRow {
+    /// Name in snake case.
+    pub name: Name,
+    /// What it measures.
+    pub quantity: Name,
+    /// `integer`, `float` or `text`.
+    #[serde(rename = "type")]
+    pub data_type: Name,
+    /// `read`, `write` or `write_while_disabled`.
+    pub access: Name,
+}

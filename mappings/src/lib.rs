@@ -1,0 +1,452 @@
+//! The mapping tables: what corresponds between CIP Motion, the generic model and SERCOS.
+//!
+//! ```text
+//! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
+//!  format                dictionary,              Telegram, CommissioningPlan, DriveProgram
+//!                        cip_tables, sercos_tables
+//! ```
+//!
+//! Loading finds unknown keys and wrong types, resolving finds names that nothing has and units that do not
+//! convert; both tell file, line, column and key. Compiling makes flat programs for one axis; what can
+//! still go wrong then lies with the axis or the drive. No translation of an attribute, IDN, state, mode or
+//! fault is code.
+
+mod attributes;
+mod capture_program;
+mod captures;
+pub mod check;
+mod cia402;
+mod cip_events;
+mod cip_scaling;
+mod cip_tables;
+mod commissioning;
+mod compile_cip;
+mod compile_sercos;
+mod definitions;
+mod device_link;
+pub mod devicenet;
+mod dictionary;
+mod drive_facts;
+mod drive_program;
+mod examples;
+pub mod finding;
+mod fixed_connections;
+pub mod format;
+mod generic_names;
+mod item;
+mod load;
+mod numbers;
+mod origin;
+mod overlay;
+mod resolver;
+mod rows;
+mod scaling;
+mod sercos_modes;
+mod sercos_tables;
+mod survey;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use profile_cip::device::attribute::AttributeDefinition;
+use profile_generic::mode::ModeSelection;
+
+pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
+pub use capture_program::{
+    CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
+    WORDS_MAX as CAPTURE_WORDS_MAX,
+};
+pub use cia402::{
+    Cia402Axis, Cia402Error, Cia402Tables, DriveIdentity, InterpolationPeriod, ModeWords, ObjectFacts,
+    ObjectStep, Plan, VOLTAGE_BIT,
+};
+pub use cip_events::EventProgram;
+pub use cip_scaling::{CipScaling, CipScalingError};
+pub use cip_tables::{
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes, SequenceAttributes,
+    Served, ServedAttribute, Times,
+};
+pub use commissioning::{CommissioningPlan, Refused, Step};
+pub use compile_cip::{
+    CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
+    CyclicValues, ELEMENTS, MissingValue,
+};
+use compile_sercos::Compiler;
+pub use compile_sercos::{SercosAxis, SercosError};
+pub use device_link::Told;
+pub use dictionary::{
+    Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,
+    Cia402Kind, Cia402Object, Cia402Pdo, Cia402Range, Cia402RangeKind, Cia402SetKind, Cia402Sub, Cia402Type,
+    CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup, CodeRange,
+    CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries, Document,
+    Documents, ETHERNET_IP, Enumeration, ExceptionAction, FaultRecord, Field, FieldValue, GenericDictionary,
+    GroupKind, IdnFormat, IdnPart, IdnUnit, Layout, NamedCode, NetworkObject, Pattern, PolarityEffect,
+    RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode, Trust, Word,
+    networks,
+};
+pub use drive_facts::{Difference, DriveFacts};
+pub use drive_program::{
+    CachedStatus, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry,
+    Procedure, ProcedureBy, Telegram,
+};
+pub use fixed_connections::{FixedConnection, FixedConnections};
+pub use item::{Attribute, Item, Object};
+pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
+pub use numbers::{LostPrecision, RowNumbers};
+pub use origin::Origin;
+pub use overlay::{DrivesHead, OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
+pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
+pub use sercos_tables::{ReportRule, SercosTables};
+
+use crate::finding::Findings;
+use profile_cip::device::attribute::{DefaultValue, ElementRule};
+use profile_cip::device::exception;
+
+/// Bits of Axis Exceptions.
+const EXCEPTION_BITS: u8 = 64;
+
+/// All tables, read and resolved.
+#[derive(Debug, Clone)]
+pub struct Mapping {
+    /// What the profiles have.
+    pub dictionaries: Arc<Dictionaries>,
+    /// CIP Motion and the generic model.
+    pub cip: Arc<CipTables>,
+    /// The generic model and SERCOS.
+    pub sercos: Arc<SercosTables>,
+    /// The generic model and CiA 402.
+    pub cia402: Arc<Cia402Tables>,
+    tables: Tables,
+    families: Vec<Family>,
+}
+
+/// CiA 402 drives that have rows of their own.
+#[derive(Debug, Clone)]
+pub struct Family {
+    /// What they are, in words.
+    pub name: String,
+    vendor: u32,
+    /// None: all that no other family of the vendor has.
+    products: Vec<u32>,
+    /// The tables with their rows.
+    pub mapping: Mapping,
+}
+
+impl Mapping {
+    /// The tables built into the binary.
+    ///
+    /// # Errors
+    /// None with the tables that are shipped; a test holds that.
+    pub fn embedded() -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::embedded())
+    }
+
+    /// The tables in a folder; files that are not there come from the binary.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the files.
+    pub fn from_folder(folder: &Path) -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::from_folder(folder)?)
+    }
+
+    /// The tables in a folder, or those in the binary, and over them files or folders of files.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the files.
+    pub fn load(folder: Option<&Path>, overlays: &[PathBuf]) -> Result<Self, Findings> {
+        Self::from_texts(&TableTexts::load(folder, overlays)?)
+    }
+
+    /// The tables in these texts.
+    ///
+    /// # Errors
+    /// Everything that is wrong with them.
+    pub fn from_texts(texts: &TableTexts) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        match Self::resolve(texts, &mut findings) {
+            Some(mapping) => Ok(mapping),
+            None => Err(findings),
+        }
+    }
+
+    /// The tables in these texts, and everything that is found in them; `None` with errors.
+    pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
+        let (tables, families) = texts.parse(findings)?;
+        let dictionaries = Dictionaries::resolve(&tables, findings);
+        // Tables that were parsed were parsed without an error: those there are now are the dictionaries'.
+        let sound = !findings.has_errors();
+        let mut mapping = Self::join(tables, Arc::new(dictionaries), sound, findings);
+        if !findings.has_errors() {
+            mapping.families = families.into_iter().map(|family| mapping.family(family, findings)).collect();
+        }
+        (!findings.has_errors()).then_some(mapping)
+    }
+
+    /// The mapping tables, resolved by the dictionaries, which are sound or were told not to be.
+    fn join(tables: Tables, dictionaries: Arc<Dictionaries>, sound: bool, findings: &mut Findings) -> Self {
+        let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
+        let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
+        // What is wrong with a dictionary need not be told again by every row that names it.
+        let cia402 = sound.then(|| Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, findings));
+        Self {
+            dictionaries,
+            cip: Arc::new(cip),
+            sercos: Arc::new(sercos),
+            cia402: Arc::new(cia402.unwrap_or_default()),
+            tables,
+            families: Vec::new(),
+        }
+    }
+
+    /// The same for a family of drives.
+    fn family(&self, family: overlay::ParsedFamily, findings: &mut Findings) -> Family {
+        let overlay::ParsedFamily { name, vendor, products, table } = family;
+        let cia402 = Arc::new(Cia402Tables::resolve(&table, &self.dictionaries, findings));
+        let tables = Tables { generic_cia402: table, ..self.tables.clone() };
+        Family {
+            name,
+            vendor,
+            products,
+            mapping: Self { cia402, tables, families: Vec::new(), ..self.clone() },
+        }
+    }
+
+    /// The families of CiA 402 drives that have rows of their own.
+    #[must_use]
+    pub fn families(&self) -> &[Family] {
+        &self.families
+    }
+
+    /// The family that a CiA 402 drive is of, by what its device says of itself.
+    #[must_use]
+    pub fn family_of(&self, identity: &DriveIdentity) -> Option<&Family> {
+        let (vendor, product) = (identity.vendor?, identity.product);
+        let mut own = self.families.iter().filter(|family| family.vendor == vendor);
+        let named = own.clone().find(|family| product.is_some_and(|code| family.products.contains(&code)));
+        named.or_else(|| own.find(|family| family.products.is_empty()))
+    }
+
+    /// The tables for a CiA 402 drive: those of its family, where it is of one.
+    #[must_use]
+    pub fn of_drive(&self, facts: &ObjectFacts) -> &Self {
+        self.family_of(facts.identity()).map_or(self, |family| &family.mapping)
+    }
+
+    /// The same with another text of one of the mapping tables, such as `cip-generic.toml`, for all drives: for whoever
+    /// tries a change. The dictionaries stay as they are.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, and another name of a file.
+    pub fn with_table(&self, file: &str, text: &str) -> Result<Self, Findings> {
+        let mut findings = Findings::default();
+        let table = TableText { path: file.to_owned(), text: text.to_owned() };
+        let mut tables = self.tables.clone();
+        match load::table_name(file) {
+            "cip-generic" => {
+                if let Some(parsed) = rows::parse(&table, "cip-generic", &[], &mut findings) {
+                    tables.cip_generic = parsed;
+                }
+            }
+            "generic-sercos" => {
+                if let Some(parsed) = rows::parse(&table, "generic-sercos", &[], &mut findings) {
+                    tables.generic_sercos = parsed;
+                }
+            }
+            "generic-cia402" => {
+                if let Some(parsed) = rows::parse(&table, "generic-cia402", &[], &mut findings) {
+                    tables.generic_cia402 = parsed;
+                }
+            }
+            _ => {
+                let message = format!("expected the file of a mapping table, got `{file}`");
+                findings.push_file(crate::finding::registry::STRANGER, Path::new(file), message);
+            }
+        }
+        if findings.has_errors() {
+            return Err(findings);
+        }
+        let mapping = Self::join(tables, Arc::clone(&self.dictionaries), true, &mut findings);
+        findings.into_result(mapping)
+    }
+
+    /// The operation modes that drives have, each once, as many as a drive has places for.
+    pub fn drive_modes(&self) -> impl Iterator<Item = ModeSelection> + '_ {
+        self.sercos.modes.iter().map(|rule| rule.selection).take(MAX_MODES)
+    }
+
+    /// The rows as they stand in the files, with their places.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// The program of an axis on the CIP side. `None` when a ratio of the scaling does not fit 64 bits.
+    pub fn cip_program(&self, scaling: &CipScaling) -> Option<CipProgram> {
+        CipProgram::compile(&self.cip, scaling)
+    }
+
+    /// Default and range of each element of Axis Exception Action, or of that of the manufacturer: an exception that nobody
+    /// finds, neither the box nor a drive by its table, is Unsupported.
+    pub fn exception_rules(&self, manufacturer: bool) -> Vec<ElementRule> {
+        let rows = |bit: u8| {
+            let found = |cause| self.sercos.faults.iter().any(|row| row.cause == cause);
+            let exceptions = self.cip.exceptions.iter();
+            exceptions.filter(move |row| {
+                row.manufacturer == manufacturer
+                    && row.bit == bit
+                    && (row.found_by.is_some() || found(row.cause))
+            })
+        };
+        let rule = |bit| {
+            let unsupported = exception::ExceptionAction::UNSUPPORTED.0;
+            // Where several causes share a bit, the strictest counts.
+            let default = rows(bit).map(|row| row.default).max().unwrap_or(unsupported);
+            let least = rows(bit).map(|row| row.least).max().unwrap_or(unsupported);
+            let most =
+                if least == unsupported { unsupported } else { exception::ExceptionAction::MAJOR_FAULT.0 };
+            let range = (f64::from(least), f64::from(most));
+            ElementRule { default: DefaultValue::Integer(i64::from(default)), range }
+        };
+        (0..EXCEPTION_BITS).map(rule).collect()
+    }
+
+    /// Bits of Axis Exceptions that the box, the device or a drive finds.
+    pub fn raised_exceptions(&self) -> impl Iterator<Item = u8> + '_ {
+        let by_drive = |cause| {
+            let rows = self.sercos.faults.iter().map(|row| row.cause);
+            rows.chain(self.cia402.faults().iter().map(|row| row.cause)).any(|known| known == cause)
+        };
+        let rows = self.cip.exceptions.iter().filter(|row| !row.manufacturer);
+        rows.filter(move |row| row.found_by.is_some() || by_drive(row.cause)).map(|row| row.bit)
+    }
+
+    /// The attributes of an axis. `None` when a ratio of the scaling does not fit 64 bits.
+    pub fn attribute_table(&self, scaling: &CipScaling) -> Option<AttributeTable> {
+        AttributeTable::compile(&self.cip, scaling)
+    }
+
+    /// What the device has to know of its attributes, those of the class included. `None` when a ratio of the scaling
+    /// does not fit 64 bits.
+    pub fn attribute_definitions(&self, scaling: &CipScaling) -> Option<Vec<AttributeDefinition>> {
+        Some(definitions::definitions(self, &self.attribute_table(scaling)?))
+    }
+
+    /// What the telegrams of an axis carry, as far as `facts` are known.
+    ///
+    /// # Errors
+    /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
+    pub fn telegram(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<Telegram, SercosError> {
+        Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// The connections of a drive of class SCP_FixCFG, as it has said them; `None` of a drive that takes others.
+    ///
+    /// # Errors
+    /// They lack the control or the status word, or contradict themselves.
+    pub fn fixed_connections(&self, facts: &DriveFacts) -> Result<Option<FixedConnections>, SercosError> {
+        FixedConnections::of(&self.sercos, facts)
+    }
+
+    /// The steps of commissioning in a phase. Parameters are converted by the scaling that `facts` hold by
+    /// then.
+    ///
+    /// # Errors
+    /// A mode has no row, or a value does not fit the drive.
+    pub fn commissioning(
+        &self,
+        axis: &SercosAxis,
+        phase: u8,
+        facts: &DriveFacts,
+    ) -> Result<CommissioningPlan, SercosError> {
+        CommissioningPlan::compile(&self.sercos, &self.dictionaries.sercos, axis, phase, facts)
+    }
+
+    /// The program of an axis on the SERCOS side, once its drive has told its scaling.
+    ///
+    /// # Errors
+    /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
+    pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<DriveProgram, SercosError> {
+        DriveProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// What is asked of a CiA 402 drive at start, or told to it.
+    ///
+    /// # Errors
+    /// A mode is not there, or a value does not fit the drive.
+    pub fn cia402_steps(
+        &self,
+        plan: Plan,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Vec<ObjectStep>, Cia402Error> {
+        self.cia402.steps(plan, axis, facts)
+    }
+
+    /// What has to be tried of a CiA 402 drive that does not tell its modes of operation; `None` where it does, or where the
+    /// configuration tells them, which is noted.
+    #[must_use]
+    pub fn cia402_modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
+        self.cia402.modes_untold(axis, facts)
+    }
+
+    /// Operating modes that an axis does without, because its SERCOS drive lacks something, and what.
+    #[must_use]
+    pub fn sercos_modes_left_out(
+        &self,
+        axis: &SercosAxis,
+        facts: &DriveFacts,
+    ) -> Vec<(ModeSelection, SercosError)> {
+        let compiler = Compiler { tables: &self.sercos, dictionary: &self.dictionaries.sercos, axis, facts };
+        compiler.modes().map(|modes| modes.left_out).unwrap_or_default()
+    }
+
+    /// Operating modes that an axis does without, because its CiA 402 drive lacks something, and what.
+    #[must_use]
+    pub fn cia402_modes_left_out(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Vec<(ModeSelection, Cia402Error)> {
+        self.cia402.modes_left_out(axis, facts)
+    }
+
+    /// The time between set-points that a CiA 402 drive expects, where it is another one than the cycle.
+    #[must_use]
+    pub fn cia402_other_period(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Option<InterpolationPeriod> {
+        self.cia402.other_period(axis, facts)
+    }
+
+    /// Notes that a CiA 402 drive has these modes of operation and no others.
+    pub fn cia402_has_modes(&self, facts: &mut ObjectFacts, codes: impl Iterator<Item = i8>) {
+        self.cia402.has_modes(facts, codes);
+    }
+
+    /// What the telegrams of an axis carry at most, of a CiA 402 drive that lacks nothing.
+    ///
+    /// # Errors
+    /// A mode has no row.
+    pub fn cia402_telegram(&self, axis: &Cia402Axis) -> Result<Telegram, Cia402Error> {
+        self.cia402.telegram_room(axis)
+    }
+
+    /// The program of an axis on the CiA 402 side, once its drive was asked.
+    ///
+    /// # Errors
+    /// The drive lacks a mode or a value that it must have, or nobody says what its counts are.
+    pub fn cia402_program(
+        &self,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<DriveProgram, Cia402Error> {
+        self.cia402.program(axis, facts)
+    }
+
+    /// Runs every worked example of the tables.
+    ///
+    /// Returns how many there are; an example whose numbers do not come out is a finding.
+    pub fn run_examples(&self, findings: &mut Findings) -> usize {
+        examples::run(self, &self.tables, findings)
+    }
+}
