@@ -128,7 +128,7 @@ impl Checker {
             if own.is_some_and(|own| i64::from(own) == *node.get_ref()) {
                 self.report::<()>(
                     node.span(),
-                    format_args!("node-id {} is that of the box", node.get_ref()),
+                    format_args!("node-id {} is that of the gateway", node.get_ref()),
                     "expected another one, or another `node` of the bus",
                 );
             }
@@ -170,7 +170,7 @@ impl Checker {
             Some(names) => self.words(names, "mode", &MODES).map(Some),
         };
         if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
-            self.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");
+            self.report::<()>(names.span(), "an axis without a mode", "expected at least one mode");
         }
         let sent = match &table.actual_values {
             None => {

@@ -39,7 +39,7 @@ impl Checker {
                 |earlier: &&Spanned<CanDeviceTable>| earlier.get_ref().node.get_ref() == node.get_ref();
             if let Some(first) = bus.device[..index].iter().find(same) {
                 let problem = Problem::new(code::TWICE, node.span())
-                    .title(format!("the device with node-id {} is there twice", node.get_ref()))
+                    .title(format!("the device with node-id {} is defined twice", node.get_ref()))
                     .expected("expected all that is said of a device in one [[south.can.device]]");
                 self.push(problem.related(first.get_ref().node.span(), "said here first"));
             }
@@ -77,7 +77,7 @@ impl Checker {
             self.report::<()>(
                 store.span(),
                 "there is no configuration to be stored",
-                "expected `store` only beside `configuration`",
+                "expected `store` only together with `configuration`",
             );
         }
         let keeps_mapping = match &table.pdo_mapping {
@@ -136,11 +136,7 @@ impl Checker {
             (&given.serial_number, "the serial number"),
         ];
         if all.iter().all(|(number, _)| number.is_none()) {
-            return self.report(
-                identity.span(),
-                "an identity that says nothing",
-                "expected `vendor_id` at least",
-            );
+            return self.report(identity.span(), "an empty identity", "expected `vendor_id` at least");
         }
         let numbers = all.map(|(number, what)| match number {
             None => Some(None),
@@ -172,7 +168,7 @@ impl Checker {
             return self.report(
                 factor.span(),
                 "there is no guarding for a life time factor",
-                "expected `life_time_factor` only beside `guarding`",
+                "expected `life_time_factor` only together with `guarding`",
             );
         };
         let guard_time_ms = self.watch_time(text, "the time between two requests of guarding");

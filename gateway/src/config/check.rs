@@ -379,7 +379,7 @@ impl Checker {
                     Some((major @ 1..=127, minor @ 1..)) => Some((major, minor)),
                     _ => self.report(
                         text.span(),
-                        format_args!("`{}` is no revision", text.get_ref()),
+                        format_args!("`{}` is not a revision", text.get_ref()),
                         "expected major and minor, such as \"1.1\" (1 to 127, 1 to 255)",
                     ),
                 }
@@ -774,7 +774,7 @@ impl Checker {
         if south.sercos.is_none() && south.can.is_empty() && south.devicenet.is_empty() {
             self.report::<()>(
                 table.span(),
-                "there is no bus behind the box",
+                "the gateway has no bus",
                 "expected [south.sercos], [[south.can]] or [[south.devicenet]]",
             );
         }
@@ -886,7 +886,7 @@ impl Checker {
             Ok(mac) if text.get_ref().len() == 17 && mac[0] & 1 == 0 && mac != [0; 6] => Some(mac),
             _ => self.report(
                 text.span(),
-                format_args!("`{}` is no Ethernet address of a station", text.get_ref()),
+                format_args!("`{}` is not the Ethernet address of a station", text.get_ref()),
                 "expected six bytes, such as \"02:00:00:00:00:01\", the first one even",
             ),
         }
@@ -935,7 +935,7 @@ impl Checker {
                 Some(rated) => Some(Some(rated)),
                 None => self.report(
                     text.span(),
-                    format_args!("`{}` is no torque or force", text.get_ref()),
+                    format_args!("`{}` is not a torque or force", text.get_ref()),
                     rated::EXPECTED,
                 ),
             },
@@ -947,7 +947,7 @@ impl Checker {
             None => Some(None),
             Some(names) if names.get_ref().is_empty() => self.report(
                 names.span(),
-                "an axis that is used for nothing",
+                "an axis without a mode",
                 "expected at least one mode of \"position\", \"velocity\" and \"torque\"",
             ),
             Some(names) => self.words(names, "mode", &super::can::MODES).map(Some),
@@ -996,7 +996,7 @@ impl Checker {
             Some(time) => Some(time),
             None => self.report(
                 text.span(),
-                format_args!("`{}` is no time", text.get_ref()),
+                format_args!("`{}` is not a time", text.get_ref()),
                 format_args!("expected {}", duration::EXPECTED),
             ),
         }
@@ -1011,7 +1011,7 @@ impl Checker {
             }
             _ => self.report(
                 text.span(),
-                format_args!("`{}` is no address a device can have", text.get_ref()),
+                format_args!("`{}` is not an address that a device can have", text.get_ref()),
                 "expected one IPv4 address of this host, without port, such as \"192.168.1.10\"",
             ),
         }
@@ -1022,8 +1022,8 @@ impl Checker {
             Ok(address) => Some(address),
             Err(_) => self.report(
                 text.span(),
-                format_args!("`{}` is no address with port", text.get_ref()),
-                "expected such as \"0.0.0.0:502\" or \"[::]:502\"",
+                format_args!("`{}` is not an address with a port", text.get_ref()),
+                "expected an address such as \"0.0.0.0:502\" or \"[::]:502\"",
             ),
         }
     }

@@ -118,7 +118,7 @@ impl Checker {
             if own.is_some_and(|own| i64::from(own) == *mac.get_ref()) {
                 self.report::<()>(
                     mac.span(),
-                    format_args!("MAC ID {} is that of the box", mac.get_ref()),
+                    format_args!("MAC ID {} is that of the gateway", mac.get_ref()),
                     "expected another one, or another `mac_id` of the network",
                 );
             }
@@ -164,12 +164,12 @@ impl Checker {
             Some(names) => self.words(names, "mode", &MODES),
         };
         if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
-            self.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");
+            self.report::<()>(names.span(), "an axis without a mode", "expected at least one mode");
         }
         let Some(resolution) = &table.resolution else {
             return self.report(
                 table.name.span(),
-                format_args!("nobody says what the counts of the drive `{}` are", table.name.get_ref()),
+                format_args!("`resolution` of the drive `{}` is missing", table.name.get_ref()),
                 "expected `resolution`, its position counts in a unit: no update of the fixed format tells it",
             );
         };
@@ -190,7 +190,7 @@ impl Checker {
     /// A key that the other kind of drive has.
     fn out_of_place(&mut self, key: Option<(core::ops::Range<usize>, &str)>, expected: &str) {
         if let Some((span, key)) = key {
-            self.report::<()>(span, format_args!("`{key}` says nothing of this drive"), expected);
+            self.report::<()>(span, format_args!("`{key}` does not apply to this drive"), expected);
         }
     }
 
@@ -205,7 +205,7 @@ impl Checker {
             let span = table.packet_rate.as_ref().map_or_else(|| table.name.span(), Spanned::span);
             return self.report(
                 span,
-                format_args!("the drive gives the box up after {} ms", given * TIMEOUT_MULTIPLIER),
+                format_args!("the drive stops by itself after {} ms", given * TIMEOUT_MULTIPLIER),
                 format_args!("expected a packet rate of at least half of the cycle of {cycle} ms"),
             );
         }

@@ -201,14 +201,14 @@ fn identify(sections: &[Section], rows: &Map<String, Value>, definitions: &mut M
             properties.insert(
                 "remove".to_owned(),
                 json!({
-                    "description": "Takes the row away, or keys of it.",
+                    "description": "Removes the row, or keys of it.",
                     "anyOf": [{ "const": true }, { "type": "array", "items": { "type": "string" } }],
                 }),
             );
             if section.first_wins {
                 properties.insert(
                     "last".to_owned(),
-                    json!({ "description": "Puts a new row behind those that are there.", "type": "boolean" }),
+                    json!({ "description": "Puts a new row after the existing ones.", "type": "boolean" }),
                 );
             }
             let rows = properties.clone();

@@ -131,7 +131,7 @@ impl<'a> Builder<'a> {
                     self.resolver.error(code::CONTRADICTION, name.span(), "objects", message);
                 }
                 if self.tables.unbound.iter().any(|(index, _)| *index == object.index) {
-                    let message = format!("{shown} is there twice");
+                    let message = format!("{shown} is defined twice");
                     self.resolver.error(code::TWICE, name.span(), "objects", message);
                 }
                 if !wins {
@@ -194,7 +194,7 @@ impl<'a> Builder<'a> {
         let methods = row.methods.iter().filter_map(|method| self.method(row, method)).collect();
         let unit = row.unit.get_ref().clone();
         if self.tables.scalings.iter().any(|known| known.unit == unit) {
-            self.resolver.error(code::TWICE, row.unit.span(), "unit", "the unit is there twice");
+            self.resolver.error(code::TWICE, row.unit.span(), "unit", "the unit is defined twice");
         }
         self.tables.scalings.push(ScalingRule { unit, quantity, methods });
     }
@@ -285,7 +285,7 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
         }
         if !self.measures(&value, signal.quantity()) {
-            let message = format!("the unit of {} is no {}", value.object, signal.quantity());
+            let message = format!("the unit of {} is not a unit of {}", value.object, signal.quantity());
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
         self.writable(entry, to_drive, &row.direction, value.object);
@@ -294,7 +294,7 @@ impl<'a> Builder<'a> {
             known.modes.is_empty() && modes.is_empty() || known.modes.iter().any(|mode| modes.contains(mode))
         };
         if self.tables.signals.iter().any(|known| known.signal == signal && shared(known)) {
-            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
+            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is defined twice");
         }
         let polarity = row.polarity.as_ref().and_then(|name| self.polarity("polarity", name));
         self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse });
@@ -355,7 +355,7 @@ impl<'a> Builder<'a> {
         let same = |known: &&ModeRule| known.selection == selection;
         let mut known = self.tables.modes.iter().filter(same).flat_map(|known| &known.modes);
         if known.any(|known| modes.contains(known)) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
         }
         let rule = ModeRule { selection, optional, modes, control, handshake, command, actual };
         self.tables.modes.push(rule);
@@ -388,7 +388,7 @@ impl<'a> Builder<'a> {
         };
         let selection = ModeSelection { mode, interpolation };
         if self.tables.procedures.iter().any(|known| known.selection == selection) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
         }
         let time_out = DurationNs::from_secs(i64::from(*row.seconds.get_ref()));
         self.tables.procedures.push(ProcedureRule { selection, modes, start, done, failed, time_out });
@@ -460,7 +460,7 @@ impl<'a> Builder<'a> {
             };
             let pattern = over(pattern, sent);
             if self.tables.actions.iter().any(|known| known.action == action && known.when == when) {
-                self.resolver.error(code::TWICE, row.action.span(), "action", "the action is there twice");
+                self.resolver.error(code::TWICE, row.action.span(), "action", "the action is defined twice");
             }
             self.tables.actions.push(ActionRule { action, when, pattern });
         }
@@ -546,7 +546,7 @@ impl<'a> Builder<'a> {
         let word = Item::object(ERROR_CODE.index, ERROR_CODE.sub);
         for (pattern, place) in patterns {
             if self.tables.faults.iter().any(|known| known.pattern == *pattern) {
-                let message = format!("the code {:04X} is there twice", pattern.value);
+                let message = format!("the code {:04X} is defined twice", pattern.value);
                 self.resolver.error(code::TWICE, place.clone(), "codes", message);
             }
             self.tables.faults.push(FaultRow { word, pattern: *pattern, cause, reaction });
@@ -575,12 +575,12 @@ impl<'a> Builder<'a> {
             return;
         };
         if !self.measures(&value, quantity) {
-            let message = format!("the unit of {} is no {quantity}", value.object);
+            let message = format!("the unit of {} is not a unit of {quantity}", value.object);
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
         self.writable(entry, to_drive, &row.direction, value.object);
         if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
-            let message = "the parameter is there twice";
+            let message = "the parameter is defined twice";
             self.resolver.error(code::TWICE, row.parameter.span(), "parameter", message);
         }
         let rule = ParameterRule {
@@ -622,7 +622,8 @@ impl<'a> Builder<'a> {
             (Some(value), Some(function)) => {
                 let Some((value, _)) = self.value("value", value) else { return };
                 if !self.measures(&value, Quantity::Position) {
-                    let message = format!("the unit of {} is no {}", value.object, Quantity::Position);
+                    let message =
+                        format!("the unit of {} is not a unit of {}", value.object, Quantity::Position);
                     self.resolver.error(code::UNIT, row.capture.span(), "value", message);
                 }
                 let Some((held, entry)) = self.value("function", function) else { return };
@@ -638,7 +639,7 @@ impl<'a> Builder<'a> {
             }
         };
         if self.tables.captures.iter().any(|known| known.kind == kind) {
-            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is there twice");
+            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is defined twice");
         }
         self.tables.captures.push(CaptureRule { kind, word, pattern, latch });
     }

@@ -68,7 +68,7 @@ impl GenericDictionary {
             same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
             same(&mut resolver, "access", &row.access, access);
             if dictionary.signals.contains(&signal) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the signal is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the signal is defined twice");
             }
             dictionary.signals.push(signal);
         }
@@ -93,7 +93,7 @@ impl GenericDictionary {
             same(&mut resolver, "type", &row.data_type, known.kind.name());
             same(&mut resolver, "access", &row.access, known.access.name());
             if dictionary.parameters.iter().any(|other| other.parameter == known.parameter) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is defined twice");
             }
             dictionary.parameters.push(known);
         }
@@ -235,11 +235,11 @@ pub struct Enumeration {
 }
 
 impl Enumeration {
-    /// Checks that no code and no name is there twice; `names` are those of the codes, in order.
+    /// Checks that no code and no name is defined twice; `names` are those of the codes, in order.
     fn unique<'a>(&self, names: impl Iterator<Item = &'a Name>, resolver: &mut Resolver<'_>) {
         for (at, (code, name)) in self.codes.iter().zip(names).enumerate() {
             if self.codes[..at].iter().any(|known| known.code == code.code || known.name == code.name) {
-                resolver.error(code::TWICE, name.span(), "name", "the code or its name is there twice");
+                resolver.error(code::TWICE, name.span(), "name", "the code or its name is defined twice");
             }
         }
     }

@@ -139,7 +139,7 @@ impl Merger<'_> {
                             code::CONTRADICTION,
                             place,
                             REMOVE,
-                            "expected no other keys in a row that is taken away",
+                            "expected no other keys in a row that is removed",
                         );
                     }
                     known.remove(at);

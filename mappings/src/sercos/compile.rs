@@ -65,7 +65,7 @@ pub enum SercosError {
         led_in: ModeSelection,
     },
     /// A slave that says that it is no drive.
-    #[error("S-0-1302.0.1 says that it is {0}, and no drive")]
+    #[error("S-0-1302.0.1 says that it is {0}, not a drive")]
     Profile(&'static str),
     /// No operation mode at all.
     #[error(
@@ -90,7 +90,7 @@ pub enum SercosError {
     },
     /// The drive lists what its telegrams can carry, and a value that the mode needs is not in it.
     #[error(
-        "{list}, the list of what may stand in a telegram of the drive, has no {idn}, which carries {signal}"
+        "{list}, the list of what may be in a telegram of the drive, has no {idn}, which carries {signal}"
     )]
     NotConfigurable {
         /// S-0-0187 or S-0-0188.
@@ -156,7 +156,7 @@ pub enum SercosError {
     },
     /// A value stands in a fixed configuration list twice.
     #[error(
-        "{list}: {idn} stands in the list of this slave of class SCP_FixCFG twice; configure the list in the slave with each value once"
+        "{list}: {idn} is twice in the list of this slave of class SCP_FixCFG; configure the list in the slave with each value once"
     )]
     FixedTwice {
         /// S-0-1050.x.6.
@@ -189,7 +189,7 @@ pub enum SercosError {
         produces: bool,
     },
     /// Nobody knows how long a value is.
-    #[error("{0}: neither the drive nor the dictionary tells the length")]
+    #[error("{0}: neither the drive nor the dictionary has the length")]
     Length(Idn),
     /// The unit of a value is not known.
     #[error(transparent)]

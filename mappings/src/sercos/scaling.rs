@@ -325,7 +325,7 @@ impl ScalingRule {
         {
             return Err(ScalingError::Value {
                 idn,
-                expected: "1, as nobody tells how it changes the range",
+                expected: "1, because no source says how it changes the range",
                 value,
             });
         }

@@ -360,7 +360,11 @@ fn modulo_positions_know_their_longest_step() {
     );
     for (range, divider, what) in [
         (1, None, "S-0-0103: expected a number above 1, got 1"),
-        (3_600_000, Some(2_u16), "S-0-0294: expected 1, as nobody tells how it changes the range, got 2"),
+        (
+            3_600_000,
+            Some(2_u16),
+            "S-0-0294: expected 1, because no source says how it changes the range, got 2",
+        ),
         (
             i64::from(u32::MAX),
             None,

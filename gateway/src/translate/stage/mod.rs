@@ -135,7 +135,7 @@ pub enum StageError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A drive on CANopen cannot be led by its data sheet.
-    #[error("axis {axis}: the drive of its data sheet cannot be led: {told}")]
+    #[error("axis {axis}: the drive of its data sheet cannot be used: {told}")]
     Sheet {
         /// The axis.
         axis: String,
@@ -143,7 +143,7 @@ pub enum StageError {
         told: String,
     },
     /// No program can be made for an axis.
-    #[error("axis {axis}: no program can be made: {told}")]
+    #[error("axis {axis}: its program cannot be compiled: {told}")]
     Program {
         /// The axis.
         axis: String,

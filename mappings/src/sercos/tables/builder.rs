@@ -121,7 +121,7 @@ impl<'a> Builder<'a> {
                     );
                 }
                 if !known.insert(idn) {
-                    self.resolver.error(code::TWICE, name.span(), "idns", format!("{idn} is there twice"));
+                    self.resolver.error(code::TWICE, name.span(), "idns", format!("{idn} is defined twice"));
                 }
                 if !self.bound.iter().any(|(bound, _)| *bound == idn) {
                     self.tables.unbound.push((idn, row.reason.get_ref().clone()));
@@ -311,11 +311,11 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::NO_LENGTH, row.idn.span(), "idn", message);
         }
         if !self.measures(idn, signal.quantity()) {
-            let message = format!("the unit of {} is no {}", idn.idn, signal.quantity());
+            let message = format!("the unit of {} is not a unit of {}", idn.idn, signal.quantity());
             return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
         if self.tables.signal(signal).is_some() {
-            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
+            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is defined twice");
         }
         let polarity = row.polarity.as_ref().and_then(|row| self.polarity(row));
         self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity });
@@ -362,7 +362,7 @@ impl<'a> Builder<'a> {
         if let (Some(mode), Some(interpolation), Some(optional)) = (mode, interpolation, optional) {
             let selection = ModeSelection { mode, interpolation };
             if self.tables.modes.iter().any(|known| known.selection == selection) {
-                self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+                self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
             }
             self.tables.modes.push(ModeRule { selection, optional, codes, command, actual });
         }
@@ -387,7 +387,7 @@ impl<'a> Builder<'a> {
         for name in &row.commands {
             let Some(idn) = self.idn("commands", name) else { continue };
             if !idn.command {
-                let message = format!("expected a procedure command, {} is none", idn.idn);
+                let message = format!("expected a procedure command, {} is not one", idn.idn);
                 self.resolver.error(code::NOT_A_COMMAND, name.span(), "commands", message);
             }
             commands.push(idn.idn);
@@ -406,7 +406,7 @@ impl<'a> Builder<'a> {
         let modes = self.tables.modes.iter().map(|known| known.selection);
         if modes.chain(self.tables.procedures.iter().map(|known| known.selection)).any(|one| one == selection)
         {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
         }
         self.tables.procedures.push(ProcedureRule { selection, led_in, commands });
     }
@@ -470,7 +470,7 @@ impl<'a> Builder<'a> {
                 Some(name) => match self.idn("command", name) {
                     Some(idn) if idn.command => Some(idn.idn),
                     Some(idn) => {
-                        let message = format!("expected a procedure command, {} is none", idn.idn);
+                        let message = format!("expected a procedure command, {} is not one", idn.idn);
                         self.resolver.error(code::NOT_A_COMMAND, name.span(), "command", message);
                         None
                     }
@@ -535,7 +535,7 @@ impl<'a> Builder<'a> {
     fn diagnosis(&mut self, row: &DiagnosisRow) {
         let text = self.idn("text", &row.text);
         if let Some(idn) = text.filter(|idn| !idn.list || idn.format != Some(IdnFormat::Text)) {
-            let message = format!("expected a text, {} is none", idn.idn);
+            let message = format!("expected a text, {} is not one", idn.idn);
             self.resolver.error(code::OUT_OF_RANGE, row.text.span(), "text", message);
         }
         let number = self.idn("number", &row.number);
@@ -551,7 +551,7 @@ impl<'a> Builder<'a> {
         let Some(row) = self.idn("list", name) else { return };
         let (idn, list) = (row.idn, row.list);
         if !list {
-            let message = format!("expected a list, {idn} is none");
+            let message = format!("expected a list, {idn} is not one");
             self.resolver.error(code::OUT_OF_RANGE, name.span(), "list", message);
         }
         self.tables.supported_modes = idn;
@@ -566,7 +566,12 @@ impl<'a> Builder<'a> {
         for row in &rows.capture {
             let Some(rule) = self.capture(row) else { continue };
             if self.tables.captures.iter().any(|known| known.kind == rule.kind) {
-                self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is there twice");
+                self.resolver.error(
+                    code::TWICE,
+                    row.capture.span(),
+                    "capture",
+                    "the capture is defined twice",
+                );
             }
             self.tables.captures.push(rule);
         }
@@ -599,11 +604,11 @@ impl<'a> Builder<'a> {
             && value.is_known()
             && !self.measures(value, Quantity::Position)
         {
-            let message = format!("the unit of {} is no {}", value.idn, Quantity::Position);
+            let message = format!("the unit of {} is not a unit of {}", value.idn, Quantity::Position);
             self.resolver.error(code::UNIT, name.span(), "value", message);
         }
         if let (Some(command), Some(name)) = (command.filter(|command| !command.command), &row.command) {
-            let message = format!("expected a procedure command, {} is none", command.idn);
+            let message = format!("expected a procedure command, {} is not one", command.idn);
             self.resolver.error(code::NOT_A_COMMAND, name.span(), "command", message);
         }
         let word = match (&row.word, by) {
@@ -664,7 +669,7 @@ impl<'a> Builder<'a> {
             let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for no other";
             self.resolver.error(code::UNIT, row.idn.span(), "unit_by_drive", message);
         } else if !row.unit_by_drive && !self.measures(idn, quantity) {
-            let message = format!("the unit of {} is no {quantity}", idn.idn);
+            let message = format!("the unit of {} is not a unit of {quantity}", idn.idn);
             return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
         if to_drive && idn.write.as_ref().is_some_and(Vec::is_empty) {
@@ -676,7 +681,7 @@ impl<'a> Builder<'a> {
                 code::TWICE,
                 row.parameter.span(),
                 "parameter",
-                "the parameter is there twice",
+                "the parameter is defined twice",
             );
         }
         let idn = idn.idn;
