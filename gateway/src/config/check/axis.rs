@@ -7,8 +7,6 @@ use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
 use crate::mapping::CaptureMode;
 
-const DEFAULT_MOTION_RESOLUTION: u32 = 1_000_000;
-
 pub(super) fn check(
     problems: &mut Problems,
     table: &AxisTable,
@@ -35,16 +33,16 @@ pub(super) fn check(
     let counts = 1..=i64::from(i32::MAX);
     let motion_resolution = value::number_or(
         problems,
-        table.motion_resolution.as_ref(),
+        &table.motion_resolution,
         "the motion resolution",
         counts.clone(),
-        DEFAULT_MOTION_RESOLUTION,
+        1_000_000,
     );
     let unwind_counts =
         value::optional(&table.unwind_counts, |value| value::number(problems, value, "the unwind", counts));
     let power_structure_axis_id = value::number_or(
         problems,
-        table.power_structure_axis_id.as_ref(),
+        &table.power_structure_axis_id,
         "the power structure axis ID",
         0..=i64::from(u32::MAX),
         0,

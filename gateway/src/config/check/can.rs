@@ -26,7 +26,6 @@ pub(super) const NODES: core::ops::RangeInclusive<i64> = 1..=127;
 const DEFAULT_NODE: u8 = 127;
 const WATCH_MS: core::ops::RangeInclusive<i64> = 10..=10_000;
 const DEFAULT_HEARTBEAT_MS: u16 = 100;
-const DEFAULT_ALLOWED_LOSSES: u16 = 3;
 const AXES: core::ops::RangeInclusive<i64> = 0..=7;
 
 /// Parts per million in the rated torque.
@@ -63,21 +62,15 @@ pub(super) fn check(problems: &mut Problems, tables: &[Spanned<CanTable>]) -> Op
 
 fn check_bus(problems: &mut Problems, table: &CanTable) -> Option<Can> {
     let link = can_link(problems, &table.interface, table.set_bit_rate);
-    let bit_rate =
-        value::number_or(problems, table.bit_rate.as_ref(), "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
+    let bit_rate = value::number_or(problems, &table.bit_rate, "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
     let cycle_time = sync_time(problems, &table.cycle_time);
-    let node = value::number_or(problems, table.node.as_ref(), "the node-id of the box", NODES, DEFAULT_NODE);
+    let node = value::number_or(problems, &table.node, "the node-id of the box", NODES, DEFAULT_NODE);
     let heartbeat_ms = match &table.heartbeat {
         None => Some(DEFAULT_HEARTBEAT_MS),
         Some(text) => watch_time(problems, text, "the time between heartbeats"),
     };
-    let allowed_losses = value::number_or(
-        problems,
-        table.allowed_losses.as_ref(),
-        "the number of allowed losses",
-        1..=1000,
-        DEFAULT_ALLOWED_LOSSES,
-    );
+    let allowed_losses =
+        value::number_or(problems, &table.allowed_losses, "the number of allowed losses", 1..=1000, 3);
     if table.drive.is_empty() {
         return problems.report(
             table.interface.span(),
@@ -166,7 +159,7 @@ pub(super) fn watch_time(problems: &mut Problems, text: &Spanned<String>, what: 
 fn check_drive(problems: &mut Problems, table: &CanDriveTable) -> Option<CanDrive> {
     let name = value::name(problems, "drive", &table.name);
     let node = value::number(problems, &table.node, "the node-id", NODES);
-    let axis = value::number_or(problems, table.axis.as_ref(), "the axis of the device", AXES, 0);
+    let axis = value::number_or(problems, &table.axis, "the axis of the device", AXES, 0);
     let modes = value::optional(&table.modes, |names| value::words(problems, names, "mode", &MODES));
     if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
         problems.report::<()>(names.span(), "an axis that is used for nothing", "expected at least one mode");

@@ -167,7 +167,7 @@ fn lss(problems: &mut Problems, table: &CanDeviceTable, expected: Option<&Expect
 }
 
 fn guarding(problems: &mut Problems, table: &CanDeviceTable) -> Option<Option<GuardingConfig>> {
-    let factor = table.life_time_factor.as_ref();
+    let factor = &table.life_time_factor;
     let Some(text) = &table.guarding else {
         let Some(factor) = factor else { return Some(None) };
         return problems.report(

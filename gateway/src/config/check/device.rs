@@ -23,7 +23,7 @@ pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: Du
     let identity = identity(problems, &table.identity);
     let power_structure_class_id = value::number_or(
         problems,
-        table.power_structure_class_id.as_ref(),
+        &table.power_structure_class_id,
         "the power structure class ID",
         0..=i64::from(u32::MAX),
         0,

@@ -19,7 +19,6 @@ const RATES: [DataRate; 3] = [DataRate::Rate125, DataRate::Rate250, DataRate::Ra
 const CYCLE_MS: core::ops::RangeInclusive<i64> = 1..=1_000;
 const MAC_IDS: core::ops::RangeInclusive<i64> = 0..=63;
 const DEFAULT_MAC_ID: u8 = 0;
-const DEFAULT_ALLOWED_LOSSES: u8 = 3;
 const PACKET_RATE_MS: core::ops::RangeInclusive<i64> = 1..=10_000;
 const DEFAULT_ASSEMBLY: u8 = 21;
 const MILLISECOND_NS: i64 = 1_000_000;
@@ -44,15 +43,9 @@ fn network(problems: &mut Problems, table: &DevicenetTable) -> Option<Devicenet>
     let link = can::can_link(problems, &table.interface, table.set_bit_rate);
     let rate = data_rate(problems, table.bit_rate.as_ref());
     let cycle_time = whole_milliseconds(problems, &table.cycle_time, "the cycle of a DeviceNet", CYCLE_MS);
-    let mac =
-        value::number_or(problems, table.mac_id.as_ref(), "the MAC ID of the box", MAC_IDS, DEFAULT_MAC_ID);
-    let allowed_losses = value::number_or(
-        problems,
-        table.allowed_losses.as_ref(),
-        "the number of allowed losses",
-        1..=100,
-        DEFAULT_ALLOWED_LOSSES,
-    );
+    let mac = value::number_or(problems, &table.mac_id, "the MAC ID of the box", MAC_IDS, DEFAULT_MAC_ID);
+    let allowed_losses =
+        value::number_or(problems, &table.allowed_losses, "the number of allowed losses", 1..=100, 3);
     if table.drive.is_empty() {
         return problems.report(
             table.interface.span(),
@@ -189,8 +182,8 @@ fn speed_drive(problems: &mut Problems, table: &DevicenetDriveTable) -> Option<D
     out_of_place(problems, table.modes.as_ref().map(|value| (value.span(), "modes")), only);
     out_of_place(problems, table.resolution.as_ref().map(|value| (value.span(), "resolution")), only);
     let assembly =
-        value::number_or(problems, table.assembly.as_ref(), "the output assembly", 20..=21, DEFAULT_ASSEMBLY);
-    let scale = value::number_or(problems, table.speed_scale.as_ref(), "SpeedScale", -15..=15, 0_i8);
+        value::number_or(problems, &table.assembly, "the output assembly", 20..=21, DEFAULT_ASSEMBLY);
+    let scale = value::number_or(problems, &table.speed_scale, "SpeedScale", -15..=15, 0_i8);
     Some(DevicenetKind::Speed { assembly: Assembly(assembly?), scale: scale? })
 }
 

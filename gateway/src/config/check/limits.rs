@@ -19,11 +19,11 @@ pub(super) fn check(
     unwind: Option<&Spanned<i64>>,
 ) -> Option<Limits> {
     // Axis units to 1e-9 of them; percent to parts per million.
-    let velocity = value::positive(problems, table.velocity.as_ref(), "the velocity limit", NANO);
-    let acceleration = value::positive(problems, table.acceleration.as_ref(), "the acceleration limit", NANO);
-    let torque = value::positive(problems, table.torque_percent.as_ref(), "the torque limit", PERCENT_TO_PPM);
+    let velocity = value::positive(problems, &table.velocity, "the velocity limit", NANO);
+    let acceleration = value::positive(problems, &table.acceleration, "the acceleration limit", NANO);
+    let torque = value::positive(problems, &table.torque_percent, "the torque limit", PERCENT_TO_PPM);
     let following_error =
-        value::positive(problems, table.following_error.as_ref(), "the following error limit", NANO);
+        value::positive(problems, &table.following_error, "the following error limit", NANO);
     let position = position_range(problems, table, unwind);
     let (position_min, position_max) = position?;
     Some(Limits {

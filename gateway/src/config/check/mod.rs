@@ -24,7 +24,7 @@ pub(crate) use self::realtime::DEFAULT_PRIORITY;
 pub(crate) use self::sercos::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER};
 
 use self::problems::Problems;
-use super::file::{File, SouthTable};
+use super::file::{File, RealtimeTable, SouthTable};
 use super::{AXES_MAX, Config, DEVICES_MAX, LogLevel, TimeSource};
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
@@ -57,8 +57,10 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
     let settings_file = settings_file.map(path);
 
     let south = file.south.get_ref();
-    let realtime = realtime::check(problems, south.realtime.as_ref());
-    let lead = realtime::lead(problems, south.realtime.as_ref());
+    let usual = RealtimeTable::default();
+    let realtime_table = south.realtime.as_ref().unwrap_or(&usual);
+    let realtime = realtime::check(problems, realtime_table);
+    let lead = realtime::lead(problems, realtime_table);
     let sercos = value::optional(&south.sercos, |table| sercos::check(problems, table.get_ref()));
     some_bus(problems, &file.south);
     let can = can::check(problems, &south.can);

@@ -4,17 +4,10 @@ use super::{Problems, value};
 use crate::config::Modbus;
 use crate::config::file::ModbusTable;
 
-const DEFAULT_CLIENTS_MAX: u8 = 8;
-
 pub(super) fn check(problems: &mut Problems, table: &ModbusTable) -> Option<Modbus> {
     let listen = value::socket_address(problems, &table.listen);
-    let clients_max = value::number_or(
-        problems,
-        table.clients_max.as_ref(),
-        "the number of Modbus clients",
-        1..=64,
-        DEFAULT_CLIENTS_MAX,
-    );
+    let clients_max =
+        value::number_or(problems, &table.clients_max, "the number of Modbus clients", 1..=64, 8);
     Some(Modbus { listen: listen?, clients_max: clients_max? })
 }
 

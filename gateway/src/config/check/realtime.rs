@@ -16,30 +16,9 @@ const LEAD_MAX: DurationNs = DurationNs::from_millis(1);
 
 pub(crate) const DEFAULT_PRIORITY: u8 = 80;
 
-pub(super) fn check(problems: &mut Problems, table: Option<&RealtimeTable>) -> Option<Request> {
-    let priority = value::number_or(
-        problems,
-        table.and_then(|table| table.priority.as_ref()),
-        "the priority",
-        0..=i64::from(PRIORITY_MAX),
-        DEFAULT_PRIORITY,
-    );
-    let cpu = match table.and_then(|table| table.cpu.as_ref()) {
-        Some(cpu) => value::number(problems, cpu, "the processor", 0..=1023).map(Some),
-        None => Some(None),
-    };
-    let lock_memory = table.and_then(|table| table.lock_memory).unwrap_or(true);
-    Some(Request {
-        priority: priority.map(|priority| (priority > 0).then_some(priority))?,
-        cpu: cpu?,
-        lock_memory,
-        stay_awake: table.and_then(|table| table.stay_awake).unwrap_or(false),
-    })
-}
-
 /// How long before its instant the work for a cycle begins.
-pub(super) fn lead(problems: &mut Problems, table: Option<&RealtimeTable>) -> Option<DurationNs> {
-    let Some(text) = table.and_then(|table| table.lead.as_ref()) else { return Some(DEFAULT_LEAD) };
+pub(super) fn lead(problems: &mut Problems, table: &RealtimeTable) -> Option<DurationNs> {
+    let Some(text) = &table.lead else { return Some(DEFAULT_LEAD) };
     let lead = value::time_span(problems, text)?;
     if (DurationNs::ZERO..=LEAD_MAX).contains(&lead) {
         return Some(lead);
@@ -51,6 +30,18 @@ pub(super) fn lead(problems: &mut Problems, table: Option<&RealtimeTable>) -> Op
     )
 }
 
+pub(super) fn check(problems: &mut Problems, table: &RealtimeTable) -> Option<Request> {
+    let priorities = 0..=i64::from(PRIORITY_MAX);
+    let priority = value::number_or(problems, &table.priority, "the priority", priorities, DEFAULT_PRIORITY);
+    let cpu = value::optional(&table.cpu, |cpu| value::number(problems, cpu, "the processor", 0..=1023));
+    Some(Request {
+        priority: priority.map(|priority| (priority > 0).then_some(priority))?,
+        cpu: cpu?,
+        lock_memory: table.lock_memory.unwrap_or(true),
+        stay_awake: table.stay_awake.unwrap_or(false),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::checked;
@@ -58,7 +49,7 @@ mod tests {
 
     #[test]
     fn priority_zero_leaves_the_scheduling_class_alone() {
-        let request = |text| checked(text, |problems, table| check(problems, Some(table)));
+        let request = |text| checked(text, check);
         let usual =
             Request { priority: Some(DEFAULT_PRIORITY), cpu: None, lock_memory: true, stay_awake: false };
         assert_eq!(request(""), Ok(usual));
@@ -69,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_lead_is_at_most_a_millisecond() {
-        let found = |text| checked(text, |problems, table| lead(problems, Some(table)));
+        let found = |text| checked(text, lead);
         assert_eq!(found("lead = \"0 us\""), Ok(DurationNs::ZERO));
         assert_eq!(found("lead = \"2 ms\""), Err(vec!["a lead of 2 ms is too long".to_owned()]));
     }

@@ -16,7 +16,6 @@ const SHORT_CYCLES_NS: [i64; 3] = [31_250, 62_500, 125_000];
 const CYCLE_STEP_NS: i64 = 250_000;
 const CYCLE_MAX_NS: i64 = 65_000_000;
 pub(crate) const DEFAULT_JITTER: DurationNs = DurationNs::from_micros(50);
-const DEFAULT_CP0_STABLE_CYCLES: u16 = 100;
 pub(crate) const DEFAULT_ALLOWED_LOSSES: u16 = 5;
 
 pub(super) fn check(problems: &mut Problems, table: &SercosTable) -> Option<Sercos> {
@@ -27,16 +26,11 @@ pub(super) fn check(problems: &mut Problems, table: &SercosTable) -> Option<Serc
         value::optional(&table.setup_cycle, |text| setup_cycle(problems, text, DurationNs(i64::from(least))));
     let master_mac = value::optional(&table.master_mac, |text| mac(problems, text));
     let jitter = jitter(problems, table.jitter.as_ref(), cycle_time);
-    let cp0_stable_cycles = value::number_or(
-        problems,
-        table.cp0_stable_cycles.as_ref(),
-        "the number of stable cycles",
-        1..=1000,
-        DEFAULT_CP0_STABLE_CYCLES,
-    );
+    let cp0_stable_cycles =
+        value::number_or(problems, &table.cp0_stable_cycles, "the number of stable cycles", 1..=1000, 100);
     let allowed_losses = value::number_or(
         problems,
-        table.allowed_losses.as_ref(),
+        &table.allowed_losses,
         "the number of allowed losses",
         1..=65_535,
         DEFAULT_ALLOWED_LOSSES,

@@ -110,34 +110,30 @@ pub(super) fn number<T: TryFrom<i64>>(
 
 pub(super) fn number_or<T: TryFrom<i64>>(
     problems: &mut Problems,
-    value: Option<&Spanned<i64>>,
+    value: &Option<Spanned<i64>>,
     what: &str,
     range: RangeInclusive<i64>,
     default: T,
 ) -> Option<T> {
-    match value {
-        Some(value) => number(problems, value, what, range),
-        None => Some(default),
-    }
+    value.as_ref().map_or(Some(default), |value| number(problems, value, what, range))
 }
 
 /// An optional value above zero in fine units.
 pub(super) fn positive(
     problems: &mut Problems,
-    value: Option<&Spanned<f64>>,
+    value: &Option<Spanned<f64>>,
     what: &str,
     scale: Option<Ratio>,
 ) -> Option<Option<i64>> {
-    let Some(value) = value else { return Some(None) };
-    match fine(problems, value, what, scale)? {
-        fine if fine > 0 => Some(Some(fine)),
-        _ => problems.report_as(
-            code::OUT_OF_RANGE,
-            value.span(),
-            format_args!("{what} is {}", value.get_ref()),
-            "expected a number above 0",
-        ),
-    }
+    optional(value, |value| match fine(problems, value, what, scale)? {
+        fine if fine > 0 => Some(fine),
+        _ => not_above_zero(problems, value, what),
+    })
+}
+
+fn not_above_zero<T>(problems: &mut Problems, value: &Spanned<f64>, what: &str) -> Option<T> {
+    let title = format!("{what} is {}", value.get_ref());
+    problems.report_as(code::OUT_OF_RANGE, value.span(), title, "expected a number above 0")
 }
 
 /// A value in fine units, rounded to the nearest.
@@ -161,15 +157,8 @@ pub(super) fn fine(
 /// A number above 0 with up to nine decimals as an exact ratio.
 pub(super) fn exact(problems: &mut Problems, value: &Spanned<f64>, what: &str) -> Option<Ratio> {
     let nano = fine(problems, value, what, NANO)?;
-    match Ratio::new(nano, NANO?.num()).filter(|_| nano > 0) {
-        Some(ratio) => Some(ratio),
-        None => problems.report_as(
-            code::OUT_OF_RANGE,
-            value.span(),
-            format_args!("{what} is {}", value.get_ref()),
-            "expected a number above 0",
-        ),
-    }
+    let ratio = Ratio::new(nano, NANO?.num()).filter(|_| nano > 0);
+    ratio.or_else(|| not_above_zero(problems, value, what))
 }
 
 /// A word of a list.
