@@ -248,7 +248,7 @@ pub struct SercosTable {
 }
 
 /// `[south.realtime]`
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RealtimeTable {
     /// `SCHED_FIFO` priority, 1 to 99; 0 for no real-time scheduling. Default: 80.

@@ -206,7 +206,7 @@ impl<'s> Followed<'s> {
 
 fn axes() -> Vec<StageAxis> {
     let config =
-        Config::parse(include_str!("../frames/config.toml"), "config.toml").expect("a configuration");
+        Config::parse(include_str!("../../frames/config.toml"), "config.toml").expect("a configuration");
     let sercos = Stage::rehearse(&config, MAPPING.clone()).expect("its drives");
     let can = can_frames::stage(MAPPING.clone()).expect("its drives");
     let wraps = |axis: &StageAxis| {

@@ -18,7 +18,7 @@ fn file(name: &str, text: &str) -> PathBuf {
 /// that the box is asked to end. Gives the box and its log.
 fn turning(name: &str, octet: u8, seconds: u64) -> (Running, Running, PathBuf) {
     let (device, controller) = (format!("127.0.0.{octet}"), format!("127.0.1.{octet}"));
-    let example = include_str!("../../examples/two-axes-in-process.toml");
+    let example = include_str!("../../../examples/two-axes-in-process.toml");
     let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
     let mut text = example.replace("127.0.0.2", &device);
     text.replace_range(modbus, "");

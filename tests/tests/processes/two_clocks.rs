@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 fn run(name: &str, octet: u8, words: &str) -> (serde_json::Value, String) {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let (device, bind) = (format!("127.0.0.{octet}"), format!("127.0.1.{octet}"));
-    let example = include_str!("../../examples/two-axes-in-process.toml");
+    let example = include_str!("../../../examples/two-axes-in-process.toml");
     let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
     let mut text = example.replace("127.0.0.2", &device);
     text.replace_range(modbus, "");

@@ -5,9 +5,9 @@ use std::path::Path;
 
 /// A page in `docs/` and how many tests it names at least: fewer are a page that is not read rightly.
 const PAGES: [(&str, &str, usize); 3] = [
-    ("compliance-cip-motion.md", include_str!("../../docs/compliance-cip-motion.md"), 150),
-    ("sercos.md", include_str!("../../docs/sercos.md"), 150),
-    ("canopen.md", include_str!("../../docs/canopen.md"), 60),
+    ("compliance-cip-motion.md", include_str!("../../../docs/compliance-cip-motion.md"), 150),
+    ("sercos.md", include_str!("../../../docs/sercos.md"), 150),
+    ("canopen.md", include_str!("../../../docs/canopen.md"), 60),
 ];
 
 /// What stands between backquotes and looks like `file.rs::function`.
@@ -54,10 +54,10 @@ fn a_test_that_does_not_exist_is_noticed() {
         named_tests("| `a/b.rs::one`<br>`a/b.rs::two` | `x` |"),
         [("a/b.rs", "one"), ("a/b.rs", "two")].into()
     );
-    let page = "`tests/tests/compliance.rs::no_such_test` `tests/tests/nowhere.rs::one`";
+    let page = "`tests/tests/files/compliance.rs::no_such_test` `tests/tests/nowhere.rs::one`";
     let [none, nowhere] = &missing(page)[..] else { panic!("two are missing") };
     assert!(nowhere.starts_with("tests/tests/nowhere.rs: "), "{nowhere}");
-    assert_eq!(none, "tests/tests/compliance.rs has no `fn no_such_test`");
+    assert_eq!(none, "tests/tests/files/compliance.rs has no `fn no_such_test`");
     assert!(has_function("    fn one() {", "one"));
     assert!(!has_function("fn one_more() {}\n// fn one()", "one"));
 }

@@ -16,7 +16,7 @@ use profile_cip::wire::forward_open::Trigger;
 use profile_cip::wire::motion::Format;
 use serde_json::{Value, json};
 
-const EXAMPLE: &str = include_str!("../../examples/two-axes-in-process.toml");
+const EXAMPLE: &str = include_str!("../../../examples/two-axes-in-process.toml");
 
 fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// The shipped example with another interface, the device on an address of this host.
 fn configuration(name: &str, interface: &str) -> PathBuf {
-    let example = include_str!("../../examples/two-axes-sercos.toml");
+    let example = include_str!("../../../examples/two-axes-sercos.toml");
     let text = example.replace("enp3s0", interface).replace("192.168.1.10", "127.0.0.2");
     // Not every machine of the tests has a second processor, and none can spare one.
     let text = text.replace("cpu = 1\n", "").replace("stay_awake = true", "stay_awake = false");

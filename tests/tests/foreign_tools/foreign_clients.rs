@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 fn start_box(address: &str, name: &str) -> (Running, PathBuf) {
     let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let config = scratch.join(format!("{name}.toml"));
-    let example = include_str!("../../examples/two-axes-in-process.toml")
+    let example = include_str!("../../../examples/two-axes-in-process.toml")
         .replace("\"127.0.0.2\"", &format!("\"{address}\""))
         .replace("127.0.0.1:1502", &format!("{address}:1502"));
     std::fs::write(&config, example).expect("the scratch folder can be written");
