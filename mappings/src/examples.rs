@@ -3,6 +3,8 @@
 use core::fmt;
 use std::ops::Range;
 
+use profile_cip::device::drive_link::DriveImage;
+use profile_generic::fault_set::FaultSet;
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
@@ -17,7 +19,7 @@ use super::load::Tables;
 use super::sercos::compile::{Compiler, unit_of};
 use super::{
     AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
-    Mapping, ObjectFacts, Rated, Reference, SercosAxis,
+    Mapping, ObjectFacts, Rated, Reference, SercosAxis, Told,
 };
 use crate::finding::{Findings, Problem, Source, registry as code};
 
@@ -160,14 +162,6 @@ fn cip_value(bytes: &[u8], data_type: CipType) -> Option<(CipValue, f64)> {
     }
 }
 
-fn cip_bytes(value: CipValue) -> Vec<u8> {
-    match value {
-        CipValue::Dint(value) => value.to_le_bytes().to_vec(),
-        CipValue::Real(value) => value.to_le_bytes().to_vec(),
-        CipValue::Lreal(value) => value.to_le_bytes().to_vec(),
-    }
-}
-
 fn number(number: Number) -> f64 {
     match number {
         Number::Integer(value) => profile_generic::cast::f64_from_i64(value),
@@ -227,9 +221,15 @@ impl Mapping {
         } else {
             let mut feedback = AxisFeedback::default();
             feedback.set(signal, generic);
-            let mut values = CyclicValues::default();
-            program.encode(&feedback, 1 << element.bit, &mut values);
-            let sent = values.0[usize::from(element.bit)].map(cip_bytes);
+            let mut image = DriveImage::default();
+            program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
+            // The device sends the low word of a position that it does not unwind.
+            let sent = match signal {
+                Signal::PositionActual => Some(image.position.to_le_bytes()[..4].to_vec()),
+                Signal::VelocityActual => image.velocity.map(|value| value.to_le_bytes().to_vec()),
+                Signal::AccelerationActual => image.acceleration.map(|value| value.to_le_bytes().to_vec()),
+                _ => None,
+            };
             expect(example.bytes.span(), "bytes", &Some(bytes), &sent)
         }
     }

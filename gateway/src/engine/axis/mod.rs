@@ -309,6 +309,12 @@ impl AxisChannel {
         self.drive.machine.state()
     }
 
+    /// What the drive is told to do.
+    #[must_use]
+    pub fn action(&self) -> Action {
+        self.action
+    }
+
     /// Everything that is wrong now.
     pub fn faults(&self) -> impl Iterator<Item = &ActiveFault> {
         self.faults.iter()
