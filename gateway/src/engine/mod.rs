@@ -239,6 +239,13 @@ impl Engine {
         self.devices.iter().find_map(|device| device.program(axis))
     }
 
+    /// Takes another scaling of the controller for an axis; `false`, and nothing done, while the torque may be on.
+    pub fn set_cip_program(&mut self, axis: usize, program: CipProgram) -> bool {
+        let Self { devices, axes, .. } = self;
+        let mut member = devices.iter_mut().find_map(|device| device.cip_axis(axis));
+        member.as_mut().zip(axes.get_mut(axis)).is_some_and(|(cip, axis)| cip.set_program(axis, program))
+    }
+
     /// The devices in the order of the configuration.
     #[must_use]
     pub fn devices(&self) -> &[DeviceChannel] {

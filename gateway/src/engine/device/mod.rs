@@ -259,6 +259,11 @@ impl DeviceChannel {
         self.members.iter().find(|member| member.axis == axis).map(|member| member.cip.program())
     }
 
+    /// What CIP Motion keeps of an axis of the engine; `None` when the axis is not one of this device.
+    pub fn cip_axis(&mut self, axis: usize) -> Option<&mut CipAxis> {
+        self.members.iter_mut().find(|member| member.axis == axis).map(|member| &mut member.cip)
+    }
+
     /// Counters beside those of the motion device.
     #[must_use]
     pub fn counters(&self) -> DatagramCounters {

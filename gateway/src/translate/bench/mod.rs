@@ -394,9 +394,9 @@ impl Bench {
         self.learn(axes);
         self.settle();
         self.run_while(PERIODS_MAX, |bench| bench.engine.axes().iter().any(|axis| axis.may_have_torque()));
-        for (axis, stage) in self.engine.axes_mut().iter_mut().zip(axes) {
-            axis.set_north(stage.north.clone());
-            axis.set_south(stage.south.clone());
+        for (number, stage) in axes.iter().enumerate().take(self.engine.axes().len()) {
+            self.engine.set_cip_program(number, stage.north.clone());
+            self.engine.axes_mut()[number].set_south(stage.south.clone());
         }
         for tap in &mut self.taps {
             tap.peers().iter_mut().for_each(|peer| peer.told = None);
@@ -681,14 +681,17 @@ impl Bench {
     /// A block that keeps an axis where it is, in a mode of its drive.
     fn standing(&self, axis: usize, control_mode: ControlMode) -> CommandBlock {
         let channel = &self.engine.axes()[axis];
-        let mode =
-            |code: ControlMode| channel.north().mode(code.0).filter(|mode| *mode != OperatingMode::None);
+        let north = self.engine.cip_program(axis);
+        let mode = |code: ControlMode| {
+            north.and_then(|north| north.mode(code.0)).filter(|mode| *mode != OperatingMode::None)
+        };
         let has = |code: &ControlMode| {
             mode(*code).is_some_and(|mode| channel.south().is_some_and(|program| program.has_mode(mode)))
         };
         let codes = (0..16).map(ControlMode);
         let control_mode = Some(control_mode).filter(has).or_else(|| codes.into_iter().find(has));
-        let counts = channel.north().counts(channel.feedback().position.get()).value;
+        let here = channel.feedback().position.get();
+        let counts = north.map_or(0, |north| north.counts(here).value);
         let [a, b, c, d, ..] = counts.to_le_bytes();
         let position = CommandPosition::Integer(i32::from_le_bytes([a, b, c, d]));
         let control_mode = control_mode.unwrap_or(ControlMode::POSITION);
@@ -777,8 +780,8 @@ impl Bench {
     pub fn say(&mut self, axis: usize, bytes: &[u8], torque: Option<OperatingMode>) {
         self.used = true;
         if let Some(mode) = torque.filter(|_| self.is_unheard(axis)) {
-            let north = self.engine.axes()[axis].north();
-            let code = (0..16).find(|code| north.mode(*code) == Some(mode));
+            let north = self.engine.cip_program(axis);
+            let code = (0..16).find(|code| north.and_then(|north| north.mode(*code)) == Some(mode));
             self.enable(axis, code.map_or(ControlMode::POSITION, ControlMode));
         }
         let member = &mut self.members[axis];

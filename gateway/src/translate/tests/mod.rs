@@ -152,7 +152,7 @@ fn what_the_engine_does_wrong_is_seen() {
     }
     south.command = fields;
     let bench = wrong.bench().unwrap();
-    assert!(bench.engine_mut().axes_mut()[0].set_north(north), "it has no torque");
+    assert!(bench.engine_mut().set_cip_program(0, north), "it has no torque");
     bench.engine_mut().axes_mut()[0].set_south(south);
     let shown = |text: &str, what: &str| {
         let line = text.lines().find(|line| line.contains(what)).map(|line| line.trim().to_owned());
