@@ -12,11 +12,11 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
 use super::cip_tables::CipTables;
-use super::compile_sercos::{Compiler, unit_of};
 use super::format::{
     Cia402ExampleRow, CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow,
 };
 use super::load::Tables;
+use super::sercos::compile::{Compiler, unit_of};
 use super::{
     AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
     Mapping, ObjectFacts, Rated, Reference, SercosAxis, Told,
@@ -279,7 +279,7 @@ impl Mapping {
         let entry = self.cia402.entry(&rule, &Cia402Axis::default(), &facts);
         let entry = entry.map_err(|error| wrong(error.to_string()))?;
         let entry =
-            entry.ok_or_else(|| wrong("the drive tells nothing that its unit follows from".to_owned()))?;
+            entry.ok_or_else(|| wrong("the drive reports nothing that determines its unit".to_owned()))?;
         let bytes = hex(&example.bytes)?;
         let sent =
             entry.encode(*example.generic.get_ref()).map(|(bytes, length, _)| bytes[..length].to_vec());

@@ -327,7 +327,11 @@ fn can_drives_come_up_without_allocating_in_the_cycle() {
 #[test]
 fn neither_an_emergency_nor_a_lost_can_drive_nor_its_return_allocates() {
     let mut rig = on_can(Some(without_torque()));
-    assert!(rig.told().contains("commissioning goes on without reading 60A9:00, 6077:00"), "{}", rig.told());
+    assert!(
+        rig.told().contains("commissioning continues without reading 60A9:00, 6077:00"),
+        "{}",
+        rig.told()
+    );
     let found = weigh(&mut rig, 6_000, |rig, number| {
         let now = rig.now();
         let bus = &mut rig.can[0].bus;

@@ -403,6 +403,16 @@ impl fmt::Display for ConfigError {
 
 impl std::error::Error for ConfigError {}
 
+/// Attribute Command Control, which a service sets where the updates do not carry it (footnote of Table 5-2.16).
+const COMMAND_CONTROL: u16 = 92;
+/// Command Position Data Type in Command Control: DINT.
+const DINT: u8 = 0b0100;
+
+/// Command Control as one value: the type of the position, and the update that commands are meant for.
+pub(super) fn command_control(target: CommandTarget) -> AttributeSet {
+    AttributeSet::usint(COMMAND_CONTROL, DINT | target.0).optional()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -22,7 +22,8 @@ use super::session::{Answer, Output, Session};
 use super::time_offset::TimeOffset;
 use super::update::Traffic;
 use crate::wire::Error;
-use crate::wire::motion::codes::AxisControl;
+use crate::wire::motion::codes::{AxisControl, EventChecking};
+use crate::wire::motion::event::ExtendedEventData;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// Shortest time between two attempts to get a lost session back.
@@ -451,6 +452,30 @@ impl Controller {
     /// Tells the caller to close the stream.
     pub(super) fn drop_stream(&mut self) {
         self.stream = Some(StreamAction::Close);
+    }
+
+    /// Arms events of an axis, with the parameters that extended checking needs. Each comes as [`Event::AxisEvent`].
+    /// Whether the device checks for them shows in [`Controller::event_status`]. `false` if there is no such axis.
+    pub fn arm_events(
+        &mut self,
+        axis: u8,
+        checking: EventChecking,
+        parameters: Option<&ExtendedEventData>,
+    ) -> bool {
+        let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
+        axis.map(|axis| axis.events.arm(checking, parameters)).is_some()
+    }
+
+    /// Disarms events of an axis. `false` if there is no such axis.
+    pub fn disarm_events(&mut self, axis: u8, checking: EventChecking) -> bool {
+        let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
+        axis.map(|axis| axis.events.disarm(checking)).is_some()
+    }
+
+    /// Event Checking Status of the newest update; `None` if there is no such axis.
+    #[must_use]
+    pub fn event_status(&self, axis: u8) -> Option<EventChecking> {
+        self.axes.iter().find(|known| known.instance() == axis).map(|axis| axis.events.status())
     }
 }
 

@@ -6,8 +6,6 @@
 
 use arrayvec::ArrayVec;
 
-use super::Controller;
-use super::event::Event;
 use crate::wire::motion::codes::EventChecking;
 use crate::wire::motion::event::{ExtendedEventData, MAX_EVENTS};
 use crate::wire::motion::{ActualEvents, CommandEvents, EventAck, EventNotification};
@@ -121,47 +119,10 @@ impl EventChecks {
     }
 }
 
-impl Controller {
-    /// Arms events of an axis, with the parameters that extended checking needs. Each comes as [`Event::AxisEvent`].
-    /// Whether the device checks for them shows in [`Controller::event_status`]. `false` if there is no such axis.
-    pub fn arm_events(
-        &mut self,
-        axis: u8,
-        checking: EventChecking,
-        parameters: Option<&ExtendedEventData>,
-    ) -> bool {
-        let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
-        axis.map(|axis| axis.events.arm(checking, parameters)).is_some()
-    }
-
-    /// Disarms events of an axis. `false` if there is no such axis.
-    pub fn disarm_events(&mut self, axis: u8, checking: EventChecking) -> bool {
-        let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
-        axis.map(|axis| axis.events.disarm(checking)).is_some()
-    }
-
-    /// Event Checking Status of the newest update; `None` if there is no such axis.
-    #[must_use]
-    pub fn event_status(&self, axis: u8) -> Option<EventChecking> {
-        self.axes.iter().find(|known| known.instance() == axis).map(|axis| axis.events.status())
-    }
-
-    /// Takes the event block of an axis.
-    pub(super) fn handle_events(&mut self, index: usize, block: Option<&ActualEvents>, received: u8) {
-        let Some(axis) = self.axes.get_mut(index) else { return };
-        let (number, events) = (axis.instance(), &mut self.events);
-        let super::axis::Axis { events: checks, seen, .. } = axis;
-        checks.handle(block, received, |notification| {
-            seen.note_event(notification);
-            super::engine::push(events, Event::AxisEvent { axis: number, notification });
-        });
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::event_channel::EventChannel;
+    use crate::device::axis::event_channel::EventChannel;
     use crate::wire::motion::codes::EventType;
     use crate::wire::motion::event::Window;
     use proptest::prelude::*;

@@ -407,13 +407,13 @@ impl fmt::Display for Failure {
             Self::Encapsulation { exchange, status } => {
                 write!(f, "{exchange}: expected encapsulation status 0, found {status:#06x}")
             }
-            Self::Explicit { exchange, general, extended, detail } => {
-                write!(f, "{exchange}: refused with {}", status(general))?;
-                if let Some(code) = extended {
-                    write!(f, ", {}", status::Extended { general, code })?;
-                }
-                detail.map_or(Ok(()), |size| write!(f, ", the device expects {size}"))
-            }
+            Self::Explicit { exchange, general, extended, detail } => write!(
+                f,
+                "{exchange}: refused with {}{}{}",
+                status(general),
+                Suffix(", ", extended.map(|code| status::Extended { general, code })),
+                Suffix(", the device expects ", detail)
+            ),
             Self::AnswerMalformed { exchange, error } => write!(f, "answer to {exchange}: {error}"),
             Self::PacketInterval { requested_us, o_to_t_us, t_to_o_us } => write!(
                 f,
@@ -451,17 +451,17 @@ impl fmt::Display for Failure {
             Self::ServiceMalformed { instance, service, error } => {
                 write!(f, "{}: answer to {service}: {error}", Instance(instance))
             }
-            Self::NotSynchronized { status, skew, waited } => {
-                write!(f, "Group_Sync: no success within {waited}, last answer: {status}")?;
-                skew.map_or(Ok(()), |skew| write!(f, ", device time stamp older by {skew}"))
-            }
+            Self::NotSynchronized { status, skew, waited } => write!(
+                f,
+                "Group_Sync: no success within {waited}, last answer: {status}{}",
+                Suffix(", device time stamp older by ", skew)
+            ),
             Self::NoSyncMode { waited, alarm } => {
                 write!(f, "Sync Mode not on within {waited}, node alarm: {alarm}")
             }
             Self::NodeFault(fault) => write!(f, "node fault: {fault}"),
             Self::AxisNotReady { axis, state, waited } => {
-                write!(f, "axis {axis}: not ready within {waited}, ")?;
-                StateText(state).fmt(f)
+                write!(f, "axis {axis}: not ready within {waited}, {}", StateText(state))
             }
             Self::RequestRefused { axis, request, status: s, state } => {
                 write!(f, "axis {axis}: {request} refused with {}, state {state}", status(s))
@@ -471,16 +471,17 @@ impl fmt::Display for Failure {
                 "axis {axis}: {request} not acknowledged within {waited}, axis response {response}, \
                  state {state}"
             ),
-            Self::AxisNotRunning { axis, state, fault } => {
-                write!(f, "axis {axis}: expected state Running, ")?;
-                StateText(state).fmt(f)?;
-                fault.map_or(Ok(()), |fault| write!(f, ", {}", FaultText(fault)))
-            }
+            Self::AxisNotRunning { axis, state, fault } => write!(
+                f,
+                "axis {axis}: expected state Running, {}{}",
+                StateText(state),
+                Suffix(", ", fault.map(FaultText))
+            ),
             Self::AxisBusy { axis } => write!(f, "axis {axis}: a motion is under way already"),
             Self::WrongMode { axis, mode } => write!(f, "axis {axis}: this step does not go with {mode}"),
             Self::UnknownAxis { axis, count } => write!(f, "axis {axis}: expected an axis from 1 to {count}"),
             Self::NotScaled { axis } => {
-                write!(f, "axis {axis}: does not move, since nobody knows how many counts its unit has")
+                write!(f, "axis {axis}: does not move, because the counts of its unit are not known")
             }
             Self::BeyondLimit { axis, what, value, limit } => {
                 write!(f, "axis {axis}: {what} {value} is beyond the limit {limit}")
@@ -503,24 +504,25 @@ impl fmt::Display for Failure {
             Self::CyclicRefused { axis, status: s } => {
                 write!(f, "axis {axis}: cyclic data refused with {}", status(s))
             }
-            Self::ScalingUnknown { axis, configuration } => {
-                write!(f, "axis {axis}: expected the device to scale (attribute 45 is 1), found ")?;
-                match configuration {
-                    Some(configuration) => write!(f, "{configuration}"),
-                    None => f.write_str("no such attribute"),
-                }
+            Self::ScalingUnknown { axis, configuration: Some(found) } => {
+                write!(f, "axis {axis}: expected the device to scale (attribute 45 is 1), found {found}")
             }
+            Self::ScalingUnknown { axis, configuration: None } => write!(
+                f,
+                "axis {axis}: expected the device to scale (attribute 45 is 1), found no such attribute"
+            ),
             Self::Unmet { condition, found, waited } => {
                 write!(f, "expected {condition}, found {found} after {waited}")
             }
             Self::OtherStatus { service, expected, found } => {
                 write!(f, "service {service:#04x}: expected {}, found {}", status(expected), status(found))
             }
-            Self::NotRefused { axis, request, expected, found } => {
-                write!(f, "axis {axis}: expected {request} refused")?;
-                expected.map_or(Ok(()), |expected| write!(f, " with {}", status(expected)))?;
-                write!(f, ", found {}", status(found))
-            }
+            Self::NotRefused { axis, request, expected, found } => write!(
+                f,
+                "axis {axis}: expected {request} refused{}, found {}",
+                Suffix(" with ", expected.map(status)),
+                status(found)
+            ),
             Self::TestResult { axis, expected, found } => {
                 write!(f, "axis {axis}: expected {expected}, found {found}")
             }
@@ -542,6 +544,15 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
+
+/// A text and a value behind it; nothing without a value.
+struct Suffix<T>(&'static str, Option<T>);
+
+impl<T: fmt::Display> fmt::Display for Suffix<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.1.as_ref().map_or(Ok(()), |value| write!(f, "{}{value}", self.0))
+    }
+}
 
 struct StateText(Option<AxisStateCode>);
 

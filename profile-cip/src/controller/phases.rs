@@ -23,7 +23,7 @@
 //! Whatever fails leads to Stopping if the connection is still there, and to Closing otherwise.
 
 use super::axis::Axis;
-use super::config::{AttributeSet, Scaling};
+use super::config::{AttributeSet, Scaling, command_control};
 use super::engine::{Controller, push};
 use super::event::Event;
 use super::executor::{Context, report_refused};
@@ -46,9 +46,6 @@ const MOTION_RESOLUTION: u16 = 78;
 const DRIVE_SCALING: u8 = 1;
 /// Attributes that a service sets where the updates do not carry them (footnote of Table 5-2.16).
 const CONTROL_STATUS: u16 = 89;
-const COMMAND_CONTROL: u16 = 92;
-/// Command Position Data Type in Command Control: DINT.
-const DINT: u8 = 0b0100;
 
 /// Where a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -324,11 +321,6 @@ impl Controller {
             self.close(now);
         }
     }
-}
-
-/// Command Control as one value: the type of the position, and the update that commands are meant for.
-pub(super) fn command_control(target: CommandTarget) -> AttributeSet {
-    AttributeSet::usint(COMMAND_CONTROL, DINT | target.0).optional()
 }
 
 /// What ends the configuration in the fixed format, in this order.

@@ -14,7 +14,7 @@ use crate::wire::Error;
 use crate::wire::motion::codes::{CommandTarget, NodeControl, NodeFault, NodeStatus, TimeDataSet};
 use crate::wire::motion::fixed::{FixedActual, FixedCommand};
 use crate::wire::motion::header::CommandHeader;
-use crate::wire::motion::{ActualFrame, CommandInstance, CommandValues, Format};
+use crate::wire::motion::{ActualEvents, ActualFrame, CommandInstance, CommandValues, Format};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// Update IDs.
@@ -375,5 +375,16 @@ impl Controller {
         let sum = lens().fold((0, 0), |all, axis| (all.0 + axis.0, all.1 + axis.1));
         let most = lens().fold((0, 0), |most: (usize, usize), axis| (most.0.max(axis.0), most.1.max(axis.1)));
         self.link.room(sum, most)
+    }
+
+    /// Takes the event block of an axis.
+    fn handle_events(&mut self, index: usize, block: Option<&ActualEvents>, received: u8) {
+        let Some(axis) = self.axes.get_mut(index) else { return };
+        let (number, events) = (axis.instance(), &mut self.events);
+        let super::axis::Axis { events: checks, seen, .. } = axis;
+        checks.handle(block, received, |notification| {
+            seen.note_event(notification);
+            push(events, Event::AxisEvent { axis: number, notification });
+        });
     }
 }

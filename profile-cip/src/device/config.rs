@@ -5,10 +5,7 @@ use core::fmt;
 use core::net::Ipv4Addr;
 use std::sync::Arc;
 
-use super::ethernet_link::{InterfaceType, LinkState};
-use super::qos::DSCP_MAX;
-use super::tcp_ip::INACTIVITY_TIMEOUT_MAX_S;
-
+use super::port::{InterfaceType, LinkState};
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::encapsulation::{EXPLICIT_PORT, IO_PORT};
 use crate::wire::epath::ElectronicKey;
@@ -37,6 +34,12 @@ pub const MOTION_SIZE_MAX: u16 = 1454;
 
 /// Longest electronic data sheet in bytes: a sheet of every attribute of 16 axes has less than a tenth of it.
 pub const EDS_LEN_MAX: usize = 1 << 22;
+
+/// Largest code point: six bits.
+pub const DSCP_MAX: u8 = 63;
+
+/// Longest session inactivity time-out in seconds (attribute 13).
+pub const INACTIVITY_TIMEOUT_MAX_S: u16 = 3600;
 
 /// Everything the adapter is told at its start.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -168,7 +171,7 @@ pub struct LinkConfig {
     pub label: ArrayString<64>,
     /// Kind of port.
     pub interface_type: InterfaceType,
-    /// How the port is at the start; [`super::adapter::Adapter::set_link`] tells of it later.
+    /// How the port is at the start; [`crate::device::explicit::adapter::Adapter::set_link`] tells of it later.
     pub state: LinkState,
 }
 
@@ -304,7 +307,7 @@ const _: () = assert!(MOTION_SIZE_MIN as usize == SEQUENCE_COUNT_LEN + 8);
 const _: () = assert!(MOTION_SIZE_FIXED as usize == SEQUENCE_COUNT_LEN + fixed::LEN);
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// A device with two axes, as the tests of this folder use it.

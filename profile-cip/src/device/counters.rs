@@ -74,7 +74,7 @@ pub struct Refusal {
 
 impl Counters {
     /// Counts a refused Forward_Open.
-    pub(super) fn refuse_open(&mut self, general: u8, extended: u16) {
+    pub(crate) fn refuse_open(&mut self, general: u8, extended: u16) {
         let same = |row: &&mut Refusal| row.general == general && row.extended == extended;
         if let Some(row) = self.open_refusals.iter_mut().find(same) {
             row.count += 1;

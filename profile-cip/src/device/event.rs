@@ -1,7 +1,7 @@
 //! What the adapter tells the application, for its log and its duties.
 
-use super::config::QosConfig;
-use super::motion_link::ConnectionTriad;
+use crate::device::config::QosConfig;
+use crate::device::motion_link::ConnectionTriad;
 use crate::wire::status::Service;
 use core::fmt;
 use core::net::SocketAddrV4;

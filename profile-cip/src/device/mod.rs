@@ -1,64 +1,39 @@
-//! The device role: the explicit side ([`adapter`]) and the motion device behind it.
+//! The device role: what a motion controller sees on EtherNet/IP.
+//!
+//! | folder | subject |
+//! |---|---|
+//! | [`explicit`] | encapsulation sessions over TCP and UDP, and the requests that come over them |
+//! | `connection` | which connections there are, and what a Forward_Open must be like |
+//! | [`objects`] | the CIP objects beside the axes: Identity, Connection Manager, TCP/IP, Ethernet Link, QoS, File, Time Sync |
+//! | [`motion`] | the motion device: I/O connection, updates, services, up to 16 axes |
+//! | [`axis`] | one axis: states, handshake, faults, events, what its drive is told |
+//! | [`attribute`] | attributes of the Motion Device Axis Object: definitions, tables, values, list services |
+//! | [`visualization`] | LEDs and display |
+//!
+//! The explicit side and the motion device run on different threads; [`motion_link`] has what passes between them.
+//! [`config`], [`event`] and [`counters`] are what the application gives to the explicit side and gets from it.
 
-pub mod adapter;
-#[cfg(test)]
-mod adapter_tests;
 pub mod attribute;
-pub mod attribute_worker;
-mod axis_control;
-pub mod axis_object;
-pub mod axis_state;
+pub mod axis;
 pub mod config;
-mod connection_data;
-pub mod connection_manager;
-mod connection_path;
+mod connection;
 pub mod counters;
-mod cyclic_list;
-pub mod drive_link;
-pub mod ethernet_link;
 pub mod event;
-pub mod event_channel;
-pub mod exception;
-mod exchange;
-pub mod fault_log;
-pub mod file_object;
-mod forward_close;
-mod forward_open;
-pub mod identity;
-mod list;
-mod list_job;
+pub mod explicit;
+pub mod motion;
 pub mod motion_link;
-pub mod motion_open;
-mod motion_owner;
-mod node;
-pub(crate) mod object;
-pub mod object_list;
-mod ownership;
-pub mod qos;
-mod refusal;
-mod reset;
-pub mod router;
-mod session;
-mod status_report;
-pub mod tcp_ip;
-mod time_offset;
-pub mod time_sync;
+pub mod objects;
+mod port;
+mod session_slot;
 pub mod visualization;
-pub use axis_object::AxisConfig;
-mod axis_report;
-mod axis_status;
-mod explicit_queue;
-mod io_connection;
-pub mod io_counters;
-mod motion_class;
-pub mod motion_device;
-mod motion_fixed;
-mod motion_receive;
-mod motion_reset;
-mod motion_service;
-mod motion_transmit;
-mod motion_visualization;
-mod service_channel;
 
-#[cfg(test)]
-mod motion_tests;
+pub use attribute::worker as attribute_worker;
+pub use axis::{
+    self as axis_object, AxisConfig, drive_link, event_channel, exception, fault_log, state as axis_state,
+};
+pub use connection::{manager as connection_manager, motion as motion_open};
+pub use explicit::adapter;
+pub use motion::{device as motion_device, io_counters};
+pub use objects::{
+    ethernet_link, file as file_object, identity, list as object_list, qos, router, tcp_ip, time_sync,
+};

@@ -1,4 +1,4 @@
-//! What passes between the explicit side ([`super::adapter`]) and the motion device.
+//! What passes between the explicit side ([`crate::device::explicit::adapter`]) and the motion device.
 //!
 //! The two run on different threads: the adapter beside the TCP sessions, the motion device in the cycle.
 //! These values cross in bounded queues, so they own fixed storage and never touch the heap.
@@ -21,6 +21,17 @@ pub const EXPLICIT_DATA_MAX: usize = 504;
 
 /// Most 16-bit words of extended status the device may add to a reply.
 pub const EXTENDED_STATUS_MAX: usize = 4;
+
+/// State of the device's clock, from its Time Sync object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SyncState {
+    /// Clock identity of the grand master that the device follows, if it follows one.
+    pub grandmaster: Option<[u8; 8]>,
+    /// The clock is within the sync threshold.
+    pub synchronized: bool,
+    /// System Time Offset, ns: system time less local clock.
+    pub offset: i64,
+}
 
 /// Names one request until its reply; never used twice by one adapter run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -130,7 +130,7 @@ pub enum StageError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A drive on CANopen cannot be led by its data sheet.
-    #[error("axis {axis}: the drive of its data sheet cannot be led: {told}")]
+    #[error("axis {axis}: the drive of its data sheet cannot be used: {told}")]
     Sheet {
         /// The axis.
         axis: String,
@@ -138,7 +138,7 @@ pub enum StageError {
         told: String,
     },
     /// No program can be made for an axis.
-    #[error("axis {axis}: no program can be made: {told}")]
+    #[error("axis {axis}: its program cannot be compiled: {told}")]
     Program {
         /// The axis.
         axis: String,
@@ -207,7 +207,7 @@ impl Stage {
                 stands_in: !drive.set_scaling,
                 scaling,
                 attributes,
-                north: channel.north().clone(),
+                north: engine.cip_program(number).ok_or_else(unready)?.clone(),
                 south: south.clone(),
             };
             axes.push((number, on_sercos));

@@ -4,6 +4,7 @@ use super::Context;
 use super::leaf::Run;
 use crate::controller::condition::{Condition, Found, Number};
 use crate::controller::failure::Failure;
+use crate::controller::program::Step;
 use crate::controller::services::Outcome;
 use crate::wire::motion::EventNotification;
 use crate::wire::motion::attribute_list::AttributeSelector;
@@ -13,12 +14,8 @@ use profile_generic::time::DurationNs;
 /// Time between two reads of an attribute.
 const READ_INTERVAL: DurationNs = DurationNs::from_millis(10);
 
-pub(super) fn expect(
-    condition: &Condition,
-    within: DurationNs,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-) -> Result<bool, Failure> {
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
+    let Step::Expect { condition, within } = step else { return Ok(true) };
     let waited = cx.now - run.since;
     let of_faults =
         matches!(condition, Condition::NoFault | Condition::NodeFault(_) | Condition::Fault { .. });
@@ -36,7 +33,7 @@ pub(super) fn expect(
     };
     match found {
         None => Ok(true),
-        Some(found) if waited >= within => Err(Failure::Unmet { condition: *condition, found, waited }),
+        Some(found) if waited >= *within => Err(Failure::Unmet { condition: *condition, found, waited }),
         Some(_) => Ok(false),
     }
 }

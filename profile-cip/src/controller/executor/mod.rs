@@ -1,8 +1,14 @@
 //! Runs the steps of a program, once per update period.
 
+mod attributes;
+mod connection;
+mod events;
 mod expect;
 mod leaf;
+mod motion;
 mod request;
+mod services;
+mod settings;
 
 use self::leaf::Run;
 use super::axis::Axis;
@@ -144,9 +150,9 @@ impl Node {
         }
         let mut run = match &self.progress {
             Progress::Running(run) => *run,
-            _ => leaf::start(&self.step, cx)?,
+            _ => leaf::start(&self.step, self.time_out, cx)?,
         };
-        let finished = leaf::advance(&self.step, &mut run, cx, self.time_out)?;
+        let finished = leaf::advance(&self.step, &mut run, cx)?;
         self.progress = Progress::Running(run);
         Ok(finished)
     }

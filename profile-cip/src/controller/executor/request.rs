@@ -3,8 +3,8 @@
 use super::Context;
 use super::leaf::Run;
 use crate::controller::failure::Failure;
+use crate::controller::program::Step;
 use crate::wire::motion::codes::{AxisControl, AxisStateCode};
-use profile_generic::time::DurationNs;
 
 /// States in which an axis is on its way somewhere and an Enable would come too early.
 fn in_transit(state: Option<AxisStateCode>) -> bool {
@@ -13,15 +13,29 @@ fn in_transit(state: Option<AxisStateCode>) -> bool {
         || state.is_none()
 }
 
+pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
+    match step {
+        Step::Ask { axes, request } => {
+            // It has been sent once before the next step can take it back.
+            if !run.done {
+                for instance in axes.iter() {
+                    cx.axis(instance)?.handshake.request(*request);
+                }
+            }
+            Ok(core::mem::replace(&mut run.done, true))
+        }
+        Step::Refused { request, status, .. } => await_refusal(*request, *status, run, cx),
+        _ => match step.request() {
+            Some((_, request)) => ask(request, run, cx),
+            None => Ok(true),
+        },
+    }
+}
+
 /// Asks every axis of the step and waits for all of them.
-pub(super) fn ask(
-    request: AxisControl,
-    run: &mut Run,
-    cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
-) -> Result<bool, Failure> {
+fn ask(request: AxisControl, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
-    let time_out = time_out.unwrap_or(cx.config.time_outs.axis_control);
+    let time_out = run.time_out.unwrap_or(cx.config.time_outs.axis_control);
     for instance in run.left.iter() {
         let axis = cx.axis(instance)?;
         let state = axis.state();
@@ -59,15 +73,14 @@ pub(super) fn ask(
 }
 
 /// Asks every axis of the step and waits until all of them have said no.
-pub(super) fn await_refusal(
+fn await_refusal(
     request: AxisControl,
     expected: Option<u8>,
     run: &mut Run,
     cx: &mut Context<'_>,
-    time_out: Option<DurationNs>,
 ) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
-    let time_out = time_out.unwrap_or(cx.config.time_outs.axis_control);
+    let time_out = run.time_out.unwrap_or(cx.config.time_outs.axis_control);
     for instance in run.left.iter() {
         let axis = cx.axis(instance)?;
         if !run.asked.contains(instance) {

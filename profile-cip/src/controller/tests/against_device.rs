@@ -11,20 +11,20 @@ use crate::controller::{
     AttributeSet, AxisSet, Controller, ControllerConfig, DATAGRAM_MAX, Event, Limits, Report, Step,
     StreamAction,
 };
-use crate::device::adapter::{Adapter, SessionSlot};
 use crate::device::attribute::{Access, AttributeDefinition, DataType, Scope, id};
-use crate::device::axis_object::AxisConfig;
-use crate::device::axis_state::AxisState;
+use crate::device::axis::AxisConfig;
+use crate::device::axis::drive_link::{
+    AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
+};
+use crate::device::axis::state::AxisState;
 use crate::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig,
     QosConfig,
 };
-use crate::device::drive_link::{
-    AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
-};
-use crate::device::ethernet_link::{InterfaceType, LinkState};
-use crate::device::motion_device::{DeviceConfig, MotionDevice, SyncState};
+use crate::device::explicit::adapter::{Adapter, SessionSlot};
+use crate::device::motion::device::{DeviceConfig, MotionDevice, SyncState};
 use crate::device::motion_link::MotionReply;
+use crate::device::objects::ethernet_link::{InterfaceType, LinkState};
 use crate::wire::class1::Class1Datagram;
 use crate::wire::encapsulation::IO_PORT;
 use crate::wire::motion::Format;

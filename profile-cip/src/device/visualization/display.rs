@@ -23,8 +23,8 @@ use core::fmt::Write as _;
 use arrayvec::ArrayString;
 use profile_generic::open_code;
 
-use super::super::axis_state::{AxisState, ControlKind};
 use super::AxisCondition;
+use crate::device::axis::state::{AxisState, ControlKind};
 use crate::wire::motion::codes::{AlarmType, FaultType, NodeAlarm, NodeFault};
 
 /// Characters that hold any line: `X255:SAFE FLT M255` and less.

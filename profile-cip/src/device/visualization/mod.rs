@@ -31,8 +31,8 @@ pub mod display;
 
 use profile_generic::open_code;
 
-use super::axis_state::{AxisState, ControlKind};
-use super::identity::ModuleState;
+use crate::device::axis::state::{AxisState, ControlKind};
+use crate::device::objects::identity::ModuleState;
 use crate::wire::motion::codes::{AlarmType, FaultType};
 
 open_code! {

@@ -27,7 +27,7 @@ use crate::wire::{Error, Writer};
 use super::event::ExplicitRequest;
 
 /// Class code of the Motion Device Axis Object.
-const CLASS: u16 = crate::device::router::CLASS_MOTION_DEVICE_AXIS;
+const CLASS: u16 = crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
 
 /// Attribute Control Status, whose bit 0 is Configuration Complete.
 const CONTROL_STATUS: u8 = 89;

@@ -8,7 +8,7 @@ use super::super::wire::{AllocationChoice, BodyFormat, Header, Identifier, MacId
 use super::event::{Event, ExplicitRequest, LossReason, Outcome};
 use super::station::{Phase, PhaseEvent};
 use super::{Master, Place, Station};
-use crate::device::identity::CLASS_IDENTITY;
+use crate::device::objects::identity::CLASS_IDENTITY;
 use crate::wire::status::{GeneralStatus, Service};
 
 /// Attributes of the Identity object that are asked for: vendor, device type, product code, serial number.

@@ -6,7 +6,7 @@ use super::super::connection::{Change, Connection, ConnectionKind, ConnectionSet
 use super::super::fragmentation::{Body, IoData};
 use super::super::wire::explicit::NO_ADDITIONAL_CODE;
 use super::super::wire::{MacId, Request};
-use crate::device::identity::Health;
+use crate::device::objects::identity::Health;
 use crate::wire::status::GeneralStatus;
 
 /// Why a service is refused.

@@ -17,10 +17,10 @@ use super::allocation::NOT_ON_UNCONNECTED_PORT;
 use super::application::{Application, ServiceError};
 use super::event::SlaveEvent;
 use super::objects::{DeviceNetObject, Router};
-use crate::device::identity::{CLASS_IDENTITY, Identity, Ownership, reset_kind};
 use crate::device::motion_link::ObjectPath;
-use crate::device::object::{self, Answer, Object};
-use crate::device::router::CLASS_MESSAGE_ROUTER;
+use crate::device::objects::identity::{CLASS_IDENTITY, Identity, Ownership, reset_kind};
+use crate::device::objects::object::{self, Answer, Object};
+use crate::device::objects::router::CLASS_MESSAGE_ROUTER;
 use crate::wire::Error;
 use crate::wire::status::{GeneralStatus, REPLY_BIT, Service};
 

@@ -35,19 +35,19 @@ use super::application::{Application, ServiceError};
 use super::explicit::{append, path_of};
 use crate::device::AxisConfig;
 use crate::device::attribute::AttributeDefinition;
-use crate::device::axis_state::{AxisState, ControlKind};
-use crate::device::config::MOTION_SIZE_FIXED;
-use crate::device::drive_link::{
+use crate::device::axis::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
     SetPoints,
 };
-use crate::device::identity::{Health, ModuleState};
-use crate::device::motion_device::{DeviceConfig, DeviceError, MotionDevice};
+use crate::device::axis::state::{AxisState, ControlKind};
+use crate::device::config::MOTION_SIZE_FIXED;
+use crate::device::motion::device::{DeviceConfig, DeviceError, MotionDevice};
 use crate::device::motion_link::{
     CloseParameters, ConnectionTriad, EXPLICIT_DATA_MAX, ExplicitRequest, MotionReply, MotionRequest,
     OpenParameters, Token,
 };
-use crate::device::router::CLASS_MOTION_DEVICE_AXIS;
+use crate::device::objects::identity::{Health, ModuleState};
+use crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::motion::codes::{ControlMode, FaultType};
 use crate::wire::motion::{CommandPosition, FORMAT_REVISION, Format, fixed};
 use crate::wire::status::GeneralStatus;

@@ -5,7 +5,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::bench::Bench;
 use super::rig::{MASTER, Net, Node, mac, refusals, slave_config};
-use crate::device::identity::Health;
+use crate::device::objects::identity::Health;
 use crate::devicenet::connection::{Change, Connection, ConnectionKind, ConnectionSetup, ConnectionState};
 use crate::devicenet::fragmentation::{Body, IoData};
 use crate::devicenet::master::config::{IoConfig, SlaveConfig as Planned};

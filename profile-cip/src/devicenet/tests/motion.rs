@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 
 use super::rig::{Net, mac, motion};
-use crate::device::axis_state::AxisState;
+use crate::device::axis::state::AxisState;
 use crate::devicenet::connection::ConnectionKind;
 use crate::devicenet::master::event::{Event, ExplicitRequest, Outcome};
 use crate::devicenet::master::motion::{MotionEnd, SetPoint, UpdateError, Watched};

@@ -35,7 +35,7 @@ use super::super::wire::speed::{
 use super::super::wire::{MacId, Request};
 use super::application::{Application, ServiceError};
 use super::explicit::serve;
-use crate::device::identity::{Health, ModuleState};
+use crate::device::objects::identity::{Health, ModuleState};
 use crate::wire::status::GeneralStatus;
 
 /// Period of the simulation.

@@ -3,7 +3,7 @@
 
 use super::super::super::wire::speed::{Assembly, SpeedActual, SpeedCommand, SpeedStatus};
 use super::SpeedDrive;
-use crate::device::object::Object;
+use crate::device::objects::object::Object;
 use crate::wire::status::GeneralStatus;
 
 /// Class code.

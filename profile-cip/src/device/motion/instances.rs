@@ -1,0 +1,168 @@
+//! The instances of the Motion Device Axis Object: the class, which is instance 0, and the axes, from 1.
+
+use super::device::DeviceConfig;
+use super::service_channel::ServiceChannel;
+use super::slot::Slot;
+use crate::device::attribute::worker::{AttributeAccess, AttributeSpace};
+use crate::device::attribute::{AttributeStore, AttributeTable, Scope, TableError, id};
+use crate::device::axis::Context;
+use crate::wire::status::GeneralStatus;
+
+/// The class with its attributes and channel.
+struct Class {
+    store: AttributeStore,
+    service: ServiceChannel,
+}
+
+/// Class and axes, with the tables of their attributes.
+pub(super) struct Instances {
+    class_table: AttributeTable,
+    axis_table: AttributeTable,
+    class: Class,
+    pub slots: Vec<Slot>,
+    /// Last ticket given out for an access to an attribute that lives in a drive.
+    tickets: u32,
+}
+
+impl Instances {
+    pub fn new(config: &DeviceConfig) -> Result<Self, TableError> {
+        let class_table = AttributeTable::new(Scope::Class, &config.attributes)?;
+        let axis_table = AttributeTable::new(Scope::Instance, &config.attributes)?;
+        let class = Class { store: AttributeStore::new(&class_table), service: ServiceChannel::default() };
+        let slots = config.axes.iter().map(|axis| Slot::new(*axis, &axis_table)).collect();
+        Ok(Self { class_table, axis_table, class, slots, tickets: 0 })
+    }
+
+    /// Number of axes, which is the number of the last instance.
+    pub fn axis_count(&self) -> usize {
+        self.slots.len()
+    }
+
+    pub fn table(&self, scope: Scope) -> &AttributeTable {
+        match scope {
+            Scope::Class => &self.class_table,
+            Scope::Instance => &self.axis_table,
+        }
+    }
+
+    /// The axis with this instance number, and the table of its attributes.
+    pub fn axis(&mut self, instance: usize) -> Option<(&mut Slot, &AttributeTable)> {
+        Some((self.slots.get_mut(instance.checked_sub(1)?)?, &self.axis_table))
+    }
+
+    pub fn channel(&mut self, instance: usize) -> Option<&mut ServiceChannel> {
+        match instance.checked_sub(1) {
+            None => Some(&mut self.class.service),
+            Some(axis) => self.slots.get_mut(axis).map(|slot| &mut slot.service),
+        }
+    }
+
+    /// The channel of an instance, to look at.
+    pub fn channel_of(&self, instance: u8) -> Option<&ServiceChannel> {
+        match usize::from(instance).checked_sub(1) {
+            None => Some(&self.class.service),
+            Some(axis) => self.slots.get(axis).map(|slot| &slot.service),
+        }
+    }
+
+    /// The channel of an instance and the values that its services work on.
+    pub fn service(&mut self, instance: usize) -> Option<(&mut ServiceChannel, AttributeSpace<'_>)> {
+        let tickets = &mut self.tickets;
+        let Some(axis) = instance.checked_sub(1) else {
+            let (table, store) = (&self.class_table, &mut self.class.store);
+            let space = AttributeSpace { table, store, instance: 0, running: false, tickets };
+            return Some((&mut self.class.service, space));
+        };
+        let Slot { axis, store, service, .. } = self.slots.get_mut(axis)?;
+        let instance = u8::try_from(instance).unwrap_or(u8::MAX);
+        let running = axis.is_running();
+        Some((service, AttributeSpace { table: &self.axis_table, store, instance, running, tickets }))
+    }
+
+    /// Factory defaults and idle channels: a connection begins or ends.
+    pub fn start_over(&mut self) {
+        self.class.store.reset(&self.class_table);
+        self.class.service.reset();
+        self.slots.iter_mut().for_each(|slot| slot.start_over(&self.axis_table));
+    }
+
+    /// The connection is lost: idle channels, but the attributes stay.
+    pub fn lose(&mut self) {
+        self.class.service.reset();
+        for slot in &mut self.slots {
+            slot.axis.lose();
+            slot.service.reset();
+        }
+    }
+
+    /// The next access to an attribute that lives in a drive.
+    pub fn take_access(&mut self) -> Option<AttributeAccess> {
+        let axes = self.slots.iter_mut().map(|slot| &mut slot.service.worker);
+        axes.chain([&mut self.class.service.worker]).find_map(|worker| worker.take_access())
+    }
+
+    /// Hands the drive's answer to the channel that waits for it. Returns the instance of that channel.
+    pub fn complete(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) -> Option<usize> {
+        (0..=self.slots.len()).find(|instance| {
+            let service = self.service(*instance);
+            service.is_some_and(|(channel, mut space)| channel.worker.complete(ticket, answer, &mut space))
+        })
+    }
+
+    /// An attribute of the class as a number without sign.
+    pub fn class_value(&self, id: u16) -> u64 {
+        self.class.store.unsigned(&self.class_table, id).unwrap_or(0)
+    }
+
+    pub fn publish_class(&mut self, values: &[(u16, u64)]) {
+        for (id, value) in values {
+            self.class.store.publish(&self.class_table, *id, *value);
+        }
+    }
+
+    pub fn publish_axis(&mut self, instance: usize, fixed: bool, context: &Context) {
+        if let Some((slot, table)) = self.axis(instance) {
+            slot.publish(table, fixed, context);
+        }
+    }
+
+    /// Missed updates that are a fault (class attribute 21), update periods.
+    pub fn high_limit(&self) -> u64 {
+        self.class_value(id::UPDATE_DELAY_HIGH_LIMIT)
+    }
+
+    /// Missed updates that are an alarm (class attribute 22), update periods.
+    pub fn low_limit(&self) -> u64 {
+        self.class_value(id::UPDATE_DELAY_LOW_LIMIT)
+    }
+
+    /// Step of a system time offset that is compensated at once (class attribute 35), ns.
+    pub fn step_threshold(&self) -> i64 {
+        i64::try_from(self.class_value(id::STEP_THRESHOLD)).unwrap_or(i64::MAX)
+    }
+
+    /// Publishes the value of a stored attribute of an axis, which counts from 0. Access and range do not count.
+    pub fn put(&mut self, axis: usize, id: u16, value: &[u8]) -> Result<(), GeneralStatus> {
+        let slot = self.slots.get_mut(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        slot.store.put(entry, entry.whole(), value)
+    }
+
+    /// The value of an attribute of an axis, which counts from 0, as it is stored in the device.
+    pub fn get(&self, axis: usize, id: u16) -> Result<&[u8], GeneralStatus> {
+        let slot = self.slots.get(axis).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
+        let entry = self.axis_table.find(id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        slot.store.get(entry, entry.whole())
+    }
+
+    /// Publishes the signals of an axis, which counts from 0, that its cyclic read lists hold.
+    pub fn publish_signals(
+        &mut self,
+        axis: usize,
+        value: &mut dyn FnMut(u16, &mut [u8; 8]) -> Option<usize>,
+    ) {
+        if let Some(slot) = self.slots.get_mut(axis) {
+            slot.read_lists.publish(&self.axis_table, &mut slot.store, value);
+        }
+    }
+}
