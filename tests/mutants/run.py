@@ -161,12 +161,12 @@ def plan():
     return mutants
 
 
-def write(scratch, mutants):
+def write(scratch, mutants, files):
     """The copy with these mutants; at most one on a line."""
     by_file = {}
     for mutant in mutants:
         by_file.setdefault(mutant["file"], {}).setdefault(mutant["line"], mutant)
-    for name in {mutant["file"] for mutant in mutants} | {"profile-generic/src/lib.rs"}:
+    for name in files | {"profile-generic/src/lib.rs"}:
         lines, rest = source_lines((ROOT / name).read_text())
         for line, mutant in by_file.get(name, {}).items():
             lines[line - 1] = mutant["text"].replace("@N@", str(mutant["number"]))
@@ -190,8 +190,9 @@ def cargo(scratch, *arguments):
 
 def build(scratch, mutants):
     """Takes out what does not compile, and builds the rest."""
+    files = {mutant["file"] for mutant in mutants}
     for attempt in range(40):
-        there = write(scratch, mutants)
+        there = write(scratch, mutants, files)
         result = cargo(scratch, "check")
         if result.returncode == 0:
             break
@@ -208,7 +209,7 @@ def build(scratch, mutants):
             sys.exit("does not compile, and no mutant is to blame:\n" + result.stdout[-4000:] + result.stderr[-4000:])
         mutants = [m for m in mutants if (m["file"], m["line"]) not in wrong]
         print(f"attempt {attempt + 1}: {len(wrong & places)} do not compile", file=sys.stderr)
-    there = write(scratch, mutants)
+    there = write(scratch, mutants, files)
     result = cargo(scratch, "build")
     if result.returncode != 0:
         sys.exit(result.stderr[-4000:])
