@@ -10,7 +10,7 @@ use profile_generic::inhibit::Inhibits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::Conversion;
 use profile_generic::ratio::{Outcome, Ratio, Rounding};
-use profile_generic::scaling::{WrapTracker, fold};
+use profile_generic::scaling::WrapTracker;
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{DriveState, Request};
 
@@ -19,7 +19,7 @@ use super::cip_events::EventProgram;
 use super::cip_scaling::CipScaling;
 use super::cip_tables::{CipTables, Served};
 use super::device_link::DRIVE_ACTIONS;
-use super::dictionary::{Access, CipType};
+use super::dictionary::Access;
 
 /// Elements of a data set: one per bit.
 pub const ELEMENTS: usize = 8;
@@ -171,7 +171,6 @@ struct Element {
     signal: Signal,
     conversion: Conversion,
     wraps: bool,
-    data_type: CipType,
     missing: MissingValue,
 }
 
@@ -352,7 +351,6 @@ impl CipProgram {
                 signal: row.signal,
                 conversion: Conversion::new(conversion),
                 wraps: row.wraps,
-                data_type: row.data_type,
                 missing: row.missing,
             };
             let set = if row.to_generic { &mut program.commands } else { &mut program.actuals };
@@ -422,38 +420,6 @@ impl CipProgram {
             };
             if !command.set(*signal, outcome.value) || outcome.saturated {
                 report.saturated(*signal);
-            }
-        }
-        report
-    }
-
-    /// Puts the actual values of an axis into the elements of an Actual Data Set whose bits are in
-    /// `wanted`.
-    pub fn encode(&self, feedback: &AxisFeedback, wanted: u8, values: &mut CyclicValues) -> CipReport {
-        let mut report = CipReport::default();
-        for (bit, (value, element)) in values.0.iter_mut().zip(&self.actuals).enumerate() {
-            *value = None;
-            if wanted & (1 << bit) == 0 {
-                continue;
-            }
-            let Some(element) = element else {
-                report.unmapped += 1;
-                continue;
-            };
-            let generic = match (feedback.get(element.signal), element.missing) {
-                (Some(generic), _) => generic,
-                (None, missing) => {
-                    report.missing += 1;
-                    if missing == MissingValue::Absent {
-                        continue;
-                    }
-                    0
-                }
-            };
-            let (encoded, saturated) = element.encode(generic, self.unwind);
-            *value = Some(encoded);
-            if saturated {
-                report.saturated(element.signal);
             }
         }
         report
@@ -640,24 +606,6 @@ impl Element {
         let inexact = counts.inexact || rest.inexact;
         Some(Outcome { value: sum.unwrap_or(counts.value), saturated, inexact })
     }
-
-    fn encode(&self, generic: i64, unwind: Option<i64>) -> (CipValue, bool) {
-        match self.data_type {
-            CipType::Real => {
-                let (outcome, saturated) = self.conversion.convert_to_f32(generic);
-                (CipValue::Real(outcome.value), saturated)
-            }
-            CipType::Lreal => {
-                let (outcome, saturated) = self.conversion.convert_to_f64(generic);
-                (CipValue::Lreal(outcome.value), saturated)
-            }
-            _ => {
-                let Outcome { value, saturated, .. } = self.conversion.convert(generic);
-                let (value, clamped) = if self.wraps { (wrap(value, unwind), false) } else { clamp(value) };
-                (CipValue::Dint(value), saturated || clamped)
-            }
-        }
-    }
 }
 
 /// The whole counts in a double, and the rest; `None` when it is not finite or holds more than a DINT does.
@@ -665,21 +613,4 @@ fn split(value: f64) -> Option<(i64, f64)> {
     let whole = value.floor();
     let counts = Conversion::IDENTITY.within(i64::from(i32::MIN), i64::from(i32::MAX)).convert_f64(whole)?;
     (!counts.saturated).then_some((counts.value, value - whole))
-}
-
-/// The counts as the controller sees them: within one cycle of the machine, or the low 32 bits.
-fn wrap(counts: i64, unwind: Option<i64>) -> i32 {
-    let folded = match unwind {
-        Some(modulus) => fold(counts, modulus),
-        None => counts,
-    };
-    let bytes = folded.to_le_bytes();
-    i32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
-}
-
-fn clamp(value: i64) -> (i32, bool) {
-    match i32::try_from(value) {
-        Ok(value) => (value, false),
-        Err(_) => (if value > 0 { i32::MAX } else { i32::MIN }, true),
-    }
 }

@@ -401,12 +401,31 @@ impl DriveProgram {
         place(item, &self.telegram.feedback, at, self.feedback_fields()).or(word)
     }
 
-    /// A status that says this, for whoever has not heard the drive.
-    pub fn status_of(&self, report: Report) -> Option<u32> {
-        self.reports
-            .rows()
-            .find(|(pattern, _)| self.report(pattern.value) == report)
-            .map(|(row, _)| row.value)
+    /// Writes a status that reports this in a mode, with more bits of the status word, into a telegram from the drive: for a peer
+    /// that stands in for the drive. `false`, and nothing written, where no status reports it.
+    pub fn write_status(
+        &self,
+        report: Report,
+        selection: ModeSelection,
+        bits: StatusBits,
+        telegram: &mut [u8],
+    ) -> bool {
+        let mode = self.shown_in(selection).and_then(|shown| self.entry(shown));
+        let shown = |status: u32| mode.map_or(status, |entry| entry.status.apply(status));
+        let rows = self.reports.rows().map(|(row, _)| shown(row.value));
+        let Some(status) = rows.into_iter().find(|status| self.report(*status) == report) else {
+            return false;
+        };
+        let more = self.status.iter().filter(|row| row.word.is_none() && bits.contains(row.bit));
+        let [low, high, octet, _] = more.fold(status, |status, row| row.pattern.apply(status)).to_le_bytes();
+        let [_, at] = self.words_at.map(usize::from);
+        if let Some(word) = telegram.get_mut(at..at + usize::from(WORD_BYTES)) {
+            word.copy_from_slice(&[low, high]);
+        }
+        if let Some(place) = self.mode_octets.and_then(|[_, at]| telegram.get_mut(usize::from(at))) {
+            *place = octet;
+        }
+        true
     }
 
     /// Whether an item is a word that shows faults or warnings.
@@ -567,7 +586,7 @@ impl DriveProgram {
     }
 
     /// The status in a telegram: the status word, and the operating mode above it where it has an octet of its own.
-    fn status(&self, telegram: &[u8]) -> Option<u32> {
+    pub fn status(&self, telegram: &[u8]) -> Option<u32> {
         let [_, at] = self.words_at.map(usize::from);
         let [low, high] = *telegram.get(at..)?.first_chunk()?;
         let mode = match self.mode_octets {

@@ -3,6 +3,8 @@
 use core::fmt;
 use std::ops::Range;
 
+use profile_cip::device::drive_link::DriveImage;
+use profile_generic::fault_set::FaultSet;
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
@@ -10,14 +12,14 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
 use super::cip_tables::CipTables;
-use super::compile_sercos::{Compiler, unit_of};
 use super::format::{
     Cia402ExampleRow, CipAttributeRow, CipExampleRow, CyclicRow, Name, Number, ScalingExampleRow,
 };
 use super::load::Tables;
+use super::sercos::compile::{Compiler, unit_of};
 use super::{
     AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
-    Mapping, ObjectFacts, Rated, Reference, SercosAxis,
+    Mapping, ObjectFacts, Rated, Reference, SercosAxis, Told,
 };
 use crate::finding::{Findings, Problem, Source, registry as code};
 
@@ -160,14 +162,6 @@ fn cip_value(bytes: &[u8], data_type: CipType) -> Option<(CipValue, f64)> {
     }
 }
 
-fn cip_bytes(value: CipValue) -> Vec<u8> {
-    match value {
-        CipValue::Dint(value) => value.to_le_bytes().to_vec(),
-        CipValue::Real(value) => value.to_le_bytes().to_vec(),
-        CipValue::Lreal(value) => value.to_le_bytes().to_vec(),
-    }
-}
-
 fn number(number: Number) -> f64 {
     match number {
         Number::Integer(value) => profile_generic::cast::f64_from_i64(value),
@@ -227,9 +221,15 @@ impl Mapping {
         } else {
             let mut feedback = AxisFeedback::default();
             feedback.set(signal, generic);
-            let mut values = CyclicValues::default();
-            program.encode(&feedback, 1 << element.bit, &mut values);
-            let sent = values.0[usize::from(element.bit)].map(cip_bytes);
+            let mut image = DriveImage::default();
+            program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
+            // The device sends the low word of a position that it does not unwind.
+            let sent = match signal {
+                Signal::PositionActual => Some(image.position.to_le_bytes()[..4].to_vec()),
+                Signal::VelocityActual => image.velocity.map(|value| value.to_le_bytes().to_vec()),
+                Signal::AccelerationActual => image.acceleration.map(|value| value.to_le_bytes().to_vec()),
+                _ => None,
+            };
             expect(example.bytes.span(), "bytes", &Some(bytes), &sent)
         }
     }
@@ -279,7 +279,7 @@ impl Mapping {
         let entry = self.cia402.entry(&rule, &Cia402Axis::default(), &facts);
         let entry = entry.map_err(|error| wrong(error.to_string()))?;
         let entry =
-            entry.ok_or_else(|| wrong("the drive tells nothing that its unit follows from".to_owned()))?;
+            entry.ok_or_else(|| wrong("the drive reports nothing that determines its unit".to_owned()))?;
         let bytes = hex(&example.bytes)?;
         let sent =
             entry.encode(*example.generic.get_ref()).map(|(bytes, length, _)| bytes[..length].to_vec());

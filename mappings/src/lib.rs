@@ -13,26 +13,22 @@
 
 mod attributes;
 mod capture_program;
-mod captures;
 pub mod check;
 mod cia402;
 mod cip_events;
 mod cip_scaling;
 mod cip_tables;
-mod commissioning;
 mod compile_cip;
-mod compile_sercos;
 mod definitions;
 mod device_link;
 pub mod devicenet;
 mod dictionary;
-mod drive_facts;
 mod drive_program;
 mod examples;
 pub mod finding;
-mod fixed_connections;
 pub mod format;
 mod generic_names;
+mod groups;
 mod item;
 mod load;
 mod numbers;
@@ -40,10 +36,7 @@ mod origin;
 mod overlay;
 mod resolver;
 mod rows;
-mod scaling;
-mod sercos_modes;
-mod sercos_tables;
-mod survey;
+mod sercos;
 
 #[cfg(test)]
 mod tests;
@@ -69,13 +62,10 @@ pub use cip_tables::{
     CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes, SequenceAttributes,
     Served, ServedAttribute, Times,
 };
-pub use commissioning::{CommissioningPlan, Refused, Step};
 pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     CyclicValues, ELEMENTS, MissingValue,
 };
-use compile_sercos::Compiler;
-pub use compile_sercos::{SercosAxis, SercosError};
 pub use device_link::Told;
 pub use dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,
@@ -87,19 +77,22 @@ pub use dictionary::{
     RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode, Trust, Word,
     networks,
 };
-pub use drive_facts::{Difference, DriveFacts};
 pub use drive_program::{
     CachedStatus, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry,
     Procedure, ProcedureBy, Telegram,
 };
-pub use fixed_connections::{FixedConnection, FixedConnections};
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{DrivesHead, OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
-pub use scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
-pub use sercos_tables::{ReportRule, SercosTables};
+pub use sercos::commissioning::{CommissioningPlan, Refused, Step};
+use sercos::compile::Compiler;
+pub use sercos::compile::{SercosAxis, SercosError};
+pub use sercos::facts::{Difference, DriveFacts};
+pub use sercos::fixed_connections::{FixedConnection, FixedConnections};
+pub use sercos::scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
+pub use sercos::tables::{ReportRule, SercosTables};
 
 use crate::finding::Findings;
 use profile_cip::device::attribute::{DefaultValue, ElementRule};
@@ -170,6 +163,12 @@ impl Mapping {
             Some(mapping) => Ok(mapping),
             None => Err(findings),
         }
+    }
+
+    /// The dictionaries in these texts, also where a row of them is wrong; `None` where a file cannot be read into rows.
+    pub fn dictionaries_of(texts: &TableTexts, findings: &mut Findings) -> Option<Dictionaries> {
+        let (tables, _) = texts.parse(findings)?;
+        Some(Dictionaries::resolve(&tables, findings))
     }
 
     /// The tables in these texts, and everything that is found in them; `None` with errors.

@@ -8,7 +8,7 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 
 use super::attributes::Backing;
-use super::commissioning::Step;
+use super::sercos::commissioning::Step;
 use super::{CipScaling, DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError};
 
 /// Whole numbers that a single and a double can tell apart.

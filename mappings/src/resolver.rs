@@ -6,7 +6,8 @@ use crate::finding::Spanned;
 use profile_generic::program::BitPattern;
 use profile_generic::ratio::Ratio;
 
-use super::format::{FieldValueRow, Name, RatioRow};
+use super::dictionary::FieldValue;
+use super::format::{FieldIs, FieldValueRow, Name, RatioRow};
 use super::load::FORMAT;
 use crate::finding::registry::{self as code, Code};
 use crate::finding::{Findings, Problem, Source, closest};
@@ -15,6 +16,11 @@ use crate::finding::{Findings, Problem, Source, closest};
 pub(super) struct Resolver<'a> {
     file: &'a Source,
     errors: &'a mut Findings,
+}
+
+/// A pattern over another one, whose bits count where the first has none.
+pub(super) fn over(pattern: BitPattern, base: BitPattern) -> BitPattern {
+    BitPattern::new(base.mask | pattern.mask, pattern.apply(base.value))
 }
 
 impl<'a> Resolver<'a> {
@@ -118,20 +124,35 @@ impl<'a> Resolver<'a> {
         ratio
     }
 
-    /// Mask and value of all `rows`, whose fields `find` knows as first and last bit.
-    pub fn pattern<'n>(
+    /// Mask and value of all `rows`, whose fields `find` knows as first and last bit, with their named values.
+    pub fn pattern<'n, 'v>(
         &mut self,
         rows: &[FieldValueRow],
-        find: impl Fn(&str) -> Option<(u32, u32)>,
+        find: impl Fn(&str) -> Option<((u32, u32), &'v [FieldValue])>,
         known: impl IntoIterator<Item = &'n str> + Clone,
     ) -> Option<BitPattern> {
         let mut pattern = BitPattern::new(0, 0);
         for row in rows {
-            let (low, high) = self.name("field", &row.field, "a field of the word", &find, known.clone())?;
+            let ((low, high), values) =
+                self.name("field", &row.field, "a field of the word", &find, known.clone())?;
             let width = high - low + 1;
             let field_mask = if width >= 32 { u32::MAX } else { (1 << width) - 1 };
-            let value = *row.is.get_ref();
+            let is_named = matches!(row.is.get_ref(), FieldIs::Name(_));
+            let value = match row.is.get_ref() {
+                FieldIs::Number(number) => *number,
+                FieldIs::Name(name) => {
+                    let name = Spanned::new(row.is.span(), name.clone());
+                    let names = values.iter().map(|value| value.name.as_str());
+                    let find = |text: &str| values.iter().find(|value| value.name == text);
+                    self.name("is", &name, "a number, or the name of a value of the field", find, names)?
+                        .value
+                }
+            };
             if value & !field_mask != 0 {
+                // What is wrong with a named value is told in the dictionary.
+                if is_named {
+                    return None;
+                }
                 let message = format!("expected 0 to {field_mask}, got {value}");
                 self.error(code::FIELD_VALUE, row.is.span(), "is", message);
                 return None;

@@ -2,6 +2,7 @@
 
 use serde::de::DeserializeOwned;
 
+use super::groups;
 use super::load::{Parsed, TableText};
 use super::overlay::{self, Layer};
 use crate::finding::{Findings, Source, deserialize, tree};
@@ -14,11 +15,8 @@ pub(super) fn parse<T: DeserializeOwned>(
     findings: &mut Findings,
 ) -> Option<Parsed<T>> {
     let mut text = Source::new(&table.path, &table.text);
-    let is_plain = !layers.iter().any(|layer| layer.touches(name));
-    if is_plain && let Ok(rows) = toml::from_str(&table.text) {
-        return Some(Parsed::new(text, rows));
-    }
     let mut tree = tree(&table.text, &text, findings)?;
+    groups::spread(tree.get_mut());
     let bases: Vec<usize> = layers.iter().map(|layer| layer.add_to(&mut text)).collect();
     for (layer, base) in layers.iter().zip(bases).filter(|(layer, _)| layer.touches(name)) {
         overlay::lay(layer, base, name, tree.get_mut(), &text, findings);

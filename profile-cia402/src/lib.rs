@@ -19,6 +19,7 @@
 
 pub mod drive;
 pub mod eds;
+mod generated;
 pub mod lss;
 pub mod master;
 pub mod node;

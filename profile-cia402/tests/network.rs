@@ -504,7 +504,7 @@ fn a_storm_of_emcys_delays_nobody() {
     assert!(rig.saw(&Event::EmcyStorm { node: id(1) }));
     let told = rig.log.iter().filter(|event| matches!(event, Event::Emcy { .. })).count();
     assert!((16..=32).contains(&told), "{told} told one by one in half a second");
-    // One of them is the drive's own: 8150h, somebody else sends what only it may send.
+    // One of them is the drive's own: 8150h, another station sends what only it may send.
     assert_eq!(rig.master.statistics().emcys_suppressed, 501 - u64::try_from(told).unwrap());
     assert_eq!(rig.master.node(id(1)).unwrap().emcy.unwrap().vendor[..2], 499_u16.to_le_bytes());
     rig.undisturbed(0);

@@ -16,4 +16,5 @@
 pub mod controller;
 pub mod device;
 pub mod devicenet;
+mod generated;
 pub mod wire;

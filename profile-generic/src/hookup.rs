@@ -146,6 +146,60 @@ impl HookupMove {
     }
 }
 
+/// A test of the connections of motor and feedback (Hookup Test of CIP Volume 9).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Test {
+    /// Moves the axis by torque and looks at its feedback.
+    MotorFeedback,
+    /// Watches the feedback while somebody else moves the axis.
+    Feedback,
+}
+
+impl Test {
+    /// Whether it needs torque.
+    #[must_use]
+    pub const fn is_active(self) -> bool {
+        matches!(self, Self::MotorFeedback)
+    }
+}
+
+/// A test that is to be carried out, as long as it is ordered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestOrder {
+    /// Another number for every order.
+    pub id: u32,
+    /// The test.
+    pub test: Test,
+    /// The distance that ends it, in revolutions or metres.
+    pub distance: f32,
+    /// The time that ends it, in seconds; 0 where the distance does.
+    pub time: f32,
+}
+
+/// How a test ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TestResult {
+    /// The feedback moved as far as it was to.
+    Successful,
+    /// The motor had torque and the feedback did not move.
+    NoFeedback,
+    /// It took too long.
+    TimedOut,
+    /// It could not be carried out, or was too fast.
+    Faulted,
+}
+
+/// The end of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TestReport {
+    /// The order that it belongs to.
+    pub id: u32,
+    /// How it ended.
+    pub result: TestResult,
+    /// The feedback moved in negative direction.
+    pub negative: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -55,6 +55,7 @@ pub mod code;
 pub mod fault;
 pub mod fault_set;
 pub mod functional_element;
+mod generated;
 pub mod hookup;
 pub mod image;
 pub mod inhibit;

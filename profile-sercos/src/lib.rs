@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod checker;
+mod generated;
 pub mod master;
 pub mod port;
 pub mod slave;

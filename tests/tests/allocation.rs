@@ -7,7 +7,7 @@ use std::rc::Rc;
 use allocation_counter::{measure, opt_out};
 use axisbridge::config::Config;
 use axisbridge::engine::notice::Notice;
-use axisbridge::mapping::{CyclicValues, Mapping};
+use axisbridge::mapping::{CyclicValues, Mapping, Told};
 use axisbridge::simulate::drives::linear;
 use axisbridge::status::BoxState;
 use axisbridge::translate::Stage;
@@ -20,12 +20,14 @@ use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
 use profile_cip::device::axis_state::AxisState;
+use profile_cip::device::drive_link::DriveImage;
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
+use profile_generic::fault_set::FaultSet;
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
@@ -79,7 +81,8 @@ fn translation_allocates_nothing() {
         };
         let (mut trackers, mut south) = (axis.north.trackers(), axis.south.cached_status());
         let (mut command, mut feedback) = (AxisCommand::default(), AxisFeedback::default());
-        let (mut telegram, mut seen) = ([0; 128], CyclicValues::default());
+        let (mut telegram, mut image) = ([0; 128], DriveImage::default());
+        let (faults, mut told) = (FaultSet::new(), Told::default());
         let mut report = ConversionReport::default();
         let info = measure(|| {
             for mode in [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque] {
@@ -91,7 +94,7 @@ fn translation_allocates_nothing() {
                     }
                 }
                 axis.south.decode(&telegram, false, &mut feedback, &mut south, &mut report);
-                axis.north.encode(&feedback, 0b111, &mut seen);
+                axis.north.drive_image(&feedback, &faults, &mut told, &mut image);
                 for code in [0x2310, 0x8611, 0xFFFF] {
                     for word in axis.south.diagnostic_words(true) {
                         let causes = axis.south.faults(word, code);
@@ -324,7 +327,11 @@ fn can_drives_come_up_without_allocating_in_the_cycle() {
 #[test]
 fn neither_an_emergency_nor_a_lost_can_drive_nor_its_return_allocates() {
     let mut rig = on_can(Some(without_torque()));
-    assert!(rig.told().contains("commissioning goes on without reading 60A9:00, 6077:00"), "{}", rig.told());
+    assert!(
+        rig.told().contains("commissioning continues without reading 60A9:00, 6077:00"),
+        "{}",
+        rig.told()
+    );
     let found = weigh(&mut rig, 6_000, |rig, number| {
         let now = rig.now();
         let bus = &mut rig.can[0].bus;

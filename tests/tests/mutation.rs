@@ -15,6 +15,7 @@ use axisbridge::finding::Findings;
 use axisbridge::mapping::{Mapping, check};
 use axisbridge::translate::{RowNames, Stage, translate_list};
 use axisbridge_tests::{can_frames, can_led, tables};
+use toml::de::{DeTable, DeValue};
 
 /// What a key says to people alone.
 const REMARKS: [&str; 5] = ["source", "note", "examples", "reason", "name"];
@@ -58,63 +59,60 @@ impl fmt::Display for Noticed {
     }
 }
 
-/// A row: its lines, and its keys with the bytes of their values.
+/// A row: its bytes, and its keys with the bytes of their values.
 struct Row {
     name: String,
     section: String,
-    /// `[[section]]`: one of several.
+    /// One of several.
     repeats: bool,
     span: (usize, usize),
     keys: Vec<(String, (usize, usize))>,
 }
 
 fn rows(text: &str) -> Vec<Row> {
+    let tree = DeTable::parse(text).expect("the tables are TOML").into_inner();
     let mut rows: Vec<Row> = Vec::new();
-    let mut at = 0;
-    let mut open = 0_i32;
-    for line in text.split_inclusive('\n') {
-        let (start, end) = (at, at + line.len());
-        at = end;
-        let trimmed = line.trim();
-        if open == 0 && trimmed.starts_with('[') {
-            let section = trimmed.trim_matches(['[', ']']).to_owned();
-            let repeats = trimmed.starts_with("[[");
-            rows.push(Row { name: String::new(), section, repeats, span: (start, end), keys: Vec::new() });
-            continue;
-        }
-        let Some(row) = rows.last_mut() else { continue };
-        if open > 0 {
-            row.span.1 = end;
-            if let Some((_, value)) = row.keys.last_mut() {
-                value.1 = end;
+    for (section, value) in &tree {
+        match value.get_ref() {
+            DeValue::Table(table) => rows.push(row(text, section.get_ref(), table, false)),
+            DeValue::Array(list) => {
+                for item in list {
+                    let DeValue::Table(table) = item.get_ref() else { continue };
+                    // What a group says in common is changed once for all of its rows.
+                    let group = table.get("rows").map(|rows| rows.get_ref());
+                    let row = row(text, section.get_ref(), table, group.is_none());
+                    if !row.keys.is_empty() {
+                        rows.push(row);
+                    }
+                    let Some(DeValue::Array(members)) = group else { continue };
+                    rows.extend(members.iter().filter_map(|member| {
+                        let DeValue::Table(table) = member.get_ref() else { return None };
+                        let rest = &text[member.span().end..];
+                        let end = member.span().end + usize::from(rest.starts_with(','));
+                        let span = (member.span().start, end);
+                        Some(Row { span, ..self::row(text, section.get_ref(), table, true) })
+                    }));
+                }
             }
-        } else if let Some((key, value)) = line.split_once(" = ").filter(|_| !trimmed.starts_with('#')) {
-            row.span.1 = end;
-            if row.name.is_empty() {
-                row.name = format!("[{}] {}", row.section, value.trim());
-            }
-            row.keys.push((key.trim().to_owned(), (end - value.len(), end)));
-        } else {
-            continue;
-        }
-        open += brackets(line);
-    }
-    rows
-}
-
-/// Brackets that a line opens and does not close, outside of strings.
-fn brackets(line: &str) -> i32 {
-    let (mut open, mut quoted) = (0, false);
-    for letter in line.chars() {
-        match letter {
-            '"' => quoted = !quoted,
-            '#' if !quoted => break,
-            '[' | '{' if !quoted => open += 1,
-            ']' | '}' if !quoted => open -= 1,
             _ => {}
         }
     }
-    open
+    rows.sort_by_key(|row| row.span);
+    rows
+}
+
+fn row(text: &str, section: &str, table: &DeTable<'_>, repeats: bool) -> Row {
+    let own = table.iter().filter(|(key, _)| *key.get_ref() != "rows");
+    let mut keys: Vec<_> =
+        own.map(|(key, value)| (key.get_ref().to_string(), (value.span().start, value.span().end))).collect();
+    keys.sort_by_key(|(_, span)| *span);
+    let first = keys.first().map_or("", |(_, (start, end))| &text[*start..*end]);
+    let name = format!("[{section}] {first}");
+    // From its head to the end of its last value.
+    let start = keys.first().and_then(|(_, (start, _))| text[..*start].rfind("\n["));
+    let end = keys.last().map_or(0, |(_, (_, end))| *end);
+    let start = start.map_or(0, |start| start + 1);
+    Row { name, section: section.to_owned(), repeats, span: (start, end), keys }
 }
 
 /// The values in the inline tables of a value, with their keys.

@@ -162,7 +162,7 @@ fn golden_texts_are_made_compared_and_accepted() {
     std::fs::remove_file(&list).expect("it is there");
     std::fs::write(frames.join("other.hex"), "# nothing\n").expect("a file");
     let (code, out, _) = snapshot(&["--accept"]);
-    assert!(code == Some(0) && out.contains("moves.golden: its frames are gone"), "{out}");
+    assert!(code == Some(0) && out.contains("moves.golden: it has no frames any more"), "{out}");
     assert!(!frames.join("moves.golden").exists());
 
     std::fs::write(frames.join("other.hex"), "at\n").expect("a file");

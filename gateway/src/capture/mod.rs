@@ -4,6 +4,7 @@
 //! [`synth`] puts the headers around their payloads that the network had there, so that any protocol analyser
 //! dissects the file.
 
+mod blocks;
 pub mod can;
 pub mod can_bus;
 pub mod reader;

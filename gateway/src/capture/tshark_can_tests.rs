@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::process::Command;
 
-use profile_cia402::wire::emcy::{Emcy, EmcyCode, ErrorRegister};
+use profile_cia402::drive::ErrorCode;
+use profile_cia402::wire::emcy::{Emcy, ErrorRegister};
 use profile_cia402::wire::error_control::Heartbeat;
 use profile_cia402::wire::lss::{LssMode, LssRequest, Part};
 use profile_cia402::wire::nmt::{Nmt, NmtCommand, NmtState};
@@ -111,7 +112,7 @@ fn what_canopen_says_in_them_is_what_was_meant() {
     let record = Mux::new(0x1018, 4);
     let segment = Segment { toggle: true, data: Bytes::new(&[1, 2, 3]).unwrap(), last: true };
     let emcy = Emcy {
-        code: EmcyCode(0x8611),
+        code: ErrorCode(0x8611),
         register: ErrorRegister::from_bits_retain(0x21),
         vendor: [1, 2, 3, 4, 5],
     };

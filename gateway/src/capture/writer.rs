@@ -1,31 +1,28 @@
 //! Writes pcapng files with one interface for each side, SERCOS port and CAN bus of the box and nanosecond time stamps.
 
-use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
-use std::time::Duration;
 
-use pcap_file::pcapng::blocks::enhanced_packet::{EnhancedPacketBlock, EnhancedPacketOption};
-use pcap_file::pcapng::blocks::interface_description::{
-    InterfaceDescriptionBlock, InterfaceDescriptionOption,
-};
-use pcap_file::pcapng::blocks::interface_statistics::{InterfaceStatisticsBlock, InterfaceStatisticsOption};
-use pcap_file::pcapng::blocks::section_header::{SectionHeaderBlock, SectionHeaderOption};
-use pcap_file::pcapng::{PcapNgBlock, PcapNgWriter};
-use pcap_file::{DataLink, Endianness, PcapError};
 use profile_generic::can::Frame;
 
-use super::can::{self, RECORD_LEN_MAX};
+use super::blocks::{self, BlockBuilder};
+use super::can::{self, LINK_TYPE_CAN, RECORD_LEN_MAX};
+use super::reader::LINK_TYPE_ETHERNET;
 use super::{CAN_BUSES_MAX, FRAME_LEN_MAX, Side};
 use crate::sys::clock::KernelTime;
 
 /// Time stamps count units of 10^-9 s (`if_tsresol`).
 const RESOLUTION_NS: u8 = 9;
 
+/// Version 1.0 of the format: major number low, minor number high.
+const VERSION: u32 = 1;
+
 /// A pcapng file being written.
 pub struct Writer<W: Write> {
-    inner: PcapNgWriter<BufWriter<W>>,
+    destination: BufWriter<W>,
+    block: BlockBuilder,
+    /// Bytes after the section header.
     bytes: u64,
-    /// CAN buses it has.
+    /// CAN buses that the file has.
     can: usize,
 }
 
@@ -35,30 +32,25 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// What the destination says.
     pub fn new(destination: W, descriptions: [&str; Side::ETHERNET.len()], can: &[&str]) -> io::Result<Self> {
+        let (destination, block) = (BufWriter::new(destination), BlockBuilder::default());
+        let mut writer = Self { destination, block, bytes: 0, can: can.len().min(CAN_BUSES_MAX) };
+        // The length of the section is unknown: -1.
+        writer.block.begin(blocks::SECTION, &[blocks::BYTE_ORDER, VERSION, u32::MAX, u32::MAX]);
         let program = concat!("axisbridge ", env!("CARGO_PKG_VERSION"));
-        let section = SectionHeaderBlock {
-            endianness: Endianness::Little,
-            options: vec![SectionHeaderOption::UserApplication(Cow::Borrowed(program))],
-            ..SectionHeaderBlock::default()
-        };
-        let inner = PcapNgWriter::with_section_header(BufWriter::new(destination), section).map_err(to_io)?;
-        let mut writer = Self { inner, bytes: 0, can: can.len().min(CAN_BUSES_MAX) };
+        writer.block.option(blocks::OPTION_SHB_USERAPPL, program.as_bytes());
+        writer.destination.write_all(writer.block.end())?;
         let all = Side::all(can.len()).zip(descriptions.into_iter().chain(can.iter().copied()));
         for (side, description) in all {
-            let (linktype, snaplen) = match side {
-                Side::Can(_) => (DataLink::CAN_SOCKETCAN, RECORD_LEN_MAX),
-                _ => (DataLink::ETHERNET, FRAME_LEN_MAX),
+            let (link_type, snap_len) = match side {
+                Side::Can(_) => (LINK_TYPE_CAN, RECORD_LEN_MAX),
+                _ => (LINK_TYPE_ETHERNET, FRAME_LEN_MAX),
             };
-            let interface = InterfaceDescriptionBlock {
-                linktype,
-                snaplen: u32::try_from(snaplen).unwrap_or(0),
-                options: vec![
-                    InterfaceDescriptionOption::IfName(Cow::Borrowed(side.name())),
-                    InterfaceDescriptionOption::IfDescription(Cow::Borrowed(description)),
-                    InterfaceDescriptionOption::IfTsResol(RESOLUTION_NS),
-                ],
-            };
-            writer.block(interface)?;
+            let snap_len = u32::try_from(snap_len).unwrap_or(0);
+            writer.block.begin(blocks::INTERFACE, &[u32::from(link_type), snap_len]);
+            writer.block.option(blocks::OPTION_IF_NAME, side.name().as_bytes());
+            writer.block.option(blocks::OPTION_IF_DESCRIPTION, description.as_bytes());
+            writer.block.option(blocks::OPTION_IF_TSRESOL, &[RESOLUTION_NS]);
+            writer.end_block()?;
         }
         Ok(writer)
     }
@@ -103,15 +95,15 @@ impl<W: Write> Writer<W> {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         }
         let kept = frame.get(..FRAME_LEN_MAX).unwrap_or(frame);
-        let options =
-            comment.map(|text| EnhancedPacketOption::Comment(Cow::Borrowed(text))).into_iter().collect();
-        self.block(EnhancedPacketBlock {
-            interface_id: side.number(),
-            timestamp: Duration::from_nanos(at.0),
-            original_len: u32::try_from(frame.len()).unwrap_or(u32::MAX),
-            data: Cow::Borrowed(kept),
-            options,
-        })
+        let original_len = u32::try_from(frame.len()).unwrap_or(u32::MAX);
+        let kept_len = u32::try_from(kept.len()).unwrap_or(u32::MAX);
+        let [high, low] = halves(at.0);
+        self.block.begin(blocks::ENHANCED, &[side.number(), high, low, kept_len, original_len]);
+        self.block.data(kept);
+        if let Some(comment) = comment {
+            self.block.option(blocks::OPTION_COMMENT, comment.as_bytes());
+        }
+        self.end_block()
     }
 
     /// Writes how many frames of a side were seen and how many could not be recorded.
@@ -119,20 +111,14 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// What the destination says.
     pub fn statistics(&mut self, side: Side, at: KernelTime, seen: u64, dropped: u64) -> io::Result<()> {
-        // The format has the high half first whatever the byte order; the library writes one 64-bit number,
-        // which in a little endian file is the low half first.
-        let timestamp = at.0.rotate_left(32);
-        self.block(InterfaceStatisticsBlock {
-            interface_id: side.number(),
-            timestamp,
-            options: vec![
-                InterfaceStatisticsOption::IsbIfRecv(seen),
-                InterfaceStatisticsOption::IsbIfDrop(dropped),
-            ],
-        })
+        let [high, low] = halves(at.0);
+        self.block.begin(blocks::STATISTICS, &[side.number(), high, low]);
+        self.block.option(blocks::OPTION_ISB_IFRECV, &seen.to_le_bytes());
+        self.block.option(blocks::OPTION_ISB_IFDROP, &dropped.to_le_bytes());
+        self.end_block()
     }
 
-    /// Bytes of the blocks written so far, beside the section header.
+    /// Bytes of the blocks written so far, without the section header.
     #[must_use]
     pub const fn bytes_written(&self) -> u64 {
         self.bytes
@@ -143,7 +129,7 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// What the destination says.
     pub fn flush(&mut self) -> io::Result<()> {
-        self.inner.get_mut().flush()
+        self.destination.flush()
     }
 
     /// Flushes and returns the destination.
@@ -151,21 +137,20 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// What the destination says.
     pub fn finish(self) -> io::Result<W> {
-        self.inner.into_inner().into_inner().map_err(io::IntoInnerError::into_error)
+        self.destination.into_inner().map_err(io::IntoInnerError::into_error)
     }
 
-    fn block<'a, B: PcapNgBlock<'a>>(&mut self, block: B) -> io::Result<()> {
-        let written = self.inner.write_pcapng_block(block).map_err(to_io)?;
-        self.bytes = self.bytes.saturating_add(u64::try_from(written).unwrap_or(0));
+    fn end_block(&mut self) -> io::Result<()> {
+        let block = self.block.end();
+        self.destination.write_all(block)?;
+        self.bytes = self.bytes.saturating_add(u64::try_from(block.len()).unwrap_or(0));
         Ok(())
     }
 }
 
-fn to_io(error: PcapError) -> io::Error {
-    match error {
-        PcapError::IoError(source) => source,
-        other => io::Error::other(other),
-    }
+/// A time stamp as the format has it in either byte order: the high half first.
+fn halves(time: u64) -> [u32; 2] {
+    [time >> 32, time & u64::from(u32::MAX)].map(|half| u32::try_from(half).unwrap_or(u32::MAX))
 }
 
 #[cfg(test)]
@@ -185,6 +170,30 @@ mod tests {
             9, 0,
         ];
         assert!(file.windows(block.len()).any(|window| window == block), "{file:02x?}");
+    }
+
+    #[test]
+    fn a_file_begins_with_the_program_and_its_interfaces_and_has_a_block_for_each_frame() {
+        let mut writer = Writer::new(Vec::new(), ["a", "bcde", ""], &["can0"]).unwrap();
+        let headers = usize::try_from(writer.bytes_written()).unwrap();
+        writer.frame(Side::Can(0), KernelTime(0x0102_0304_0506_0708), &[0xA1; 5], Some("why")).unwrap();
+        let file = writer.finish().unwrap();
+        let section = [
+            0x0A, 0x0D, 0x0D, 0x0A, 52, 0, 0, 0, 0x4D, 0x3C, 0x2B, 0x1A, 1, 0, 0, 0, 255, 255, 255, 255, 255,
+            255, 255, 255, 4, 0,
+        ];
+        assert_eq!(file[..section.len()], section);
+        // Snap length 1518; name, description, nanoseconds, the end of the options.
+        let north = [
+            1, 0, 0, 0, 56, 0, 0, 0, 1, 0, 0, 0, 0xEE, 5, 0, 0, 2, 0, 5, 0, b'n', b'o', b'r', b't', b'h', 0,
+            0, 0, 3, 0, 1, 0, b'a', 0, 0, 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0, 56, 0, 0, 0,
+        ];
+        assert_eq!(file[52..52 + north.len()], north);
+        let frame = [
+            6, 0, 0, 0, 52, 0, 0, 0, 3, 0, 0, 0, 4, 3, 2, 1, 8, 7, 6, 5, 5, 0, 0, 0, 5, 0, 0, 0, 0xA1, 0xA1,
+            0xA1, 0xA1, 0xA1, 0, 0, 0, 1, 0, 3, 0, b'w', b'h', b'y', 0, 0, 0, 0, 0, 52, 0, 0, 0,
+        ];
+        assert_eq!(file[52 + headers..], frame);
     }
 
     #[test]

@@ -146,11 +146,8 @@ fn numbers(rows: &[RowNumbers], table: &AxisTable, text: &Source, findings: &mut
         );
         if !(low..=high).contains(value.get_ref()) {
             let title = format!("`{key}` is beyond what the drive can hold in {}", row.item);
-            let message = format!(
-                "the drive ends at {} and {}: commands beyond are held there",
-                short(low),
-                short(high)
-            );
+            let message =
+                format!("the drive ends at {} and {}: commands beyond are clamped", short(low), short(high));
             findings.push(
                 text,
                 Problem::new(code::RANGE_LOST, value.span()).key(key).title(title).expected(message),

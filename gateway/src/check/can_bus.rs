@@ -79,7 +79,7 @@ fn scaling(written: &Written, findings: &mut Findings) {
         let all = [Quantity::Position, Quantity::Velocity, Quantity::Acceleration].into_iter().all(told);
         let name = table.get_ref().drive.span();
         if axis.kind == AxisKind::Linear && drive.way_of_a_turn.is_none() && !all {
-            let title = format!("nobody says what a turn of the drive `{}` is in millimetres", drive.name);
+            let title = format!("`millimetres_per_turn` of the drive `{}` is missing", drive.name);
             let problem = Problem::new(code::AXIS_TABLES, name).title(title);
             let help = "expected millimetres_per_turn, or counts of position, velocity and acceleration";
             findings.push(&written.text, problem.expected(help));

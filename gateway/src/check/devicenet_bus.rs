@@ -83,7 +83,7 @@ fn able(
     }
     let mut fit = true;
     if axis.kind == AxisKind::Linear && drive.way_of_a_turn.is_none() {
-        let title = format!("nobody says what a turn of the drive `{}` is in millimetres", drive.name);
+        let title = format!("`millimetres_per_turn` of the drive `{}` is missing", drive.name);
         let problem = Problem::new(code::AXIS_TABLES, table.drive.span()).title(title);
         findings.push(&written.text, problem.expected("expected millimetres_per_turn"));
         fit = false;
@@ -98,7 +98,7 @@ fn able(
     ];
     for (key, limit) in all.into_iter().filter_map(|(key, limit)| Some((key, limit.as_ref()?))) {
         let problem = Problem::new(code::LIMIT_UNFIT, limit.span()).key(key);
-        let problem = problem.title(format!("nobody can hold `{key}` on the drive `{}`", drive.name));
+        let problem = problem.title(format!("`{key}` cannot be enforced on the drive `{}`", drive.name));
         let help = "expected no limit but that of the velocity: a velocity drive of the AC/DC drive profile tells no \
                     position and is told no limits";
         findings.push(&written.text, problem.expected(help));

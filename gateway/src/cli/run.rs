@@ -99,7 +99,7 @@ fn run_once(
             told = true;
             let refused = running.realtime_report();
             if !refused.is_empty() {
-                warn!(refused, "the cycle thread runs without");
+                warn!(refused, "the kernel refused real-time settings of the cycle thread");
             }
         }
         if running.is_dead() {
@@ -109,12 +109,14 @@ fn run_once(
             next = reload(&arguments.config).or(next);
             reloads = next.is_some() && !running.has_torque();
             if next.is_some() && !reloads {
-                info!("an axis has torque: what was read counts from the next start of the box");
+                info!("an axis has torque: the new configuration takes effect at the next start");
             }
         }
     }
     let stops = asked.stop.load(Ordering::Relaxed);
-    info!("axisbridge ends: axes stop, then the bus goes down; a second signal waits for no axis");
+    info!(
+        "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
+    );
     let stopped = running.stop(&|| asked.hurry.load(Ordering::Relaxed))?;
     if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
         warn!(dropped, "frames are missing in the recording");
@@ -123,9 +125,12 @@ fn run_once(
     if stops {
         return Ok(After::End { rested: stopped.unrested.is_empty() });
     }
-    let why =
-        if reloads { "its files were read again" } else { "a controller has reset the Identity object" };
-    info!(why, "axisbridge starts anew");
+    let why = if reloads {
+        "configuration and tables were read again"
+    } else {
+        "a controller has reset the Identity object"
+    };
+    info!(why, "axisbridge restarts");
     Ok(After::Again(next))
 }
 
@@ -140,7 +145,7 @@ fn reload(path: &Path) -> Option<Box<Good>> {
         Err(findings) => {
             let errors = findings.list().iter().filter(|finding| finding.severity() == Severity::Error);
             errors.for_each(|finding| error!("{finding}"));
-            warn!("configuration and tables are refused: the box keeps those that it runs with");
+            warn!("configuration and tables are refused: the gateway keeps the present ones");
             None
         }
     }

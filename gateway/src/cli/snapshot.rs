@@ -78,7 +78,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<ExitCode, CliError> {
         golden.iter().filter(|path| !frames.iter().any(|frames| frames.with_extension(GOLDEN) == **path))
     {
         tally.orphaned += 1;
-        println!("{}: its frames are gone", path.display());
+        println!("{}: it has no frames any more", path.display());
         if arguments.accept {
             std::fs::remove_file(path).map_err(|error| format!("{}: {error}", path.display()))?;
         }
@@ -96,7 +96,7 @@ fn finish(tally: &Tally, accept: bool) -> ExitCode {
         println!("accepted");
         return ExitCode::SUCCESS;
     }
-    println!("if this is meant: run again with --accept");
+    println!("if you meant this change, run again with --accept");
     ExitCode::FAILURE
 }
 

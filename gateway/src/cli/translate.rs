@@ -54,7 +54,7 @@ pub fn run(arguments: &TranslateArguments) -> Result<ExitCode, CliError> {
     let simulated: Vec<&str> = stage.stand_ins().collect();
     if !simulated.is_empty() && !arguments.json {
         eprintln!(
-            "the scaling of {} is that of simulated drives; --values FILE gives that of the machine's",
+            "the scaling of {} is that of simulated drives; use --values FILE for that of the machine",
             simulated.join(", ")
         );
     }

@@ -1,8 +1,13 @@
+use std::net::Ipv4Addr;
 use std::path::Path;
 
+use profile_cip::wire::motion::Format;
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::scaling::UnitKind;
+use profile_sercos::master::config::AddressPolicy;
 
 use super::*;
+use crate::mapping::{CaptureMode, Rated};
 
 /// A small configuration without faults; the cases below break it in one place.
 const GOOD: &str = r#"[box]

@@ -377,3 +377,41 @@ proptest! {
         }
     }
 }
+
+/// The codes of drives and those of the communication profile are one list, that of the tables.
+#[test]
+fn emergencies_have_the_names_of_the_tables() {
+    let cases: [([u8; 8], &str); 4] = [
+        (
+            [0x11, 0x86, 0x21, 0, 0, 0, 0, 0],
+            "EMCY 8611 (following error), register 0x21 (GENERIC, PROFILE), 00 00 00 00 00",
+        ),
+        (
+            [0x30, 0x82, 0x11, 0, 0, 0, 0, 0],
+            "EMCY 8230 (multiplexed PDO not processed: no such object), register 0x11 (GENERIC, COMMUNICATION), \
+             00 00 00 00 00",
+        ),
+        (
+            [0x51, 0x54, 0x21, 0, 0, 0, 0, 0],
+            "EMCY 5451 (fuse S1: L1), register 0x21 (GENERIC, PROFILE), 00 00 00 00 00",
+        ),
+        ([0x99, 0x23, 0x03, 0, 0, 0, 0, 0], "EMCY 2399, register 0x03 (GENERIC, CURRENT), 00 00 00 00 00"),
+    ];
+    // pcap: magic number, version 2.4, zone, accuracy, snap length, link type.
+    let mut file = vec![0xD4, 0xC3, 0xB2, 0xA1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0, 0];
+    file.extend(u32::from(LINK_TYPE_CAN).to_le_bytes());
+    for (data, _) in &cases {
+        let id = profile_generic::can::Id::Standard(0x081);
+        let frame = profile_generic::can::Frame::new(id, data).unwrap();
+        let mut record = [0; can::RECORD_LEN_MAX];
+        let len = can::emit(&frame, &mut record);
+        let size = u32::try_from(len).unwrap().to_le_bytes();
+        file.extend([[0; 4], [0; 4], size, size].concat());
+        file.extend(&record[..len]);
+    }
+    let (text, summary) = decoded(&file, &Options::default());
+    assert_eq!(summary.frames, 4, "{text}");
+    let emergencies: Vec<&str> =
+        text.lines().map(str::trim).filter(|line| line.starts_with("EMCY ")).collect();
+    assert_eq!(emergencies, cases.map(|(_, expected)| expected));
+}

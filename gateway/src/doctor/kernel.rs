@@ -51,12 +51,12 @@ pub(super) fn grant(outcome: &Outcome) -> Check {
 
 fn discipline(disciplined: bool) -> Check {
     if disciplined {
-        return Check::good(CLOCK, "kept right", "a daemon keeps the host's clock");
+        return Check::good(CLOCK, "synchronization", "a daemon synchronizes the host's clock");
     }
     Check::doubtful(
         CLOCK,
-        "kept right",
-        "nobody keeps the host's clock",
+        "synchronization",
+        "no daemon synchronizes the host's clock",
         "run ptp4l with phc2sys, or chronyd; a controller on another host can be synchronous only then",
     )
 }
@@ -104,7 +104,7 @@ impl Host<'_> {
             AREA,
             "machine",
             "a virtual machine",
-            "its host can stop it for milliseconds, and nothing in it can prevent that: take a machine of its own",
+            "its host can stop it for milliseconds, and nothing in it can prevent that: use a physical machine",
         ))
     }
 
@@ -118,9 +118,9 @@ impl Host<'_> {
                 AREA,
                 "clock source",
                 source,
-                "reading it takes microseconds; see why the kernel does not take the processor's counter (dmesg)",
+                "reading it takes microseconds; see in dmesg why the kernel does not use the processor's counter",
             ),
-            None => Check::doubtful(AREA, "clock source", "not told", "/sys is not mounted"),
+            None => Check::doubtful(AREA, "clock source", "unknown", "/sys is not mounted"),
         }
     }
 
@@ -137,7 +137,7 @@ impl Host<'_> {
             return Check::doubtful(AREA, what, format!("any of {}", online.len()), advice);
         };
         if !online.contains(&wanted) {
-            let advice = "name one that is there: [south.realtime] cpu";
+            let advice = "name an existing one: [south.realtime] cpu";
             return Check::unfit(AREA, what, format!("there is no processor {wanted}"), advice);
         }
         if alone.contains(&wanted) {
@@ -146,7 +146,7 @@ impl Host<'_> {
         Check::doubtful(
             AREA,
             what,
-            format!("{wanted}, shared with everybody"),
+            format!("{wanted}, shared with other threads"),
             format!("isolcpus={wanted} at boot"),
         )
     }
@@ -277,7 +277,7 @@ mod tests {
             ("preemption", "Linux 6.8.0, PREEMPT_DYNAMIC"),
             ("machine", "a virtual machine"),
             ("clock source", "hpet"),
-            ("processor of the cycle", "1, shared with everybody"),
+            ("processor of the cycle", "1, shared with other threads"),
             ("frequency", "performance, powersave"),
             ("sleep", "waking takes up to 133 us"),
         ];

@@ -128,13 +128,13 @@ impl Result {
         let gap = self.longest_gap();
         if gap > i64::from(*losses) {
             return format!(
-                "a pause of {} takes {gap} cycles of {time}, and the bus bears {losses}",
+                "a pause of {} takes {gap} cycles of {time}, and the bus allows {losses}",
                 self.latest
             );
         }
         match self.outside() {
-            0 => format!("no wake was more than {tolerance} off"),
-            outside => format!("{outside} of {} wakes were more than {tolerance} off", self.wakes()),
+            0 => format!("no wake-up was more than {tolerance} off"),
+            outside => format!("{outside} of {} wake-ups were more than {tolerance} off", self.wakes()),
         }
     }
 }
@@ -180,19 +180,19 @@ mod tests {
     #[test]
     fn a_cycle_is_judged_by_what_its_bus_bears() {
         let rows = [
-            (with(&[], 1000), Verdict::Good, "no wake was more than 50 us off"),
+            (with(&[], 1000), Verdict::Good, "no wake-up was more than 50 us off"),
             // Always late is not uneven.
-            (result(&[400; 1000], 0), Verdict::Good, "no wake was more than 50 us off"),
-            (with(&[60], 1000), Verdict::Good, "no wake was more than 50 us off"),
-            (with(&[61], 999), Verdict::Doubtful, "1 of 1000 wakes were more than 50 us off"),
-            (with(&[9_000; 10], 990), Verdict::Doubtful, "10 of 1000 wakes were more than 50 us off"),
-            (with(&[70; 11], 989), Verdict::Unfit, "11 of 1000 wakes were more than 50 us off"),
+            (result(&[400; 1000], 0), Verdict::Good, "no wake-up was more than 50 us off"),
+            (with(&[60], 1000), Verdict::Good, "no wake-up was more than 50 us off"),
+            (with(&[61], 999), Verdict::Doubtful, "1 of 1000 wake-ups were more than 50 us off"),
+            (with(&[9_000; 10], 990), Verdict::Doubtful, "10 of 1000 wake-ups were more than 50 us off"),
+            (with(&[70; 11], 989), Verdict::Unfit, "11 of 1000 wake-ups were more than 50 us off"),
             // Six cycles are lost only when the pause is as long as six cycles.
-            (with(&[11_999], 999), Verdict::Doubtful, "1 of 1000 wakes were more than 50 us off"),
+            (with(&[11_999], 999), Verdict::Doubtful, "1 of 1000 wake-ups were more than 50 us off"),
             (
                 with(&[12_000], 999),
                 Verdict::Unfit,
-                "a pause of 12 ms takes 6 cycles of 2 ms, and the bus bears 5",
+                "a pause of 12 ms takes 6 cycles of 2 ms, and the bus allows 5",
             ),
         ];
         for (result, verdict, reason) in rows {

@@ -156,7 +156,7 @@ impl Wire {
 fn wire(name: &str, wire: &Wire) -> Check {
     let what = format!("wire of {name}");
     let Features { driver, coalescing_us, energy_efficient, .. } = &wire.features;
-    let mut found = vec![driver.clone().unwrap_or_else(|| "driver not told".to_owned())];
+    let mut found = vec![driver.clone().unwrap_or_else(|| "driver unknown".to_owned())];
     found.extend(wire.speed_mbit.map(|speed| format!("{speed} Mbit/s")));
     if wire.half_duplex {
         found.push("half duplex".to_owned());
@@ -185,11 +185,16 @@ fn stamps(name: &str, granted: bool, features: &Features) -> Check {
     let what = format!("time stamps of {name}");
     let hardware = features.time_stamps.is_some_and(|stamps| stamps.hardware);
     match (granted, hardware) {
-        (true, true) => Check::good(AREA, what, "by the kernel; the card could, which the box does not use"),
-        (true, false) => Check::good(AREA, what, "by the kernel"),
-        (false, _) => {
-            Check::doubtful(AREA, what, "none", "recordings show when the box read a frame, which is later")
+        (true, true) => {
+            Check::good(AREA, what, "by the kernel; the card could do it too, but is not used for it")
         }
+        (true, false) => Check::good(AREA, what, "by the kernel"),
+        (false, _) => Check::doubtful(
+            AREA,
+            what,
+            "none",
+            "recordings show when Axisbridge read a frame, which is later",
+        ),
     }
 }
 
@@ -227,7 +232,7 @@ fn can(name: &str, wanted: BitRate, set_bit_rate: bool) -> Check {
     match (state.link, state.has_bit_rate) {
         (LinkState::Gone, _) => Check::unfit(AREA, what, "gone", "`ip link` shows what there is"),
         (LinkState::Down, true) if set_bit_rate => {
-            Check::good(AREA, what, format!("{found}; the box sets it up"))
+            Check::good(AREA, what, format!("{found}; the gateway sets it up"))
         }
         (LinkState::Down, _) => Check::unfit(AREA, what, found, by_hand),
         (_, true) if !state.has(wanted) => {
@@ -243,7 +248,7 @@ fn left_to_the_user(name: &str, state: &State, drives: usize) -> Vec<Check> {
     let mut checks = Vec::new();
     let frames = 1 + FRAMES_OF_A_DRIVE * drives;
     if usize::try_from(state.queue).is_ok_and(|queue| queue < frames) {
-        let found = format!("{} frames, the box may send {frames} in a cycle", state.queue);
+        let found = format!("{} frames, the gateway may send {frames} in a cycle", state.queue);
         let advice = format!("ip link set {name} txqueuelen 128, or set_bit_rate");
         checks.push(Check::doubtful(AREA, format!("transmit queue of {name}"), found, advice));
     }
@@ -265,7 +270,7 @@ fn address(what: &str, at: SocketAddr) -> Check {
             AREA,
             what,
             found("in use"),
-            "another process listens there: a box that runs already?",
+            "another process listens there: is a gateway running already?",
         ),
         Err(error) if error.kind() == ErrorKind::AddrNotAvailable => {
             let advice = format!("no interface of this host has it: ip addr add {}/24 dev IF", at.ip());
@@ -310,7 +315,7 @@ mod tests {
         };
         let none = "restart of can0 after bus off: none: it stays off the bus";
         assert_eq!(checks(&state, 2), [none]);
-        let short = "transmit queue of can0: 10 frames, the box may send 13 in a cycle";
+        let short = "transmit queue of can0: 10 frames, the gateway may send 13 in a cycle";
         assert_eq!(checks(&state, 3), [short, none]);
         assert_eq!(checks(&State { restart_ms: Some(100), queue: 13, ..state }, 3), [""; 0]);
         // A virtual interface is never off the bus.
@@ -350,7 +355,7 @@ mod tests {
         ] {
             assert_eq!(wire("eth1", &bad).verdict, Verdict::Unfit, "{bad:?}");
         }
-        assert_eq!(told(&wire("eth1", &Wire::default())), (Verdict::Good, "driver not told", None));
+        assert_eq!(told(&wire("eth1", &Wire::default())), (Verdict::Good, "driver unknown", None));
     }
 
     #[test]

@@ -27,8 +27,10 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     }
     let said = match diagnosis.verdict() {
         Verdict::Good => "this host is fit",
-        Verdict::Doubtful => "the box runs on this host, not as well as it could: see what is doubtful",
-        Verdict::Unfit => "the box does not run on this host as it is: see what is unfit",
+        Verdict::Doubtful => {
+            "the gateway runs on this host, but not as well as it could: see what is doubtful"
+        }
+        Verdict::Unfit => "the gateway does not run on this host: see what is unfit",
     };
     let _ = writeln!(out, "\n{said}");
     out
@@ -46,14 +48,17 @@ fn cycle(out: &mut String, result: &latency::Result) {
     let _ = writeln!(out, "  {:<9} {what}", result.verdict());
     let _ = writeln!(
         out,
-        "            {} wakes, late by {} as a rule and by {} at most; {} cycles skipped",
+        "            {} wake-ups, usually {} late, at most {}; {} cycles skipped",
         result.wakes(),
         result.usual,
         result.latest,
         result.skipped
     );
     let [p50, p99, p999] = [500, 990, 999].map(|permille| result.permille(permille));
-    let _ = writeln!(out, "            off the rule by {p50} (p50), {p99} (p99), {p999} (p99.9)");
+    let _ = writeln!(
+        out,
+        "            deviation from the usual lateness: {p50} (p50), {p99} (p99), {p999} (p99.9)"
+    );
     let _ = writeln!(out, "            -> {}", result.reason());
 }
 

@@ -35,7 +35,7 @@ fn read(bytes: &[u8]) -> Sheet {
         if let Some(name) = line.strip_prefix('[') {
             assert_eq!(statement, "", "an entry that is not ended");
             let name = name.strip_suffix(']').unwrap().to_owned();
-            assert!(sheet.iter().all(|(known, _)| *known != name), "section {name} is there twice");
+            assert!(sheet.iter().all(|(known, _)| *known != name), "section {name} is defined twice");
             sheet.push((name, BTreeMap::new()));
             continue;
         }
@@ -44,7 +44,7 @@ fn read(bytes: &[u8]) -> Sheet {
         let (keyword, fields) = entry.split_once('=').unwrap();
         let section = &mut sheet.last_mut().unwrap().1;
         let before = section.insert(keyword.trim().to_owned(), split(fields));
-        assert_eq!(before, None, "{keyword} is there twice");
+        assert_eq!(before, None, "{keyword} is defined twice");
         statement.clear();
     }
     sheet

@@ -44,7 +44,7 @@ use self::device::DeviceChannel;
 use self::notice::Notice;
 use self::port::{NorthPort, SouthPort};
 use crate::latest::Publisher;
-use crate::mapping::Mapping;
+use crate::mapping::{CipProgram, Mapping};
 use crate::status::{AxisStatus, AxisWait, BoxState, BoxStatus, Indicators, PHASE_NONE};
 
 /// Most buses of a box.
@@ -231,6 +231,12 @@ impl Engine {
     /// The axes, for a north side that speaks in the generic model: see [`AxisChannel::from_north`].
     pub fn axes_mut(&mut self) -> &mut [AxisChannel] {
         &mut self.axes
+    }
+
+    /// The program of the CIP side for an axis; `None` for one that is on no device.
+    #[must_use]
+    pub fn cip_program(&self, axis: usize) -> Option<&CipProgram> {
+        self.devices.iter().find_map(|device| device.program(axis))
     }
 
     /// The devices in the order of the configuration.
@@ -634,6 +640,9 @@ impl Engine {
                         minor_fault: shown.is_some_and(|axis| axis.minor_fault),
                     };
                     fill(entry, axis);
+                    let counts =
+                        |program: &CipProgram| low_word(program.counts(axis.feedback().position.get()).value);
+                    entry.position_counts = channel.program(number).map_or(0, counts);
                     entry.wait = self.waits.get(number).and_then(|wait| wait.shown(now, axis));
                     entry.cip_axis_state = state.code().0;
                     entry.lost_updates = u32::try_from(lost).unwrap_or(u32::MAX);
@@ -662,7 +671,6 @@ fn fill(entry: &mut AxisStatus, axis: &AxisChannel) {
     entry.fault = axis.fault().map(|fault| fault.cause);
     entry.fault_vendor_code = axis.fault().map_or(0, |fault| fault.vendor_code);
     entry.position = feedback.position;
-    entry.position_counts = low_word(axis.north().counts(feedback.position.get()).value);
     entry.velocity = feedback.velocity;
     entry.torque = feedback.torque;
     entry.following_error = feedback.following_error;

@@ -108,7 +108,7 @@ pub enum Notice {
         /// Why.
         error: SercosError,
     },
-    /// The drive says of a parameter what the dictionary does not say; the drive is followed.
+    /// The drive says of a parameter what the dictionary does not say; the value of the drive is used.
     Difference {
         /// The axis.
         axis: u8,
@@ -427,7 +427,7 @@ impl fmt::Display for Notice {
         match self {
             Self::Sercos(event) => write!(f, "{event}"),
             Self::Waiting { wait, .. } => write!(f, "{wait}"),
-            Self::Retry => f.write_str("phase-up failed; the next attempt follows"),
+            Self::Retry => f.write_str("phase-up failed; trying again"),
             Self::DriveMissing { address, .. } => {
                 write!(f, "expected a drive with SERCOS address {address} on the bus, found none")
             }
@@ -458,11 +458,11 @@ impl fmt::Display for Notice {
                 write!(f, "node {node} cannot be used: {error}; it is left out")
             }
             Self::Progress { phase, seconds, with: Some((slave, idn, operation)) } => {
-                write!(f, "{phase} since {seconds} s: {slave}, {operation} {idn}")
+                write!(f, "{phase} has taken {seconds} s: waiting for {slave}, {operation} {idn}")
             }
-            Self::Progress { phase, seconds, with: None } => write!(f, "{phase} since {seconds} s"),
+            Self::Progress { phase, seconds, with: None } => write!(f, "{phase} has taken {seconds} s"),
             Self::SlaveAnswers { mac, error, .. } => {
-                write!(f, "the answers of the drive with MAC ID {mac} do not count: {error}")
+                write!(f, "the answers of the drive with MAC ID {mac} are ignored: {error}")
             }
             Self::Bare { address, .. } => write!(
                 f,
@@ -470,10 +470,10 @@ impl fmt::Display for Notice {
                  tried next without those that the axis can do without"
             ),
             Self::ModesLeftOut { address, modes, .. } => {
-                write!(f, "the drive with SERCOS address {address}: the axis does without {}", left_out(modes))
+                write!(f, "the drive with SERCOS address {address}: the axis works without {}", left_out(modes))
             }
             Self::NodeModesLeftOut { node, modes, .. } => {
-                write!(f, "node {node}: the axis does without {}", left_out(modes))
+                write!(f, "node {node}: the axis works without {}", left_out(modes))
             }
             Self::Family { node, identity, name, .. } => {
                 let number = |number: Option<u32>| number.map_or_else(|| "none".to_owned(), |number| format!("{number:#x}"));
@@ -487,7 +487,7 @@ impl fmt::Display for Notice {
             ),
             Self::NotMapped { node, objects, .. } => {
                 let all: Vec<_> = objects.iter().map(ToString::to_string).collect();
-                write!(f, "node {node} keeps its PDOs, and {} is in none that can be used: the axis does without", all.join(", "))
+                write!(f, "node {node} keeps its PDOs, and {} is in none that can be used: the axis works without", all.join(", "))
             }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
@@ -502,9 +502,9 @@ impl fmt::Display for Notice {
             Self::Program { address, error, .. } => {
                 write!(f, "the drive with SERCOS address {address} cannot be used: {error}; it is left out")
             }
-            Self::Difference { difference, .. } => write!(f, "{difference}; the drive is followed"),
+            Self::Difference { difference, .. } => write!(f, "{difference}; the value of the drive is used"),
             Self::Ends { .. } => f.write_str(
-                "unwind_counts wants an axis without ends, but the positions of its drive have them: expected modulo \
+                "unwind_counts needs a drive that counts modulo, but the positions of this drive have ends: expected modulo \
                  (S-0-0076 bit 7, S-0-0103), or set_scaling = true",
             ),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
@@ -536,14 +536,14 @@ fn left_out(modes: &[(ModeSelection, impl fmt::Display)]) -> String {
     all.join(" and ")
 }
 
-/// `commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; writing S-0-0079: ...`: what failed
+/// `commissioning continues without reading S-0-0294, S-0-0208: IDN: IDN not available; writing S-0-0079: ...`: what failed
 /// alike stands together.
 fn passed_over<I, F>(f: &mut fmt::Formatter<'_>, failures: &[(&str, I, F)]) -> fmt::Result
 where
     I: fmt::Display,
     F: fmt::Display + PartialEq,
 {
-    f.write_str("commissioning goes on without ")?;
+    f.write_str("commissioning continues without ")?;
     let alike = |one: &(&str, I, F), other: &(&str, I, F)| (one.0, &one.2) == (other.0, &other.2);
     let mut between = "";
     for (at, first) in failures.iter().enumerate() {
@@ -562,9 +562,9 @@ where
     Ok(())
 }
 
-/// `the drive says 0xC00F0007 "overcurrent"`.
+/// `the drive reports 0xC00F0007 "overcurrent"`.
 fn diagnostic_message(f: &mut fmt::Formatter<'_>, said: &DiagnosticMessage) -> fmt::Result {
-    f.write_str("the drive says")?;
+    f.write_str("the drive reports")?;
     if let Some(number) = said.number {
         write!(f, " {number:#010X}")?;
     }
@@ -615,7 +615,7 @@ mod tests {
         ];
         assert_eq!(
             Notice::PassedOver { axis: 0, failures }.to_string(),
-            "commissioning goes on without reading S-0-0294, S-0-0208: IDN: IDN not available; \
+            "commissioning continues without reading S-0-0294, S-0-0208: IDN: IDN not available; \
              writing S-0-0079: IDN: operation data cannot be changed; writing S-0-0208: IDN: IDN not available"
         );
     }

@@ -73,7 +73,7 @@ impl ModbusServer {
             let source = Arc::clone(&source);
             async move {
                 let Some(place) = place else {
-                    tracing::warn!(%peer, "Modbus client refused: all places are taken");
+                    tracing::warn!(%peer, "Modbus client refused: too many clients are connected");
                     return Ok(None);
                 };
                 tracing::debug!(%peer, "Modbus client connected");

@@ -325,7 +325,7 @@ impl Traffic {
         let slot = if crowded { None } else { core.adapter.open(now, peer) };
         let Some(slot) = slot else {
             if !self.refusing {
-                tracing::warn!(%peer, at = %local, "stream refused: all places are taken");
+                tracing::warn!(%peer, at = %local, "stream refused: too many streams are open");
             }
             self.refusing = true;
             core.statistics.refused += 1;
@@ -381,7 +381,7 @@ fn ended(stream: &mut Stream, ending: Ending, core: &mut Core) {
     match ending {
         Ending::Stalled => {
             core.statistics.stalled += 1;
-            tracing::warn!(%peer, "stream dropped: the peer does not take what is sent to it");
+            tracing::warn!(%peer, "stream closed: the peer does not read what is sent to it");
         }
         Ending::Failed(error) => tracing::debug!(%peer, %error, "stream broken"),
         Ending::Closed => {

@@ -243,18 +243,18 @@ pub fn start(
             .on_open(move |open| {
                 // Data are sent unmarked rather than not at all.
                 if let Err(error) = marker.mark(open.t_to_o_dscp) {
-                    warn!(dscp = open.t_to_o_dscp, %error, "the data of the connection are not marked");
+                    warn!(dscp = open.t_to_o_dscp, %error, "the datagrams of the connection carry no DSCP mark");
                 }
             })
             .on_admit(move |admitted| {
                 // The cycle refuses what the kernel lets through, at its own cost.
                 if let Err(error) = gate.set(admitted) {
-                    warn!(%error, "the datagrams of others are not dropped by the kernel");
+                    warn!(%error, "the kernel does not drop foreign datagrams");
                 }
             })
             .on_event(move |event| {
                 if let Err(error) = keeper.note(&name, event) {
-                    warn!(device = name, %error, "what was set cannot be written; it counts until the box ends");
+                    warn!(device = name, %error, "the settings cannot be written; they last until Axisbridge ends");
                 }
                 if matches!(event, Event::Reset { .. }) {
                     asked.store(true, Ordering::Relaxed);

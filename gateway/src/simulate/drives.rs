@@ -283,6 +283,11 @@ impl InProcessDrives {
         Self { network, returned: Returned::new(), tap }
     }
 
+    /// The drives and their cables.
+    pub fn network_mut(&mut self) -> &mut DriveNetwork {
+        &mut self.network
+    }
+
     /// The drives of a configuration, each for the axis it is to move.
     #[must_use]
     pub fn of(config: &Config, sercos: &Sercos, tap: Option<Tap>) -> Self {

@@ -21,10 +21,10 @@ pub struct AxisWait {
     pub seconds: u32,
 }
 
-/// The line of the log: `waits since 12 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1`.
+/// The line of the log: `has waited 12 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1`.
 impl fmt::Display for AxisWait {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "waits since {} s for {}", self.seconds, self.waiting)
+        write!(f, "has waited {} s for {}", self.seconds, self.waiting)
     }
 }
 
@@ -145,7 +145,7 @@ mod tests {
         let wait = AxisWait::new(waiting, DurationNs::from_millis(12_999));
         assert_eq!(
             wait.to_string(),
-            "waits since 12 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1"
+            "has waited 12 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1"
         );
         assert_eq!(
             (wait.item(), wait.word(), wait.mask(), wait.value()),

@@ -6,7 +6,7 @@
 //! of other programs on this host are, as from the bus.
 
 use std::io;
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::time::Duration;
 
 use profile_generic::can::{Frame, Id};
@@ -20,7 +20,8 @@ use thiserror::Error;
 use super::can_error::ErrorFrame;
 use super::clock::KernelTime;
 use super::link::{self, LinkError, LinkState};
-use super::receive::{PlainAddress as _, enable_time_stamps, receive, set_option, wait_for_input};
+use super::option::set_option;
+use super::receive::{enable_time_stamps, receive, wait_for_input};
 
 /// Lengths of the kernel's `struct can_frame` and `struct canfd_frame`.
 const CLASSIC_LEN: usize = 16;
@@ -256,11 +257,10 @@ impl CanSocket {
     /// # Errors
     /// [`LinkError`]: once when the interface has gone down; receiving may be tried again.
     pub fn recv(&mut self) -> Result<Option<Received>, LinkError> {
-        let mut from = libc::sockaddr_can::zeroed();
         let mut buffer = [0; FD_LEN];
         for _ in 0..SKIPPED_MAX {
-            let message = receive(self.socket.as_fd(), &mut buffer, &mut from)
-                .map_err(|error| LinkError::from_io(&error))?;
+            let message =
+                receive(self.socket.as_fd(), &mut buffer).map_err(|error| LinkError::from_io(&error))?;
             let Some(message) = message else { return Ok(None) };
             self.dropped = message.dropped.unwrap_or(self.dropped);
             let content = buffer.get(..message.len).filter(|_| !message.truncated).and_then(content);
@@ -286,7 +286,7 @@ impl CanSocket {
     /// # Errors
     /// What `poll` refuses.
     pub fn wait(&self, timeout: Duration) -> io::Result<bool> {
-        wait_for_input(&[self.socket.as_raw_fd()], timeout)
+        wait_for_input(&[self.socket.as_fd()], timeout)
     }
 }
 

@@ -18,9 +18,13 @@
 
 use std::fmt;
 use std::io;
+use std::mem::MaybeUninit;
 
 use profile_generic::time::{MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
+use rustix::io::Errno;
+use rustix::thread::clock_nanosleep_absolute;
+use rustix::time::{ClockId, Timespec, clock_gettime};
 
 const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 
@@ -33,13 +37,13 @@ pub struct KernelTime(pub u64);
 /// The time on the host's monotonic clock.
 #[must_use]
 pub fn monotonic_now() -> MonotonicTime {
-    MonotonicTime(read(libc::CLOCK_MONOTONIC))
+    MonotonicTime(read(ClockId::Monotonic))
 }
 
 /// The time on the host's real-time clock (UTC): for file names and time stamps in recordings.
 #[must_use]
 pub fn realtime_now() -> KernelTime {
-    KernelTime(read(libc::CLOCK_REALTIME))
+    KernelTime(read(ClockId::Realtime))
 }
 
 /// Sleeps until the monotonic clock reads `deadline`; a deadline in the past returns at once.
@@ -49,25 +53,15 @@ pub fn realtime_now() -> KernelTime {
 /// # Errors
 /// What `clock_nanosleep` refuses, which for a valid clock and time is nothing.
 pub fn sleep_until(deadline: MonotonicTime) -> io::Result<()> {
-    let request = libc::timespec {
+    let request = Timespec {
         // Seconds since boot stay far below 2^63.
-        tv_sec: libc::time_t::try_from(deadline.0 / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
-        tv_nsec: libc::c_long::try_from(deadline.0 % NANOSECONDS_PER_SECOND).unwrap_or(0),
+        tv_sec: i64::try_from(deadline.0 / NANOSECONDS_PER_SECOND).unwrap_or(i64::MAX),
+        tv_nsec: (deadline.0 % NANOSECONDS_PER_SECOND).try_into().unwrap_or(0),
     };
     loop {
-        // SAFETY: `request` lives through the call; a null remainder is allowed with TIMER_ABSTIME.
-        let error = unsafe {
-            libc::clock_nanosleep(
-                libc::CLOCK_MONOTONIC,
-                libc::TIMER_ABSTIME,
-                &raw const request,
-                std::ptr::null_mut(),
-            )
-        };
-        match error {
-            0 => return Ok(()),
-            libc::EINTR => {}
-            other => return Err(io::Error::from_raw_os_error(other)),
+        match clock_nanosleep_absolute(ClockId::Monotonic, &request) {
+            Err(Errno::INTR) => {}
+            result => return result.map_err(io::Error::from),
         }
     }
 }
@@ -111,7 +105,7 @@ impl HostTime {
         let mut best: Option<(u64, TimeSample)> = None;
         for _ in 0..READINGS {
             let before = monotonic_now();
-            let system = SystemTime(read(libc::CLOCK_TAI));
+            let system = SystemTime(read(ClockId::Tai));
             let apart = monotonic_now().0.saturating_sub(before.0);
             if best.is_none_or(|(best, _)| apart < best) {
                 let at = MonotonicTime(before.0 + apart / 2);
@@ -129,7 +123,7 @@ impl HostTime {
     pub fn first_sample(self) -> TimeSample {
         self.sample().unwrap_or_else(|| TimeSample {
             at: monotonic_now(),
-            system: SystemTime(read(libc::CLOCK_TAI)),
+            system: SystemTime(read(ClockId::Tai)),
             rate_ppb: 0,
         })
     }
@@ -166,25 +160,21 @@ fn tai_offset_s() -> Option<i32> {
 
 /// What the kernel knows of its clock; `None` when it cannot be asked.
 fn kernel_clock() -> Option<libc::timex> {
-    // SAFETY: `timex` is plain integers, for which all zeroes is a value; modes 0 only reads.
-    let mut state: libc::timex = unsafe { std::mem::zeroed() };
-    // SAFETY: `state` is a valid, writable `timex` that outlives the call.
-    let result = unsafe { libc::adjtimex(&raw mut state) };
-    if result < 0 { None } else { Some(state) }
+    let mut state = MaybeUninit::<libc::timex>::zeroed();
+    // SAFETY: `state` is writable and outlives the call; `timex` is plain integers, for which all zeroes is a value, and its modes
+    // of 0 only read.
+    let (result, state) = unsafe { (libc::adjtimex(state.as_mut_ptr()), state.assume_init()) };
+    (result >= 0).then_some(state)
 }
 
-fn read(clock: libc::clockid_t) -> u64 {
-    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `now` is a valid, writable `timespec` that outlives the call.
-    let result = unsafe { libc::clock_gettime(clock, &raw mut now) };
-    assert_eq!(result, 0, "clock {clock} cannot be read: {}", io::Error::last_os_error());
-    nanoseconds(now)
+fn read(clock: ClockId) -> u64 {
+    let now = clock_gettime(clock);
+    nanoseconds(now.tv_sec, now.tv_nsec)
 }
 
-/// A `timespec` at or after its epoch as nanoseconds; times before it read as 0.
-pub(super) fn nanoseconds(time: libc::timespec) -> u64 {
-    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
-    let rest = u64::try_from(time.tv_nsec).unwrap_or(0);
+/// A time at or after its epoch as nanoseconds; times before it read as 0.
+pub(super) fn nanoseconds(seconds: impl TryInto<u64>, rest: impl TryInto<u64>) -> u64 {
+    let (seconds, rest) = (seconds.try_into().unwrap_or(0), rest.try_into().unwrap_or(0));
     seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(rest)
 }
 
@@ -234,7 +224,7 @@ mod tests {
 
     #[test]
     fn the_scale_agrees_with_the_tai_clock() {
-        let offset = i64::try_from(read(libc::CLOCK_TAI)).unwrap() - i64::try_from(realtime_now().0).unwrap();
+        let offset = i64::try_from(read(ClockId::Tai)).unwrap() - i64::try_from(realtime_now().0).unwrap();
         let expected_s = match HostTime.scale() {
             TimeScale::Tai { offset_s } => i64::from(offset_s),
             TimeScale::Utc => 0,

@@ -12,16 +12,15 @@
 //! where such datagrams come from, which the kernel does not.
 //!
 //! The functions here are system calls that take a lock of the socket and allocate: they are for threads beside the cycle.
-#![allow(unsafe_code)]
 
 use std::io;
 use std::net::Ipv4Addr;
-use std::os::fd::{AsFd, AsRawFd};
+use std::os::fd::AsFd;
 
 use profile_cip::wire::class1::CONNECTION_ID_OFFSET;
 use socket2::Socket;
 
-use super::receive::set_option;
+use super::option::{counters, set_option};
 
 /// One in so many dropped datagrams passes: at 80 000 a second 20, at 100 a second two or three a minute. A power of two.
 pub const SAMPLE: u32 = 4096;
@@ -95,21 +94,8 @@ impl Gate {
     /// # Errors
     /// What the system says.
     pub fn dropped(&self) -> io::Result<u32> {
-        let mut counters = [0_u32; MEMORY_COUNTERS];
-        let mut length = libc::socklen_t::try_from(size_of_val(&counters)).unwrap_or(0);
-        // SAFETY: `counters` is writable for `length` bytes, and both outlive the call.
-        let result = unsafe {
-            libc::getsockopt(
-                self.socket.as_raw_fd(),
-                libc::SOL_SOCKET,
-                libc::SO_MEMINFO,
-                counters.as_mut_ptr().cast(),
-                &raw mut length,
-            )
-        };
-        if result != 0 {
-            return Err(io::Error::last_os_error());
-        }
+        let counters: [u32; MEMORY_COUNTERS] =
+            counters(self.socket.as_fd(), libc::SOL_SOCKET, libc::SO_MEMINFO)?;
         usize::try_from(libc::SK_MEMINFO_DROPS)
             .ok()
             .and_then(|place| counters.get(place).copied())

@@ -2,10 +2,10 @@
 //! sent.
 #![allow(unsafe_code)]
 
-use std::ffi::CString;
 use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
 
+use nix::net::if_::if_nametoindex;
 use thiserror::Error;
 
 /// Longest name of an interface on Linux, without the closing zero.
@@ -22,13 +22,11 @@ pub(super) enum NoIndex {
 
 /// Index of the interface with this name.
 pub(super) fn index(name: &str) -> Result<i32, NoIndex> {
-    let c_name = CString::new(name).map_err(|_| NoIndex::BadName)?;
-    if name.is_empty() || name.len() > NAME_LEN_MAX {
+    if name.is_empty() || name.len() > NAME_LEN_MAX || name.contains('\0') {
         return Err(NoIndex::BadName);
     }
-    // SAFETY: `c_name` ends in a zero and outlives the call.
-    let index = unsafe { libc::if_nametoindex(c_name.as_ptr()) };
-    i32::try_from(index).ok().filter(|index| *index != 0).ok_or(NoIndex::NoSuchInterface)
+    let index = if_nametoindex(name).map_err(|_| NoIndex::NoSuchInterface)?;
+    i32::try_from(index).map_err(|_| NoIndex::NoSuchInterface)
 }
 
 /// Why a frame was not sent or nothing can be received.

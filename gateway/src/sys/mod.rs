@@ -20,6 +20,7 @@ pub mod packet_socket;
 pub mod realtime;
 pub mod udp;
 
+mod option;
 mod receive;
 
 #[cfg(test)]

@@ -1,19 +1,18 @@
 //! For tests: a thread inside a network namespace of its own.
 //!
 //! The namespace lives as long as the thread and its sockets; nothing has to be cleaned up.
-#![allow(unsafe_code)]
 
 use std::process::Command;
+
+use nix::sched::{CloneFlags, unshare};
 
 /// Runs `test` on a thread in a fresh network namespace, or says that it was skipped.
 pub(super) fn in_namespace(name: &str, test: impl FnOnce() + Send + 'static) {
     let ran = std::thread::spawn(move || {
-        // SAFETY: unshare takes flags; it moves only the calling thread to the new namespace.
-        if unsafe { libc::unshare(libc::CLONE_NEWNET) } != 0 {
-            return Err(std::io::Error::last_os_error());
-        }
+        // Only the calling thread moves to the new namespace.
+        unshare(CloneFlags::CLONE_NEWNET)?;
         test();
-        Ok(())
+        Ok::<(), nix::Error>(())
     })
     .join();
     match ran {

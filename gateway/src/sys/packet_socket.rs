@@ -5,21 +5,26 @@
 #![allow(unsafe_code)]
 
 use std::io;
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::time::Duration;
 
 use arrayvec::ArrayVec;
+use rustix::net::{AddressFamily, SendFlags, SocketFlags, SocketType, send, socket_with};
 use thiserror::Error;
 
 use super::clock::KernelTime;
 use super::link::{self, LinkError, LinkState};
-use super::receive::{PlainAddress, enable_time_stamps, receive, set_option, wait_for_input};
+use super::option::{counters, set_option};
+use super::receive::{enable_time_stamps, receive, wait_for_input};
 
 /// EtherType of SERCOS III.
 pub const ETHER_TYPE_SERCOS: u16 = 0x88CD;
 
 /// Frames of our own that one [`PacketSocket::recv`] passes over before it gives the caller its time back.
 const OUTGOING_SKIPPED_MAX: usize = 32;
+
+/// Place of `sll_pkttype` in a `sockaddr_ll`.
+const PACKET_TYPE_AT: usize = std::mem::offset_of!(libc::sockaddr_ll, sll_pkttype);
 
 /// Room for received frames in the kernel: 64 cycles of eight frames of the longest kind.
 const RECEIVE_BUFFER_LEN: i32 = 1 << 20;
@@ -108,19 +113,13 @@ impl PacketSocket {
         };
 
         // Protocol 0 receives nothing: no frame of another interface can slip in before the bind below.
-        // SAFETY: socket() takes integers only.
-        let descriptor = unsafe {
-            libc::socket(libc::AF_PACKET, libc::SOCK_RAW | libc::SOCK_NONBLOCK | libc::SOCK_CLOEXEC, 0)
-        };
-        if descriptor < 0 {
-            let error = io::Error::last_os_error();
-            return Err(match error.kind() {
+        let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
+        let socket = socket_with(AddressFamily::PACKET, SocketType::RAW, flags, None)
+            .map_err(io::Error::from)
+            .map_err(|error| match error.kind() {
                 io::ErrorKind::PermissionDenied => OpenError::NotPermitted { name: owned() },
                 _ => system("socket", error),
-            });
-        }
-        // SAFETY: the descriptor has just been made and belongs to nobody else.
-        let socket = unsafe { OwnedFd::from_raw_fd(descriptor) };
+            })?;
 
         match link::state(socket.as_fd(), index, name) {
             LinkState::Up | LinkState::NoCarrier => {}
@@ -149,10 +148,15 @@ impl PacketSocket {
             .map_err(|error| system("PACKET_ADD_MEMBERSHIP", error))?;
         let time_stamps = enable_time_stamps(socket.as_fd());
 
-        let mut address = libc::sockaddr_ll::zeroed();
-        address.sll_family = libc::sa_family_t::try_from(libc::AF_PACKET).unwrap_or(0);
-        address.sll_protocol = ether_type.to_be();
-        address.sll_ifindex = index;
+        let address = libc::sockaddr_ll {
+            sll_family: libc::sa_family_t::try_from(libc::AF_PACKET).unwrap_or(0),
+            sll_protocol: ether_type.to_be(),
+            sll_ifindex: index,
+            sll_hatype: 0,
+            sll_pkttype: 0,
+            sll_halen: 0,
+            sll_addr: [0; 8],
+        };
         let length = libc::socklen_t::try_from(size_of::<libc::sockaddr_ll>()).unwrap_or(0);
         // SAFETY: `address` is a valid `sockaddr_ll` of the length given and outlives the call.
         let bound = unsafe { libc::bind(socket.as_raw_fd(), (&raw const address).cast(), length) };
@@ -191,16 +195,8 @@ impl PacketSocket {
     /// # Errors
     /// [`LinkError`]: the frame has not left.
     pub fn send(&self, frame: &[u8]) -> Result<(), LinkError> {
-        // SAFETY: `frame` is readable for its length through the call.
-        let sent = unsafe {
-            libc::send(
-                self.socket.as_raw_fd(),
-                frame.as_ptr().cast(),
-                frame.len(),
-                libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL,
-            )
-        };
-        if sent < 0 { Err(LinkError::from_io(&io::Error::last_os_error())) } else { Ok(()) }
+        let sent = send(&self.socket, frame, SendFlags::DONTWAIT | SendFlags::NOSIGNAL);
+        sent.map(|_| ()).map_err(|error| LinkError::from_io(&error.into()))
     }
 
     /// Receives one frame into `buffer` without waiting; `Ok(None)` when there is none.
@@ -210,12 +206,10 @@ impl PacketSocket {
     /// # Errors
     /// [`LinkError`]: once when the interface has gone down; receiving may be tried again.
     pub fn recv(&self, buffer: &mut [u8]) -> Result<Option<Received>, LinkError> {
-        let mut from = libc::sockaddr_ll::zeroed();
         for _ in 0..OUTGOING_SKIPPED_MAX {
-            let message = receive(self.socket.as_fd(), buffer, &mut from)
-                .map_err(|error| LinkError::from_io(&error))?;
+            let message = receive(self.socket.as_fd(), buffer).map_err(|error| LinkError::from_io(&error))?;
             let Some(message) = message else { return Ok(None) };
-            if from.sll_pkttype == libc::PACKET_OUTGOING {
+            if message.from[PACKET_TYPE_AT] == libc::PACKET_OUTGOING {
                 continue;
             }
             return Ok(Some(Received { len: message.len, at: message.at }));
@@ -226,19 +220,10 @@ impl PacketSocket {
     /// Frames the kernel dropped since the last call because they were not fetched in time.
     #[must_use]
     pub fn take_dropped(&self) -> u32 {
-        let mut statistics = libc::tpacket_stats { tp_packets: 0, tp_drops: 0 };
-        let mut length = libc::socklen_t::try_from(size_of::<libc::tpacket_stats>()).unwrap_or(0);
-        // SAFETY: `statistics` is writable for `length` bytes and both outlive the call.
-        let result = unsafe {
-            libc::getsockopt(
-                self.socket.as_raw_fd(),
-                libc::SOL_PACKET,
-                libc::PACKET_STATISTICS,
-                (&raw mut statistics).cast(),
-                &raw mut length,
-            )
-        };
-        if result == 0 { statistics.tp_drops } else { 0 }
+        // `struct tpacket_stats`: frames, dropped frames.
+        let [_, dropped] =
+            counters(self.socket.as_fd(), libc::SOL_PACKET, libc::PACKET_STATISTICS).unwrap_or([0; 2]);
+        dropped
     }
 }
 
@@ -249,8 +234,7 @@ impl PacketSocket {
 /// # Errors
 /// What `poll` refuses.
 pub fn wait(sockets: &[PacketSocket], timeout: Duration) -> io::Result<bool> {
-    let descriptors: ArrayVec<_, 2> =
-        sockets.iter().take(2).map(|socket| socket.socket.as_raw_fd()).collect();
+    let descriptors: ArrayVec<_, 2> = sockets.iter().take(2).map(AsFd::as_fd).collect();
     wait_for_input(&descriptors, timeout)
 }
 

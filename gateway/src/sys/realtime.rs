@@ -8,14 +8,18 @@
 use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
+use std::num::NonZeroU64;
 
 use arrayvec::ArrayVec;
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::process::{Resource, geteuid, getrlimit};
+use rustix::thread::{CpuSet, sched_setaffinity, set_current_timer_slack};
 
 /// The highest priority of `SCHED_FIFO` on Linux; the lowest is 1.
 pub const PRIORITY_MAX: u8 = 99;
 
 /// Without real-time scheduling a wake-up may be put off by this much less than the kernel's usual 50 us.
-const TIMER_SLACK_NS: libc::c_ulong = 1;
+const TIMER_SLACK_NS: Option<NonZeroU64> = NonZeroU64::new(1);
 
 /// Takes the longest time in microseconds that a processor may need to wake, as four octets.
 const LATENCY_LIMIT: &str = "/dev/cpu_dma_latency";
@@ -145,22 +149,12 @@ impl Report {
             file.write_all(&0_i32.to_ne_bytes())?;
             Ok(file)
         });
-        let result = match asked {
-            Ok(file) => {
-                self.awake = Some(file);
-                Ok(())
-            }
-            Err(error) => Err(error.raw_os_error().unwrap_or(libc::EINVAL)),
-        };
-        self.outcomes.push(Outcome { measure: Measure::StayAwake, result });
+        let result = asked.map(|file| self.awake = Some(file));
+        self.record(Measure::StayAwake, result);
     }
 
-    fn record(&mut self, measure: Measure, result: libc::c_int) {
-        let result = if result == 0 {
-            Ok(())
-        } else {
-            Err(io::Error::last_os_error().raw_os_error().unwrap_or(libc::EINVAL))
-        };
+    fn record<E: Into<io::Error>>(&mut self, measure: Measure, result: Result<(), E>) {
+        let result = result.map_err(|error| error.into().raw_os_error().unwrap_or(libc::EINVAL));
         self.outcomes.push(Outcome { measure, result });
     }
 }
@@ -181,61 +175,53 @@ impl fmt::Display for Report {
 #[must_use]
 pub fn apply(request: &Request) -> Report {
     let mut report = Report::default();
-    // SAFETY: PR_SET_TIMERSLACK takes an integer and touches no memory.
-    let result = unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, TIMER_SLACK_NS) };
-    report.record(Measure::TimerSlack, result);
+    report.record(Measure::TimerSlack, set_current_timer_slack(TIMER_SLACK_NS));
 
     if request.lock_memory {
         let (measure, flags) = if may_lock_without_limit() {
-            (Measure::LockMemory, libc::MCL_CURRENT | libc::MCL_FUTURE)
+            (Measure::LockMemory, MlockAllFlags::CURRENT | MlockAllFlags::FUTURE)
         } else {
-            (Measure::LockPresentMemory, libc::MCL_CURRENT)
+            (Measure::LockPresentMemory, MlockAllFlags::CURRENT)
         };
-        // SAFETY: mlockall takes flags and changes no contents of memory.
-        let result = unsafe { libc::mlockall(flags) };
-        report.record(measure, result);
+        report.record(measure, mlockall(flags));
     }
     if request.stay_awake {
         report.stay_awake();
     }
     if let Some(cpu) = request.cpu {
-        let result = set_affinity(cpu);
-        report.record(Measure::Affinity { cpu }, result);
+        // A processor beyond the set leaves it empty, which is refused with EINVAL.
+        let mut set = CpuSet::new();
+        if usize::from(cpu) < CpuSet::MAX_CPU {
+            set.set(usize::from(cpu));
+        }
+        report.record(Measure::Affinity { cpu }, sched_setaffinity(None, &set));
     }
     if let Some(priority) = request.priority {
-        let parameters = libc::sched_param { sched_priority: i32::from(priority) };
-        // SAFETY: `parameters` outlives the call; thread 0 is the calling one.
-        let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
-        report.record(Measure::Scheduler { priority }, result);
+        report.record(Measure::Scheduler { priority }, schedule_fifo(priority));
     }
     report
 }
 
-fn set_affinity(cpu: u16) -> libc::c_int {
-    // SAFETY: `cpu_set_t` is an array of integers, for which all zeroes is a value (the empty set).
-    let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
-    let cpu = usize::from(cpu);
-    if cpu < size_of::<libc::cpu_set_t>() * 8 {
-        // SAFETY: `cpu` is below the number of bits of the set, checked above.
-        unsafe { libc::CPU_SET(cpu, &mut set) };
-    }
-    // SAFETY: `set` is valid for the size given; thread 0 is the calling one. An empty set is refused with
-    // EINVAL.
-    unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) }
+fn schedule_fifo(priority: u8) -> io::Result<()> {
+    let parameters = libc::sched_param { sched_priority: i32::from(priority) };
+    // SAFETY: `parameters` outlives the call; thread 0 is the calling one.
+    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
 fn may_lock_without_limit() -> bool {
-    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: `limit` is a valid, writable `rlimit` that outlives the call.
-    let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) } == 0;
-    // SAFETY: geteuid has no preconditions and cannot fail.
-    let root = unsafe { libc::geteuid() } == 0;
-    root || (known && limit.rlim_cur == libc::RLIM_INFINITY)
+    geteuid().is_root() || getrlimit(Resource::Memlock).current.is_none()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Scheduling policy of the calling thread: field 41 of its `stat`, of which the second ends with a parenthesis.
+    fn policy() -> String {
+        let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
+        stat[stat.rfind(')').unwrap()..].split_whitespace().nth(39).unwrap().to_owned()
+    }
 
     fn on_own_thread(request: Request) -> Report {
         // Scheduling is per thread: a thread of its own keeps the test runner's ones as they are.
@@ -288,12 +274,11 @@ mod tests {
     fn fifo_scheduling_is_granted_or_the_refusal_says_what_is_needed() {
         let scheduler = std::thread::spawn(|| {
             let report = apply(&Request { priority: Some(10), ..Request::default() });
-            // SAFETY: sched_getscheduler takes a thread number, 0 being the calling one.
-            (report.outcomes()[1], unsafe { libc::sched_getscheduler(0) })
+            (report.outcomes()[1], policy())
         });
         let (outcome, policy) = scheduler.join().unwrap();
         match outcome.result {
-            Ok(()) => assert_eq!(policy, libc::SCHED_FIFO),
+            Ok(()) => assert_eq!(policy, libc::SCHED_FIFO.to_string()),
             Err(number) => {
                 assert_eq!(number, libc::EPERM);
                 assert!(outcome.to_string().contains("CAP_SYS_NICE"), "{outcome}");

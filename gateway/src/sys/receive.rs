@@ -3,16 +3,24 @@
 #![allow(unsafe_code)]
 
 use std::io;
-use std::os::fd::{AsRawFd, BorrowedFd, RawFd};
+use std::os::fd::{AsRawFd as _, BorrowedFd};
 use std::time::Duration;
 
 use arrayvec::ArrayVec;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 
 use super::clock::{KernelTime, nanoseconds};
+use super::option::set_option;
 
-/// What one `recvmsg` brought; the data are in the caller's buffer, the address in the caller's storage.
+/// Bytes of the longest socket address here, a `sockaddr_can`.
+const ADDRESS_LEN: usize = size_of::<libc::sockaddr_can>();
+
+/// What one `recvmsg` brought; the data are in the caller's buffer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Message {
+    /// Socket address of the sender as the kernel writes it, zero after its end.
+    pub from: [u8; ADDRESS_LEN],
     /// Bytes written to the buffer.
     pub len: usize,
     /// Whether the message was longer than the buffer.
@@ -31,37 +39,14 @@ pub(super) struct Message {
 #[repr(C, align(8))]
 struct Control([u8; 64]);
 
-/// A C address structure of integers, into which the kernel may write any bytes.
-///
-/// # Safety
-/// Every bit pattern, also one the kernel has filled in part, must be a value of the type.
-pub(super) unsafe trait PlainAddress: Sized {
-    /// The address of all zeroes.
-    fn zeroed() -> Self {
-        // SAFETY: the trait promises that any bit pattern is a value.
-        unsafe { std::mem::zeroed() }
-    }
-}
-
-// SAFETY: both consist of integers and arrays of integers.
-unsafe impl PlainAddress for libc::sockaddr_in {}
-// SAFETY: as above.
-unsafe impl PlainAddress for libc::sockaddr_ll {}
-// SAFETY: a family, an index and a union of structures of integers.
-unsafe impl PlainAddress for libc::sockaddr_can {}
-
 /// Receives one message without waiting; `Ok(None)` when there is none.
-pub(super) fn receive<Address: PlainAddress>(
-    socket: BorrowedFd<'_>,
-    buffer: &mut [u8],
-    from: &mut Address,
-) -> io::Result<Option<Message>> {
+pub(super) fn receive(socket: BorrowedFd<'_>, buffer: &mut [u8]) -> io::Result<Option<Message>> {
     let mut part = libc::iovec { iov_base: buffer.as_mut_ptr().cast(), iov_len: buffer.len() };
-    let mut control = Control([0; 64]);
+    let (mut from, mut control) = ([0; ADDRESS_LEN], Control([0; 64]));
     // SAFETY: `msghdr` is integers and pointers, for which all zeroes is a value.
     let mut message: libc::msghdr = unsafe { std::mem::zeroed() };
-    message.msg_name = std::ptr::from_mut(from).cast();
-    message.msg_namelen = libc::socklen_t::try_from(size_of::<Address>()).unwrap_or(0);
+    message.msg_name = from.as_mut_ptr().cast();
+    message.msg_namelen = libc::socklen_t::try_from(ADDRESS_LEN).unwrap_or(0);
     message.msg_iov = &raw mut part;
     message.msg_iovlen = 1;
     message.msg_control = control.0.as_mut_ptr().cast();
@@ -79,51 +64,60 @@ pub(super) fn receive<Address: PlainAddress>(
     };
 
     let (mut at, mut tos, mut dropped) = (None, None, None);
-    // SAFETY: the kernel has filled `message`; the macros walk only within `msg_controllen` bytes of
-    // `control`.
-    let mut header = unsafe { libc::CMSG_FIRSTHDR(&raw const message) };
-    while !header.is_null() {
-        // SAFETY: a header that is not null points into `control`, at a place aligned and long enough for it.
-        let (level, kind) = unsafe { ((*header).cmsg_level, (*header).cmsg_type) };
-        if level == libc::SOL_SOCKET && kind == libc::SCM_TIMESTAMPNS {
-            // SAFETY: this message carries one `timespec`; it need not be aligned for it.
-            let stamp = unsafe { libc::CMSG_DATA(header).cast::<libc::timespec>().read_unaligned() };
-            at = Some(KernelTime(nanoseconds(stamp)));
+    for (level, kind, data) in ControlMessages(control.0.get(..message.msg_controllen as _).unwrap_or(&[])) {
+        match (level, kind) {
+            (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => at = time_stamp(data),
+            (libc::IPPROTO_IP, libc::IP_TOS) => tos = data.first().copied(),
+            (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => {
+                dropped = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes));
+            }
+            _ => {}
         }
-        if level == libc::IPPROTO_IP && kind == libc::IP_TOS {
-            // SAFETY: this message carries one octet.
-            tos = Some(unsafe { libc::CMSG_DATA(header).read() });
-        }
-        if level == libc::SOL_SOCKET && kind == libc::SO_RXQ_OVFL {
-            // SAFETY: this message carries one integer of 32 bits; it need not be aligned for it.
-            dropped = Some(unsafe { libc::CMSG_DATA(header).cast::<u32>().read_unaligned() });
-        }
-        // SAFETY: as for CMSG_FIRSTHDR; `header` came from it.
-        header = unsafe { libc::CMSG_NXTHDR(&raw const message, header) };
     }
     let flag = |flag: libc::c_int| message.msg_flags & flag != 0;
     let (truncated, own) = (flag(libc::MSG_TRUNC), flag(libc::MSG_CONFIRM));
-    Ok(Some(Message { len, truncated, at, tos, dropped, own }))
+    Ok(Some(Message { from, len, truncated, at, tos, dropped, own }))
+}
+
+/// The control messages of one `recvmsg`: level, type and data of each. A `cmsghdr` is length (with itself), level and type; each
+/// begins at a multiple of the length of a word.
+struct ControlMessages<'a>(&'a [u8]);
+
+impl<'a> Iterator for ControlMessages<'a> {
+    type Item = (libc::c_int, libc::c_int, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (length, rest) = self.0.split_first_chunk()?;
+        let (level, rest) = rest.split_first_chunk()?;
+        let kind = rest.first_chunk()?;
+        let length = usize::from_ne_bytes(*length);
+        let data = self.0.get(size_of::<libc::cmsghdr>()..length)?;
+        self.0 = self.0.get(length.next_multiple_of(size_of::<usize>())..).unwrap_or(&[]);
+        Some((libc::c_int::from_ne_bytes(*level), libc::c_int::from_ne_bytes(*kind), data))
+    }
+}
+
+/// A `timespec`.
+fn time_stamp(data: &[u8]) -> Option<KernelTime> {
+    let (seconds, rest) = data.split_first_chunk()?;
+    let rest = libc::c_long::from_ne_bytes(*rest.first_chunk()?);
+    Some(KernelTime(nanoseconds(libc::time_t::from_ne_bytes(*seconds), rest)))
 }
 
 /// Waits until something can be received from one of the descriptors (two at most) or `timeout` is over; `true` when something
 /// can.
-pub(super) fn wait_for_input(descriptors: &[RawFd], timeout: Duration) -> io::Result<bool> {
-    let entry = |descriptor: &RawFd| libc::pollfd { fd: *descriptor, events: libc::POLLIN, revents: 0 };
-    let mut entries: ArrayVec<_, 2> = descriptors.iter().take(2).map(entry).collect();
-    let count = libc::nfds_t::try_from(entries.len()).unwrap_or(0);
-    let timeout = libc::timespec {
-        tv_sec: libc::time_t::try_from(timeout.as_secs()).unwrap_or(libc::time_t::MAX),
-        tv_nsec: libc::c_long::from(timeout.subsec_nanos().cast_signed()),
+pub(super) fn wait_for_input(descriptors: &[BorrowedFd<'_>], timeout: Duration) -> io::Result<bool> {
+    let entry = |descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN);
+    let mut entries: ArrayVec<_, 2> = descriptors.iter().copied().take(2).map(entry).collect();
+    let timeout = Timespec {
+        tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
+        tv_nsec: timeout.subsec_nanos().into(),
     };
-    // SAFETY: `entries` are `count` valid, writable `pollfd`s, and they and `timeout` outlive the call; without a signal mask
-    // the process keeps its own.
-    let ready = unsafe { libc::ppoll(entries.as_mut_ptr(), count, &raw const timeout, std::ptr::null()) };
-    if ready < 0 {
-        let error = io::Error::last_os_error();
-        return if error.kind() == io::ErrorKind::Interrupted { Ok(false) } else { Err(error) };
+    match poll(&mut entries, Some(&timeout)) {
+        Ok(ready) => Ok(ready > 0),
+        Err(Errno::INTR) => Ok(false),
+        Err(error) => Err(error.into()),
     }
-    Ok(ready > 0)
 }
 
 /// Asks the kernel to stamp received messages; `false` when it will not.
@@ -136,17 +130,27 @@ pub(super) fn enable_type_of_service(socket: BorrowedFd<'_>) -> io::Result<()> {
     set_option(socket, libc::IPPROTO_IP, libc::IP_RECVTOS, &1_i32)
 }
 
-/// `setsockopt` with a plain C value.
-pub(super) fn set_option<Value: Copy>(
-    socket: BorrowedFd<'_>,
-    level: libc::c_int,
-    option: libc::c_int,
-    value: &Value,
-) -> io::Result<()> {
-    let length = libc::socklen_t::try_from(size_of::<Value>()).unwrap_or(0);
-    // SAFETY: `value` is readable for `length` bytes through the call; the kernel copies it.
-    let result = unsafe {
-        libc::setsockopt(socket.as_raw_fd(), level, option, std::ptr::from_ref(value).cast(), length)
-    };
-    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_messages_are_read_one_after_the_other_and_end_where_one_is_cut() {
+        let word = |value: usize| value.to_ne_bytes().to_vec();
+        let header = |length, level: i32, kind: i32| {
+            [word(length), level.to_ne_bytes().to_vec(), kind.to_ne_bytes().to_vec()].concat()
+        };
+        let head = size_of::<usize>() + 8;
+        // One octet and its padding, then four octets.
+        let mut bytes =
+            [header(head + 1, 0, 1), vec![0xB8; size_of::<usize>()], header(head + 4, 1, 40)].concat();
+        bytes.extend([1, 2, 3, 4]);
+        let read = |bytes: &[u8]| {
+            ControlMessages(bytes).map(|(level, kind, data)| (level, kind, data.to_vec())).collect::<Vec<_>>()
+        };
+        assert_eq!(read(&bytes), [(0, 1, vec![0xB8]), (1, 40, vec![1, 2, 3, 4])]);
+        assert_eq!(read(&bytes[..bytes.len() - 1]), [(0, 1, vec![0xB8])]);
+        assert_eq!(read(&header(3, 0, 1)), []);
+        assert_eq!(read(&[]), []);
+    }
 }

@@ -3,11 +3,10 @@
 //!
 //! EtherNet/IP's implicit messages go from and to port 2222 at both ends. Two ends on one host work when each
 //! binds an address of its own, which is why the address is always given and `SO_REUSEADDR` is set.
-#![allow(unsafe_code)]
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
@@ -18,7 +17,7 @@ use thiserror::Error;
 
 use super::clock::KernelTime;
 use super::gate::Gate;
-use super::receive::{PlainAddress, enable_time_stamps, enable_type_of_service, receive, wait_for_input};
+use super::receive::{enable_time_stamps, enable_type_of_service, receive, wait_for_input};
 
 /// UDP port of EtherNet/IP implicit messages.
 pub const PORT_IO: u16 = 2222;
@@ -197,10 +196,10 @@ impl IoSocket {
     /// # Errors
     /// What the system says.
     pub fn recv(&self, buffer: &mut [u8]) -> io::Result<Option<Datagram>> {
-        let mut from = libc::sockaddr_in::zeroed();
-        let Some(message) = receive(self.socket.as_fd(), buffer, &mut from)? else { return Ok(None) };
-        let ip = Ipv4Addr::from(u32::from_be(from.sin_addr.s_addr));
-        let from = SocketAddrV4::new(ip, u16::from_be(from.sin_port));
+        let Some(message) = receive(self.socket.as_fd(), buffer)? else { return Ok(None) };
+        // `struct sockaddr_in`: family, port and address, the latter two big endian.
+        let [_, _, p, q, a, b, c, d, ..] = message.from;
+        let from = SocketAddrV4::new(Ipv4Addr::new(a, b, c, d), u16::from_be_bytes([p, q]));
         let dscp = message.tos.unwrap_or(0) >> 2;
         Ok(Some(Datagram { len: message.len, truncated: message.truncated, from, at: message.at, dscp }))
     }
@@ -213,8 +212,8 @@ impl IoSocket {
 /// # Errors
 /// What `ppoll` refuses.
 pub fn wait(socket: &IoSocket, stream: Option<&TcpStream>, timeout: Duration) -> io::Result<bool> {
-    let mut descriptors = ArrayVec::<_, 2>::from_iter([socket.socket.as_raw_fd()]);
-    descriptors.extend(stream.map(AsRawFd::as_raw_fd));
+    let mut descriptors = ArrayVec::<_, 2>::from_iter([socket.as_fd()]);
+    descriptors.extend(stream.map(AsFd::as_fd));
     wait_for_input(&descriptors, timeout)
 }
 

@@ -1,15 +1,19 @@
 //! Attributes, IDNs and objects beside the cyclic data.
 
-use super::stage::StageAxis;
+use std::sync::Arc;
+
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::fault_set::{ActiveFault, Origin};
+
 use super::tree::hex;
 use super::{Node, TranslateError, Translator, quantity};
-use crate::mapping::{Access, Backing, CipFault, Item, ParameterEntry, ValueError};
+use crate::mapping::{Access, Backing, CipFault, Item, ValueError};
 
 impl Translator {
     /// The controller sets an attribute of an axis.
     pub(super) fn set(&mut self, number: usize, id: u16, bytes: &[u8]) -> Result<Node, TranslateError> {
-        let axis = &self.stage.axes[number];
-        let mapping = &self.stage.mapping;
+        let stage = Arc::clone(&self.stage);
+        let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let Some(known) = mapping.dictionaries.cip.attribute_by_id(id) else {
             return Err(TranslateError::Value(format!(
                 "attribute {id}: the axis object has no such attribute"
@@ -17,83 +21,64 @@ impl Translator {
         };
         let mut node =
             Node::new(format!("axis {}: set attribute {id} {} to {}", axis.name, known.name, hex(bytes)));
-        let rejected = mapping.cip.rejected.iter().find(|(rejected, _)| *rejected == id);
-        if let Some((_, reason)) = rejected {
+        if let Some((_, reason)) = mapping.cip.rejected.iter().find(|(rejected, _)| *rejected == id) {
             node.push(Node::new(format!("not supported: {reason}")));
-            return Ok(node);
         }
         let Some(entry) = axis.attributes.get(id) else {
-            node.push(Node::new("no row: not supported"));
+            let (reply, _) = self.bench()?.set(number, id, bytes);
+            node.push(Node::new("no row"));
+            let status = reply.map(|reply| GeneralStatus(reply.general_status).to_string());
+            node.push(Node::new(format!("answer: {}", status.as_deref().unwrap_or("none"))));
             return Ok(node);
         };
         let row = mapping.attribute_row(id);
-        match entry.backing {
-            Backing::Device => node.push(Node::new("served by the device").by(row)),
-            Backing::Connection => node.push(Node::new("written by the connection").by(row)),
-            Backing::Shadow => {
-                node.push(Node::new("stored and given back, without effect on the drive").by(row))
-            }
-            Backing::Constant(value) => node.push(Node::new(format!("always {value}")).by(row)),
+        let (what, place) = match entry.backing {
+            Backing::Device => ("served by the device".to_owned(), None),
+            Backing::Connection => ("written by the connection".to_owned(), None),
+            Backing::Shadow => ("stored and given back, without effect on the drive".to_owned(), None),
+            Backing::Constant(value) => (format!("always {value}"), None),
             Backing::Signal { signal, .. } if entry.access == Access::SetCyclic => {
-                let text = format!("shows {signal}, set by cyclic write data only: refused");
-                node.push(Node::new(text).by(row));
+                (format!("shows {signal}, set by cyclic write data only"), None)
             }
-            Backing::Signal { signal, .. } => {
-                node.push(Node::new(format!("shows {signal}, cannot be set")).by(row));
-            }
-            Backing::Parameter { parameter, reject, .. } => {
+            Backing::Signal { signal, .. } => (format!("shows {signal}, cannot be set"), None),
+            Backing::Parameter { parameter, .. } => {
                 let value = match entry.to_generic(bytes) {
-                    Ok(value) => value,
+                    Ok(value) => parameter
+                        .row()
+                        .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value)),
                     Err(error @ (ValueError::Length { .. } | ValueError::NotConvertible)) => {
                         return Err(TranslateError::Value(format!("attribute {id} {}: {error}", known.name)));
                     }
-                    Err(error) => {
-                        node.push(Node::new(format!("refused: {error}")).by(row));
-                        return Ok(node);
-                    }
+                    Err(error) => error.to_string(),
                 };
-                let measured = parameter
-                    .row()
-                    .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
-                node.push(Node::new(format!("{parameter} {measured}")).by(row));
-                match axis.south.parameter(parameter) {
-                    Some(place) => node.push(self.written(axis, place, value)),
-                    None if reject => node.push(Node::new("the drive has no such parameter: refused")),
-                    None => node.push(Node::new("the drive has no such parameter: stored only")),
-                }
+                let place = axis.south.parameter(parameter);
+                let lacks = if place.is_none() { ": the drive has no such parameter" } else { "" };
+                (format!("{parameter} {value}{lacks}"), place)
             }
+        };
+        node.push(Node::new(what).by(row));
+        let (reply, written) = self.bench()?.set(number, id, bytes);
+        for (item, bytes) in written {
+            let width = place.map_or(bytes.len(), |place| place.width.bytes());
+            let row = place.and_then(|place| axis.parameter_row(mapping, place.parameter));
+            let bytes = bytes.get(..width).unwrap_or(&bytes);
+            let text = format!("{}: write {} ({} bytes)", self.named(item), hex(bytes), bytes.len());
+            node.push(Node::new(text).by(row));
         }
+        node.push(Node::new(match reply {
+            Some(reply) => format!("answer: {}", GeneralStatus(reply.general_status)),
+            None => "no answer".to_owned(),
+        }));
         Ok(node)
-    }
-
-    fn written(&self, axis: &StageAxis, place: &ParameterEntry, value: i64) -> Node {
-        let row = axis.parameter_row(&self.stage.mapping, place.parameter);
-        let name = self.named(place.item);
-        match place.encode(value) {
-            None => Node::new(format!("{name}: can only be read")).by(row),
-            Some((bytes, len, clamped)) => {
-                let clamped = if clamped { ", clamped" } else { "" };
-                Node::new(format!("{name}: write {} ({} bytes{clamped})", hex(&bytes[..len]), len)).by(row)
-            }
-        }
     }
 
     /// A drive gives element 7 of an IDN, or an object.
     pub(super) fn held(&mut self, number: usize, item: Item, bytes: &[u8]) -> Result<Node, TranslateError> {
-        let axis = &self.stage.axes[number];
-        let mapping = &self.stage.mapping;
+        let stage = Arc::clone(&self.stage);
+        let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(item), hex(bytes)));
-        let word = match *bytes {
-            [a, b] => Some(u32::from(u16::from_le_bytes([a, b]))),
-            [a, b, c, d] => Some(u32::from_le_bytes([a, b, c, d])),
-            _ => None,
-        };
-        let is_diagnostic = match item {
-            Item::Idn(idn) => mapping.sercos.is_diagnostic(idn),
-            Item::Object(_) | Item::Attribute(_) => axis.south.is_diagnostic(item),
-        };
-        if let Some(word) = word.filter(|_| is_diagnostic) {
-            self.causes(number, item, word, &mut node);
+        if axis.south.is_diagnostic(item) {
+            self.causes(number, item, bytes, &mut node)?;
             return Ok(node);
         }
         for place in axis.south.parameters().iter().filter(|place| place.item == item) {
@@ -117,13 +102,14 @@ impl Translator {
                 if parameter != place.parameter {
                     continue;
                 }
-                let mut out = [0; 8];
-                let seen = match entry.from_generic(value, &mut out) {
-                    Ok((len, clamped)) => {
-                        let clamped = if clamped { ", clamped" } else { "" };
-                        format!("reads {}{clamped}", hex(&out[..len]))
-                    }
-                    Err(error) => error.to_string(),
+                let bench = self.bench()?;
+                bench.hold(number, item, place.width.integer(bytes).unwrap_or_default(), bytes.len());
+                let answer = bench.get(number, entry.id);
+                bench.release();
+                let seen = match answer {
+                    Some(reply) if reply.general_status == 0 => format!("reads {}", hex(&reply.data)),
+                    Some(reply) => format!("answers {}", GeneralStatus(reply.general_status)),
+                    None => "is not answered".to_owned(),
                 };
                 let name =
                     mapping.dictionaries.cip.attribute_by_id(entry.id).map_or("", |row| row.name.as_str());
@@ -140,13 +126,43 @@ impl Translator {
         Ok(node)
     }
 
-    /// What a word says is wrong, and how the controller sees it.
-    pub(super) fn causes(&self, number: usize, item: Item, word: u32, node: &mut Node) {
-        let (axis, mapping) = (&self.stage.axes[number], &self.stage.mapping);
-        let mut any = false;
-        for (cause, reaction) in axis.south.faults(item, word) {
-            let mut fault = Node::new(format!("{cause}, reaction {reaction}"))
-                .by(axis.fault_row(mapping, item, word, cause));
+    /// What the box finds wrong by a word of a drive, and how the controller sees it.
+    pub(super) fn causes(
+        &mut self,
+        number: usize,
+        item: Item,
+        bytes: &[u8],
+        node: &mut Node,
+    ) -> Result<(), TranslateError> {
+        let stage = Arc::clone(&self.stage);
+        let (axis, mapping) = (&stage.axes[number], &stage.mapping);
+        let mut word = [0; 4];
+        word.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+        let word = u32::from_le_bytes(word);
+        let bench = self.bench()?;
+        bench.take_notices();
+        let mut found = Vec::new();
+        // A drive shows an error for what stops it, and a warning otherwise.
+        let reads = |stops: &bool| axis.south.diagnostic_words(*stops).any(|known| known == item);
+        let shows = |stops: &bool| {
+            axis.south.faults(item, word).any(|(_, reaction)| reaction.stops() == *stops) && reads(stops)
+        };
+        let mut kinds: Vec<bool> = [true, false].into_iter().filter(shows).collect();
+        if kinds.is_empty() {
+            kinds.extend([true, false].into_iter().find(reads));
+        }
+        for stops in kinds {
+            let before = bench.diagnose(number, item, word, stops);
+            let faults = bench.engine().axes()[number].faults();
+            let drive = |active: &&ActiveFault| matches!(active.origin, Origin::Drive | Origin::Warning);
+            found.extend(faults.filter(drive).map(|active| active.fault));
+            bench.recover(number, before);
+        }
+        for fault in &found {
+            let (cause, reaction) = (fault.cause, fault.reaction);
+            let has_row = axis.south.faults(item, word).any(|(known, _)| known == cause);
+            let row = has_row.then(|| axis.fault_row(mapping, item, word, cause)).flatten();
+            let mut shown = Node::new(format!("{cause}, reaction {reaction}")).by(row);
             let seen = match axis.north.fault(cause) {
                 Some(CipFault::Axis { fault_type, alarm_type, code }) => {
                     let alarm =
@@ -156,12 +172,12 @@ impl Translator {
                 Some(CipFault::Node(code)) => format!("Node Fault Code {code}"),
                 None => "no CIP exception".to_owned(),
             };
-            fault.push(Node::new(seen).by(mapping.exception_row(cause)));
-            node.push(fault);
-            any = true;
+            shown.push(Node::new(seen).by(mapping.exception_row(cause)));
+            node.push(shown);
         }
-        if !any {
+        if found.is_empty() {
             node.push(Node::new("nothing is wrong"));
         }
+        Ok(())
     }
 }

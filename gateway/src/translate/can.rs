@@ -98,14 +98,12 @@ impl Translator {
             return Ok(Node::new(text));
         }
         state.heard.clear();
-        let values = std::mem::take(&mut state.came);
-        let node = self.feedback(number, &values);
-        self.states[number].came = values;
-        Ok(node)
+        let values = state.came.clone();
+        self.feedback(number, &values)
     }
 
     /// What a drive says is wrong.
-    fn emcy(&self, bus: Option<usize>, id: u8, data: &[u8]) -> Option<Result<Node, TranslateError>> {
+    fn emcy(&mut self, bus: Option<usize>, id: u8, data: &[u8]) -> Option<Result<Node, TranslateError>> {
         let axes = self.stage.axes.iter().enumerate().filter(|(_, axis)| axis.may_be_on(bus));
         let of_node = axes.filter(|(_, axis)| axis.can().is_some_and(|drive| drive.node == id));
         let of_node: Vec<_> =
@@ -116,11 +114,15 @@ impl Translator {
             Err(error) => return Some(Err(TranslateError::Value(format!("EMCY of {drive}: {error}")))),
         };
         let mut node = Node::new(format!("EMCY of {drive}: {emcy}"));
-        for (number, name, _) in &of_node {
+        let words = |number: usize| self.stage.axes[number].south.diagnostic_words(true).collect();
+        let words: Vec<Vec<Item>> = of_node.iter().map(|(number, ..)| words(*number)).collect();
+        for ((number, name, _), words) in of_node.iter().zip(words) {
             let mut axis = Node::new(format!("axis {name}"));
-            let words: Vec<Item> = self.stage.axes[*number].south.diagnostic_words(true).collect();
             for word in words {
-                self.causes(*number, word, emcy.code.0.into(), &mut axis);
+                // The box reads the code where the drive keeps it; the message alone stops no axis.
+                if let Err(error) = self.causes(*number, word, &emcy.code.0.to_le_bytes(), &mut axis) {
+                    return Some(Err(error));
+                }
             }
             node.push(axis);
         }

@@ -10,16 +10,13 @@ use profile_cip::wire::motion::codes::{AxisControl, AxisStateCode, ControlMode};
 use profile_generic::can::{Frame, Id};
 use profile_generic::program::{Field, Width};
 
-use super::command::{bytes_of, generic_of};
 use super::stage::{DevicenetDrive, StageAxis};
+use super::telegram::{bytes_of, generic_of};
 use super::tree::hex;
-use super::{Node, Translator, flags, shown};
+use super::{Node, TranslateError, Translator, flags, shown};
 use crate::engine::bus::devicenet::end::{End, Row};
 use crate::mapping::devicenet::{DevicenetAxis, MODE_AT, ROW_LEN, motion, speed};
 use crate::mapping::{Mapping, Origin};
-
-/// Longest message of a drive.
-const MESSAGE_MAX: usize = 16;
 
 /// What is heard of the poll connection of a drive.
 #[derive(Debug)]
@@ -43,7 +40,11 @@ impl Listener {
 impl Translator {
     /// Takes a frame of a DeviceNet; `None` of one that is no end of a poll or its answer. `bus` is the number of its bus among
     /// the CAN buses of the configuration, where it is known.
-    pub(super) fn devicenet(&mut self, bus: Option<usize>, frame: &Frame) -> Option<Node> {
+    pub(super) fn devicenet(
+        &mut self,
+        bus: Option<usize>,
+        frame: &Frame,
+    ) -> Option<Result<Node, TranslateError>> {
         let Id::Standard(bits) = frame.id() else { return None };
         if frame.is_remote() || frame.is_fd() {
             return None;
@@ -60,12 +61,18 @@ impl Translator {
         let mut told = axes.into_iter().filter_map(|number| self.poll(number, is_command, frame.data()));
         let mut first = told.next()?;
         // Drives with this MAC ID on several networks, and nobody knows which.
-        told.for_each(|other| first.push(other));
+        for other in told {
+            match (&mut first, other) {
+                (Ok(first), Ok(other)) => first.push(other),
+                (Ok(_), Err(error)) => first = Err(error),
+                (Err(_), _) => {}
+            }
+        }
         Some(first)
     }
 
     /// A frame of a poll; `None` while its message is not whole.
-    fn poll(&mut self, number: usize, is_command: bool, data: &[u8]) -> Option<Node> {
+    fn poll(&mut self, number: usize, is_command: bool, data: &[u8]) -> Option<Result<Node, TranslateError>> {
         let listener = self.states[number].listener.as_mut()?;
         let (output, input) = listener.end.lengths();
         let (receiver, size) =
@@ -76,11 +83,11 @@ impl Translator {
             Ok(false) | Err(FragmentError::NoBeginning { .. }) => return None,
             Err(error) => {
                 let drive = &self.stage.axes[number].drive;
-                return Some(Node::new(format!("message of {drive} dropped: {error}")));
+                return Some(Ok(Node::new(format!("message of {drive} dropped: {error}"))));
             }
         }
         let message = receiver.data().to_vec();
-        Some(if is_command { self.polled(number, &message) } else { self.answered(number, &message) })
+        Some(if is_command { Ok(self.polled(number, &message)) } else { self.answered(number, &message) })
     }
 
     /// What a drive is told, read back.
@@ -105,40 +112,30 @@ impl Translator {
     }
 
     /// What a drive says.
-    pub(super) fn answered(&mut self, number: usize, message: &[u8]) -> Node {
+    pub(super) fn answered(&mut self, number: usize, message: &[u8]) -> Result<Node, TranslateError> {
         let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
         let mut node =
             Node::new(format!("answer of {}, {} bytes: {}", axis.drive, message.len(), hex(message)));
-        let Some(listener) = &mut state.listener else { return node };
+        let Some(listener) = &mut state.listener else { return Ok(node) };
         if message.is_empty() {
-            return Node::new(format!(
-                "answer of {} without data: there is nothing valid to tell",
-                axis.drive
-            ));
+            let text = format!("answer of {} without data: there is nothing valid to tell", axis.drive);
+            return Ok(Node::new(text));
         }
         if let Err(error) = listener.end.handle(listener.cycle, message, &mut listener.row) {
             node.push(Node::new(format!("not taken: {error}")));
-            return node;
+            return Ok(node);
         }
         let row = listener.row;
-        self.understood(number, node, &row)
+        self.understood(number, node, message, &row)
     }
 
     /// What a drive says, whatever it was asked before.
-    pub(super) fn answered_alone(&mut self, number: usize, message: &[u8]) -> Node {
+    pub(super) fn answered_alone(&mut self, number: usize, message: &[u8]) -> Result<Node, TranslateError> {
         if let Some(listener) = &mut self.states[number].listener {
             listener.cycle += 1;
             listener.end.expect(message);
         }
         self.answered(number, message)
-    }
-
-    /// The message that carries a row to the drive; `None` where there is none.
-    pub(super) fn message_of(&self, number: usize, row: &[u8]) -> Option<Vec<u8>> {
-        let mut end = self.states[number].listener.as_ref()?.end.clone();
-        let mut message = [0; MESSAGE_MAX];
-        let message = message.get_mut(..end.lengths().0)?;
-        end.emit(row.first_chunk()?, message).then(|| message.to_vec())
     }
 
     /// A value of a row of commands.

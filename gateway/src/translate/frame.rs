@@ -14,8 +14,8 @@ const FIXED_LEN: usize = 16;
 /// Bytes that were recognised.
 #[derive(Debug, Clone, Copy)]
 pub enum Recognised<'a> {
-    /// An update from the controller.
-    Command(CommandFrame<'a>),
+    /// An update from the controller, with its octets.
+    Command(CommandFrame<'a>, &'a [u8]),
     /// The same in the fixed format.
     FixedCommand(FixedCommand),
     /// An update of the device.
@@ -91,6 +91,6 @@ fn update(bytes: &[u8]) -> Result<Recognised<'_>, profile_cip::wire::Error> {
             FixedActual::parse(bytes).map(Recognised::FixedActual)
         }
         Some(ConnectionFormat::VARIABLE_ACTUAL) => ActualFrame::parse(bytes).map(Recognised::Actual),
-        _ => CommandFrame::parse(bytes).map(Recognised::Command),
+        _ => CommandFrame::parse(bytes).map(|frame| Recognised::Command(frame, bytes)),
     }
 }

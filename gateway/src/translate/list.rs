@@ -105,7 +105,7 @@ pub fn translate_capture<R: Read>(
             let record = can::parse(frame.data);
             let translated = match (&record, buses.find(&frame)) {
                 (Ok(Record::Frame(record)), Some(bus)) if bus.protocol == CanProtocol::Devicenet => {
-                    translator.devicenet(bus.number, record).map(Ok)
+                    translator.devicenet(bus.number, record)
                 }
                 // Without CAN buses in the configuration the drives come from data sheets, and those are of CANopen.
                 (Ok(Record::Frame(record)), bus)

@@ -1,74 +1,71 @@
-//! Frames through the mapping tables: what the box makes of them, and which row of which file made each value.
+//! Frames through the box: what it makes of them, and which row of which file made each value.
 //!
 //! ```text
-//! C-to-D update --CipProgram--> generic command  --DriveProgram--> MDT, RPDOs, polls
-//! D-to-C update <--CipProgram-- generic feedback <--DriveProgram-- AT, TPDOs, answers
-//! Set attribute --AttributeTable--> generic parameter --DriveProgram--> element 7 of an IDN, object, and back
-//! diagnostic word --DriveProgram--> faults --CipProgram--> exceptions
+//! C-to-D update   -> north port -> Engine -> south port -> MDT, RPDOs, poll
+//! D-to-C update   <- north port <- Engine <- south port <- AT, TPDOs, answer
+//! Set attribute   -> north port -> Engine -> south port -> element 7 of an IDN, object
+//! diagnostic word -> south port -> Engine -> faults     -> exceptions
 //! ```
 //!
-//! The programs are the ones that run in the cycle, made by [`Stage::rehearse`]. What depends on time is left out: a command
-//! is translated for the instant that it is meant for, without the interpolation on the way there. Frames that follow one
-//! another share the positions that are unrolled and the state of the drive; before a drive has been heard it counts as
-//! operating.
+//! There is no second implementation: every frame goes through the engine of the box, in virtual time, on a [`bench`]. An update is
+//! handed in, the engine runs to the instant for which the update is meant, and the telegram of that instant is shown with the rows
+//! of the programs that made it. What the box refuses is refused here, and the lines that begin with `log:` say why, as its log would.
+//! Frames that follow one another share the state of the box; `restart` in a list makes it forget.
+//!
+//! A frame of a list, or of a recording that begins anywhere, has to get through whatever came before. Where that differs from what
+//! the box would do on its own, this is decided:
+//!
+//! - Header, connection and counts of an update are replaced: see [`bench`].
+//! - An axis of which no frame has said what its drive shows is enabled before it gets an update, in the Control Mode of the update if
+//!   its drive has it, and its faults are reset before. From the first frame of its drive on, the list alone says what the drive does.
+//!   A drive that comes with torque as the first thing was enabled by somebody.
+//! - Feedback Modes that an axis does not have are replaced by that of the motor, and that is said.
+//! - An update with a number that is none raises a node fault, which stops every axis of the device: as in the box.
 
 mod access;
+mod bench;
 mod can;
-mod command;
+mod commanded;
 mod devicenet;
-mod feedback;
 mod frame;
 mod line;
 mod list;
+mod reported;
 mod rows;
 mod stage;
+mod telegram;
 mod tree;
 mod written;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use profile_cip::device::drive_link::Trims;
+use profile_cip::wire::motion::Format;
 use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
-use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
+use profile_generic::image::Signal;
 use profile_generic::quantity::{
     Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
 };
 use profile_generic::scaling::UnitKind;
-use profile_generic::state::{Action, BasicDrive, Report};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
 
-use crate::mapping::{CachedStatus, CipTrackers};
-
+use bench::{Bench, Update};
 use devicenet::Listener;
 pub use frame::{FrameError, Recognised, recognise};
 pub use line::{Line, LineError};
 pub use list::{List, ListError, translate_capture, translate_list};
 pub use stage::{
-    Behind, CanDrive, CanMember, CanPart, CanPdo, DevicenetDrive, SercosDrive, Stage, StageAxis, StageError,
-    ValuesError,
+    Behind, CanDrive, CanPart, CanPdo, DevicenetDrive, SercosDrive, Stage, StageAxis, StageError, ValuesError,
 };
 pub use tree::{Node, RowNames};
 
 /// Connection of a drive with its command values, and with its actual values.
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
 
-/// What is kept of an axis from frame to frame.
+/// What is kept of an axis from frame to frame, beside the engine.
 #[derive(Debug)]
 struct AxisState {
-    /// The state of the drive; `None` before it was heard.
-    machine: Option<BasicDrive>,
-    action: Action,
-    control: u32,
-    status: u32,
-    north: CipTrackers,
-    south: CachedStatus,
-    command: AxisCommand,
-    feedback: AxisFeedback,
-    /// Attributes of the cyclic write data, in their order.
-    writes: Vec<u16>,
-    /// The next telegram resets the drive.
-    pulse: bool,
     /// What has come of the values of a drive on CANopen, and by which of its TPDOs.
     came: Vec<u8>,
     heard: Vec<u16>,
@@ -81,7 +78,16 @@ struct AxisState {
 pub struct Translator {
     stage: Arc<Stage>,
     states: Vec<AxisState>,
+    /// Attributes of the cyclic write data of axes, in their order.
+    writes: BTreeMap<usize, Vec<u16>>,
     device: usize,
+    bench: Option<Bench>,
+}
+
+impl Drop for Translator {
+    fn drop(&mut self) {
+        self.bench.take().into_iter().for_each(|bench| self.stage.keep(bench));
+    }
 }
 
 /// Why something is not translated.
@@ -103,6 +109,9 @@ pub enum TranslateError {
     /// Something about a value.
     #[error("{0}")]
     Value(String),
+    /// There is no box for the axes.
+    #[error("{0}")]
+    Stage(String),
 }
 
 impl Translator {
@@ -110,28 +119,35 @@ impl Translator {
     #[must_use]
     pub fn new(stage: impl Into<Arc<Stage>>) -> Self {
         let stage = stage.into();
-        Self { states: Self::unheard(&stage), stage, device: 0 }
+        Self { states: Self::unheard(&stage), stage, writes: BTreeMap::new(), device: 0, bench: None }
     }
 
     /// Axes of which no frame has told anything.
     fn unheard(stage: &Stage) -> Vec<AxisState> {
         let states = stage.axes.iter().map(|axis| AxisState {
-            machine: None,
-            action: Action::TorqueOff,
-            control: 0,
-            // Before it was heard it counts as operating.
-            status: axis.south.status_of(Report::Operating).unwrap_or(0),
-            north: axis.north.trackers(),
-            south: axis.south.cached_status(),
-            command: AxisCommand::default(),
-            feedback: AxisFeedback::default(),
-            writes: Vec::new(),
-            pulse: false,
             came: vec![0; usize::from(axis.south.telegram.feedback_bytes)],
             heard: Vec::new(),
             listener: axis.devicenet().map(Listener::new),
         });
         states.collect()
+    }
+
+    /// The bench on which the frames are.
+    fn bench(&mut self) -> Result<&mut Bench, TranslateError> {
+        let bench = match self.bench.take() {
+            Some(bench) => bench,
+            None => self.stage.bench().map_err(|error| TranslateError::Stage(error.to_string()))?,
+        };
+        Ok(self.bench.insert(bench))
+    }
+
+    /// Forgets what the frames before have told.
+    fn restart(&mut self) {
+        self.states = Self::unheard(&self.stage);
+        self.writes.clear();
+        if let Some(bench) = &mut self.bench {
+            bench.restart(&self.stage.axes);
+        }
     }
 
     /// Takes updates as those of this device, by its number in the configuration.
@@ -154,7 +170,7 @@ impl Translator {
             Line::Frame(bytes) => self.frame(bytes),
             Line::Actual { drive, bytes } => {
                 let axis = self.drive(drive)?;
-                Ok(self.feedback(axis, bytes))
+                self.feedback(axis, bytes)
             }
             Line::Held { drive, item, bytes } => {
                 let axis = self.drive(drive)?;
@@ -164,16 +180,16 @@ impl Translator {
                 Err(TranslateError::Value(format!("{}: no PDO and no EMCY of a drive here", frame.id())))
             }),
             // A message has several frames; only the last one tells something.
-            Line::Devicenet(frame) => Ok(self
+            Line::Devicenet(frame) => self
                 .devicenet(None, frame)
-                .unwrap_or_else(|| Node::new("no whole poll or answer of a drive here"))),
+                .unwrap_or_else(|| Ok(Node::new("no whole poll or answer of a drive here"))),
             Line::Restart => {
-                self.states = Self::unheard(&self.stage);
+                self.restart();
                 Ok(Node::new("restart"))
             }
             Line::Writes { axis, attributes } => {
                 let axis = self.axis(axis)?;
-                Ok(self.list_writes(axis, attributes))
+                self.list_writes(axis, attributes)
             }
             Line::Set { axis, attribute, bytes } => {
                 let axis = self.axis(axis)?;
@@ -188,11 +204,28 @@ impl Translator {
     /// The bytes are none of them.
     pub fn frame(&mut self, bytes: &[u8]) -> Result<Node, TranslateError> {
         Ok(match recognise(bytes)? {
-            Recognised::Command(frame) => {
+            Recognised::Command(frame, update) => {
                 let mut node = Node::new(format!("C-to-D update {}", frame.header().update_id));
                 node.push(decoded("as it came", &frame.to_string()));
-                for instance in frame.instances() {
-                    node.push(self.instance(&instance));
+                if self.format() == Format::Fixed {
+                    node.push(Node::new(
+                        "the device has the fixed format: an update of the variable one is refused",
+                    ));
+                    return Ok(node);
+                }
+                let instances: Vec<_> = frame.instances().collect();
+                let blocks: Vec<_> = instances
+                    .iter()
+                    .filter_map(|instance| Some((instance.number, instance.cyclic?, instance.write)))
+                    .collect();
+                self.commands(Update::Variable(update), &blocks, &mut node)?;
+                for instance in &instances {
+                    if instance.cyclic.is_none() {
+                        node.push(Node::new(format!("instance {} without cyclic data", instance.number)));
+                    }
+                    if let Some(service) = &instance.service {
+                        node.push(Node::new(format!("service request: {}", service.to_string().trim())));
+                    }
                 }
                 node
             }
@@ -201,7 +234,7 @@ impl Translator {
                 node.push(decoded("as it came", &update.to_string()));
                 // The format has neither Control Status nor Command Control: the device assumes these (clause 6-2.7).
                 let block = update.block(ControlStatus::empty(), CommandTarget::default());
-                node.push(self.command(1, &block, &Trims::default()));
+                self.commands(Update::Fixed(block, update.node_control), &[(1, block, None)], &mut node)?;
                 node
             }
             Recognised::Actual(frame) => decoded("D-to-C update", &frame.to_string()),
@@ -212,18 +245,9 @@ impl Translator {
         })
     }
 
-    fn instance(&mut self, instance: &profile_cip::wire::motion::CommandInstance<'_>) -> Node {
-        let written = instance.write.as_ref().map(|block| self.written_cyclically(instance.number, block));
-        let (written, trims) = written.unzip();
-        let mut node = match &instance.cyclic {
-            Some(block) => self.command(instance.number, block, &trims.unwrap_or_default()),
-            None => Node::new(format!("instance {} without cyclic data", instance.number)),
-        };
-        written.into_iter().for_each(|written| node.push(written));
-        if let Some(service) = &instance.service {
-            node.push(Node::new(format!("service request: {}", service.to_string().trim())));
-        }
-        node
+    /// The format of the updates of the device that is spoken to.
+    fn format(&self) -> Format {
+        self.stage.format(self.device)
     }
 
     /// Takes a SERCOS telegram apart.
@@ -237,6 +261,7 @@ impl Translator {
             return Ok(node);
         }
         let data = frame.get(HEADER_LEN..).unwrap_or_default();
+        let mut came = Vec::new();
         let wanted = if kind == Kind::At { FEEDBACK_CONNECTION } else { COMMAND_CONNECTION };
         for axis in 0..self.stage.axes.len() {
             let Some(topology) = self.stage.axes[axis].sercos().map(|drive| drive.topology) else { continue };
@@ -262,11 +287,12 @@ impl Translator {
                 node.push(Node::new(format!("{name}: C-CON {control:#06x}, no values")));
                 continue;
             }
-            node.push(match kind {
-                Kind::At => self.feedback(axis, values),
-                Kind::Mdt => self.command_values(axis, values),
-            });
+            match kind {
+                Kind::At => came.push((axis, values)),
+                Kind::Mdt => node.push(self.command_values(axis, values)),
+            }
         }
+        self.telegram_heard(&came)?.into_iter().for_each(|heard| node.push(heard));
         Ok(node)
     }
 

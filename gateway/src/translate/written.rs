@@ -1,85 +1,99 @@
 //! The cyclic write data of an update.
 
 use profile_cip::device::drive_link::Trims;
-use profile_cip::wire::motion::WriteBlock;
-use profile_generic::image::AxisCommand;
-use profile_generic::program::Width;
+use profile_cip::wire::motion::{ActualFrame, WriteBlock};
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::image::{AxisCommand, Signal};
 
-use super::{Node, Translator, shown};
-use crate::mapping::{Access, AttributeEntry, Backing};
+use super::stage::StageAxis;
+use super::{Node, TranslateError, Translator, shown};
+use crate::mapping::{AttributeEntry, Backing};
 
 impl Translator {
-    /// What cyclic write data say, by the list that a line before has told, and the trims among them.
-    pub(super) fn written_cyclically(&mut self, instance: u8, block: &WriteBlock<'_>) -> (Node, Trims) {
-        let mut trims = Trims::default();
+    /// What cyclic write data say, by the list that a line before has told, and what became of the trims among them.
+    pub(super) fn written_cyclically(&mut self, number: usize, block: &WriteBlock<'_>) -> Node {
         let mut node = Node::new(format!("cyclic write block: {}", block.to_string().trim()));
-        let Some(number) = self.axis_of_instance(instance) else { return (node, trims) };
-        let (mut at, mut good) = (0_usize, true);
-        for id in self.states[number].writes.clone() {
-            let entry = self.stage.axes[number].attributes.get(id);
-            let width =
-                entry.filter(|entry| entry.length.is_none()).and_then(|entry| entry.data_type.width());
-            let Some((entry, width)) = entry.zip(width) else {
-                node.push(Node::new(format!("attribute {id}: not served, or no single number")));
-                return (node, Trims::default());
-            };
-            at = at.next_multiple_of(width.bytes().min(4));
-            let Some(value) = block.data.get(at..at + width.bytes()) else {
-                good = false;
+        let stage = std::sync::Arc::clone(&self.stage);
+        let axis = &stage.axes[number];
+        let status = self.write_status(number);
+        let mut at = 0_usize;
+        for id in self.writes.get(&number).into_iter().flatten() {
+            let name =
+                stage.mapping.dictionaries.cip.attribute_by_id(*id).map_or("", |row| row.name.as_str());
+            let Some(entry) = axis.attributes.get(*id).filter(|entry| entry.length.is_none()) else {
+                node.push(Node::new(format!("attribute {id} {name}: not served, or no single number")));
                 break;
             };
+            let Some(width) = entry.data_type.width() else { break };
+            at = at.next_multiple_of(width.bytes().min(4));
+            let Some(value) = block.data.get(at..at + width.bytes()) else { break };
             at += value.len();
-            let told = match number_of(entry, width, value) {
-                Some(value) => {
-                    good &= value.is_finite();
-                    self.trim(number, entry.id, value, &mut trims)
+            let number = number_of(width, value);
+            let trim = trim_of(entry).filter(|_| status == Some(0));
+            let text = match trim {
+                Some(signal) => {
+                    let value = trimmed(axis, *id, &number, signal).unwrap_or_default();
+                    format!("{name} {number} -> {signal} {}", shown(axis, signal, value))
                 }
-                None => self.set(number, id, value).unwrap_or_else(|error| Node::new(error.to_string())),
+                None => format!("{name} {number}"),
             };
-            node.push(told);
+            node.push(Node::new(text).by(stage.mapping.attribute_row(*id)));
         }
-        let listed = !self.states[number].writes.is_empty();
-        if listed && (!good || at.next_multiple_of(4) != block.data.len()) {
-            node.push(Node::new("no data of this list: refused as a whole, trims are zero"));
-            trims = Trims::default();
+        if let Some(status) = status {
+            node.push(Node::new(format!("Cyclic Write Status: {}", GeneralStatus(status))));
         }
-        (node, trims)
+        node
     }
 
-    /// A trim, and the signal that it becomes.
-    fn trim(&self, number: usize, id: u16, value: f64, trims: &mut Trims) -> Node {
-        let (axis, mapping) = (&self.stage.axes[number], &self.stage.mapping);
-        let mut one = Trims::default();
-        one.set(id, value);
-        let mut command = AxisCommand::default();
-        axis.north.decode_trims(&one, &mut command);
-        trims.set(id, value);
-        let name = mapping.dictionaries.cip.attribute_by_id(id).map_or("", |row| row.name.as_str());
-        let signal = profile_generic::image::Signal::OFFSETS
-            .into_iter()
-            .find_map(|signal| Some((signal, command.get(signal)?)));
-        let text = match signal {
-            Some((signal, generic)) => format!("{name} {value} -> {signal} {}", shown(axis, signal, generic)),
-            None => format!("{name} {value}: no number"),
-        };
-        Node::new(text).by(mapping.attribute_row(id))
+    /// What the device says of the newest cyclic write data of an axis.
+    fn write_status(&mut self, number: usize) -> Option<u8> {
+        let instance = self.stage.axes[number].instance;
+        let update = self.bench().ok()?.actual(number);
+        let frame = ActualFrame::parse(&update).ok()?;
+        let read = frame.instances().find(|known| known.number == instance)?.read?;
+        Some(read.write_status)
     }
 
     /// The list of an axis's cyclic write data.
-    pub(super) fn list_writes(&mut self, number: usize, attributes: &[u16]) -> Node {
-        self.states[number].writes = attributes.to_vec();
+    pub(super) fn list_writes(&mut self, number: usize, attributes: &[u16]) -> Result<Node, TranslateError> {
+        self.writes.insert(number, attributes.to_vec());
         let ids = attributes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-        Node::new(format!("axis {}: updates write {ids}", self.stage.axes[number].name))
+        let mut node = Node::new(format!("axis {}: updates write {ids}", self.stage.axes[number].name));
+        match self.bench()?.list_writes(number, attributes) {
+            None => node.push(Node::new("no answer")),
+            Some((status, each)) => {
+                node.push(Node::new(format!("Set_Cyclic_Write_List: {}", GeneralStatus(status))));
+                for (id, status) in each.into_iter().filter(|(_, status)| *status != 0) {
+                    node.push(Node::new(format!("attribute {id}: {}", GeneralStatus(status))));
+                }
+            }
+        }
+        Ok(node)
     }
 }
 
-/// The value of a trim; `None` of an attribute that is none.
-fn number_of(entry: &AttributeEntry, width: Width, bytes: &[u8]) -> Option<f64> {
-    let is_trim = entry.access == Access::SetCyclic && matches!(entry.backing, Backing::Signal { .. });
-    let number = match (width, bytes) {
-        (Width::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
-        (Width::F64, &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-        _ => f64::from(i32::try_from(width.integer(bytes)?).ok()?),
-    };
-    is_trim.then_some(number)
+/// What the program of the axis makes of a trim. What the telegram has of it stands with its other values.
+fn trimmed(axis: &StageAxis, id: u16, number: &str, signal: Signal) -> Option<i64> {
+    let (mut trims, mut command) = (Trims::default(), AxisCommand::default());
+    trims.set(id, number.parse().ok()?);
+    axis.north.decode_trims(&trims, &mut command);
+    command.get(signal)
+}
+
+/// The signal of a trim.
+fn trim_of(entry: &AttributeEntry) -> Option<Signal> {
+    match entry.backing {
+        Backing::Signal { signal, .. } if signal.is_command() => Some(signal),
+        _ => None,
+    }
+}
+
+/// A number as people write it.
+fn number_of(width: profile_generic::program::Width, bytes: &[u8]) -> String {
+    use profile_generic::program::Width;
+    match (width, bytes) {
+        (Width::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]).to_string(),
+        (Width::F64, &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]).to_string(),
+        _ => width.integer(bytes).map_or_else(String::new, |number| number.to_string()),
+    }
 }

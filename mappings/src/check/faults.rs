@@ -46,8 +46,8 @@ fn causes(mapping: &Mapping, findings: &mut Findings) {
         let problem = Problem::new(code::CODE_SHARED, span).key(key);
         let problem = problem.title(format!("`{one}` and `{two}` have the same code"));
         let problem =
-            problem.expected("the controller cannot tell them apart").related(place, "the other one");
-        findings.push(&file.text, problem.help("say `shared = true` in both rows where that is meant"));
+            problem.expected("the controller cannot distinguish them").related(place, "the other one");
+        findings.push(&file.text, problem.help("set `shared = true` in both rows if you mean that"));
     }
 }
 
@@ -110,7 +110,7 @@ fn sercos_faults(mapping: &Mapping, findings: &mut Findings) {
         if let Some(before) = hidden {
             let cause = row.cause.get_ref();
             let problem = Problem::new(code::NEVER_REACHED, row.cause.span()).key("cause");
-            let problem = problem.title(format!("the row of the fault `{cause}` never counts"));
+            let problem = problem.title(format!("the row of the fault `{cause}` is never used"));
             let problem = problem.expected("whatever fits this row fits one before it");
             findings.push(&file.text, problem.related(file.rows.fault[before].cause.span(), "this one"));
         }
@@ -129,7 +129,7 @@ fn sercos_reports(mapping: &Mapping, findings: &mut Findings) {
         });
         if let Some(before) = hidden {
             let problem = Problem::new(code::NEVER_REACHED, row.report.span()).key("report");
-            let problem = problem.title(format!("the row of the report `{}` never counts", rule.report));
+            let problem = problem.title(format!("the row of the report `{}` is never used", rule.report));
             let problem = problem.expected("whatever fits this row fits one before it");
             findings.push(&file.text, problem.related(file.rows.report[before].report.span(), "this one"));
         }
@@ -148,8 +148,8 @@ fn cia402_faults(mapping: &Mapping, findings: &mut Findings) {
         let hidden = rules[..at].iter().position(|other| hides(other.pattern, rule.pattern));
         if let Some(before) = hidden {
             let problem = Problem::new(code::NEVER_REACHED, name.span()).key(*key);
-            let problem = problem.title(format!("`{}` never counts", name.get_ref()));
-            let problem = problem.expected("whatever fits it fits what stands before it");
+            let problem = problem.title(format!("`{}` is never used", name.get_ref()));
+            let problem = problem.expected("everything that fits it also fits an earlier row");
             findings.push(&file.text, problem.related(places[before].1.span(), "this one"));
         }
     }
@@ -168,7 +168,7 @@ fn cia402_reports(mapping: &Mapping, findings: &mut Findings) {
         });
         if let Some(before) = hidden {
             let problem = Problem::new(code::NEVER_REACHED, row.report.span()).key("report");
-            let problem = problem.title(format!("the row of the report `{}` never counts", rule.report));
+            let problem = problem.title(format!("the row of the report `{}` is never used", rule.report));
             let problem = problem.expected("whatever fits this row fits one before it");
             findings.push(&file.text, problem.related(file.rows.report[before].report.span(), "this one"));
         }

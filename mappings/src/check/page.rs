@@ -1,11 +1,13 @@
 //! The mapping tables as a page for a browser: every row with where it stands, and what was found.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
 use super::Outcome;
 use crate::finding::Severity;
+use crate::groups;
 use crate::{IdnPart, Mapping, TableText, TableTexts};
 
 /// The page needs nothing beside itself.
@@ -111,10 +113,17 @@ fn coverage(page: &mut String, mapping: &Mapping) {
 /// The rows of a file, kind by kind in the order of the file.
 fn table(page: &mut String, title: &str, text: &str) {
     let _ = writeln!(page, "<h2 id=\"{0}\">{0}</h2>", escaped(title));
-    let Ok(tree) = DeTable::parse(text) else {
+    let Ok(mut tree) = DeTable::parse(text) else {
         let _ = writeln!(page, "<pre>{}</pre>", escaped(text));
         return;
     };
+    groups::spread(tree.get_mut());
+    for (_, value) in tree.get_mut().iter_mut() {
+        // An overlay has the rows below the name of their table.
+        if let DeValue::Table(rows) = value.get_mut() {
+            groups::spread(rows);
+        }
+    }
     let mut sections: Vec<_> = tree.get_ref().iter().collect();
     sections.sort_by_key(|(key, _)| key.span().start);
     for (key, value) in sections {
@@ -125,19 +134,18 @@ fn table(page: &mut String, title: &str, text: &str) {
 fn section(page: &mut String, file: &str, text: &str, name: &str, value: &DeValue<'_>) {
     match value {
         DeValue::Table(row) if row.iter().all(|(_, value)| is_rows(value.get_ref())) && !row.is_empty() => {
-            // An overlay has the rows below the name of their table.
             let mut inner: Vec<_> = row.iter().collect();
             inner.sort_by_key(|(key, _)| key.span().start);
             for (key, value) in inner {
                 section(page, file, text, &format!("{name}.{}", key.get_ref()), value.get_ref());
             }
         }
-        DeValue::Table(row) => rows(page, file, text, name, &[row]),
+        DeValue::Table(row) => rows(page, file, text, name, &[(first_key(row), row)]),
         DeValue::Array(array) => {
             let tables: Vec<_> = array
                 .iter()
                 .filter_map(|item| match item.get_ref() {
-                    DeValue::Table(row) => Some(row),
+                    DeValue::Table(row) => Some((first_key_in(row, &item.span()), row)),
                     _ => None,
                 })
                 .collect();
@@ -155,9 +163,21 @@ fn is_rows(value: &DeValue<'_>) -> bool {
     matches!(value, DeValue::Array(array) if array.iter().any(|item| matches!(item.get_ref(), DeValue::Table(_))))
 }
 
-fn rows(page: &mut String, file: &str, text: &str, name: &str, rows: &[&DeTable<'_>]) {
+/// Where the first key of a row stands.
+fn first_key(row: &DeTable<'_>) -> usize {
+    row.iter().map(|(key, _)| key.span().start).min().unwrap_or_default()
+}
+
+/// The same of a row of a list, which may have keys of its group.
+fn first_key_in(row: &DeTable<'_>, place: &Range<usize>) -> usize {
+    let own = row.iter().map(|(key, _)| key.span().start).filter(|start| place.contains(start)).min();
+    own.unwrap_or_else(|| first_key(row))
+}
+
+/// Rows with where each begins.
+fn rows(page: &mut String, file: &str, text: &str, name: &str, rows: &[(usize, &DeTable<'_>)]) {
     let mut columns: Vec<(usize, &str)> = Vec::new();
-    for row in rows {
+    for (_, row) in rows {
         for (key, _) in row.iter() {
             if !columns.iter().any(|(_, known)| *known == key.get_ref().as_ref()) {
                 columns.push((key.span().start, key.get_ref().as_ref()));
@@ -170,9 +190,8 @@ fn rows(page: &mut String, file: &str, text: &str, name: &str, rows: &[&DeTable<
         let _ = write!(page, "<th>{}</th>", escaped(column));
     }
     page.push_str("</tr></thead><tbody>\n");
-    for row in rows {
-        let at = row.iter().map(|(key, _)| key.span().start).min().unwrap_or_default();
-        let line = text.get(..at).map_or(0, |before| before.matches('\n').count() + 1);
+    for (at, row) in rows {
+        let line = text.get(..*at).map_or(0, |before| before.matches('\n').count() + 1);
         let _ = write!(
             page,
             "<tr id=\"{0}-{line}\"><td class=\"n\"><a href=\"#{0}-{line}\">{line}</a></td>",
@@ -228,9 +247,9 @@ mod tests {
         texts.overlays.push(Overlay::new("own.toml", overlay));
         let outcome = Outcome { texts: Some(texts.clone()), ..check(None, &[]) };
         let page = page(&outcome);
-        let rows = texts.cip_generic.text.matches("\n[[").count()
-            + texts.generic_sercos.text.matches("\n[[").count()
-            + texts.generic_cia402.text.matches("\n[[").count();
+        let tables = [&texts.cip_generic, &texts.generic_sercos, &texts.generic_cia402];
+        let rows: usize = tables.iter().map(|table| rows_of(&table.text)).sum();
+        assert!(rows > 900, "{rows}");
         assert!(page.matches("<tr id=").count() > rows, "{}", page.matches("<tr id=").count());
         assert!(page.contains("a &lt; b") && !page.contains("a < b"));
         assert!(page.contains("<h3>generic-sercos.parameter</h3>"));
@@ -238,10 +257,18 @@ mod tests {
             .generic_sercos
             .text
             .lines()
-            .position(|line| line == "signal = \"position_command\"")
+            .position(|line| line.contains("signal = \"position_command\""))
             .unwrap()
             + 1;
         assert!(page.contains(&format!("id=\"generic-sercos.toml-{line}\"")), "{line}");
         assert!(page.contains("0 errors"));
+    }
+
+    /// Rows of the lists of a table.
+    fn rows_of(text: &str) -> usize {
+        let mut tree = DeTable::parse(text).unwrap();
+        groups::spread(tree.get_mut());
+        let lists = tree.get_ref().iter().filter_map(|(_, list)| list.get_ref().as_array());
+        lists.map(|list| list.len()).sum()
     }
 }

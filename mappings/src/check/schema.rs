@@ -19,7 +19,7 @@ use crate::format::{
     CipNetworkFile, CipServiceFile, GenericCia402File, GenericFile, GenericSercosFile, SercosBitFile,
     SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
-use crate::{Mapping, OverlayHead, Section, sections};
+use crate::{Mapping, OverlayHead, Section, groups, sections};
 
 /// A kind of file that has a schema.
 struct Kind {
@@ -87,7 +87,37 @@ pub fn schema(name: &str, mapping: &Mapping) -> Option<Value> {
     if name.contains("-generic") || name.starts_with("generic-") {
         complete(&mut schema, mapping);
     }
+    let lists: Vec<String> = lists(&schema["properties"]);
+    for list in lists {
+        add_groups(&mut schema, &["properties", &list]);
+    }
     Some(schema)
+}
+
+/// The properties that are lists of rows.
+fn lists(properties: &Value) -> Vec<String> {
+    let all = properties.as_object().into_iter().flatten();
+    all.filter(|(_, list)| list["items"]["$ref"].is_string()).map(|(name, _)| name.clone()).collect()
+}
+
+/// Lets the elements of a list be groups: keys of the rows, and under `rows` the rows, which have the others.
+fn add_groups(schema: &mut Value, place: &[&str]) {
+    let list = place.iter().fold(&*schema, |value, key| &value[*key]);
+    let Some(reference) = list["items"]["$ref"].as_str().map(str::to_owned) else { return };
+    let Some(row) = reference.rsplit('/').next().map(str::to_owned) else { return };
+    let (part, group) = (format!("{row}.part"), format!("{row}.group"));
+    let mut of_part = schema["definitions"][&row].clone();
+    // What a row does not have its group may have.
+    loosen(&mut of_part);
+    let mut of_group = of_part.clone();
+    of_group["description"] = Value::from("Rows with what they have in common.");
+    of_group["properties"][groups::ROWS] =
+        json!({ "type": "array", "items": { "$ref": format!("#/definitions/{part}") } });
+    of_group["required"] = json!([groups::ROWS]);
+    schema["definitions"][&part] = of_part;
+    schema["definitions"][&group] = of_group;
+    let list = place.iter().fold(schema, |value, key| &mut value[*key]);
+    list["items"] = json!({ "anyOf": [{ "$ref": reference }, { "$ref": format!("#/definitions/{group}") }] });
 }
 
 /// The schema of files that are read into `T`, which are no tables.
@@ -139,6 +169,11 @@ fn overlay(mapping: &Mapping) -> Value {
     }
     overlay["additionalProperties"] = Value::Bool(false);
     overlay["definitions"] = Value::Object(all);
+    for kind in &KINDS {
+        for list in lists(&overlay["properties"][kind.name]["properties"]) {
+            add_groups(&mut overlay, &["properties", kind.name, "properties", &list]);
+        }
+    }
     set_title(&mut overlay, OVERLAY);
     overlay
 }
@@ -166,14 +201,14 @@ fn identify(sections: &[Section], rows: &Map<String, Value>, definitions: &mut M
             properties.insert(
                 "remove".to_owned(),
                 json!({
-                    "description": "Takes the row away, or keys of it.",
+                    "description": "Removes the row, or keys of it.",
                     "anyOf": [{ "const": true }, { "type": "array", "items": { "type": "string" } }],
                 }),
             );
             if section.first_wins {
                 properties.insert(
                     "last".to_owned(),
-                    json!({ "description": "Puts a new row behind those that are there.", "type": "boolean" }),
+                    json!({ "description": "Puts a new row after the existing ones.", "type": "boolean" }),
                 );
             }
             let rows = properties.clone();

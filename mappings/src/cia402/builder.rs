@@ -31,7 +31,7 @@ use crate::generic_names::{
 };
 use crate::item::Item;
 use crate::load::Parsed;
-use crate::resolver::Resolver;
+use crate::resolver::{Resolver, over};
 
 /// Where the error code is.
 const ERROR_CODE: Object = Object { index: 0x603F, sub: 0 };
@@ -131,7 +131,7 @@ impl<'a> Builder<'a> {
                     self.resolver.error(code::CONTRADICTION, name.span(), "objects", message);
                 }
                 if self.tables.unbound.iter().any(|(index, _)| *index == object.index) {
-                    let message = format!("{shown} is there twice");
+                    let message = format!("{shown} is defined twice");
                     self.resolver.error(code::TWICE, name.span(), "objects", message);
                 }
                 if !wins {
@@ -194,7 +194,7 @@ impl<'a> Builder<'a> {
         let methods = row.methods.iter().filter_map(|method| self.method(row, method)).collect();
         let unit = row.unit.get_ref().clone();
         if self.tables.scalings.iter().any(|known| known.unit == unit) {
-            self.resolver.error(code::TWICE, row.unit.span(), "unit", "the unit is there twice");
+            self.resolver.error(code::TWICE, row.unit.span(), "unit", "the unit is defined twice");
         }
         self.tables.scalings.push(ScalingRule { unit, quantity, methods });
     }
@@ -285,7 +285,7 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
         }
         if !self.measures(&value, signal.quantity()) {
-            let message = format!("the unit of {} is no {}", value.object, signal.quantity());
+            let message = format!("the unit of {} is not a unit of {}", value.object, signal.quantity());
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
         self.writable(entry, to_drive, &row.direction, value.object);
@@ -294,7 +294,7 @@ impl<'a> Builder<'a> {
             known.modes.is_empty() && modes.is_empty() || known.modes.iter().any(|mode| modes.contains(mode))
         };
         if self.tables.signals.iter().any(|known| known.signal == signal && shared(known)) {
-            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is there twice");
+            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is defined twice");
         }
         let polarity = row.polarity.as_ref().and_then(|name| self.polarity("polarity", name));
         self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse });
@@ -355,7 +355,7 @@ impl<'a> Builder<'a> {
         let same = |known: &&ModeRule| known.selection == selection;
         let mut known = self.tables.modes.iter().filter(same).flat_map(|known| &known.modes);
         if known.any(|known| modes.contains(known)) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
         }
         let rule = ModeRule { selection, optional, modes, control, handshake, command, actual };
         self.tables.modes.push(rule);
@@ -388,7 +388,7 @@ impl<'a> Builder<'a> {
         };
         let selection = ModeSelection { mode, interpolation };
         if self.tables.procedures.iter().any(|known| known.selection == selection) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is there twice");
+            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
         }
         let time_out = DurationNs::from_secs(i64::from(*row.seconds.get_ref()));
         self.tables.procedures.push(ProcedureRule { selection, modes, start, done, failed, time_out });
@@ -413,7 +413,7 @@ impl<'a> Builder<'a> {
         let bits = &self.set(set)?.codes;
         let place = |text: &str| {
             let bit = bits.iter().find(|bit| bit.name == text)?;
-            Some((u32::try_from(bit.code).ok()?, bit.last?))
+            Some(((u32::try_from(bit.code).ok()?, bit.last?), [].as_slice()))
         };
         self.resolver.pattern(rows, place, bits.iter().map(|bit| bit.name.as_str()))
     }
@@ -427,8 +427,18 @@ impl<'a> Builder<'a> {
         let states = &self.set(set)?.codes;
         let find = |text: &str| states.iter().find(|state| state.name == text);
         let names = states.iter().map(|state| state.name.as_str());
-        let state = self.resolver.name(key, name, "a state of the drive", find, names)?;
+        let what = if set == "Command" { "a command of the profile" } else { "a state of the drive" };
+        let state = self.resolver.name(key, name, what, find, names)?;
         Some(BitPattern::new(state.mask?, u32::try_from(state.code).ok()?))
+    }
+
+    /// The controlword of a command: the bits that it names, and 0 in the others that mean the same in every mode.
+    fn command(&mut self, name: &Name) -> Option<BitPattern> {
+        let command = self.coded_state("Command", "send", name)?;
+        let bits = self.set("Controlword")?.codes.iter().filter(|bit| bit.modes.is_empty());
+        let single = bits.filter(|bit| bit.last == u32::try_from(bit.code).ok());
+        let mask = single.filter_map(|bit| bit.last).fold(command.mask, |mask, bit| mask | 1 << bit);
+        Some(BitPattern::new(mask, command.value))
     }
 
     fn states(&mut self, rows: &GenericCia402File) {
@@ -441,9 +451,16 @@ impl<'a> Builder<'a> {
                 },
                 None => None,
             };
-            let Some(pattern) = self.pattern("Controlword", &row.pattern) else { continue };
+            let sent = match &row.send {
+                Some(name) => self.command(name),
+                None => Some(BitPattern::new(0, 0)),
+            };
+            let (Some(sent), Some(pattern)) = (sent, self.pattern("Controlword", &row.pattern)) else {
+                continue;
+            };
+            let pattern = over(pattern, sent);
             if self.tables.actions.iter().any(|known| known.action == action && known.when == when) {
-                self.resolver.error(code::TWICE, row.action.span(), "action", "the action is there twice");
+                self.resolver.error(code::TWICE, row.action.span(), "action", "the action is defined twice");
             }
             self.tables.actions.push(ActionRule { action, when, pattern });
         }
@@ -529,7 +546,7 @@ impl<'a> Builder<'a> {
         let word = Item::object(ERROR_CODE.index, ERROR_CODE.sub);
         for (pattern, place) in patterns {
             if self.tables.faults.iter().any(|known| known.pattern == *pattern) {
-                let message = format!("the code {:04X} is there twice", pattern.value);
+                let message = format!("the code {:04X} is defined twice", pattern.value);
                 self.resolver.error(code::TWICE, place.clone(), "codes", message);
             }
             self.tables.faults.push(FaultRow { word, pattern: *pattern, cause, reaction });
@@ -558,12 +575,12 @@ impl<'a> Builder<'a> {
             return;
         };
         if !self.measures(&value, quantity) {
-            let message = format!("the unit of {} is no {quantity}", value.object);
+            let message = format!("the unit of {} is not a unit of {quantity}", value.object);
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
         self.writable(entry, to_drive, &row.direction, value.object);
         if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
-            let message = "the parameter is there twice";
+            let message = "the parameter is defined twice";
             self.resolver.error(code::TWICE, row.parameter.span(), "parameter", message);
         }
         let rule = ParameterRule {
@@ -605,7 +622,8 @@ impl<'a> Builder<'a> {
             (Some(value), Some(function)) => {
                 let Some((value, _)) = self.value("value", value) else { return };
                 if !self.measures(&value, Quantity::Position) {
-                    let message = format!("the unit of {} is no {}", value.object, Quantity::Position);
+                    let message =
+                        format!("the unit of {} is not a unit of {}", value.object, Quantity::Position);
                     self.resolver.error(code::UNIT, row.capture.span(), "value", message);
                 }
                 let Some((held, entry)) = self.value("function", function) else { return };
@@ -621,7 +639,7 @@ impl<'a> Builder<'a> {
             }
         };
         if self.tables.captures.iter().any(|known| known.kind == kind) {
-            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is there twice");
+            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is defined twice");
         }
         self.tables.captures.push(CaptureRule { kind, word, pattern, latch });
     }

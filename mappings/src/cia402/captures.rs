@@ -12,8 +12,8 @@ use super::compile::{Cia402Axis, Cia402Error, Places};
 use super::facts::ObjectFacts;
 use super::{Cia402Tables, FULL_RANGE, Object, Value};
 use crate::capture_program::{CaptureMode, CaptureProgram, Gate, Input, Latch, Place, Stored};
-use crate::captures::index_of;
 use crate::drive_program::Telegram;
+use crate::sercos::captures::index_of;
 
 #[derive(Debug, Clone)]
 pub(crate) struct CaptureRule {

@@ -20,7 +20,7 @@ use crate::drive_program::{
     PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
 use crate::item::Item;
-use crate::scaling::AxisUnits;
+use crate::sercos::scaling::AxisUnits;
 
 /// Octets of a mode of operation.
 const MODE_BYTES: u16 = 1;
@@ -103,7 +103,7 @@ pub enum Cia402Error {
     #[error("expected at least one operating mode, got none")]
     NoMode,
     /// The drive lacks something for every mode that an axis could have.
-    #[error("the axis would have to do without all its modes: {0}")]
+    #[error("the axis would have none of its modes: {0}")]
     NoneLeft(String),
     /// The drive has no mode of operation that an operating mode can be.
     #[error("{mode} needs one of the modes {wanted}, the drive has none of them: 6502:00 is {told:#010x}")]
@@ -133,11 +133,11 @@ pub enum Cia402Error {
     },
     /// The drive has told nothing that a unit follows from, and the configuration does not say it either.
     #[error(
-        "nobody says what a count of {0} is: expected a factor group in the drive, or `counts` in the configuration"
+        "the size of a count of {0} is not known: expected a factor group in the drive, or `counts` in the configuration"
     )]
     NoScaling(String),
     /// A linear axis whose way in a turn is not known.
-    #[error("expected the way that a linear axis makes in a turn of its motor, got none")]
+    #[error("expected the travel of a linear axis in a turn of its motor, got none")]
     Way,
     /// A ratio beyond 64 bits.
     #[error("{0}: its scaling does not fit 64 bits")]
@@ -151,7 +151,7 @@ pub enum Cia402Error {
         value: i64,
     },
     /// A cycle that an interpolation time cannot be.
-    #[error("a cycle of {0} is no whole number up to 255 of a power of ten of seconds")]
+    #[error("a cycle of {0} is not 1 to 255 times a power of ten of seconds")]
     Cycle(DurationNs),
     /// The device has no axis of this number.
     #[error("expected an axis from 0 to 7 of a device, got {0}")]

@@ -302,7 +302,7 @@ impl Builder<'_> {
     /// Notes that the row of something is there.
     fn once(&mut self, seen: &mut [bool], at: usize, key: &str, name: &Name) {
         if std::mem::replace(&mut seen[at], true) {
-            let message = format!("the {} is there twice", key.replace('_', " "));
+            let message = format!("the {} is defined twice", key.replace('_', " "));
             self.resolver.error(code::TWICE, name.span(), key, message);
         }
     }
@@ -406,7 +406,7 @@ impl Builder<'_> {
         }
         if let (Some(cause), [fault]) = (cause, faults.as_slice()) {
             if self.tables.faults.iter().any(|(known, _)| *known == cause) {
-                self.resolver.error(code::TWICE, row.cause.span(), "cause", "the cause is there twice");
+                self.resolver.error(code::TWICE, row.cause.span(), "cause", "the cause is defined twice");
             }
             self.tables.faults.push((cause, *fault));
             let opposite = row.inverted.as_ref().and_then(|name| self::cause(&mut self.resolver, name));
@@ -595,7 +595,7 @@ impl Builder<'_> {
             };
             if let (Some(event), Some(checking), Some(trigger)) = (event, checking, trigger) {
                 if self.tables.events.rules.iter().any(|known| known.event == event) {
-                    self.resolver.error(code::TWICE, row.event.span(), "event", "the event is there twice");
+                    self.resolver.error(code::TWICE, row.event.span(), "event", "the event is defined twice");
                 }
                 let checking = 1 << checking;
                 self.tables.events.rules.push(EventRule { event, checking, trigger });
@@ -651,7 +651,7 @@ impl Builder<'_> {
                 code::TWICE,
                 row.attribute.span(),
                 "attribute",
-                "the attribute is there twice",
+                "the attribute is defined twice",
             );
         }
         let range = row.range.map(|[low, high]| (low, high));
@@ -667,7 +667,7 @@ impl Builder<'_> {
             let served = self.tables.attributes.iter().any(|known| known.attribute.id == attribute.id);
             let twice = self.tables.rejected.iter().any(|(known, _)| *known == attribute.id);
             if served || twice {
-                self.resolver.error(code::TWICE, name.span(), "attributes", "the attribute is there twice");
+                self.resolver.error(code::TWICE, name.span(), "attributes", "the attribute is defined twice");
             }
             self.tables.rejected.push((attribute.id, row.reason.get_ref().clone()));
         }
@@ -678,7 +678,7 @@ impl Builder<'_> {
         for name in &row.exceptions {
             let Some(bit) = self.bit("Axis Exceptions", "exceptions", name) else { continue };
             if self.tables.unraised.iter().any(|(known, _)| *known == bit) {
-                self.resolver.error(code::TWICE, name.span(), "exceptions", "the exception is there twice");
+                self.resolver.error(code::TWICE, name.span(), "exceptions", "the exception is defined twice");
             }
             self.tables.unraised.push((bit, row.reason.get_ref().clone()));
         }

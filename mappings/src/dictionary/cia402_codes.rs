@@ -135,7 +135,7 @@ pub(super) fn resolve_codes(
     resolver.head(&rows.format, "profile", &rows.profile, "cia402");
     for row in &rows.enumeration {
         if dictionary.codes(row.name.get_ref()).is_some() {
-            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is defined twice");
         }
         let set = resolve_set(row, dictionary, &mut resolver);
         dictionary.code_sets.extend(set);
@@ -260,10 +260,10 @@ fn resolve_code(
         shared && known.code <= end && first <= known_end && (mask.is_none() || known.mask == mask)
     };
     if set.codes.iter().any(meets) {
-        resolver.error(code::TWICE, row.code.span(), "code", "the code is there twice");
+        resolver.error(code::TWICE, row.code.span(), "code", "the code is defined twice");
     }
     if set.codes.iter().any(|known| known.name == *row.name.get_ref()) {
-        resolver.error(code::TWICE, row.name.span(), "name", "the name is there twice");
+        resolver.error(code::TWICE, row.name.span(), "name", "the name is defined twice");
     }
     let own = (row.source.as_ref(), row.confidence.as_ref());
     Some(Cia402Code {

@@ -228,7 +228,7 @@ pub(super) fn resolve_objects(
     for row in rows {
         let Some(object) = resolve_object(row, dictionary, resolver) else { continue };
         if objects.iter().any(|known| object.index <= known.last && known.index <= object.last) {
-            let message = format!("{:04X} is there twice", object.index);
+            let message = format!("{:04X} is defined twice", object.index);
             resolver.error(code::TWICE, row.index.span(), "index", message);
         }
         objects.push(object);

@@ -240,14 +240,19 @@ fn resolve_rows(
     attributes.sort_by_key(|(_, attribute)| attribute.id);
     for pair in attributes.windows(2) {
         if pair[0].1.id == pair[1].1.id {
-            let message = format!("attribute {} is there twice", pair[1].1.id);
+            let message = format!("attribute {} is defined twice", pair[1].1.id);
             resolver.error(code::TWICE, pair[1].0.clone(), "id", message);
         }
     }
     let mut names = BTreeSet::new();
     for (span, attribute) in &attributes {
         if !names.insert(attribute.name.as_str()) {
-            resolver.error(code::TWICE, span.clone(), "name", format!("`{}` is there twice", attribute.name));
+            resolver.error(
+                code::TWICE,
+                span.clone(),
+                "name",
+                format!("`{}` is defined twice", attribute.name),
+            );
         }
     }
     attributes.into_iter().map(|(_, attribute)| attribute).collect()

@@ -21,7 +21,7 @@ pub(super) fn resolve_sets(
 ) {
     for row in enumerations {
         if dictionary.enumeration(row.name.get_ref()).is_some() {
-            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is defined twice");
         }
         if let Some(width) = &row.width {
             resolver.error(
@@ -36,7 +36,7 @@ pub(super) fn resolve_sets(
     }
     for row in bits {
         if dictionary.bits(row.name.get_ref()).is_some() {
-            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is defined twice");
         }
         if let Some(field) = &row.field {
             resolver.error(

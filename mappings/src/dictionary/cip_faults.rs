@@ -116,14 +116,14 @@ pub(super) fn resolve_faults(
                 && known.conditions == record.conditions
         };
         if dictionary.fault_records.iter().any(same) {
-            resolver.error(code::TWICE, row.conditions.span(), "conditions", "the record is there twice");
+            resolver.error(code::TWICE, row.conditions.span(), "conditions", "the record is defined twice");
         }
         dictionary.fault_records.push(record);
     }
     for row in &rows.exception_action {
         let Some(action) = resolve_action(row, dictionary, &mut resolver) else { continue };
         if dictionary.exception_actions.iter().any(|known| known.code == action.code) {
-            resolver.error(code::TWICE, row.action.span(), "action", "the action is there twice");
+            resolver.error(code::TWICE, row.action.span(), "action", "the action is defined twice");
         }
         dictionary.exception_actions.push(action);
     }
@@ -131,7 +131,7 @@ pub(super) fn resolve_faults(
         let code = resolve_status(row);
         let same = |known: &StatusCode| (known.general, known.extended) == (code.general, code.extended);
         if dictionary.status_codes.iter().any(same) {
-            resolver.error(code::TWICE, row.general.span(), "general", "the status is there twice");
+            resolver.error(code::TWICE, row.general.span(), "general", "the status is defined twice");
         }
         dictionary.status_codes.push(code);
     }

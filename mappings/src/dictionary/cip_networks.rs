@@ -102,7 +102,7 @@ pub(super) fn resolve_networks(file: &Parsed<CipNetworkFile>, errors: &mut Findi
     let mut networks: Vec<CipNetwork> = Vec::with_capacity(file.rows.network.len());
     for row in &file.rows.network {
         if networks.iter().any(|known| known.name == *row.name.get_ref()) {
-            resolver.error(code::TWICE, row.name.span(), "name", "the network is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the network is defined twice");
         }
         networks.extend(resolve_network(row, &mut resolver));
     }
@@ -140,7 +140,7 @@ fn resolve_network(row: &NetworkRow, resolver: &mut Resolver<'_>) -> Option<CipN
     let mut objects: Vec<NetworkObject> = Vec::new();
     for object in &row.object {
         if objects.iter().any(|known| known.class == *object.class.get_ref()) {
-            resolver.error(code::TWICE, object.class.span(), "class", "the class is there twice");
+            resolver.error(code::TWICE, object.class.span(), "class", "the class is defined twice");
         }
         objects.extend(resolve_object(object, resolver));
     }

@@ -50,7 +50,7 @@ pub(super) fn resolve_services(file: &Parsed<CipServiceFile>, errors: &mut Findi
                 code::TWICE,
                 row.code.span(),
                 "code",
-                "the service code or its name is there twice",
+                "the service code or its name is defined twice",
             );
         }
         services.push(service);

@@ -131,7 +131,7 @@ pub(super) fn once<'n>(resolver: &mut Resolver<'_>, key: &str, names: impl Itera
     let mut known: Vec<&str> = Vec::new();
     for name in names {
         if known.contains(&name.get_ref().as_str()) {
-            resolver.error(code::TWICE, name.span(), key, format!("`{}` is there twice", name.get_ref()));
+            resolver.error(code::TWICE, name.span(), key, format!("`{}` is defined twice", name.get_ref()));
         }
         known.push(name.get_ref());
     }

@@ -43,8 +43,9 @@ use super::resolver::Resolver;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 
-/// Signals and parameters of the generic model, as the generic dictionary lists them. The catalogue in code
-/// decides; the dictionary must say the same.
+/// Signals and parameters of the generic model, as the generic dictionary lists them. The signals are the fields of the
+/// process image, and the constants of the parameters are generated from the shipped dictionary: another one that says
+/// otherwise is refused.
 #[derive(Debug, Clone, Default)]
 pub struct GenericDictionary {
     signals: Vec<Signal>,
@@ -67,7 +68,7 @@ impl GenericDictionary {
             same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
             same(&mut resolver, "access", &row.access, access);
             if dictionary.signals.contains(&signal) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the signal is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the signal is defined twice");
             }
             dictionary.signals.push(signal);
         }
@@ -76,11 +77,23 @@ impl GenericDictionary {
             let what = "a parameter of the generic model";
             let find = |name: &str| Parameter::from_name(name).and_then(Parameter::row);
             let Some(known) = resolver.name("name", &row.name, what, find, names) else { continue };
+            if let Some(number) = row.number.as_ref().filter(|number| *number.get_ref() != known.parameter.0)
+            {
+                let (expected, got) = (known.parameter.0, number.get_ref());
+                let message = format!("expected 0x{expected:04X}, got 0x{got:04X}");
+                resolver.error(code::CONTRADICTS_CATALOGUE, number.span(), "number", message);
+            }
+            if let Some(element) = &row.element {
+                same(&mut resolver, "element", element, known.element.name());
+            }
+            if let Some(about) = &row.about {
+                same(&mut resolver, "about", about, known.description);
+            }
             same(&mut resolver, "quantity", &row.quantity, known.quantity.name());
             same(&mut resolver, "type", &row.data_type, known.kind.name());
             same(&mut resolver, "access", &row.access, known.access.name());
             if dictionary.parameters.iter().any(|other| other.parameter == known.parameter) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is there twice");
+                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is defined twice");
             }
             dictionary.parameters.push(known);
         }
@@ -109,7 +122,7 @@ impl GenericDictionary {
     }
 }
 
-/// Checks that a dictionary repeats what the catalogue says.
+/// Checks that a dictionary says what the program was built with.
 fn same(resolver: &mut Resolver<'_>, key: &str, name: &Name, expected: &str) {
     if name.get_ref() != expected {
         resolver.error(
@@ -222,11 +235,11 @@ pub struct Enumeration {
 }
 
 impl Enumeration {
-    /// Checks that no code and no name is there twice; `names` are those of the codes, in order.
+    /// Checks that no code and no name is defined twice; `names` are those of the codes, in order.
     fn unique<'a>(&self, names: impl Iterator<Item = &'a Name>, resolver: &mut Resolver<'_>) {
         for (at, (code, name)) in self.codes.iter().zip(names).enumerate() {
             if self.codes[..at].iter().any(|known| known.code == code.code || known.name == code.name) {
-                resolver.error(code::TWICE, name.span(), "name", "the code or its name is there twice");
+                resolver.error(code::TWICE, name.span(), "name", "the code or its name is defined twice");
             }
         }
     }

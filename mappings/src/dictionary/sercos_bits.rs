@@ -135,6 +135,12 @@ impl Word {
         if let [bits] = found.parts.as_slice() { Some(*bits) } else { None }
     }
 
+    /// The named values of the field with this name.
+    pub fn values(&self, name: &str) -> &[FieldValue] {
+        let found = self.fields.iter().find(|field| field.name.as_deref() == Some(name));
+        found.map_or(&[], |field| field.values.as_slice())
+    }
+
     /// The names of all fields.
     pub fn field_names(&self) -> impl Iterator<Item = &str> + Clone {
         self.fields.iter().filter_map(|field| field.name.as_deref())
@@ -152,7 +158,7 @@ pub(super) fn resolve_words(
     resolver.head(&rows.format, "profile", &rows.profile, "sercos");
     for row in &rows.word {
         if dictionary.word(row.name.get_ref()).is_some() {
-            resolver.error(code::TWICE, row.name.span(), "name", "the word is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the word is defined twice");
         }
         if let Some(word) = resolve_word(row, dictionary, &mut resolver) {
             dictionary.words.push(word);
@@ -268,7 +274,7 @@ fn resolve_field(
             resolver.error(code::CONTRADICTION, name.span(), "name", "expected no name for reserved bits");
         }
         Some(name) if word.field_names().any(|known| known == name.get_ref()) => {
-            resolver.error(code::TWICE, name.span(), "name", "the field is there twice");
+            resolver.error(code::TWICE, name.span(), "name", "the field is defined twice");
         }
         None if !row.reserved => {
             resolver.error(code::CONTRADICTION, span, key, "expected a name, or `reserved = true`")
@@ -290,7 +296,7 @@ fn resolve_field(
     };
     for value in &row.values {
         if field.values.iter().any(|known| known.value == *value.value.get_ref()) {
-            resolver.error(code::TWICE, value.value.span(), "value", "the value is there twice");
+            resolver.error(code::TWICE, value.value.span(), "value", "the value is defined twice");
         }
         let value = resolve_value(value, &field, dictionary, resolver);
         field.values.push(value);
@@ -329,7 +335,7 @@ fn resolve_pattern(
     let value = *row.value.get_ref();
     fits(&row.value, high - low + 1, resolver);
     if word.patterns.iter().any(|known| known.bits == (low, high) && known.value.value == value) {
-        resolver.error(code::TWICE, row.value.span(), "value", "the value is there twice");
+        resolver.error(code::TWICE, row.value.span(), "value", "the value is defined twice");
     }
     let own = (row.source.as_ref(), row.confidence.as_ref());
     let value = FieldValue {

@@ -91,7 +91,7 @@ pub(super) fn resolve_codes(
     resolver.head(&rows.format, "profile", &rows.profile, "sercos");
     for row in &rows.enumeration {
         if dictionary.codes(row.name.get_ref()).is_some() {
-            resolver.error(code::TWICE, row.name.span(), "name", "the set is there twice");
+            resolver.error(code::TWICE, row.name.span(), "name", "the set is defined twice");
         }
         let set = resolve_set(row, dictionary, &mut resolver);
         dictionary.code_sets.push(set);
@@ -136,10 +136,10 @@ fn resolve_set(row: &SercosCodesRow, dictionary: &SercosDictionary, resolver: &m
         let number = *code.code.get_ref();
         fits(&code.code, "code", width, resolver);
         if set.codes.iter().any(|known| known.code == number) {
-            resolver.error(code::TWICE, code.code.span(), "code", "the code is there twice");
+            resolver.error(code::TWICE, code.code.span(), "code", "the code is defined twice");
         }
         if set.codes.iter().any(|known| known.name == *code.name.get_ref()) {
-            resolver.error(code::TWICE, code.name.span(), "name", "the name is there twice");
+            resolver.error(code::TWICE, code.name.span(), "name", "the name is defined twice");
         }
         let own = (code.source.as_ref(), code.confidence.as_ref());
         set.codes.push(NamedCode {

@@ -185,7 +185,7 @@ pub(super) fn resolve_idns(
     for row in &rows.idn {
         let Some(idn) = resolve_idn(row, part, terms, &mut resolver) else { continue };
         if idns.iter().any(|known| known.idn == idn.idn) {
-            resolver.error(code::TWICE, row.idn.span(), "idn", format!("{} is there twice", idn.number()));
+            resolver.error(code::TWICE, row.idn.span(), "idn", format!("{} is defined twice", idn.number()));
         }
         idns.push(idn);
     }

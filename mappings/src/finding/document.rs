@@ -31,6 +31,8 @@ pub fn deserialize<T: DeserializeOwned>(
     source: &Source,
     findings: &mut Findings,
 ) -> Option<T> {
+    // What a group of rows says is wrong in each of them, and is told once.
+    let mut told: Vec<Span> = Vec::new();
     for retry in 0..RETRIES_MAX {
         let error = match T::deserialize(toml::de::Deserializer::from(tree.clone())) {
             Ok(rows) => return Some(rows).filter(|_| retry == 0),
@@ -38,7 +40,10 @@ pub fn deserialize<T: DeserializeOwned>(
         };
         let problem = Problem::from_row(&error);
         let span = problem.span.clone();
-        findings.push(source, problem);
+        if !told.contains(&span) {
+            told.push(span.clone());
+            findings.push(source, problem);
+        }
         if !leave_out(tree.get_mut(), &span) {
             break;
         }

@@ -140,112 +140,112 @@ macro_rules! registry {
 
 registry! {
     UNREADABLE = 1 Error "the file cannot be read":
-        "A configuration, a table, an overlay or a folder that was named is not there, or the system does not let it be read.",
+        "A configuration, a table, an overlay or a folder that was named does not exist, or the system does not allow reading it.",
         "[mappings]\noverlays = [\"no-such-file.toml\"]",
-        "Correct the path; paths in a configuration and in `base` count from the folder of the file that names them.";
+        "Correct the path. Paths in a configuration and in `base` are relative to the folder of the file that names them.";
     TOO_LONG = 2 Error "the file is too long":
-        "Tables and overlays may have 2 MiB, a configuration 1 MiB: ten times and more what real ones have. A longer file is hardly what it should be, and is not read.",
+        "Tables and overlays may have 2 MiB, a configuration 1 MiB: more than ten times the size of real ones. A longer file is probably the wrong file, and is not read.",
         "# a recording of 10 MB, named as a table",
-        "Name the right file; split what is really so long into several overlays.";
+        "Name the right file. Split a file that is really so long into several overlays.";
     NOT_UTF8 = 3 Error "the file is not UTF-8":
-        "The files are TOML, which is UTF-8. An editor that writes another encoding spoils letters beyond ASCII, such as those of °C.",
+        "The files are TOML, which is UTF-8. An editor that writes another encoding damages characters beyond ASCII, such as those of °C.",
         "# the byte 0xB0 of ISO 8859-1 in place of °",
         "Save the file as UTF-8.";
-    SYNTAX = 4 Error "the text is no TOML":
-        "The text cannot be taken apart into keys and values. All places are told at which it goes wrong.",
+    SYNTAX = 4 Error "the text is not TOML":
+        "The text cannot be parsed into keys and values. The findings show every place where this fails.",
         "[[parameter]\nparameter = jerk_limit",
-        "Mend the brackets, quotation marks and commas; see https://toml.io.";
+        "Correct the brackets, quotation marks and commas; see https://toml.io.";
     WRONG_TYPE = 5 Error "a value of the wrong type":
-        "The key is right, and its value is of another type: a text for a number, a single value for a list.",
+        "The key is known, but its value has another type: a text instead of a number, or a single value instead of a list.",
         "[[generic-sercos.fault]]\nword = 11",
-        "Give a value of the type that is expected.";
-    UNKNOWN_KEY = 6 Error "a key that nothing reads":
-        "A key that no part of the program reads would be passed over in silence, most likely because it is misspelt.",
+        "Give a value of the expected type.";
+    UNKNOWN_KEY = 6 Error "an unknown key":
+        "No part of the program reads this key. Most likely it is misspelt, and would be ignored silently.",
         "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmising = \"reject\"",
-        "Correct its name, or take it out.";
+        "Correct its name, or remove it.";
     MISSING_KEY = 7 Error "a key is missing":
-        "The row or table needs the key. In an overlay this means that the row is new: nothing with the same identity is there from which it could take over the key.",
+        "The row or table needs the key. In an overlay this means that the row is new: there is no row with the same identity from which it could inherit the key.",
         "[[generic-sercos.parameter]]\nparameter = \"energy\"",
-        "Add the key; or correct what identifies the row, if a row was to be changed.";
-    WRONG_HEAD = 8 Error "the head of the file is another one":
-        "`format` is the version of the file format, `mapping` or `profile` says what the file holds. Another head means another kind of file, or one for another version of the program.",
+        "Add the key. If you wanted to change an existing row, correct the keys that identify it.";
+    WRONG_HEAD = 8 Error "the head of the file does not match":
+        "`format` is the version of the file format; `mapping` or `profile` says what the file contains. Another head means another kind of file, or a file for another version of the program.",
         "format = 2\noverlay = \"for a later version\"",
-        "Put the file in its place, or bring it to this version.";
-    STRANGER = 9 Error "a file that is none of the tables":
-        "In a folder that replaces tables each `.toml` file has the name of the one that it replaces. Any other would be passed over in silence.",
+        "Move the file to its place, or convert it to this version.";
+    STRANGER = 9 Error "a file that is not one of the tables":
+        "In a folder that replaces tables, each `.toml` file has the name of the table that it replaces. Any other file would be ignored silently.",
         "# mappings/tables/cip_generic.toml, which should be cip-generic.toml",
         "Correct its name, or move it out of the folder. Rows of your own belong in an overlay.";
 
     UNKNOWN_NAME = 10 Error "an unknown name":
         "The row names an attribute, a signal, a parameter, an IDN, an object, a field or a code that no dictionary has.",
         "[[cip-generic.attribute]]\nattribute = \"Kpq\"",
-        "Correct the name. `axisbridge dictionary` prints all of them. What really is new goes into the dictionary first.";
-    BAD_IDN = 11 Error "no IDN":
+        "Correct the name. `axisbridge dictionary` prints all of them. Add a name that is really new to the dictionary first.";
+    BAD_IDN = 11 Error "not an IDN":
         "An IDN is written as S-0-0047, P-1-0100, or S-0-1050.x.6 with structure instance and element.",
         "[[generic-sercos.signal]]\nsignal = \"position_command\"\nidn = \"S-47\"",
         "Write the IDN in full.";
     UNKNOWN_WORD = 12 Error "an unknown word":
         "The key takes one of a few words.",
         "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"ignore\"",
-        "Use one of the words that are listed.";
+        "Use one of the listed words.";
     OUT_OF_RANGE = 13 Error "a number or value out of range":
-        "A number, length, bit, code or time beyond what the key can hold.",
+        "A number, length, bit, code or time is outside the range of the key.",
         "[[generic-sercos.mode_slot]]\nslot = 1\nidn = \"S-0-0033\"\n[generic-sercos.direction]\npolarity = { idn = \"S-0-0055\", bit = 16 }",
-        "Give a value of the range that is told.";
-    TWICE = 14 Error "there twice":
-        "The same thing is said twice, so that one of the two would count without a word about the other.",
+        "Give a value within the shown range.";
+    TWICE = 14 Error "defined twice":
+        "The same thing is defined twice, so one of the two would be used and the other ignored silently.",
         "[[axis]]\nname = \"x\"\n[[axis]]\nname = \"x\"",
         "Keep one of them. To change a shipped row, put it into an overlay.";
-    CONTRADICTION = 15 Error "keys that do not go together":
-        "The keys of a row or table exclude each other, or one needs another that is not there.",
+    CONTRADICTION = 15 Error "keys that exclude each other":
+        "The keys of a row or table exclude each other, or one needs another that is missing.",
         "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nremove = true\nmissing = \"reject\"",
-        "Keep those that say what is meant.";
+        "Keep those that say what you mean.";
     ROW_MISSING = 16 Error "a row is missing":
         "Something that every axis needs has no row: a drive state, an action, a signal that a mode uses.",
         "[[generic-sercos.action]]\naction = \"halt\"\nremove = true",
         "Add the row.";
-    TOO_MANY = 17 Error "too many of them":
-        "The cycle works with tables of fixed size, so that it never allocates; there are more rows, axes or files than it has room for.",
+    TOO_MANY = 17 Error "too many":
+        "The cycle works with tables of fixed size, so that it never allocates. There are more rows, axes or files than fit.",
         "# 65 overlays",
-        "Take out what is not needed.";
+        "Remove what you do not need.";
     OVERLAP = 18 Error "bits or codes that overlap":
-        "Two fields have the same bit, or a range takes in a code that has a name.",
+        "Two fields have the same bit, or a range includes a code that has a name.",
         "[[sercos-bits.word]]\nname = \"Class 2 diagnostic\"\nlayout = \"all\"\nfields = [{ bits = [0, 1], name = \"Both\" }]",
         "Give every bit and every code one meaning.";
     UNTRUSTED = 19 Error "source and confidence do not agree":
-        "A row of the SERCOS dictionary says where it was read and how far to trust it: `high` takes documents of two vendor families, and every key must be a document of sercos-terms.toml.",
+        "A row of the SERCOS dictionary says where it was read and how far to trust it: `high` needs documents of two vendor families, and every key must be a document of sercos-terms.toml.",
         "[[sercos-idns.idn]]\nidn = \"S-0-0104\"\nsource = \"hearsay\"",
-        "Name the documents, and lower the confidence to what they bear.";
-    CONTRADICTS_CATALOGUE = 20 Error "the generic model has it otherwise":
-        "The generic dictionary repeats what the program's catalogue says; it is there to be read, not to be changed.",
+        "Name the documents, and lower the confidence to what they support.";
+    CONTRADICTS_CATALOGUE = 20 Error "a difference from the generic model":
+        "The generic dictionary repeats the program's catalogue. It is there to be read, not to be changed.",
         "[[generic.signal]]\nname = \"torque_command\"\nquantity = \"time\"",
-        "Take the row back to what the catalogue says.";
-    CONTRADICTS_ATTRIBUTE = 21 Error "element 3 of the drive says otherwise":
-        "`attribute` is element 3 as a live drive has shown it. Length, format, decimals and write protection of the row must be what it says.",
+        "Restore the row to what the catalogue says.";
+    CONTRADICTS_ATTRIBUTE = 21 Error "a difference from element 3 of the drive":
+        "`attribute` is element 3 as a live drive has shown it. Length, format, decimals and write protection of the row must agree with it.",
         "[[sercos-idns.idn]]\nidn = \"S-0-0159\"\nlength = 2",
-        "Correct the row, or the attribute word, whichever was misread.";
+        "Correct the row or the attribute word, whichever was misread.";
 
     UNIT = 30 Error "the unit does not convert":
         "The two ends of the row measure different things, or no [[unit]] or [[scaling]] row says how one becomes the other.",
         "[[cip-generic.attribute]]\nattribute = \"Kpp\"\nparameter = \"power_loss_time\"",
-        "Correct one of the ends; add a [[unit]] row where the unit is new.";
-    DIRECTION = 31 Error "the value does not go this way":
+        "Correct one of the ends, or add a [[unit]] row if the unit is new.";
+    DIRECTION = 31 Error "the wrong direction":
         "A command goes to the drive, an actual value comes from it; a signal belongs to one telegram.",
         "[[generic-sercos.signal]]\nsignal = \"position_command\"\ndirection = \"from_drive\"",
         "Correct the direction, or the signal.";
-    READ_ONLY = 32 Error "the target can only be read":
-        "The row writes what cannot be written in any phase: every write would be refused by the drive.",
+    READ_ONLY = 32 Error "the target is read-only":
+        "The row writes something that cannot be written in any phase: the drive would refuse every write.",
         "[[generic-sercos.parameter]]\nparameter = \"motor_rated_current\"\nidn = \"S-0-0112\"\ndirection = \"both\"",
         "Use `direction = \"from_drive\"`.";
-    NO_LENGTH = 33 Error "nobody knows the length":
-        "A value in a telegram has a place and a length before the drive is there; lists, and IDNs of which nothing is known, have none.",
+    NO_LENGTH = 33 Error "the length is unknown":
+        "A value in a telegram needs a place and a length before the drive is there. Lists, and IDNs of which nothing is known, have no length.",
         "[[generic-sercos.signal]]\nsignal = \"torque_offset\"\nidn = \"S-0-0017\"",
-        "Use an IDN of known length, or add what is known of it to the dictionary.";
+        "Use an IDN of known length, or add what you know about it to the dictionary.";
     PHASE = 34 Error "it cannot be written in this phase":
-        "By the dictionary the IDN is write protected in the communication phase of the step.",
+        "The dictionary says that the IDN is write protected in the communication phase of the step.",
         "[[generic-sercos.commission]]\nphase = 4\ndo = \"write\"\nidn = \"S-0-0076\"\nvalue = 0x42\nrefused = \"fail\"\nsource = \"test\"",
         "Move the step to a phase in which the IDN can be written.";
-    NOT_A_COMMAND = 35 Error "no procedure command":
+    NOT_A_COMMAND = 35 Error "not a procedure command":
         "Only a procedure command can be set, enabled and waited for.",
         "[[generic-sercos.action]]\naction = \"reset_fault\"\ncommand = \"S-0-0047\"",
         "Name the IDN of a procedure command.";
@@ -254,136 +254,136 @@ registry! {
         "[[cip-generic.attribute]]\nattribute = \"Kpp\"\nparameter = \"motor_name\"",
         "Use a parameter that is a number.";
     FIELD_VALUE = 37 Error "a value that its field cannot hold":
-        "A field of n bits holds 0 to 2^n - 1; the pattern could never match.",
+        "A field of n bits has values from 0 to 2^n - 1, so the pattern could never match.",
         "[[generic-sercos.action]]\naction = \"enable\"\npattern = [{ field = \"Drive on\", is = 2 }]",
         "Correct the value, or the field.";
     RANGE_LOST = 38 Warning "the range of one end does not fit the other":
-        "By types and scalings one end of the row can hold values that the other cannot: they are clamped, and the axis does less than it was told. The finding names the first value that is lost.",
+        "Types and scalings allow values at one end of the row that the other end cannot represent. They are clamped, and the axis does less than commanded. The finding names the first value that is lost.",
         "[[axis]]\nunit = \"revolution\"\nmotion_resolution = 100_000 # 21474 turns, and the drive ends at 596",
-        "Bring the scalings together, or hold the axis within the smaller range by its limits.";
+        "Adapt the scalings, or keep the axis within the smaller range by its limits.";
     PRECISION_LOST = 39 Warning "precision is lost":
-        "By types and scalings one step of one end is several steps of the other, or no whole number of them: values are rounded, and the finding says by how much at most, and at which value first.",
+        "One step of one end is several steps of the other, or not a whole number of them. Values are rounded; the finding says by how much at most, and at which value first.",
         "[[axis]]\nmotion_resolution = 10_000_000 # the drive has 3600000 counts in a turn",
-        "Use a resolution that the coarser side can follow, or a finer scaling of the drive.";
+        "Use a resolution that the coarser side can represent, or a finer scaling of the drive.";
     EXAMPLE_FAILS = 40 Error "a worked example fails":
-        "The numbers of an example do not come out: either the row or the example is wrong. Examples hold a table to what it was when somebody worked it out by hand.",
+        "The numbers of an example do not agree with the row: one of the two is wrong. Examples were computed by hand and keep a table from changing by accident.",
         "[[generic-sercos.parameter]]\nparameter = \"torque_limit_negative\"\nfactor = [1, 1]",
-        "Work the example out again, and correct whichever is wrong.";
+        "Compute the example again, and correct whichever is wrong.";
     ROW_NUMBERS = 41 Note "what a row can hold":
-        "Range and step of a value, computed with the conversions of the cycle from types and scalings of both ends: of the drive as the box scales it, in the unit of the controller. A floating point number has 24 bits, or 53: beyond the value that is told it is coarser than the drive.",
+        "Range and step of a value, computed with the conversions of the cycle from types and scalings of both ends: of the drive as Axisbridge scales it, in the unit of the controller. A floating point number has 24 bits, or 53: beyond the shown value it is coarser than the drive.",
         "[[generic-sercos.signal]]\nsignal = \"torque_command\"",
-        "Nothing; compare it with what the axis has to do.";
+        "Nothing. Compare it with what the axis has to do.";
 
     REQUIRED_UNSERVED = 50 Note "a required attribute is not served":
-        "The standard requires the attribute of a device with a position, velocity or torque loop, and a [[reject]] row says why there is none.",
-        "[[cip-generic.reject]]\nreason = \"no drive tells it\"\nattributes = [\"Kpp\"]",
-        "Serve it with an [[attribute]] row, or leave it; controllers get status 0x14 for it.";
+        "The standard requires the attribute of a device with a position, velocity or torque loop. A [[reject]] row says why it is missing.",
+        "[[cip-generic.reject]]\nreason = \"no drive reports it\"\nattributes = [\"Kpp\"]",
+        "Serve it with an [[attribute]] row, or leave it. Controllers get status 0x14 for it.";
     ATTRIBUTE_UNSAID = 51 Error "an attribute without an answer":
         "Every attribute of the dictionary is either served by an [[attribute]] row, or has its place in a [[reject]] row with the reason.",
         "[[cip-generic.attribute]]\nattribute = \"Kpp\"\nremove = true",
         "Add it to a [[reject]] row.";
     NO_WAY_IN = 52 Error "a state with no way in":
-        "With the requests, actions and reports that the tables have, an axis never comes to the state, whatever happens. It is found by walking the state machine.",
+        "With the requests, actions and reports of the tables, an axis never reaches the state. `check` walks the state machine to find this.",
         "# no [[report]] row says `operating`",
         "Add the row of the request or report that leads to it.";
     NO_WAY_OUT = 53 Error "a state with no way out":
         "Once in this state, no request and no report of the tables leads back to the state from which an axis can be started.",
         "# no [[request]] row makes `fault_reset`",
         "Add the row of the request or report that leads out of it.";
-    MODE_UNSERVED = 54 Note "an operating mode that ends at one side":
-        "The controller can ask for the mode and the drives have no row for it, or the other way round: it is refused.",
+    MODE_UNSERVED = 54 Note "an operating mode that only one side has":
+        "The controller can request the mode but the drives have no row for it, or the other way round. The mode is refused.",
         "[[generic-sercos.mode]]\nmode = \"torque\"\nremove = true",
         "Add the [[mode]] row of the other side, or leave it.";
     FAULT_NO_CODE = 55 Error "a fault without a code":
-        "A cause of the fault catalogue has no [[fault]] row in cip-generic.toml: the axis would stop, and the controller would not be told why.",
+        "A cause of the fault catalogue has no [[fault]] row in cip-generic.toml: the axis would stop, and the controller would not know why.",
         "[[cip-generic.fault]]\ncause = \"brake_slip\"\nremove = true",
         "Give it an exception, or a bit of the manufacturer.";
     CODE_SHARED = 56 Warning "one code for several faults":
-        "Two causes have the same exception, so that the controller cannot tell them apart, and the strictest of their actions counts for both.",
+        "Two causes have the same exception, so the controller cannot distinguish them, and the strictest of their actions applies to both.",
         "[[cip-generic.fault]]\ncause = \"brake_slip\"\nexception = \"Motor Overcurrent\"",
-        "Give one of them a bit of the manufacturer; where they are the same thing to the controller, say `shared = true` in both rows.";
-    NEVER_REACHED = 57 Warning "a row that never counts":
-        "The first row that fits wins, and whatever fits this row fits one before it.",
-        "[[generic-sercos.report]]\npattern = []\nreport = \"ready\"\nsource = \"in front of all the others\"",
-        "Put the row that asks for more in front of the other.";
-    UNUSED = 58 Note "a row that nothing uses":
+        "Give one of them a bit of the manufacturer. If they are the same to the controller, set `shared = true` in both rows.";
+    NEVER_REACHED = 57 Warning "a row that is never used":
+        "The first row that fits wins, and everything that fits this row also fits an earlier one.",
+        "[[generic-sercos.report]]\npattern = []\nreport = \"ready\"\nsource = \"before all the others\"",
+        "Put the more specific row before the other one.";
+    UNUSED = 58 Note "an unused row":
         "A unit or signal that no other row refers to.",
-        "[[generic-sercos.unit]]\nunit = \"kV\"\nquantity = \"voltage\"\ngeneric_per_unit = [1_000_000_000, 1]\nsource = \"nobody\"",
-        "Take it out, or leave it for later.";
+        "[[generic-sercos.unit]]\nunit = \"kV\"\nquantity = \"voltage\"\ngeneric_per_unit = [1_000_000_000, 1]\nsource = \"none\"",
+        "Remove it, or leave it for later.";
     WARNING_STOPS = 59 Error "a warning that would stop the axis":
-        "The row says that the drive only warns, and the exception of its cause stops the axis unless the controller says otherwise.",
+        "The row says that the drive only warns, but the exception of its cause stops the axis unless the controller sets another action.",
         "[[generic-sercos.fault]]\nword = \"Class 2 diagnostic\"\npattern = [{ field = \"Cooling error warning\", is = 1 }]\ncause = \"cooling\"",
-        "Use a cause of its own whose exception has `default = \"Alarm\"`.";
+        "Use a separate cause whose exception has `default = \"Alarm\"`.";
     EXCEPTION_ACTION = 60 Error "exception actions that do not fit":
         "`default` is at least as severe as `least`, neither is beyond Major Fault, and only an exception has them.",
         "[[cip-generic.fault]]\ncause = \"cooling_warning\"\nremove = [\"least\"]",
         "Correct `least` and `default`.";
-    EXCEPTION_UNSAID = 61 Warning "an exception that nobody finds":
-        "No row of a drive's table leads to the standard exception, neither the box nor the device finds it, and no [[unraised]] row says why: the controller would wait for it in vain.",
+    EXCEPTION_UNSAID = 61 Warning "an exception that nothing raises":
+        "No row of a drive's table leads to the standard exception, neither the gateway nor the device detects it, and no [[unraised]] row says why. The controller would wait for it in vain.",
         "[[cip-generic.unraised]]\nreason = \"The holding brake is the drive's own; no bit says that it slips.\"\nremove = true",
-        "Add the row that finds it, or name it in an [[unraised]] row.";
+        "Add the row that raises it, or name it in an [[unraised]] row.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
-        "The row of the overlay says what the table says already. Perhaps the table has caught up with it, perhaps something else was meant.",
+        "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",
         "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"shadow\"",
-        "Take the row out.";
+        "Remove the row.";
     OVERLAY_CYCLE = 71 Error "overlays that build on each other":
-        "`base` names an overlay that itself builds on this one: there is no order in which they could be laid over.",
+        "`base` names an overlay that itself builds on this one, so there is no order in which they could be applied.",
         "overlay = \"builds on itself\"\nbase = [\"this-file.toml\"]",
-        "Take one of the `base` entries out.";
-    OVERLAY_REMOVES_NOTHING = 72 Error "nothing is there to remove":
+        "Remove one of the `base` entries.";
+    OVERLAY_REMOVES_NOTHING = 72 Error "nothing to remove":
         "`remove` names a row or a key that the table does not have.",
         "[[generic-sercos.parameter]]\nparameter = \"energy\"\nremove = true",
-        "Correct what identifies the row, or take it out.";
+        "Correct the keys that identify the row, or remove it.";
     OVERLAY_NO_KEY = 73 Error "a row without identity":
-        "A row of an overlay must have the keys that tell one row of the table from another.",
+        "A row of an overlay must have the keys that identify a row of the table.",
         "[[generic-sercos.parameter]]\nmissing = \"reject\"",
         "Add them.";
     UNKNOWN_TABLE = 74 Error "rows of an unknown table":
-        "The rows of an overlay stand under the name of their table and of the list in it, as in [[generic-sercos.fault]].",
+        "The rows of an overlay are written under the name of their table and of the list in it, as in [[generic-sercos.fault]].",
         "[[generic-sercoss.fault]]\nword = \"Class 1 diagnostic\"",
         "Correct the name.";
 
     CONFIG_VALUE = 80 Error "a setting that cannot be used":
-        "The value of a key of the configuration is none that the box can work with.",
+        "Axisbridge cannot use the value of this key of the configuration.",
         "[south.sercos]\ncycle_time = \"1.1 ms\"",
-        "Use a value as it is described.";
+        "Use a value as described in docs/reference/configuration.md.";
     CONFIG_REFERENCE = 81 Error "a name that the configuration does not have":
-        "An axis names its drive, a device its axes; each must be there, and belong to one.",
+        "An axis names its drive, and a device its axes. Each of them must exist, and belong to exactly one.",
         "[[axis]]\nname = \"x\"\ndrive = \"no-such-drive\"",
         "Correct the name, or add what it names.";
     CYCLE_FULL = 83 Error "cyclic data that the bus cannot carry":
-        "The values of an axis are more than its connection holds, those of all drives more than the telegrams hold, or the telegrams take longer on the wire than the cycle lasts: as the master lays them out, with drives that need no time themselves.",
+        "The values of an axis are more than its connection can carry, those of all drives are more than the telegrams can carry, or the telegrams take longer on the wire than the cycle. This is computed with the layout of the master, and with drives that need no time themselves.",
         "[south.sercos]\ncycle_time = \"31.25 us\" # with 60 drives",
         "Use a longer cycle, fewer drives on the bus, or fewer signals and captures (`events = \"service-channel\"`).";
-    AXIS_TABLES = 84 Error "the tables make no axis":
-        "With these tables no program can be made for the axis: a mode or a slot is missing, or a scaling does not fit 64 bits.",
+    AXIS_TABLES = 84 Error "no program for the axis":
+        "With these tables no program can be compiled for the axis: a mode or a slot is missing, or a scaling does not fit 64 bits.",
         "[[generic-sercos.mode_slot]]\nslot = 2\nremove = true",
         "Correct the tables, or the axis.";
     LIMIT_UNFIT = 85 Error "a limit that the drive cannot hold":
-        "The box writes the limit to a parameter of the drive, whose range ends before: commissioning would refuse the axis.",
+        "Axisbridge writes the limit to a parameter of the drive whose range is smaller. Commissioning would refuse the axis.",
         "[axis.limits]\ntorque_percent = 10_000.0",
-        "Use a limit within the range that is told.";
-    DRIVE_SCALING = 86 Note "the drive's own scaling counts":
-        "Without `set_scaling` the box reads the scaling when the drive is there; range and precision cannot be told before.",
+        "Use a limit within the shown range.";
+    DRIVE_SCALING = 86 Note "the drive's own scaling is used":
+        "Without `set_scaling`, Axisbridge reads the scaling when the drive is there. Range and precision are not known before.",
         "[[south.sercos.drive]]\nname = \"a\"\naddress = 1",
-        "Nothing; or `set_scaling = true`, which makes it the same for every drive.";
+        "Nothing, or set `set_scaling = true`, which makes it the same for every drive.";
     DEVICE_FILE = 87 Error "a device's configuration that cannot be used":
-        "The file that `configuration` of a [[south.can.device]] names has an entry that cannot be read, has no values, or is for another device. A device is given all of its configuration or is not led.",
+        "The file that `configuration` of a [[south.can.device]] names has an entry that cannot be read, has no values, or is for another device. A device gets all of its configuration or is not controlled.",
         "[[south.can.device]]\nnode = 1\nconfiguration = \"of-another-drive.dcf\"",
-        "Correct the file where it is shown, or export it again from the tool that made it.";
+        "Correct the file at the shown place, or export it again from the tool that made it.";
     DEVICE_FILE_ODD = 88 Warning "a device's configuration with something odd":
-        "The file contradicts itself in something that its values do not depend on, was made for another node-id, or has values that the box does not write: it maps the PDOs, sets SYNC and supervision, and moves the drive.",
+        "The file contradicts itself in something that does not affect its values, was made for another node-id, or has values that Axisbridge does not write because it sets them itself: PDO mapping, SYNC, supervision, and what moves the drive.",
         "[1017]\nParameterValue=50",
-        "Nothing, where it is as it was meant; else correct the file.";
-    DRIVE_MAPPING = 89 Note "the drive's own PDO mapping counts":
-        "With `pdo_mapping = \"keep\"` the box uses the PDOs as they are when the drive is there. Without a `configuration` that tells them, the load of the bus is that of PDOs that the box would have mapped.",
+        "Nothing if the file is as you meant it. Otherwise correct it.";
+    DRIVE_MAPPING = 89 Note "the drive's own PDO mapping is used":
+        "With `pdo_mapping = \"keep\"` Axisbridge uses the PDOs as they are when the drive is there. Without a `configuration` that lists them, the load of the bus is computed with the PDOs that Axisbridge would have mapped.",
         "[[south.can.device]]\nnode = 1\npdo_mapping = \"keep\"",
-        "Nothing; or name the data sheet of the drive (EDS, DCF) as its `configuration`.";
+        "Nothing, or name the data sheet of the drive (EDS, DCF) as its `configuration`.";
     SCRIPT = 95 Error "a script that cannot be run":
-        "A step of a script for the simulated controller, or an event of one for simulated drives, is none, or cannot be done.",
+        "A step of a script for the simulated controller, or an event of a script for simulated drives, is unknown or cannot be executed.",
         "[[step]]\nenabel = 1",
-        "Correct the step; the guide lists them all.";
+        "Correct the step. docs/reference/scripts.md lists the steps, and docs/tasks/simulate-drives-and-controllers.md the events.";
 }
 
 #[cfg(test)]

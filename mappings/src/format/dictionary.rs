@@ -37,8 +37,12 @@ pub struct SignalRow {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterRow {
+    /// Number; the high byte groups them.
+    pub number: Option<Spanned<u16>>,
     /// Name in snake case.
     pub name: Name,
+    /// Functional element that it belongs to.
+    pub element: Option<Name>,
     /// What it measures.
     pub quantity: Name,
     /// `integer`, `float` or `text`.
@@ -46,4 +50,6 @@ pub struct ParameterRow {
     pub data_type: Name,
     /// `read`, `write` or `write_while_disabled`.
     pub access: Name,
+    /// What it is, in a sentence.
+    pub about: Option<Name>,
 }

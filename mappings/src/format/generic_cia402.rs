@@ -234,7 +234,10 @@ pub struct Cia402ActionRow {
     pub action: Name,
     /// State that the drive has to show. Default: any.
     pub when: Option<Name>,
-    /// Fields of the controlword; none when the action leaves it alone.
+    /// Command of the profile: its bits, and 0 in all other bits that commands have in every mode.
+    pub send: Option<Name>,
+    /// Fields of the controlword that are otherwise; none of both when the action leaves it alone.
+    #[serde(default)]
     pub pattern: Vec<FieldValueRow>,
     /// Where it comes from.
     pub source: Source,

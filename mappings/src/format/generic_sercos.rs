@@ -1,7 +1,10 @@
 //! Rows of the mapping between the generic model and SERCOS.
 
+use std::fmt;
+
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use crate::finding::Spanned;
 
@@ -136,8 +139,40 @@ pub struct WordsRow {
 pub struct FieldValueRow {
     /// Name of the field.
     pub field: Name,
-    /// Its value.
-    pub is: Spanned<u32>,
+    /// Its value, or the name that the dictionary has for it.
+    pub is: Spanned<FieldIs>,
+}
+
+/// The value of a field.
+#[derive(Debug, Clone, JsonSchema)]
+#[serde(untagged)]
+pub enum FieldIs {
+    /// A number.
+    Number(u32),
+    /// The name of one.
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for FieldIs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = FieldIs;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("u32 or the name of a value")
+            }
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<FieldIs, E> {
+                let number = u32::try_from(value);
+                number
+                    .map(FieldIs::Number)
+                    .map_err(|_| E::invalid_value(de::Unexpected::Signed(value), &self))
+            }
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<FieldIs, E> {
+                Ok(FieldIs::Name(value.to_owned()))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
 }
 
 /// A bit of a polarity parameter.
@@ -336,7 +371,10 @@ pub struct ModeSlotRow {
 pub struct ActionRow {
     /// Generic action.
     pub action: Name,
-    /// Fields of the control word; none when the action leaves it alone.
+    /// Named value of the control word, by the dictionary.
+    pub send: Option<Name>,
+    /// Fields of the control word besides; none of both when the action leaves it alone.
+    #[serde(default)]
     pub pattern: Vec<FieldValueRow>,
     /// Procedure command that belongs to the action.
     pub command: Option<Name>,

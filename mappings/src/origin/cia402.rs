@@ -128,10 +128,9 @@ mod tests {
             let text = include_str!("../../tables/generic-cia402.toml");
             text.lines().nth(origin.unwrap().line - 1).unwrap().to_owned()
         };
-        assert_eq!(
-            line(mapping.object_signal_row(Signal::PositionCommand, Object { index: 0x607A, sub: 0 })),
-            "signal = \"position_command\""
-        );
+        let signal =
+            line(mapping.object_signal_row(Signal::PositionCommand, Object { index: 0x607A, sub: 0 }));
+        assert!(signal.trim().starts_with("{ signal = \"position_command\""), "{signal}");
         assert_eq!(
             key(mapping.object_action_row(Action::Enable, 0x23)),
             Some("action enable, Switched on".to_owned())
@@ -144,7 +143,8 @@ mod tests {
         assert_eq!(report(0x08_0027), Some("report enabling, Operation enabled".to_owned()));
         assert_eq!(report(0x03_0027), Some("report operating, Operation enabled".to_owned()));
         assert_ne!(mapping.object_report_row(0x08_1027, &axis), mapping.object_report_row(0x03_0027, &axis));
-        assert_eq!(line(mapping.object_fault_row(0x8611)), "cause = \"excessive_position_error\"");
+        let fault = line(mapping.object_fault_row(0x8611));
+        assert!(fault.contains("cause = \"excessive_position_error\""), "{fault}");
         assert_eq!(
             key(mapping.object_fault_row(0x86FF)),
             Some("fault_class excessive_position_error".to_owned())

@@ -9,6 +9,7 @@ use super::Layer;
 use super::sections::{Section, sections};
 use crate::finding::registry::{self as code, Code};
 use crate::finding::{Findings, Problem, Source, closest};
+use crate::groups;
 
 /// The key that takes a row away, or keys of it.
 const REMOVE: &str = "remove";
@@ -31,7 +32,7 @@ pub(crate) fn lay<'t>(
     let mut merger = Merger { source, findings };
     let rows = shifted(rows, base);
     let span = rows.span();
-    let DeValue::Table(rows) = rows.into_inner() else {
+    let DeValue::Table(mut rows) = rows.into_inner() else {
         return merger.problem(
             code::WRONG_TYPE,
             span,
@@ -39,6 +40,7 @@ pub(crate) fn lay<'t>(
             "expected rows, such as [[generic-sercos.parameter]]",
         );
     };
+    groups::spread(&mut rows);
     if name == "cip-generic" {
         answer_once(table, &rows);
     }
@@ -137,7 +139,7 @@ impl Merger<'_> {
                             code::CONTRADICTION,
                             place,
                             REMOVE,
-                            "expected no other keys in a row that is taken away",
+                            "expected no other keys in a row that is removed",
                         );
                     }
                     known.remove(at);

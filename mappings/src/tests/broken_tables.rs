@@ -32,15 +32,15 @@ const CASES: &[Case] = &[
     (
         "default below the least",
         |t| &mut t.cip_generic,
-        "least = \"Ignore\"\ndefault = \"Alarm\"",
+        "least = \"Ignore\", default = \"Alarm\"",
         "default = \"Alarm\"",
     ),
     ("unknown signal", |t| &mut t.cip_generic, "\"position_command\"", "\"position_comand\""),
     (
         "unknown IDN",
         |t| &mut t.generic_sercos,
-        "idn = \"S-0-0047\"\ndirection",
-        "idn = \"S-0-4047\"\ndirection",
+        "idn = \"S-0-0047\", direction",
+        "idn = \"S-0-4047\", direction",
     ),
     ("diagnosis that is no text", |t| &mut t.generic_sercos, "text = \"S-0-0095\"", "text = \"S-0-0099\""),
     (
@@ -49,7 +49,7 @@ const CASES: &[Case] = &[
         "number = \"S-0-0390\"",
         "number = \"S-0-0375\"",
     ),
-    ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\"\ndirection", "idn = \"S-47\"\ndirection"),
+    ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\", direction", "idn = \"S-47\", direction"),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
     ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),
     ("trim that is no offset", |t| &mut t.cip_generic, "\"torque_offset\"", "\"torque_command\""),
@@ -58,10 +58,34 @@ const CASES: &[Case] = &[
         "two answers",
         |t| &mut t.cip_generic,
         "exception = \"Brake Slip\"",
-        "exception = \"Brake Slip\"\nmanufacturer = 9",
+        "exception = \"Brake Slip\", manufacturer = 9",
     ),
-    ("manufacturer bit 0", |t| &mut t.cip_generic, "manufacturer = 1\n", "manufacturer = 0\n"),
-    ("field value too large", |t| &mut t.generic_sercos, "\"Drive on\", is = 0", "\"Drive on\", is = 2"),
+    ("manufacturer bit 0", |t| &mut t.cip_generic, "manufacturer = 1 }", "manufacturer = 0 }"),
+    (
+        "field value too large",
+        |t| &mut t.generic_sercos,
+        "\"Drive on\", is = \"off\"",
+        "\"Drive on\", is = 2",
+    ),
+    (
+        "unknown value of a field",
+        |t| &mut t.generic_sercos,
+        "\"Drive on\", is = \"off\"",
+        "\"Drive on\", is = \"of\"",
+    ),
+    (
+        "unknown value of the control word",
+        |t| &mut t.generic_sercos,
+        "send = \"Follow command values\"",
+        "send = \"Follow command value\"",
+    ),
+    ("CiA 402: unknown command", |t| &mut t.generic_cia402, "send = \"Shutdown\"", "send = \"Shut down\""),
+    (
+        "unknown key of a group",
+        |t| &mut t.cip_generic,
+        "source = \"Table 5-2.10\"\nrows",
+        "sauce = \"Table 5-2.10\"\nrows",
+    ),
     ("unknown field", |t| &mut t.generic_sercos, "field = \"Drive on\"", "field = \"Drive off\""),
     (
         "who makes the way",
@@ -72,8 +96,8 @@ const CASES: &[Case] = &[
     (
         "neither refused nor omitted",
         |t| &mut t.generic_sercos,
-        "missing = \"omit\"\ncodes",
-        "missing = \"no\"\ncodes",
+        "missing = \"omit\", codes",
+        "missing = \"no\", codes",
     ),
     (
         "procedure without command",
@@ -81,7 +105,7 @@ const CASES: &[Case] = &[
         "commands = [\"S-0-0148\"]",
         "commands = [\"S-0-0147\"]",
     ),
-    ("procedure led by nobody", |t| &mut t.generic_sercos, "led_in = \"position\"\n", ""),
+    ("procedure led by nobody", |t| &mut t.generic_sercos, "led_in = \"position\", ", ""),
     (
         "procedure led in no mode",
         |t| &mut t.generic_sercos,
@@ -91,12 +115,17 @@ const CASES: &[Case] = &[
     (
         "procedure and mode",
         |t| &mut t.generic_sercos,
-        "mode = \"homing\"\ninterpolation = \"drive\"",
-        "mode = \"position\"\ninterpolation = \"drive\"",
+        "mode = \"homing\", interpolation = \"drive\"",
+        "mode = \"position\", interpolation = \"drive\"",
     ),
     ("bound and unbound", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0047\", "),
     ("unbound twice", |t| &mut t.generic_sercos, "idns = [\n    ", "idns = [\n    \"S-0-0026\", "),
-    ("unbound for no reason", |t| &mut t.generic_sercos, "reason = \"one bit", "reason = \"\" # one bit"),
+    (
+        "unbound for no reason",
+        |t| &mut t.generic_sercos,
+        "reason = \"one bit of S-0-0012 by itself: the word carries it\"",
+        "reason = \"\"",
+    ),
     ("CiA 402: bound and unbound", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"6040\""),
     ("CiA 402: unbound twice", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"60E3\""),
     ("CiA 402: unbound and unknown", |t| &mut t.generic_cia402, "\"60FE\"", "\"60FE\", \"5FFF\""),
@@ -104,10 +133,10 @@ const CASES: &[Case] = &[
     (
         "read only",
         |t| &mut t.generic_sercos,
-        "idn = \"S-0-0111\"\ndirection = \"from_drive\"",
-        "idn = \"S-0-0112\"\ndirection = \"both\"",
+        "idn = \"S-0-0111\", direction = \"from_drive\"",
+        "idn = \"S-0-0112\", direction = \"both\"",
     ),
-    ("phase", |t| &mut t.generic_sercos, "phase = 2\ndo = \"write\"", "phase = 4\ndo = \"write\""),
+    ("phase", |t| &mut t.generic_sercos, "phase = 2, do = \"write\"", "phase = 4, do = \"write\""),
     ("ratio", |t| &mut t.generic_sercos, "generic_per_unit = [1_000, 1]", "generic_per_unit = [1_000, 0]"),
     ("state twice", |t| &mut t.cip_generic, "state = \"shutdown\"", "state = \"faulted\""),
     ("attribute twice", |t| &mut t.cip_attributes, "{ id = 41,", "{ id = 40,"),
@@ -566,10 +595,12 @@ fn are_refused_with_place_key_and_what_was_expected() {
 fn errors_carry_their_place_as_numbers() {
     let mut texts = TableTexts::embedded();
     replace(&mut texts.cip_generic, "signal = \"position_command\"", "signal = \"position_comand\"");
-    let line = texts.cip_generic.text.lines().position(|line| line.contains("position_comand")).unwrap() + 1;
+    let lines = &mut texts.cip_generic.text.lines().enumerate();
+    let place = lines.find_map(|(line, text)| Some((line + 1, text.find("\"position_comand\"")? + 1)));
+    let (line, column) = place.unwrap();
     let errors = Mapping::from_texts(&texts).unwrap_err();
     let [error] = errors.list() else { panic!("{errors}") };
-    assert_eq!((error.line, error.column, error.key.as_str()), (line, 10, "signal"));
+    assert_eq!((error.line, error.column, error.key.as_str()), (line, column, "signal"));
     assert_eq!(error.file, "mappings/tables/cip-generic.toml");
 }
 
@@ -614,12 +645,12 @@ fn a_changed_ratio_makes_an_example_fail() {
     let changes: &[(Table, &str, &str)] = &[
         (
             |t| &mut t.cip_generic,
-            "quantity = \"torque\"\ngeneric_per_unit = [10_000, 1]",
-            "quantity = \"torque\"\ngeneric_per_unit = [1_000, 1]",
+            "quantity = \"torque\", generic_per_unit = [10_000, 1]",
+            "quantity = \"torque\", generic_per_unit = [1_000, 1]",
         ),
         (|t| &mut t.cip_generic, "nanounits = 25_400_000_000", "nanounits = 25_000_000_000"),
         (|t| &mut t.generic_sercos, "divisor = 3_600_000, expect", "divisor = 360_000, expect"),
-        (|t| &mut t.generic_sercos, "factor = [-1, 1]\n", ""),
+        (|t| &mut t.generic_sercos, "factor = [-1, 1], ", ""),
     ];
     for (table, from, to) in changes {
         let mut texts = TableTexts::embedded();

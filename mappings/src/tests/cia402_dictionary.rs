@@ -124,7 +124,7 @@ fn knows_states_by_their_mask() {
 #[test]
 fn unknown_error_codes_have_a_class() {
     let errors = cia402().codes("Error code").unwrap();
-    assert_eq!(errors.codes.len(), 187);
+    assert_eq!(errors.codes.len(), 190);
     assert_eq!(errors.name_of(0x8611), Some("Following error"));
     assert_eq!(errors.class_of(0x8611), Some("Positioning"));
     assert_eq!((errors.name_of(0x2399), errors.class_of(0x2399)), (None, Some("Current, output side")));

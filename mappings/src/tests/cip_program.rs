@@ -46,7 +46,7 @@ fn a_reference_shift_is_taken_off_in_counts() {
 }
 
 #[test]
-fn an_unwind_position_folds_actual_positions_and_unrolls_commands() {
+fn an_unwind_position_unrolls_commands_and_is_left_to_the_device_for_actual_positions() {
     let scaling = CipScaling { unwind: Some(360_000), counts_per_unit: 360_000, ..rotary_counts() };
     let program = shipped().cip_program(&scaling).unwrap();
     let mut trackers = program.trackers();
@@ -60,9 +60,9 @@ fn an_unwind_position_folds_actual_positions_and_unrolls_commands() {
     }
     let mut feedback = AxisFeedback::default();
     feedback.set(Signal::PositionActual, -1_000_000_000 / 4);
-    let mut values = CyclicValues::default();
-    program.encode(&feedback, 1, &mut values);
-    assert_eq!(values.0[0], Some(CipValue::Dint(270_000)));
+    let mut image = DriveImage::default();
+    program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
+    assert_eq!((image.position, image.unwind), (-90_000, Some(360_000)));
 }
 
 #[test]
@@ -230,8 +230,8 @@ proptest! {
         prop_assert!(report.is_clean());
         let mut feedback = AxisFeedback::default();
         feedback.set(Signal::PositionActual, command.position.0);
-        let mut back = CyclicValues::default();
-        program.encode(&feedback, 1, &mut back);
-        prop_assert_eq!(back.0[0], Some(CipValue::Dint(counts)));
+        let mut image = DriveImage::default();
+        program.drive_image(&feedback, &FaultSet::new(), &mut Told::default(), &mut image);
+        prop_assert_eq!(image.position, i64::from(counts));
     }
 }

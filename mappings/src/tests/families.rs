@@ -90,7 +90,7 @@ fn torque_that_is_no_thousandth_is_not_used_as_one() {
     assert_eq!(
         left(&own),
         [
-            "torque: nobody says what a count of permille of rated torque is: expected a factor group in the drive, or `counts` in the \
+            "torque: the size of a count of permille of rated torque is not known: expected a factor group in the drive, or `counts` in the \
           configuration"
         ]
     );

@@ -106,7 +106,8 @@ fn the_last_overlay_counts_and_single_tables_change_by_key() {
 fn every_list_of_the_tables_has_an_identity() {
     for (path, text) in FILES {
         let name = table_name(path);
-        let tree = DeTable::parse(text).unwrap();
+        let mut tree = DeTable::parse(text).unwrap();
+        groups::spread(tree.get_mut());
         for (key, value) in tree.get_ref() {
             let DeValue::Array(rows) = value.get_ref() else { continue };
             let section = sections(name).iter().find(|section| section.name == *key.get_ref());

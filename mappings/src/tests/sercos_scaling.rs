@@ -125,7 +125,14 @@ fn lsb(axis: &SercosAxis, facts: &DriveFacts, quantity: usize) -> Result<Lsb, Se
         Signal::TorqueCommand,
     ];
     let dictionary = &mapping.dictionaries.sercos;
-    compile_sercos::unit_of(&mapping.sercos, dictionary, axis.units, facts, idn, of[quantity].quantity())
+    crate::sercos::compile::unit_of(
+        &mapping.sercos,
+        dictionary,
+        axis.units,
+        facts,
+        idn,
+        of[quantity].quantity(),
+    )
 }
 
 fn ratio_of(lsb: Lsb) -> f64 {
@@ -353,7 +360,11 @@ fn modulo_positions_know_their_longest_step() {
     );
     for (range, divider, what) in [
         (1, None, "S-0-0103: expected a number above 1, got 1"),
-        (3_600_000, Some(2_u16), "S-0-0294: expected 1, as nobody tells how it changes the range, got 2"),
+        (
+            3_600_000,
+            Some(2_u16),
+            "S-0-0294: expected 1, because no source says how it changes the range, got 2",
+        ),
         (
             i64::from(u32::MAX),
             None,

@@ -12,6 +12,7 @@
 //! | 10 | reserved |
 //! | 11..15 | of the manufacturer |
 
+use crate::generated::bits::controlword;
 use core::fmt;
 
 use bitflags::bitflags;
@@ -21,29 +22,29 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct Controlword: u16 {
         /// Bit 0: switch on.
-        const SWITCH_ON = 1 << 0;
+        const SWITCH_ON = controlword::SWITCH_ON;
         /// Bit 1: enable voltage.
-        const ENABLE_VOLTAGE = 1 << 1;
+        const ENABLE_VOLTAGE = controlword::ENABLE_VOLTAGE;
         /// Bit 2: 0 makes a quick stop.
-        const QUICK_STOP = 1 << 2;
+        const QUICK_STOP = controlword::QUICK_STOP;
         /// Bit 3: enable operation.
-        const ENABLE_OPERATION = 1 << 3;
+        const ENABLE_OPERATION = controlword::ENABLE_OPERATION;
         /// Bit 4, of the mode of operation.
-        const MODE_4 = 1 << 4;
+        const MODE_4 = controlword::NEW_SET_POINT;
         /// Bit 5, of the mode of operation.
-        const MODE_5 = 1 << 5;
+        const MODE_5 = controlword::CHANGE_SET_IMMEDIATELY;
         /// Bit 6, of the mode of operation.
-        const MODE_6 = 1 << 6;
+        const MODE_6 = controlword::RELATIVE;
         /// Bit 7: a rising edge resets the fault.
-        const FAULT_RESET = 1 << 7;
+        const FAULT_RESET = controlword::FAULT_RESET;
         /// Bit 8: halt.
-        const HALT = 1 << 8;
+        const HALT = controlword::HALT;
         /// Bit 9, of the mode of operation.
-        const MODE_9 = 1 << 9;
+        const MODE_9 = controlword::CHANGE_ON_SET_POINT;
         /// Bit 10.
         const RESERVED = 1 << 10;
         /// Bits 11 to 15.
-        const MANUFACTURER = 0x1F << 11;
+        const MANUFACTURER = controlword::MANUFACTURER_SPECIFIC;
     }
 }
 

@@ -1,35 +1,8 @@
 //! Modes of operation, objects 6060h (set), 6061h (shown) and 6502h (supported).
 
+use crate::generated::bits::supported_modes;
+pub use crate::generated::codes::Mode;
 use bitflags::bitflags;
-use profile_generic::open_code;
-
-open_code! {
-    /// A mode of operation. Below 0: of the manufacturer.
-    pub struct Mode(i8) {
-        /// No mode.
-        NONE = 0 => "no mode",
-        /// pp.
-        PROFILE_POSITION = 1 => "profile position",
-        /// vl, of frequency converters.
-        VELOCITY = 2 => "velocity",
-        /// pv.
-        PROFILE_VELOCITY = 3 => "profile velocity",
-        /// tq.
-        TORQUE = 4 => "profile torque",
-        /// hm.
-        HOMING = 6 => "homing",
-        /// ip.
-        INTERPOLATED_POSITION = 7 => "interpolated position",
-        /// csp.
-        CYCLIC_POSITION = 8 => "cyclic synchronous position",
-        /// csv.
-        CYCLIC_VELOCITY = 9 => "cyclic synchronous velocity",
-        /// cst.
-        CYCLIC_TORQUE = 10 => "cyclic synchronous torque",
-        /// cstca.
-        CYCLIC_TORQUE_COMMUTATION = 11 => "cyclic synchronous torque with commutation angle",
-    }
-}
 
 impl Mode {
     /// Whether the set-points of the master are followed from SYNC to SYNC.
@@ -51,25 +24,25 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct SupportedModes: u32 {
         /// pp.
-        const PROFILE_POSITION = 1 << 0;
+        const PROFILE_POSITION = supported_modes::PP;
         /// vl.
-        const VELOCITY = 1 << 1;
+        const VELOCITY = supported_modes::VL;
         /// pv.
-        const PROFILE_VELOCITY = 1 << 2;
+        const PROFILE_VELOCITY = supported_modes::PV;
         /// tq.
-        const TORQUE = 1 << 3;
+        const TORQUE = supported_modes::TQ;
         /// hm.
-        const HOMING = 1 << 5;
+        const HOMING = supported_modes::HM;
         /// ip.
-        const INTERPOLATED_POSITION = 1 << 6;
+        const INTERPOLATED_POSITION = supported_modes::IP;
         /// csp.
-        const CYCLIC_POSITION = 1 << 7;
+        const CYCLIC_POSITION = supported_modes::CSP;
         /// csv.
-        const CYCLIC_VELOCITY = 1 << 8;
+        const CYCLIC_VELOCITY = supported_modes::CSV;
         /// cst.
-        const CYCLIC_TORQUE = 1 << 9;
+        const CYCLIC_TORQUE = supported_modes::CST;
         /// cstca.
-        const CYCLIC_TORQUE_COMMUTATION = 1 << 10;
+        const CYCLIC_TORQUE_COMMUTATION = supported_modes::CSTCA;
     }
 }
 

@@ -2,7 +2,9 @@
 //!
 //! Values below 0 are of the manufacturer. Names and defaults: Beckhoff's servo sample, Panasonic A6B, omsim.
 
-use profile_generic::open_code;
+pub use crate::generated::codes::{
+    AbortConnectionOption, DisableOption, FaultReactionOption, HaltOption, QuickStopOption, ShutdownOption,
+};
 
 /// How an axis is brought to a stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -32,30 +34,6 @@ impl Stop {
     }
 }
 
-open_code! {
-    /// 605Ah, quick stop: transition 11. 1 to 4 end in *switch on disabled*, 5 to 8 stand with torque.
-    pub struct QuickStopOption(i16) {
-        /// Disable the drive.
-        DISABLE = 0 => "disable",
-        /// Slow-down ramp, then off.
-        SLOW_DOWN_RAMP = 1 => "slow-down ramp",
-        /// Quick stop ramp, then off; the default.
-        QUICK_STOP_RAMP = 2 => "quick stop ramp",
-        /// Current limit, then off.
-        CURRENT_LIMIT = 3 => "current limit",
-        /// Voltage limit, then off.
-        VOLTAGE_LIMIT = 4 => "voltage limit",
-        /// Slow-down ramp, then hold.
-        SLOW_DOWN_RAMP_AND_HOLD = 5 => "slow-down ramp and hold",
-        /// Quick stop ramp, then hold.
-        QUICK_STOP_RAMP_AND_HOLD = 6 => "quick stop ramp and hold",
-        /// Current limit, then hold.
-        CURRENT_LIMIT_AND_HOLD = 7 => "current limit and hold",
-        /// Voltage limit, then hold.
-        VOLTAGE_LIMIT_AND_HOLD = 8 => "voltage limit and hold",
-    }
-}
-
 impl QuickStopOption {
     /// Whether the drive stays in *quick stop active*.
     #[must_use]
@@ -70,31 +48,11 @@ impl QuickStopOption {
     }
 }
 
-open_code! {
-    /// 605Bh, shutdown: transition 8.
-    pub struct ShutdownOption(i16) {
-        /// Disable; the default.
-        DISABLE = 0 => "disable",
-        /// Slow-down ramp first.
-        SLOW_DOWN_RAMP = 1 => "slow-down ramp",
-    }
-}
-
 impl ShutdownOption {
     /// How it stops; `None` for a code of the manufacturer or a reserved one.
     #[must_use]
     pub const fn stop(self) -> Option<Stop> {
         if self.0 > 1 { None } else { Stop::of(self.0) }
-    }
-}
-
-open_code! {
-    /// 605Ch, disable operation: transition 5.
-    pub struct DisableOption(i16) {
-        /// Disable.
-        DISABLE = 0 => "disable",
-        /// Slow-down ramp first; the default.
-        SLOW_DOWN_RAMP = 1 => "slow-down ramp",
     }
 }
 
@@ -106,20 +64,6 @@ impl DisableOption {
     }
 }
 
-open_code! {
-    /// 605Dh, halt: bit 8 of the controlword. The axis stands with torque.
-    pub struct HaltOption(i16) {
-        /// Slow-down ramp; the default.
-        SLOW_DOWN_RAMP = 1 => "slow-down ramp",
-        /// Quick stop ramp.
-        QUICK_STOP_RAMP = 2 => "quick stop ramp",
-        /// Current limit.
-        CURRENT_LIMIT = 3 => "current limit",
-        /// Voltage limit.
-        VOLTAGE_LIMIT = 4 => "voltage limit",
-    }
-}
-
 impl HaltOption {
     /// How it stops; `None` for a code of the manufacturer or a reserved one.
     #[must_use]
@@ -128,41 +72,11 @@ impl HaltOption {
     }
 }
 
-open_code! {
-    /// 605Eh, fault reaction: transition 13.
-    pub struct FaultReactionOption(i16) {
-        /// Disable.
-        DISABLE = 0 => "disable",
-        /// Slow-down ramp.
-        SLOW_DOWN_RAMP = 1 => "slow-down ramp",
-        /// Quick stop ramp; the default.
-        QUICK_STOP_RAMP = 2 => "quick stop ramp",
-        /// Current limit.
-        CURRENT_LIMIT = 3 => "current limit",
-        /// Voltage limit.
-        VOLTAGE_LIMIT = 4 => "voltage limit",
-    }
-}
-
 impl FaultReactionOption {
     /// How it stops; `None` for a code of the manufacturer or a reserved one.
     #[must_use]
     pub const fn stop(self) -> Option<Stop> {
         Stop::of(self.0)
-    }
-}
-
-open_code! {
-    /// 6007h, abort connection: the master is gone while the axis runs.
-    pub struct AbortConnectionOption(i16) {
-        /// Nothing.
-        NONE = 0 => "no action",
-        /// A fault; the default.
-        FAULT = 1 => "fault",
-        /// As the command disable voltage.
-        DISABLE_VOLTAGE = 2 => "disable voltage",
-        /// As the command quick stop.
-        QUICK_STOP = 3 => "quick stop",
     }
 }
 

@@ -1,5 +1,6 @@
 //! Polarity, object 607Eh: which data change their sign between the master and the drive.
 
+use crate::generated::bits::polarity;
 use bitflags::bitflags;
 
 bitflags! {
@@ -7,9 +8,9 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct Polarity: u8 {
         /// Bit 7: positions, in pp, csp, ip and homing.
-        const POSITION = 1 << 7;
+        const POSITION = polarity::POSITION_POLARITY;
         /// Bit 6: velocities, in pv, csv and vl.
-        const VELOCITY = 1 << 6;
+        const VELOCITY = polarity::VELOCITY_POLARITY;
     }
 }
 

@@ -11,24 +11,30 @@
 //! Source: manuals of Panasonic and Botnana. Some drives toggle bits 6 and 7 of 60B9h with every stored edge; 60D5h to
 //! 60D8h count them.
 
+use crate::generated::bits::{probe_function, probe_status};
 use bitflags::bitflags;
+
+/// The byte of probe 1.
+const fn first(word: u16) -> u8 {
+    word.to_le_bytes()[0]
+}
 
 bitflags! {
     /// Function of one probe: one byte of 60B8h.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ProbeFunction: u8 {
         /// Enable.
-        const ENABLE = 1 << 0;
+        const ENABLE = first(probe_function::ENABLE_TOUCH_PROBE_1);
         /// Take every edge instead of the first one.
-        const CONTINUOUS = 1 << 1;
+        const CONTINUOUS = first(probe_function::CONTINUOUS_1);
         /// The index pulse of the encoder instead of the input.
-        const INDEX_PULSE = 1 << 2;
+        const INDEX_PULSE = 1 << probe_function::INDEX_PULSE_1.trailing_zeros();
         /// The source is that of 60D0h.
-        const OTHER_SOURCE = 1 << 3;
+        const OTHER_SOURCE = 2 << probe_function::INDEX_PULSE_1.trailing_zeros();
         /// Sample on the rising edge.
-        const RISING = 1 << 4;
+        const RISING = first(probe_function::SAMPLE_AT_POSITIVE_EDGE_1);
         /// Sample on the falling edge.
-        const FALLING = 1 << 5;
+        const FALLING = first(probe_function::SAMPLE_AT_NEGATIVE_EDGE_1);
         /// Bits 6 and 7.
         const MANUFACTURER = 3 << 6;
     }
@@ -39,11 +45,11 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ProbeStatus: u8 {
         /// Enabled.
-        const ENABLED = 1 << 0;
+        const ENABLED = first(probe_status::TOUCH_PROBE_1_ENABLED);
         /// The position of a rising edge is stored.
-        const RISING_STORED = 1 << 1;
+        const RISING_STORED = first(probe_status::POSITIVE_EDGE_STORED_1);
         /// The position of a falling edge is stored.
-        const FALLING_STORED = 1 << 2;
+        const FALLING_STORED = first(probe_status::NEGATIVE_EDGE_STORED_1);
         /// Bits 6 and 7.
         const MANUFACTURER = 3 << 6;
     }

@@ -16,6 +16,7 @@
 //! | 11 | an internal limit is active |
 //! | 12, 13 | of the mode of operation |
 
+use crate::generated::bits::statusword;
 use core::fmt;
 
 use bitflags::bitflags;
@@ -28,35 +29,35 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct Statusword: u16 {
         /// Bit 0: ready to switch on.
-        const READY_TO_SWITCH_ON = 1 << 0;
+        const READY_TO_SWITCH_ON = statusword::READY_TO_SWITCH_ON;
         /// Bit 1: switched on.
-        const SWITCHED_ON = 1 << 1;
+        const SWITCHED_ON = statusword::SWITCHED_ON;
         /// Bit 2: operation enabled.
-        const OPERATION_ENABLED = 1 << 2;
+        const OPERATION_ENABLED = statusword::OPERATION_ENABLED;
         /// Bit 3: fault.
-        const FAULT = 1 << 3;
+        const FAULT = statusword::FAULT;
         /// Bit 4: the power stage has its voltage.
-        const VOLTAGE_ENABLED = 1 << 4;
+        const VOLTAGE_ENABLED = statusword::VOLTAGE_ENABLED;
         /// Bit 5: 0 while a quick stop is active.
-        const QUICK_STOP = 1 << 5;
+        const QUICK_STOP = statusword::QUICK_STOP;
         /// Bit 6: switch on disabled.
-        const SWITCH_ON_DISABLED = 1 << 6;
+        const SWITCH_ON_DISABLED = statusword::SWITCH_ON_DISABLED;
         /// Bit 7: warning.
-        const WARNING = 1 << 7;
+        const WARNING = statusword::WARNING;
         /// Bit 8, of the manufacturer.
-        const MANUFACTURER_8 = 1 << 8;
+        const MANUFACTURER_8 = statusword::MANUFACTURER_SPECIFIC;
         /// Bit 9: the controlword is obeyed.
-        const REMOTE = 1 << 9;
+        const REMOTE = statusword::REMOTE;
         /// Bit 10: target reached; with halt, standing.
-        const TARGET_REACHED = 1 << 10;
+        const TARGET_REACHED = statusword::TARGET_REACHED;
         /// Bit 11: an internal limit is active.
-        const INTERNAL_LIMIT = 1 << 11;
+        const INTERNAL_LIMIT = statusword::INTERNAL_LIMIT_ACTIVE;
         /// Bit 12, of the mode of operation.
-        const MODE_12 = 1 << 12;
+        const MODE_12 = statusword::SET_POINT_ACKNOWLEDGE;
         /// Bit 13, of the mode of operation.
-        const MODE_13 = 1 << 13;
+        const MODE_13 = statusword::FOLLOWING_ERROR;
         /// Bits 14 and 15, of the manufacturer.
-        const MANUFACTURER = 3 << 14;
+        const MANUFACTURER = statusword::MANUFACTURER_SPECIFIC_14;
     }
 }
 

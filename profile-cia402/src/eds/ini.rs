@@ -78,7 +78,7 @@ impl<'t> Section<'t> {
     }
 }
 
-/// Sections and keys of a file. Of what is there twice the first one counts; case does not matter.
+/// Sections and keys of a file. Of what is defined twice the first one counts; case does not matter.
 #[derive(Debug, Default)]
 pub(super) struct Document<'t> {
     pub sections: Vec<Section<'t>>,

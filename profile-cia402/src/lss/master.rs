@@ -113,7 +113,7 @@ pub enum LssFailure {
         specific: u8,
     },
     /// The scan came to an address to which nobody answered: devices came or went while it ran.
-    #[error("the scan came to {0}, which nobody has")]
+    #[error("the scan came to {0}, which no device has")]
     Unstable(LssAddress),
     /// A device told a node-id that there is not.
     #[error("expected a node-id of 1 to 127 or 255, got {0}")]
@@ -422,7 +422,7 @@ impl fmt::Display for LssReply {
             Self::NodeId(Some(node)) => write!(f, "node-id {node}"),
             Self::NodeId(None) => f.write_str("no node-id"),
             Self::Found(true) => f.write_str("found"),
-            Self::Found(false) => f.write_str("nobody there"),
+            Self::Found(false) => f.write_str("no device"),
         }
     }
 }

@@ -15,6 +15,7 @@
 //! `Await` is where the application works. `Map` configures the PDOs, `Control` the heartbeats, and `Ready` waits for the others
 //! if all shall start together.
 
+pub use crate::generated::codes::BootStatus;
 use core::fmt;
 
 /// Where a device is.
@@ -165,42 +166,6 @@ impl fmt::Display for BootState {
             Self::Lost => "lost",
             Self::Failed => "failed",
         })
-    }
-}
-
-profile_generic::open_code! {
-    /// Error status of a boot-up: a letter (CiA 302-2).
-    pub struct BootStatus(u8) {
-        /// A: the device is not in the list of this network.
-        NOT_LISTED = 0x41 => "A: not in the list of devices",
-        /// B: it does not answer to 1000.
-        NO_ANSWER = 0x42 => "B: no answer to device type",
-        /// C: 1000 is another one.
-        DEVICE_TYPE = 0x43 => "C: another device type",
-        /// D: 1018:1 is another one.
-        VENDOR = 0x44 => "D: another vendor",
-        /// E: its heartbeat was lost.
-        HEARTBEAT_LOST = 0x45 => "E: heartbeat lost",
-        /// F: it did not answer to node guarding.
-        GUARDING = 0x46 => "F: no answer to node guarding",
-        /// G: the version of its program cannot be told.
-        PROGRAM_VERSION = 0x47 => "G: program version not known",
-        /// H: it has another program, and may not be given one.
-        PROGRAM_OTHER = 0x48 => "H: another program",
-        /// I: its program could not be downloaded.
-        PROGRAM_DOWNLOAD = 0x49 => "I: program download failed",
-        /// J: its configuration could not be downloaded.
-        CONFIGURATION = 0x4A => "J: configuration download failed",
-        /// K: its heartbeat did not come when it was started.
-        NO_HEARTBEAT = 0x4B => "K: no heartbeat while starting",
-        /// L: it was in operation before the master came; no error.
-        ALREADY_OPERATIONAL = 0x4C => "L: was operational already",
-        /// M: 1018:2 is another one.
-        PRODUCT = 0x4D => "M: another product code",
-        /// N: 1018:3 is another one.
-        REVISION = 0x4E => "N: another revision",
-        /// O: 1018:4 is another one.
-        SERIAL = 0x4F => "O: another serial number",
     }
 }
 

@@ -117,7 +117,7 @@ pub enum Event {
         /// What it tells.
         emcy: Emcy,
     },
-    /// The device sends more EMCYs than are told one by one. The last one can be read at any time.
+    /// The device sends more EMCYs than are logged one by one. The last one can be read at any time.
     EmcyStorm {
         /// The device.
         node: NodeId,
@@ -215,9 +215,11 @@ pub enum Event {
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::AwaitingApplication { node, kept: false } => write!(f, "node {node} is the right one"),
+            Self::AwaitingApplication { node, kept: false } => {
+                write!(f, "node {node} is the expected device")
+            }
             Self::AwaitingApplication { node, kept: true } => {
-                write!(f, "node {node} is the right one and still in operation")
+                write!(f, "node {node} is the expected device and still in operation")
             }
             Self::MappingAdopted { node, direction, number } => {
                 write!(f, "node {node} keeps its own mapping of {direction} {number}")
@@ -265,7 +267,7 @@ impl fmt::Display for Event {
             Self::StateChanged { node, state } => write!(f, "node {node} has left operation: it is {state}"),
             Self::Emcy { node, emcy } => write!(f, "node {node}: {emcy}"),
             Self::EmcyStorm { node } => {
-                write!(f, "node {node} sends more emergency messages than are told one by one")
+                write!(f, "node {node} sends more emergency messages than are logged one by one")
             }
             Self::PdoLost { node, number } => {
                 write!(f, "TPDO {number} of node {node} is missing more often than permitted")
@@ -274,7 +276,7 @@ impl fmt::Display for Event {
             Self::PdoLength { node, number, expected, found } => {
                 write!(
                     f,
-                    "TPDO {number} of node {node}: expected {expected} bytes, got {found}; it is not taken"
+                    "TPDO {number} of node {node}: expected {expected} bytes, got {found}; it is ignored"
                 )
             }
             Self::DuplicateNode { node, sign } => {
@@ -285,9 +287,9 @@ impl fmt::Display for Event {
                 };
                 write!(f, "two devices seem to have node-id {node}: {sign}")
             }
-            Self::UnknownNode { node } => write!(f, "node {node} is there and not in the list"),
+            Self::UnknownNode { node } => write!(f, "node {node} is on the bus and not in the configuration"),
             Self::SecondMaster { id, .. } => {
-                write!(f, "somebody else sends {id}, which only the master may send")
+                write!(f, "another station sends {id}, which only the master may send")
             }
             Self::OtherMaster(other) => write!(f, "{other}"),
             Self::GaveWay => {
@@ -312,7 +314,7 @@ pub enum Refusal {
     UnknownNode,
     /// The frame has a wrong length or content for what it is.
     Malformed,
-    /// An answer that nobody has asked for.
+    /// An answer to no request.
     Unexpected,
     /// A PDO of a device that is not in operation.
     NotOperational,
@@ -340,7 +342,7 @@ impl fmt::Display for Refusal {
             Self::NotOurs => "not for the master",
             Self::UnknownNode => "device that is not in the list",
             Self::Malformed => "wrong length or content",
-            Self::Unexpected => "answer that nobody has asked for",
+            Self::Unexpected => "answer to no request",
             Self::NotOperational => "PDO of a device that is not in operation",
             Self::SecondMaster => "frame that only the master may send",
         })

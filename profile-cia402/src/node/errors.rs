@@ -5,8 +5,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::dictionary::Dictionary;
 use crate::drive::ErrorCode;
-use crate::drive::errors::ErrorClass;
-use crate::wire::emcy::{Emcy, EmcyCode, ErrorRegister};
+use crate::wire::emcy::{Emcy, ErrorRegister};
 
 /// Error register.
 pub const REGISTER: u16 = 0x1001;
@@ -53,8 +52,7 @@ impl Errors {
 
     /// Forgets what belongs to the communication, which starts anew, and what was not told yet.
     pub fn restart(&mut self, dictionary: &mut Dictionary) {
-        let communication = [ErrorClass::COMMUNICATION, ErrorClass::PROTOCOL];
-        self.active.retain(|(code, _)| !communication.contains(&code.class()));
+        self.active.retain(|(code, _)| !code.is_communication());
         self.waiting.clear();
         dictionary.set(REGISTER, 0, i64::from(self.register()));
     }
@@ -70,7 +68,7 @@ impl Errors {
             self.waiting.remove(0);
         }
         let register = ErrorRegister::from_bits_retain(register);
-        self.waiting.push(Emcy { code: EmcyCode(code.0), register, vendor: [source, 0, 0, 0, 0] });
+        self.waiting.push(Emcy { code: code, register, vendor: [source, 0, 0, 0, 0] });
     }
 
     /// The next message that may be sent now.

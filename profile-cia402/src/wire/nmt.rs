@@ -1,44 +1,13 @@
 //! NMT commands, and the state of a device that they change.
 
+pub use crate::generated::codes::{NmtCommand, NmtState};
 use core::fmt;
-
-use profile_generic::open_code;
 
 use super::cob_id::NodeId;
 use super::error::{Error, exact};
 
 /// Bytes of a command.
 pub const NMT_LEN: usize = 2;
-
-open_code! {
-    /// Command specifier.
-    pub struct NmtCommand(u8) {
-        /// Go to operational.
-        START = 1 => "start",
-        /// Go to stopped.
-        STOP = 2 => "stop",
-        /// Go to pre-operational.
-        ENTER_PRE_OPERATIONAL = 128 => "enter pre-operational",
-        /// Start again from power-on.
-        RESET_NODE = 129 => "reset node",
-        /// Start the communication again.
-        RESET_COMMUNICATION = 130 => "reset communication",
-    }
-}
-
-open_code! {
-    /// State of a device as its heartbeat tells it.
-    pub struct NmtState(u8) {
-        /// Just started; a device is pre-operational from here on.
-        BOOT_UP = 0 => "boot-up",
-        /// Only NMT and error control.
-        STOPPED = 4 => "stopped",
-        /// All services.
-        OPERATIONAL = 5 => "operational",
-        /// All services but PDOs.
-        PRE_OPERATIONAL = 127 => "pre-operational",
-    }
-}
 
 impl NmtState {
     /// Whether SDOs are served.

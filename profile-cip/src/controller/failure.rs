@@ -481,7 +481,7 @@ impl fmt::Display for Failure {
             Self::WrongMode { axis, mode } => write!(f, "axis {axis}: this step does not go with {mode}"),
             Self::UnknownAxis { axis, count } => write!(f, "axis {axis}: expected an axis from 1 to {count}"),
             Self::NotScaled { axis } => {
-                write!(f, "axis {axis}: does not move, since nobody knows how many counts its unit has")
+                write!(f, "axis {axis}: does not move, because the counts of its unit are not known")
             }
             Self::BeyondLimit { axis, what, value, limit } => {
                 write!(f, "axis {axis}: {what} {value} is beyond the limit {limit}")

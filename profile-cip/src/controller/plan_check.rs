@@ -139,7 +139,7 @@ mod tests {
         config.connection_size = 180;
         let bad = [
             (go(3, 0.0, LIMITS), "axis 3: expected an axis from 1 to 2"),
-            (go(2, 0.0, LIMITS), "axis 2: does not move, since nobody knows how many counts its unit has"),
+            (go(2, 0.0, LIMITS), "axis 2: does not move, because the counts of its unit are not known"),
             (go(1, 5.5, LIMITS), "axis 1: position 5.5 is beyond the limit 5"),
             (go(1, 1.0, Limits { velocity: 2.5, ..LIMITS }), "axis 1: velocity 2.5 is beyond the limit 2"),
             (

@@ -10,6 +10,8 @@ use core::fmt;
 
 mod catalogue;
 
+pub(crate) use catalogue::parameter_rows;
+
 pub use catalogue::{CATALOGUE, Parameter, ParameterRow};
 
 /// The longest text of a parameter in bytes: a CIP SHORT_STRING product name has at most 32.

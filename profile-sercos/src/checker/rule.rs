@@ -380,7 +380,7 @@ impl fmt::Display for Rule {
                 write!(f, "CP3 without a good {idn} at position {slave}")
             }
             Rule::NotAlike { slave, idn } => {
-                write!(f, "position {slave} was told another {idn} than the first slave")
+                write!(f, "position {slave} got another {idn} than the first slave")
             }
             Rule::CycleTime { found } => write!(f, "{found} ns is no cycle time"),
             Rule::Load { needed_ns, cycle_ns } => {
@@ -433,13 +433,13 @@ impl fmt::Display for Rule {
                 field.selection, field.word, field.info
             ),
             Rule::HotPlugValue { code, found, expected } => {
-                write!(f, "HP0 tells {code} {found}, the others were told {expected}")
+                write!(f, "HP0 announces {code} {found}, the others got {expected}")
             }
             Rule::HotPlugAddress { address } => {
                 write!(f, "HP1 gives a place to address {address}, which takes part already")
             }
             Rule::HotPlugAnswer { word } => {
-                write!(f, "answers {word:#06x} in the hot-plug field, which nobody asked")
+                write!(f, "answers {word:#06x} in the hot-plug field without a question")
             }
         }
     }

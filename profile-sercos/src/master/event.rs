@@ -103,9 +103,9 @@ impl FromIterator<Idn> for Invalid {
 impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.idns.is_empty() {
-            return f.write_str("the slave does not tell which parameter is invalid");
+            return f.write_str("the slave does not report which parameter is invalid");
         }
-        f.write_str("the slave finds invalid")?;
+        f.write_str("the slave reports as invalid")?;
         for (place, idn) in self.idns.iter().enumerate() {
             write!(f, "{} {idn}", if place > 0 { "," } else { "" })?;
         }
@@ -320,7 +320,7 @@ pub enum Event {
         /// Why.
         reason: HotPlugRefusal,
     },
-    /// The slaves have measured their delays once more, because the way of the telegrams is another one.
+    /// The slaves have measured their delays again, because the way of the telegrams is another one.
     Measured {
         /// Slaves that have.
         slaves: u16,
@@ -373,7 +373,7 @@ impl fmt::Display for Event {
             Event::Topology(topology) => write!(f, "topology: {topology}"),
             Event::CableOpen { low, high } => write!(f, "no connection between {low} and {high}"),
             Event::Isolated { slave, address, port, end: End::Master(_) } => {
-                write!(f, "{slave} with address {address} passes no telegrams on: nobody is reached from {port}")
+                write!(f, "{slave} with address {address} passes no telegrams on: no slave is reached from {port}")
             }
             Event::Isolated { slave, address, port, end } => write!(
                 f,
@@ -382,7 +382,7 @@ impl fmt::Display for Event {
             ),
             Event::RingClosed => f.write_str("the ring is closed again"),
             Event::RingNotClosed { slave, address } => {
-                write!(f, "the ring cannot be closed: {slave} (address {address}) does not do as commanded")
+                write!(f, "the ring cannot be closed: {slave} (address {address}) does not follow the command")
             }
             Event::Unknown { slave, address } => {
                 write!(f, "{slave} with address {address} is not configured")
@@ -394,7 +394,7 @@ impl fmt::Display for Event {
             Event::AddressAssigned { slave, old, new } => {
                 write!(f, "{slave} with address {old} was given address {new}")
             }
-            Event::AwaitingApplication { phase } => write!(f, "{phase}: the application may work"),
+            Event::AwaitingApplication { phase } => write!(f, "{phase}: waiting for the application"),
             Event::StepFailed { slave, idn, failure } => write!(f, "{slave}: {idn}: {failure}"),
             Event::ClassMismatch { slave } => {
                 write!(f, "{slave}: exactly one of SCP_FixCFG and SCP_VarCFG is needed")
@@ -444,9 +444,9 @@ impl fmt::Display for Event {
                 write!(f, "hot plug: the slave with address {address} does not come in: {reason}")
             }
             Event::HotPlugRefused { address: None, reason } => {
-                write!(f, "hot plug: nobody comes in: {reason}")
+                write!(f, "hot plug: no slave comes in: {reason}")
             }
-            Event::Measured { slaves } => write!(f, "{slaves} slaves have measured their delays once more"),
+            Event::Measured { slaves } => write!(f, "{slaves} slaves have measured their delays again"),
             Event::MeasureFailed { slave, idn, failure } => {
                 write!(f, "{slave} goes on with its old delay: {idn}: {failure}")
             }

@@ -5,6 +5,7 @@
 //!
 //! Where a connection is in the telegrams, S-0-1050.x.3, is [`super::layout::Offset`].
 
+use crate::generated::bits::{connection_control, connection_setup};
 use core::fmt;
 
 use bitflags::bitflags;
@@ -19,21 +20,21 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ConnectionControl: u16 {
         /// The producer is ready; before that the data means nothing.
-        const READY = 1 << 0;
+        const READY = connection_control::PRODUCER_READY;
         /// Toggles with every new value.
-        const NEW_DATA = 1 << 1;
+        const NEW_DATA = connection_control::NEW_DATA;
         /// The data field is delayed.
-        const DELAY = 1 << 2;
+        const DELAY = connection_control::DATA_FIELD_DELAY;
         /// Flow control: the producer has stopped.
-        const STOPPED = 1 << 4;
+        const STOPPED = connection_control::FLOW_CONTROL;
         /// Real-time bit 1.
-        const REAL_TIME_1 = 1 << 6;
+        const REAL_TIME_1 = connection_control::REAL_TIME_BIT_1;
         /// Real-time bit 2.
-        const REAL_TIME_2 = 1 << 7;
+        const REAL_TIME_2 = connection_control::REAL_TIME_BIT_2;
         /// Counter, see [`ConnectionControl::counter`].
-        const COUNTER = 0xF000;
+        const COUNTER = connection_control::COUNTER;
         /// Reserved bits, transmitted as 0.
-        const RESERVED = 0x0F28;
+        const RESERVED = connection_control::RESERVED;
     }
 }
 
@@ -101,15 +102,15 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ConnectionSetup: u16 {
         /// The connection is used.
-        const ACTIVE = 1 << 15;
+        const ACTIVE = connection_setup::ACTIVE;
         /// The slave produces (AT); 0: the slave consumes.
-        const PRODUCER = 1 << 14;
+        const PRODUCER = connection_setup::PRODUCER;
         /// Configuration type, see [`ConnectionSetup::configuration`].
-        const CONFIGURATION = 3 << 4;
+        const CONFIGURATION = connection_setup::CONFIGURATION_TYPE;
         /// Timing, see [`ConnectionSetup::timing`].
-        const TIMING = 3;
+        const TIMING = connection_setup::TIMING;
         /// Bits without a public meaning.
-        const RESERVED = 0x3FCC;
+        const RESERVED = connection_setup::RESERVED;
     }
 }
 

@@ -14,6 +14,7 @@
 //! On the way out a slave takes the counter as its topology address, writes its SERCOS address into that word
 //! and adds one to the counter; on the way back it only adds one.
 
+use crate::generated::bits::communication_version;
 use core::fmt;
 
 use super::error::{Error, need, put_u16, put_u32, u16_at, u32_at};
@@ -40,15 +41,15 @@ bitflags::bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct CommunicationVersion: u32 {
         /// Bit 0: address allocation by topology.
-        const ADDRESS_ALLOCATION = 1;
+        const ADDRESS_ALLOCATION = communication_version::ADDRESS_ALLOCATION;
         /// Bit 16: four MDTs and four ATs in CP1 and CP2 instead of two and two.
-        const FOUR_TELEGRAMS = 1 << 16;
+        const FOUR_TELEGRAMS = 1 << communication_version::TELEGRAMS_IN_CP1_AND_CP2.trailing_zeros();
         /// Bit 20: t1, t6 and t7 follow in this telegram.
-        const TIMES = 1 << 20;
+        const TIMES = communication_version::T1_T6_AND_T7_TRANSMITTED;
         /// Bit 21: fast phase switch.
-        const FAST_PHASE_SWITCH = 1 << 21;
+        const FAST_PHASE_SWITCH = communication_version::FAST_PHASE_SWITCH;
         /// Bit 22: the last slave does not send SERCOS telegrams on its free port.
-        const NO_FORWARD_AT_END = 1 << 22;
+        const NO_FORWARD_AT_END = communication_version::LAST_SLAVE_DOES_NOT_FORWARD;
     }
 }
 

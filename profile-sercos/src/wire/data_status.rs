@@ -3,6 +3,7 @@
 //! Parameters: bit 8 set when the operation data is invalid. Procedure commands: bits 3..0 say how far the
 //! command is (set, started, busy, error).
 
+use crate::generated::bits::{data_status, procedure_acknowledgement};
 use core::fmt;
 
 use bitflags::bitflags;
@@ -12,15 +13,15 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DataStatus: u16 {
         /// Procedure command: set in the slave.
-        const SET = 1 << 0;
+        const SET = procedure_acknowledgement::SET_IN_DRIVE;
         /// Procedure command: started.
-        const STARTED = 1 << 1;
+        const STARTED = procedure_acknowledgement::STARTED;
         /// Procedure command: not finished.
-        const BUSY = 1 << 2;
+        const BUSY = procedure_acknowledgement::BUSY;
         /// Procedure command: failed.
-        const ERROR = 1 << 3;
+        const ERROR = procedure_acknowledgement::ERROR;
         /// Parameter: the operation data is invalid.
-        const INVALID = 1 << 8;
+        const INVALID = data_status::OPERATION_DATA_INVALID;
         /// Reserved bits, transmitted as 0.
         const RESERVED = !0x010F;
     }

@@ -1,8 +1,11 @@
 //! C-DEV, the device control word (S-0-1044): what the master tells a slave in every cycle.
 
+use crate::generated::bits::device_control;
 use core::fmt;
 
 use super::header::Channel;
+
+const TOPOLOGY_SHIFT: u32 = device_control::COMMANDED_TOPOLOGY.trailing_zeros();
 
 bitflags::bitflags! {
     /// Device control word without the two bits of the commanded topology, which
@@ -10,17 +13,17 @@ bitflags::bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DeviceControl: u16 {
         /// Bit 15: show the identification light.
-        const IDENTIFICATION = 1 << 15;
+        const IDENTIFICATION = device_control::IDENTIFICATION;
         /// Bit 14: toggles with each topology command.
-        const TOPOLOGY_CHANGE = 1 << 14;
+        const TOPOLOGY_CHANGE = device_control::TOPOLOGY_CHANGE;
         /// Bit 13: high bit of the commanded topology.
-        const TOPOLOGY_1 = 1 << 13;
+        const TOPOLOGY_1 = 2 << TOPOLOGY_SHIFT;
         /// Bit 12: low bit of the commanded topology.
-        const TOPOLOGY_0 = 1 << 12;
+        const TOPOLOGY_0 = 1 << TOPOLOGY_SHIFT;
         /// Bit 11: the ring is physically closed.
-        const RING_CLOSED = 1 << 11;
+        const RING_CLOSED = device_control::PHYSICAL_RING_CLOSED;
         /// Bit 8: the master data of this slave is valid.
-        const MASTER_VALID = 1 << 8;
+        const MASTER_VALID = device_control::MASTER_VALID;
     }
 }
 
@@ -51,15 +54,15 @@ impl Topology {
     pub const fn bits(self) -> u16 {
         match self {
             Topology::FastForward => 0,
-            Topology::LoopbackForwardPrimary => 1 << 12,
-            Topology::LoopbackForwardSecondary => 2 << 12,
-            Topology::StoreAndForward => 3 << 12,
+            Topology::LoopbackForwardPrimary => 1 << TOPOLOGY_SHIFT,
+            Topology::LoopbackForwardSecondary => 2 << TOPOLOGY_SHIFT,
+            Topology::StoreAndForward => 3 << TOPOLOGY_SHIFT,
         }
     }
 
     /// Reads bits 13..12 of a device word.
     pub const fn from_word(word: u16) -> Topology {
-        match word >> 12 & 3 {
+        match word >> TOPOLOGY_SHIFT & 3 {
             0 => Topology::FastForward,
             1 => Topology::LoopbackForwardPrimary,
             2 => Topology::LoopbackForwardSecondary,

@@ -1,9 +1,13 @@
 //! S-DEV, the device status word (S-0-1045): what a slave says about itself in every cycle.
 
+use crate::generated::bits::device_status;
 use core::fmt;
 
 use super::device_control::Topology;
 use super::header::Channel;
+
+const TOPOLOGY_SHIFT: u32 = device_status::CURRENT_TOPOLOGY.trailing_zeros();
+const PORT_SHIFT: u32 = device_status::INACTIVE_PORT.trailing_zeros();
 
 bitflags::bitflags! {
     /// Device status word; the current topology (bits 13..12) and the inactive port (bits 11..10) have
@@ -11,29 +15,29 @@ bitflags::bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DeviceStatus: u16 {
         /// Bit 15: communication warning, more than half of the permitted MST losses in a row.
-        const COMMUNICATION_WARNING = 1 << 15;
+        const COMMUNICATION_WARNING = device_status::COMMUNICATION_WARNING;
         /// Bit 14: follows C-DEV bit 14 when a topology command is done.
-        const TOPOLOGY_CHANGE = 1 << 14;
+        const TOPOLOGY_CHANGE = device_status::TOPOLOGY_CHANGE_ACKNOWLEDGE;
         /// Bit 13: high bit of the current topology.
-        const TOPOLOGY_1 = 1 << 13;
+        const TOPOLOGY_1 = 2 << TOPOLOGY_SHIFT;
         /// Bit 12: low bit of the current topology.
-        const TOPOLOGY_0 = 1 << 12;
+        const TOPOLOGY_0 = 1 << TOPOLOGY_SHIFT;
         /// Bit 11: high bit of the inactive port's state.
-        const INACTIVE_PORT_1 = 1 << 11;
+        const INACTIVE_PORT_1 = 2 << PORT_SHIFT;
         /// Bit 10: low bit of the inactive port's state.
-        const INACTIVE_PORT_0 = 1 << 10;
+        const INACTIVE_PORT_0 = 1 << PORT_SHIFT;
         /// Bit 9: a connection has failed.
-        const CONNECTION_ERROR = 1 << 9;
+        const CONNECTION_ERROR = device_status::ERROR_IN_A_CONNECTION;
         /// Bit 8: the slave's data in this telegram is valid.
-        const SLAVE_VALID = 1 << 8;
+        const SLAVE_VALID = device_status::SLAVE_VALID;
         /// Bit 7: device error (class 1 diagnostic).
-        const DEVICE_ERROR = 1 << 7;
+        const DEVICE_ERROR = device_status::DEVICE_ERROR_C1D;
         /// Bit 6: device warning (class 2 diagnostic).
-        const DEVICE_WARNING = 1 << 6;
+        const DEVICE_WARNING = device_status::DEVICE_WARNING_C2D;
         /// Bit 5: a procedure command has ended or failed.
-        const COMMAND_CHANGE = 1 << 5;
+        const COMMAND_CHANGE = device_status::PROCEDURE_COMMAND_CHANGE;
         /// Bit 4: the parameterization level is active.
-        const PARAMETERIZATION = 1 << 4;
+        const PARAMETERIZATION = device_status::PARAMETERIZATION_LEVEL_ACTIVE;
     }
 }
 
@@ -64,9 +68,9 @@ impl InactivePort {
     pub const fn bits(self) -> u16 {
         match self {
             InactivePort::NoLink => 0,
-            InactivePort::Link => 1 << 10,
-            InactivePort::PrimaryTelegram => 2 << 10,
-            InactivePort::SecondaryTelegram => 3 << 10,
+            InactivePort::Link => 1 << PORT_SHIFT,
+            InactivePort::PrimaryTelegram => 2 << PORT_SHIFT,
+            InactivePort::SecondaryTelegram => 3 << PORT_SHIFT,
         }
     }
 }

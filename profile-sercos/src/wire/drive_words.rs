@@ -14,28 +14,29 @@
 //! | 4 | | halt is active |
 //! | 3 | | command values are followed |
 
+use crate::generated::bits::{drive_control, drive_status};
 use core::fmt;
 
 use bitflags::bitflags;
 
-const MODE_SHIFT: u16 = 8;
-const MODE_MASK: u16 = 7 << MODE_SHIFT;
-const READY_SHIFT: u16 = 14;
+const MODE_SHIFT: u32 = MODE_MASK.trailing_zeros();
+const MODE_MASK: u16 = drive_control::OPERATION_MODE;
+const READY_SHIFT: u32 = drive_status::READY_TO_OPERATE.trailing_zeros();
 
 bitflags! {
     /// Drive control word, S-0-0134. Bits without a name are kept.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DriveControl: u16 {
         /// Drive on; 1 to 0 brakes as well as possible and then removes the torque.
-        const ON = 1 << 15;
+        const ON = drive_control::DRIVE_ON;
         /// Enable; 1 to 0 removes the torque at once.
-        const ENABLE = 1 << 14;
+        const ENABLE = drive_control::ENABLE_DRIVE;
         /// Follow the command values; 1 to 0 halts in control.
-        const RESTART = 1 << 13;
+        const RESTART = drive_control::RESTART_DRIVE;
         /// Operation mode selection, see [`DriveControl::mode`].
         const MODE = MODE_MASK;
         /// Bits without a public meaning.
-        const RESERVED = 0x18FF;
+        const RESERVED = drive_control::RESERVED;
     }
 }
 
@@ -87,21 +88,21 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct DriveStatus: u16 {
         /// Ready state, see [`DriveStatus::ready`].
-        const READY = 3 << READY_SHIFT;
+        const READY = drive_status::READY_TO_OPERATE;
         /// Class 1 diagnostics: the drive is locked until S-0-0099 succeeds.
-        const ERROR = 1 << 13;
+        const ERROR = drive_status::DRIVE_SHUT_DOWN_ERROR;
         /// Class 2 diagnostics: a warning is pending.
-        const WARNING = 1 << 12;
+        const WARNING = drive_status::DRIVE_WARNING;
         /// Actual operation mode, see [`DriveStatus::mode`].
-        const MODE = MODE_MASK;
+        const MODE = drive_status::ACTUAL_OPERATION_MODE;
         /// Position feedback refers to machine zero (S-0-0403 bit 0).
-        const REFERENCED = 1 << 5;
+        const REFERENCED = drive_status::POSITION_FEEDBACK_VALUE_STATUS;
         /// Halt is active.
-        const HALT = 1 << 4;
+        const HALT = drive_status::DRIVE_HALT_ACKNOWLEDGE;
         /// The drive follows the command values.
-        const FOLLOWS = 1 << 3;
+        const FOLLOWS = drive_status::COMMAND_VALUE_PROCESSING;
         /// Bits without a public meaning.
-        const RESERVED = 0x08C7;
+        const RESERVED = drive_status::RESERVED | drive_status::QUICK_STOP_ACTIVE;
     }
 }
 
@@ -120,7 +121,9 @@ impl DriveStatus {
     /// The same word with another ready state.
     #[must_use]
     pub const fn with_ready(self, ready: ReadyState) -> DriveStatus {
-        DriveStatus::from_bits_retain(self.bits() & !(3 << READY_SHIFT) | (ready as u16) << READY_SHIFT)
+        DriveStatus::from_bits_retain(
+            self.bits() & !drive_status::READY_TO_OPERATE | (ready as u16) << READY_SHIFT,
+        )
     }
 
     /// Actual operation mode, numbered as in [`DriveControl::mode`].

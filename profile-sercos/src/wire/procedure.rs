@@ -3,6 +3,7 @@
 //! Bit 0 sets the command, bit 1 starts it. 0x3 sets and starts, 0x1 interrupts a running command, 0x0 cancels.
 //! The answer is the data status ([`super::data_status::DataStatus`]).
 
+use crate::generated::bits::procedure_control;
 use bitflags::bitflags;
 
 bitflags! {
@@ -10,11 +11,11 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct ProcedureControl: u16 {
         /// Set the command; 0 cancels it.
-        const SET = 1 << 0;
+        const SET = procedure_control::SET;
         /// Start it; 0 interrupts it.
-        const START = 1 << 1;
+        const START = procedure_control::START;
         /// Reserved bits, transmitted as 0.
-        const RESERVED = 0xFFFC;
+        const RESERVED = procedure_control::RESERVED;
     }
 }
 

@@ -8,6 +8,7 @@
 //! C-SVC: bit 0 MHS (toggle), bit 1 write, bit 2 last part of the element, bits 5..3 element.
 //! S-SVC: bit 0 AHS (follows MHS), bit 1 busy, bit 2 error, bit 3 SVC valid.
 
+use crate::generated::bits::svc_status;
 use core::fmt;
 
 use bitflags::bitflags;
@@ -20,11 +21,10 @@ mod field {
     pub const INFO: usize = WORD + 2;
     pub const END: usize = INFO + 4;
 
-    pub const MHS: u16 = 1 << 0;
-    pub const WRITE: u16 = 1 << 1;
-    pub const LAST: u16 = 1 << 2;
-    pub const ELEMENT_SHIFT: u16 = 3;
-    pub const ELEMENT_MASK: u16 = 7 << ELEMENT_SHIFT;
+    pub use crate::generated::bits::svc_control::{
+        ELEMENT as ELEMENT_MASK, END_OF_ELEMENT as LAST, MASTER_HANDSHAKE_MHS as MHS, READ_OR_WRITE as WRITE,
+    };
+    pub const ELEMENT_SHIFT: u32 = ELEMENT_MASK.trailing_zeros();
 }
 
 /// Length of one service channel in MDT and AT, bytes.
@@ -172,15 +172,15 @@ bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct SvcStatus: u16 {
         /// Handshake bit of the slave; equals MHS when the step has been taken over.
-        const AHS = 1 << 0;
+        const AHS = svc_status::SLAVE_HANDSHAKE_AHS;
         /// The step is still being worked on.
-        const BUSY = 1 << 1;
+        const BUSY = svc_status::BUSY;
         /// The step failed; the info's low word is the error code.
-        const ERROR = 1 << 2;
+        const ERROR = svc_status::ERROR;
         /// The service channel is alive.
-        const VALID = 1 << 3;
+        const VALID = svc_status::VALID;
         /// Reserved bits, transmitted as 0.
-        const RESERVED = 0xFFF0;
+        const RESERVED = svc_status::RESERVED;
     }
 }
 

@@ -1,22 +1,27 @@
-//! One axis through both programs, as the cycle does it: values of CIP Motion to the bytes of the drive's connection
-//! and back.
+//! One axis of the engine: values of CIP Motion to the bytes of the drive's connection and back, whole and by its programs.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::mapping::{CachedStatus, CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
+use axisbridge::engine::axis::{AxisChannel, Limits};
+use axisbridge::engine::bus::{Cycle, Received};
+use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
-use profile_cip::wire::motion::{CommandPosition, CommandValues};
-use profile_generic::image::{AxisCommand, AxisFeedback, Signal};
-use profile_generic::interpolation::{
-    FineInterpolator, InterpolatorConfig, Quality, SetPoints, TargetUpdate,
+use profile_cip::device::axis_state::AxisState;
+use profile_cip::device::drive_link::{
+    AxisCommandImage, Command, DriveAction, DriveImage, SetPoints, Trims, Withheld,
 };
+use profile_cip::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode};
+use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_generic::fault::Reaction;
+use profile_generic::image::{AxisCommand, StatusBits};
+use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::OperatingMode;
 use profile_generic::program::ConversionReport;
-use profile_generic::state::Action;
-use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_generic::state::{Action, DriveState, Report};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 /// Bytes set aside for the values of a connection.
 const TELEGRAM_MAX: usize = 64;
@@ -24,8 +29,6 @@ const TELEGRAM_MAX: usize = 64;
 const SWING: u16 = 1_000;
 /// How far it goes to either side, in counts: one revolution.
 const AMPLITUDE: f64 = 1_000_000.0;
-/// Actual Data Set: position, velocity, acceleration.
-const WANTED: u8 = 0b111;
 /// When the first update counts; the instant does not matter.
 const START: MonotonicTime = MonotonicTime(1_000_000_000_000);
 /// The status of a CiA 402 drive that operates and follows in csp: mode of operation, statusword.
@@ -33,21 +36,23 @@ const CSP_OPERATING: u32 = 0x08_1037;
 /// Cycle of the bus; an update lasts two of them.
 const CYCLE: DurationNs = DurationNs::from_millis(2);
 
-/// One axis with what the cycle keeps for it.
+/// One axis of the engine, in operation, and the programs that it runs.
 pub struct Axis {
+    channel: AxisChannel,
     north: CipProgram,
     trackers: CipTrackers,
     south: DriveProgram,
-    cached: CachedStatus,
-    interpolator: FineInterpolator,
     period: DurationNs,
+    /// What the last update was decoded to.
     command: AxisCommand,
-    feedback: AxisFeedback,
+    /// What the device has to know of the drive, and what the axis has to do.
+    image: DriveImage,
+    order: AxisCommandImage,
     telegram: [u8; TELEGRAM_MAX],
     control: u32,
     status: u32,
     saturated: u32,
-    target: MonotonicTime,
+    now: MonotonicTime,
     swing: Vec<CommandValues>,
     next: usize,
 }
@@ -58,47 +63,77 @@ impl Axis {
     pub fn turntable() -> Self {
         let rig = Rig::ready(Settings::default());
         let axis = &rig.engine.axes()[0];
-        let south = axis.south().expect("it is commissioned").clone();
-        Self::new(axis.north().clone(), south, *axis.feedback(), 0)
+        Self::new(axis.north().clone(), axis.south().expect("it is commissioned").clone())
     }
 
     /// The same on a CiA 402 drive.
     #[must_use]
     pub fn on_can() -> Self {
         let stage = can_frames::stage(Mapping::embedded().expect("the shipped tables")).expect("its drives");
-        let axis = &stage.axes[0];
-        Self::new(axis.north.clone(), axis.south.clone(), AxisFeedback::default(), CSP_OPERATING)
+        Self::new(stage.axes[0].north.clone(), stage.axes[0].south.clone())
     }
 
-    fn new(north: CipProgram, south: DriveProgram, feedback: AxisFeedback, status: u32) -> Self {
+    fn new(north: CipProgram, south: DriveProgram) -> Self {
         let period = DurationNs::from_micros(i64::from(UPDATE_PERIOD_US));
-        let config =
-            InterpolatorConfig { target_update: TargetUpdate::Interpolate, period, extrapolate_periods: 4 };
-        let mut interpolator = FineInterpolator::new(config).expect("a sound configuration");
-        interpolator.start(Some(feedback.position));
+        let mut channel =
+            AxisChannel::new(north.clone(), Limits::default(), Reaction::DecelerateAndDisable, true);
+        channel.set_south(south.clone());
+        channel.keep_update_period(period, TargetUpdate::Interpolate);
+        let order = AxisCommandImage {
+            state: AxisState::Running,
+            action: DriveAction::Enable,
+            action_id: 1,
+            reset_id: 0,
+            abort: None,
+            command: Command::Withheld(Withheld::NoSetPoint),
+            test: None,
+        };
+        let mut telegram = [0; TELEGRAM_MAX];
         let mut axis = Self {
+            channel,
             trackers: north.trackers(),
             north,
-            cached: south.cached_status(),
             south,
-            interpolator,
             period,
             command: AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() },
-            feedback,
-            telegram: [0; TELEGRAM_MAX],
+            image: DriveImage::default(),
+            order,
+            telegram,
             control: 0,
-            status,
+            status: 0,
             saturated: 0,
-            target: START,
+            now: START,
             swing: (0..SWING).map(values).collect(),
             next: 0,
         };
+        // The drive is ready, is enabled, and follows.
+        for report in [Report::Ready, Report::Operating] {
+            let shown = axis.south.write_status(
+                report,
+                OperatingMode::Position.into(),
+                StatusBits::empty(),
+                &mut telegram,
+            );
+            assert!(shown, "{report} can be shown");
+            axis.step(&telegram);
+            axis.channel.from_controller(axis.now, SystemTime(axis.now.0), &axis.order, None);
+        }
+        axis.status = axis.south.status(&telegram).expect("it is long enough");
+        assert_eq!(axis.channel.state(), DriveState::Operating);
         // The first updates are a jump from rest.
         for _ in 0..SWING {
             axis.update();
         }
+        assert_eq!(axis.channel.fault(), None);
         axis.saturated = 0;
+        axis.hold();
         axis
+    }
+
+    /// No more updates come, and the axis stays where it is.
+    pub fn hold(&mut self) {
+        self.order.command = Command::Withheld(Withheld::NoSetPoint);
+        self.channel.from_controller(self.now, SystemTime(self.now.0), &self.order, None);
     }
 
     /// The values of an update become the generic command.
@@ -126,45 +161,56 @@ impl Axis {
     /// One update and the two cycles of the bus that it lasts.
     pub fn update(&mut self) {
         self.next = (self.next + 1) % self.swing.len();
-        self.target = self.target + self.period;
-        self.decode();
-        self.interpolator.update(self.target, &SetPoints::from(&self.command)).expect("it is newer");
-        for cycle in [0, 1] {
-            let now = self.target - self.period * 2 + CYCLE * cycle;
-            let fine = self.interpolator.at(now);
-            assert_ne!(fine.quality, Quality::Lost);
-            let points = fine.set_points;
-            let all = SetPoints {
-                velocity: Some(points.velocity.unwrap_or_default()),
-                acceleration: Some(points.acceleration.unwrap_or_default()),
-                torque: Some(points.torque.unwrap_or_default()),
-                ..points
-            };
-            all.write_to(&mut self.command);
-            for offset in Signal::OFFSETS {
-                self.command.set(offset, 0);
-            }
-            self.encode();
+        let sequence = match self.order.command {
+            Command::Follow(points) => points.sequence.wrapping_add(1),
+            Command::Withheld(_) => 0,
+        };
+        self.order.command = Command::Follow(SetPoints {
+            control_mode: ControlMode::POSITION,
+            feedback_mode: FeedbackMode(2),
+            values: self.swing[self.next],
+            trims: Trims::default(),
+            target: CommandTarget::INTERPOLATE,
+            time_stamp: None,
+            target_time: None,
+            paced_at: self.now,
+            position_reference: 0,
+            sequence,
+            age_updates: 0,
+        });
+        let target = self.now + self.period * 2;
+        self.channel.from_controller(self.now, SystemTime(self.now.0), &self.order, Some(target));
+        for _ in 0..2 {
+            self.cycle();
         }
+    }
+
+    /// The telegram of a cycle of the bus.
+    fn cycle(&mut self) {
+        self.now = self.now + CYCLE;
+        let cycle = Cycle { acts_at: self.now + CYCLE, span: CYCLE, ahead: CYCLE, late: DurationNs::ZERO };
+        let system = SystemTime(self.now.0);
+        assert!(self.channel.to_drive(self.now, system, &cycle, Some(&mut self.telegram)));
+        black_box(&mut self.telegram);
     }
 
     /// What a cycle of the bus does for an axis: the drive's bytes to the generic feedback and its state, the generic command and
     /// what the state asks for to bytes.
     pub fn step(&mut self, telegram: &[u8]) {
-        let mut report = ConversionReport::default();
-        let told = self.south.decode(telegram, false, &mut self.feedback, &mut self.cached, &mut report);
-        assert!(told.is_some());
-        self.encode();
+        self.hear(telegram);
+        self.cycle();
     }
 
-    /// Bytes of the drive become the generic feedback, and that the values of an answer.
-    pub fn feedback(&mut self, telegram: &[u8]) -> CyclicValues {
-        let mut report = ConversionReport::default();
-        let word = self.south.decode(telegram, false, &mut self.feedback, &mut self.cached, &mut report);
-        assert!(word.is_some());
-        let mut values = CyclicValues::default();
-        self.north.encode(&self.feedback, WANTED, &mut values);
-        values
+    /// Bytes of the drive become the generic feedback, and that what the device has to know of it.
+    pub fn feedback(&mut self, telegram: &[u8]) {
+        self.hear(telegram);
+        self.channel.fill_drive_image(&mut self.image);
+        black_box(&mut self.image);
+    }
+
+    fn hear(&mut self, telegram: &[u8]) {
+        let received = Received { data: telegram, fresh: true, at: None, alive: true };
+        self.channel.from_drive(self.now, SystemTime(self.now.0), self.now, Some(received));
     }
 }
 
@@ -203,14 +249,16 @@ pub fn bench(criterion: &mut Criterion) {
     group.bench_function("generic_to_mdt_bytes", |bencher| bencher.iter(|| axis.encode()));
     group.bench_function("update_and_its_two_cycles", |bencher| bencher.iter(|| axis.update()));
     assert_eq!(axis.saturated, 0, "nothing was clamped");
+    axis.hold();
     let telegram = [0; TELEGRAM_MAX];
     group.bench_function("at_bytes_to_values", |bencher| {
-        bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
+        bencher.iter(|| axis.feedback(black_box(&telegram)));
     });
     let mut axis = Axis::on_can();
     group.bench_function("generic_to_rpdo_bytes", |bencher| bencher.iter(|| axis.encode()));
     group.bench_function("update_and_its_two_cycles_on_can", |bencher| bencher.iter(|| axis.update()));
     assert_eq!(axis.saturated, 0, "nothing was clamped");
+    axis.hold();
     let telegram = csp_telegram();
     group
         .bench_function("tpdos_in_and_rpdos_out", |bencher| bencher.iter(|| axis.step(black_box(&telegram))));
@@ -222,7 +270,7 @@ pub fn bench(criterion: &mut Criterion) {
         });
     });
     group.bench_function("tpdo_bytes_to_values", |bencher| {
-        bencher.iter(|| black_box(axis.feedback(black_box(&telegram))));
+        bencher.iter(|| axis.feedback(black_box(&telegram)));
     });
     group.finish();
 }

@@ -1,6 +1,6 @@
 //! Fuzz targets: whatever reads what strangers send or write, as plain functions from bytes.
 //!
-//! `fuzz/` runs them under libFuzzer, `tests/tests/fuzz.rs` runs them on the seeds of `fuzz/corpus` and on some mutations of each.
+//! `fuzz/` runs them under libFuzzer, `tests/tests/bad_input/fuzz.rs` runs them on the seeds of `fuzz/corpus` and on some mutations of each.
 //! A target panics when something is wrong. Beside what panics by itself it asserts what a reader owes its caller:
 //!
 //! - what was read and is written again is read as the same value;

@@ -13,7 +13,7 @@ use axisbridge::engine::notice::Notice;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{Engine, Parts};
 use axisbridge::latest;
-use axisbridge::mapping::{AxisUnits, CaptureMode, Cia402Axis, CipScaling, SercosAxis};
+use axisbridge::mapping::{AxisUnits, CaptureMode, Cia402Axis, SercosAxis};
 use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
@@ -289,15 +289,9 @@ impl<S: South> OneAxis<S> {
     /// The axis on its bus, once its drive is ready.
     fn on(bus: AnyBus, south: S, limits: Limits) -> Self {
         let mapping = mapping();
-        let scaling = CipScaling {
-            kind: UnitKind::Rotary,
-            nanounits_per_unit: 1_000_000_000,
-            counts_per_unit: 1_000_000,
-            inverted: false,
-            unwind: None,
-        };
-        let north = mapping.cip_program(&scaling).expect("a million counts are exact");
-        let axis = AxisChannel::new(north, limits, Reaction::DecelerateAndDisable, true);
+        let mut axis = AxisChannel::new(limits, Reaction::DecelerateAndDisable, true);
+        // A million counts to a revolution.
+        axis.set_count(1_000);
         let (producer, notice_queue) = rtrb::RingBuffer::new(1024);
         let (publisher, status) = latest::latest(BoxStatus::STARTING);
         let engine = Engine::new(Parts {

@@ -4,5 +4,6 @@
 
 mod explicit;
 mod frames;
+mod fuzz;
 mod strangers;
 mod updates;

@@ -7,6 +7,7 @@ mod chain;
 mod clocks;
 mod drive_faults;
 mod modes;
+mod round_trips;
 mod scenario;
 mod table;
 mod updates;

@@ -46,7 +46,7 @@ fn a_drive_waits_for_its_port_and_a_typed_fault_is_one_at_the_gateway() {
         wait_for(&said, "drive 1: event fault over_current for 200 ms", &mut line);
         wait_for(&said, "drive 1: CP4, faulted, fault over_current", &mut line);
         wait_for(&log, "faulted axis=\"turntable\"", &mut run);
-        wait_for(&log, "the drive says 0xC00F0007 \"overcurrent error\" axis=\"turntable\"", &mut run);
+        wait_for(&log, "the drive reports 0xC00F0007 \"overcurrent error\" axis=\"turntable\"", &mut run);
         wait_for(&said, "drive 1: event clear over_current", &mut line);
         line.end_input();
         std::thread::sleep(Duration::from_millis(500));

@@ -106,9 +106,9 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
         "cannot be used",
         "Axis Fault",
         "was refused",
-        "goes on without",
+        "continues without",
         "commissioning of",
-        "waits since 10 s",
+        "has waited 10 s",
     ];
     Outcome { works: done && was_enabled && went, said: said(&rig, &of_drive) }
 }

@@ -87,7 +87,7 @@ fn run(oddities: Oddities, keys: &str, speed: bool) -> Outcome {
         "DeviceNet 1: slave",
         "DeviceNet 1: frame",
         "cannot be used",
-        "do not count",
+        "are ignored",
         "Axis Fault",
         "was refused",
     ];

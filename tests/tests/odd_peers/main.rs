@@ -49,9 +49,9 @@ pub fn does(
 pub fn said(rig: &Rig, names: &[&str]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let ordinary = [
-        "is the right one",
+        "is the expected device",
         "is in operation",
-        "goes on without reading",
+        "continues without reading",
         ": exchanging",
         "slaves found",
         "is in state consuming",

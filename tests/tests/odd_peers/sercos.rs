@@ -64,9 +64,9 @@ const OF_SLAVE: [&str; 9] = [
     "cannot be used",
     "Axis Fault",
     "was refused",
-    "goes on without writing",
+    "continues without writing",
     "does without",
-    "waits since 10 s",
+    "has waited 10 s",
 ];
 
 /// A box with the slave.

@@ -101,7 +101,7 @@ fn a_drive_that_is_ready_is_ready_whatever_bit_4_says() {
     let waits = goes_with("voltage_bit = \"dc-link\"", bit, Statusword::empty()).expect_err("no supply");
     assert!(waits.contains("Pre-Charge"), "{waits}");
     let said =
-        "waits since 1 s for its drive to be ready, or for main power; 6041:00 = 0221, expected bit 4 = 1";
+        "has waited 1 s for its drive to be ready, or for main power; 6041:00 = 0221, expected bit 4 = 1";
     assert!(waits.contains(said), "{waits}");
     assert_eq!(goes_with("voltage_bit = \"dc-link\"", bit, bit), Ok(()));
 }
@@ -115,7 +115,7 @@ fn bit_12_is_waited_for_only_where_the_configuration_says_that_the_drive_keeps_i
     assert_eq!(goes_with("acknowledges = false", bit, Statusword::empty()), Ok(()));
     let waits = goes_with("acknowledges = true", bit, Statusword::empty()).expect_err("it never follows");
     assert!(waits.contains("Enable refused"), "{waits}");
-    let said = "waits since 1 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1";
+    let said = "has waited 1 s for its drive to follow set-points; 6041:00 = 0237, expected bit 12 = 1";
     assert!(waits.contains(said), "{waits}");
     assert_eq!(goes_with("acknowledges = true", Statusword::empty(), Statusword::empty()), Ok(()));
 }

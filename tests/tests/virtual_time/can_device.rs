@@ -165,12 +165,12 @@ fn a_drive_that_keeps_its_mapping_is_led_by_the_pdos_that_it_has() {
 fn what_a_kept_mapping_lacks_is_named() {
     let mut rig = Rig::ready(settings("pdo_mapping = \"keep\"", "modes = [\"position\", \"velocity\"]"));
     let text =
-        "axis 1: node 1 keeps its PDOs, and 6077:00 is in none that can be used: the axis does without";
+        "axis 1: node 1 keeps its PDOs, and 6077:00 is in none that can be used: the axis works without";
     assert_eq!(told(&rig, text), 1, "{}", rig.told());
     goes(&mut rig);
     let mut rig = Rig::new(settings("pdo_mapping = \"keep\"", "modes = [\"position\", \"torque\"]"));
     rig.run_for(millis(5_000));
-    let text = "6071:00 is in no RPDO that can be used, and the mapping is kept: expected one with nothing but what the axis is told, \
+    let text = "6071:00 is in no RPDO that can be used, and the mapping is kept: expected one with only values that the gateway sets, \
                 got 1: 6040:00, 2: 6040:00 6060:00, 3: 6040:00 607A:00, 4: 6040:00 60FF:00; it is left out";
     assert!(told(&rig, text) > 0, "{}", rig.told());
     assert_eq!(node(&mut rig, 0).statistics().rpdos, 0);
@@ -199,7 +199,7 @@ fn modes_that_the_drive_does_not_tell_are_tried() {
     let mut rig = Rig::new(settings("", ""));
     node(&mut rig, 0).dictionary_mut().set(0x6502, 0, 0);
     goes(&mut rig);
-    let text = "node 1: 6502 tells no modes of operation; tried by 6060 and 6061, it has csp, ip, csv, pv, vl, cst, tq";
+    let text = "node 1: 6502 reports no modes of operation; tried by 6060 and 6061, it has csp, ip, csv, pv, vl, cst, tq";
     assert_eq!(told(&rig, text), 1, "{}", rig.told());
     // One that is told what it has is not tried, even where it tells something else.
     let mut rig = Rig::new(settings("", "drive_modes = [\"ip\", \"pv\", \"tq\"]"));
@@ -268,7 +268,7 @@ fn a_device_without_a_node_id_is_given_it() {
         });
         assert_eq!(node(&mut rig, 0).node(), NodeId::new(1).ok());
         let text = format!(
-            "the device with vendor 00000319 product 00000007 revision 00010002 serial 0000002A has got node-id 1{more}"
+            "the device with vendor 00000319 product 00000007 revision 00010002 serial 0000002A was given node-id 1{more}"
         );
         assert_eq!(rig.told().lines().filter(|line| line.ends_with(&text)).count(), 1, "{}", rig.told());
         goes(&mut rig);
@@ -285,12 +285,12 @@ fn nobody_else_is_given_a_node_id() {
     rig.can[0].bus.connect(now, 0, false);
     rig.run_for(millis(15_000));
     assert_eq!(rig.can[0].bus.nodes().nth(2).expect("the stranger").node(), None);
-    assert_eq!(told(&rig, "has got node-id"), 0, "{}", rig.told());
+    assert_eq!(told(&rig, "was given node-id"), 0, "{}", rig.told());
     assert!(node(&mut rig, 1).statistics().rpdos > 0, "the other drive is led");
     // Plugged in late.
     let now = rig.now();
     rig.can[0].bus.connect(now, 0, true);
-    rig.run_until(millis(20_000), "the node-id", |rig| told(rig, "has got node-id 1") == 1);
+    rig.run_until(millis(20_000), "the node-id", |rig| told(rig, "was given node-id 1") == 1);
 }
 
 /// The device was given another node-id by somebody: it keeps that, and is told once.

@@ -172,7 +172,7 @@ fn a_storm_of_emergency_messages_stops_nobody() {
         BUS.go_for(&mut rig, 1);
         assert!(moving(&rig), "{}", rig.told());
     }
-    told(&rig, "CAN bus 1: node 1 sends more emergency messages than are told one by one");
+    told(&rig, "CAN bus 1: node 1 sends more emergency messages than are logged one by one");
     let all = rig.notices.iter().filter(|notice| notice.to_string().contains("EMCY ")).count();
     assert_eq!(all, 16, "in a second: {}", rig.told());
     assert_eq!(codes(&rig, 0), []);
@@ -318,7 +318,7 @@ fn a_tpdo_of_another_length_is_not_taken_and_stops_its_axis() {
         true
     }));
     BUS.stops_within(&mut rig, 300);
-    told(&rig, "CAN bus 1: TPDO 1 of node 1: expected 7 bytes, got 3; it is not taken");
+    told(&rig, "CAN bus 1: TPDO 1 of node 1: expected 7 bytes, got 3; it is ignored");
     silent(&rig);
     rig.can[0].tamper = None;
     BUS.runs_again(&mut rig);
@@ -343,7 +343,7 @@ fn frames_that_nobody_has_asked_for_change_nothing() {
         BUS.go_for(&mut rig, 50);
         assert!(moving(&rig), "{id}: {}", rig.told());
     }
-    told(&rig, "CAN bus 1: node 37 is there and not in the list");
+    told(&rig, "CAN bus 1: node 37 is on the bus and not in the configuration");
     assert_eq!(rig.status().counters.refused_frames - refused, strange.len() as u64);
     assert_eq!((codes(&rig, 0), codes(&rig, 1)), (vec![], vec![]));
     BUS.runs_again(&mut rig);
@@ -360,7 +360,7 @@ fn somebody_else_who_commands_a_drive_stops_its_axis_and_is_told() {
         BUS.go_for(&mut rig, 2);
     }
     BUS.stops_within(&mut rig, 1_000);
-    told(&rig, "CAN bus 1: somebody else sends 201, which only the master may send");
+    told(&rig, "CAN bus 1: another station sends 201, which only the master may send");
     // Whoever takes away its operation takes away its power, as far as the drive tells.
     assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 37)], "{}", rig.told());
     assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::POWER_LOSS));

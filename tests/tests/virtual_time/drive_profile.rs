@@ -72,7 +72,7 @@ fn a_start_tells_of_nothing_that_is_in_order() {
     };
     let told: Vec<String> = lacking(0).map(ToString::to_string).collect();
     assert_eq!((told.len(), lacking(1).count()), (1, 1), "{told:?}");
-    assert!(told[0].starts_with("commissioning goes on without reading S-0-0294, "), "{told:?}");
+    assert!(told[0].starts_with("commissioning continues without reading S-0-0294, "), "{told:?}");
 }
 
 /// What the controller's cyclic block of the turntable is changed to: another control mode, with its one set-point.

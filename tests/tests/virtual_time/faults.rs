@@ -54,7 +54,7 @@ fn a_fault_of_one_drive_leaves_the_other_axis_moving_and_can_be_reset() {
     assert_eq!(rig.report().axes[0].state, Some(AxisStateCode::MAJOR_FAULTED));
     assert_eq!(rig.drive(0).actual().report, Report::Faulted);
     assert!(!rig.watched[0].on && rig.watched[1].on);
-    assert_eq!(drive_says(&rig, 0), ["the drive says 0xC00F0007 \"overcurrent error\""]);
+    assert_eq!(drive_says(&rig, 0), ["the drive reports 0xC00F0007 \"overcurrent error\""]);
     assert_eq!(drive_says(&rig, 1), [""; 0]);
     assert!(rig.velocity(1) > 199 * NANO, "the slide goes on");
     rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT);
@@ -195,7 +195,7 @@ fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
     assert_eq!(alarms(&rig, 0), [came]);
     // Number and text of the drive follow, once.
     rig.run_for(millis(200));
-    assert_eq!(drive_says(&rig, 0), ["the drive says 0xC00E0002 \"motor overtemperature warning\""]);
+    assert_eq!(drive_says(&rig, 0), ["the drive reports 0xC00E0002 \"motor overtemperature warning\""]);
     // Another one while the first stands: the status word does not change, the word is read again.
     rig.drive_mut(0).set_warnings(1 << 2 | 1 << 15);
     rig.run_for(millis(400));
@@ -495,11 +495,11 @@ fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {
     };
     let line = |seconds| {
         format!(
-            "waits since {seconds} s for its drive to be ready, or for main power; S-0-0135 = 4000, expected \
+            "has waited {seconds} s for its drive to be ready, or for main power; S-0-0135 = 4000, expected \
              bit 14 = 0, bit 15 = 1"
         )
     };
-    let up = "waits since 1 s for its drive: it is not on the bus, or not commissioned yet".to_owned();
+    let up = "has waited 1 s for its drive: it is not on the bus, or not commissioned yet".to_owned();
     let told = [up.clone(), line(1), line(10)];
     assert_eq!(waits(&rig, 0), told, "after a second, and ten times as long after it");
     assert_eq!(waits(&rig, 1), std::slice::from_ref(&up), "it has all it needs");
@@ -519,7 +519,7 @@ fn an_axis_that_waits_for_longer_than_a_second_says_what_for() {
     rig.line.cut(1);
     rig.run_for(millis(3_000));
     assert_eq!(waits(&rig, 0).len(), 3);
-    assert_eq!(waits(&rig, 1), [up, "waits since 1 s for its drive to be heard again".to_owned()]);
+    assert_eq!(waits(&rig, 1), [up, "has waited 1 s for its drive to be heard again".to_owned()]);
     let now = shown(&rig);
     assert_eq!(now[0], (None, unconfigured), "it has power");
     assert_eq!(now[1].1, Inhibits::NO_DRIVE | unconfigured);

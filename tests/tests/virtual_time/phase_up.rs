@@ -64,7 +64,7 @@ fn a_phase_that_takes_long_says_which_slave_and_which_parameter() {
     rig.tamper_frame = None;
     let told: Vec<_> =
         rig.told().lines().filter(|line| line.contains(" since ")).map(str::to_owned).collect();
-    let line = |seconds: u32| format!("CP2 since {seconds} s: slave at position 2, ");
+    let line = |seconds: u32| format!("CP2 has taken {seconds} s: waiting for slave at position 2, ");
     let rows: Vec<_> = told.iter().filter(|row| row.starts_with("CP2")).collect();
     assert_eq!(rows.len(), 2, "{told:#?}");
     assert!(rows[0].starts_with(&line(5)) && rows[1].starts_with(&line(10)), "{told:#?}");

@@ -189,7 +189,7 @@ fn a_torque_that_cannot_be_converted_is_done_without() {
         rig
     };
     let rig = preset_and_run(BOX.to_owned());
-    let line = format!("the drive with SERCOS address 1: the axis does without torque ({why})");
+    let line = format!("the drive with SERCOS address 1: the axis works without torque ({why})");
     assert!(rig.told().contains(&line), "{}", rig.told());
     assert_ne!(rig.engine.axes()[0].state(), DriveState::NotReady, "{}", rig.told());
     let first = "name = \"drive-a\"\naddress = 1\n";

@@ -121,7 +121,7 @@ fn a_box_on_an_occupied_can_bus_sends_nothing_and_starts_when_the_bus_is_silent(
     assert_eq!(sync, 0);
     let text = "CAN bus 1: another master is on this bus: SYNC, identifier 080, a SYNC every 2";
     assert_eq!(count(&rig, text), 1, "{}", rig.told());
-    assert_eq!(count(&rig, "is the right one") + count(&rig, "does not come up"), 0, "{}", rig.told());
+    assert_eq!(count(&rig, "is the expected device") + count(&rig, "does not come up"), 0, "{}", rig.told());
     rig.run_until(millis(20_000), "the bus", |rig| rig.status().state == BoxState::READY);
 }
 

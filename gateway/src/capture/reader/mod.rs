@@ -16,6 +16,7 @@ use std::path::Path;
 
 use thiserror::Error;
 
+use super::blocks;
 use crate::sys::clock::KernelTime;
 
 /// The longest frame or packet block accepted: what Wireshark accepts.
@@ -29,19 +30,6 @@ pub const INTERFACES_MAX: usize = 1024;
 
 /// Link type of Ethernet frames.
 pub const LINK_TYPE_ETHERNET: u16 = 1;
-
-const BLOCK_SECTION: u32 = 0x0A0D_0D0A;
-const BLOCK_INTERFACE: u32 = 1;
-const BLOCK_PACKET_OBSOLETE: u32 = 2;
-const BLOCK_SIMPLE: u32 = 3;
-const BLOCK_ENHANCED: u32 = 6;
-
-const OPTION_END: u16 = 0;
-const OPTION_COMMENT: u16 = 1;
-const OPTION_IF_NAME: u16 = 2;
-const OPTION_IF_DESCRIPTION: u16 = 3;
-const OPTION_IF_TSRESOL: u16 = 9;
-const OPTION_IF_TSOFFSET: u16 = 14;
 
 /// What is wrong with a recording.
 #[derive(Debug, Error)]
@@ -303,7 +291,7 @@ impl<R: Read> Reader<R> {
         let interface = &interfaces[packet.index];
         let comment = packet.options_at.and_then(|at| {
             let mut options = Options::new(&self.body, at, *endian);
-            let (_, text) = options.find(|(code, _)| *code == OPTION_COMMENT)?;
+            let (_, text) = options.find(|(code, _)| *code == blocks::OPTION_COMMENT)?;
             std::str::from_utf8(text).ok()
         });
         self.frames += 1;
@@ -331,14 +319,14 @@ impl<R: Read> Reader<R> {
             }
             let kind = endian.u32(&kind, 0);
             // The section header's type reads the same in both byte orders.
-            if kind == BLOCK_SECTION {
+            if kind == blocks::SECTION {
                 *endian = section_header(&mut self.source, start)?;
                 interfaces.clear();
                 continue;
             }
             block_body(&mut self.source, *endian, start, &mut self.body)?;
             match kind {
-                BLOCK_INTERFACE if interfaces.len() == INTERFACES_MAX => {
+                blocks::INTERFACE if interfaces.len() == INTERFACES_MAX => {
                     return Err(ReadError::BadLength {
                         offset: start,
                         what: "the number of interfaces",
@@ -346,8 +334,8 @@ impl<R: Read> Reader<R> {
                         found: 1025,
                     });
                 }
-                BLOCK_INTERFACE => interfaces.push(interface_description(&self.body, *endian, start)?),
-                BLOCK_ENHANCED | BLOCK_PACKET_OBSOLETE | BLOCK_SIMPLE => {
+                blocks::INTERFACE => interfaces.push(interface_description(&self.body, *endian, start)?),
+                blocks::ENHANCED | blocks::PACKET_OBSOLETE | blocks::SIMPLE => {
                     return packet(kind, &self.body, *endian, start, interfaces).map(Some);
                 }
                 _ => {}
@@ -474,9 +462,9 @@ fn interface_description(body: &[u8], endian: Endian, start: u64) -> Result<Inte
     let utf8 = |text| std::str::from_utf8(text).ok().map(str::to_owned);
     for (code, value) in Options::new(body, 8, endian) {
         match (code, value) {
-            (OPTION_IF_NAME, text) => interface.name = utf8(text),
-            (OPTION_IF_DESCRIPTION, text) => interface.description = utf8(text),
-            (OPTION_IF_TSRESOL, &[byte]) => {
+            (blocks::OPTION_IF_NAME, text) => interface.name = utf8(text),
+            (blocks::OPTION_IF_DESCRIPTION, text) => interface.description = utf8(text),
+            (blocks::OPTION_IF_TSRESOL, &[byte]) => {
                 interface.unit = TimeUnit::from_resolution(byte).ok_or(ReadError::BadValue {
                     offset: start,
                     what: "the resolution of time stamps",
@@ -484,7 +472,7 @@ fn interface_description(body: &[u8], endian: Endian, start: u64) -> Result<Inte
                     found: u32::from(byte),
                 })?;
             }
-            (OPTION_IF_TSOFFSET, &[a, b, c, d, e, f, g, h]) => {
+            (blocks::OPTION_IF_TSOFFSET, &[a, b, c, d, e, f, g, h]) => {
                 let bytes = [a, b, c, d, e, f, g, h];
                 offset_s = match endian {
                     Endian::Little => i64::from_le_bytes(bytes),
@@ -524,7 +512,7 @@ fn packet(
         })?;
         Ok((index, interface))
     };
-    let (id, units, captured, original_len, data_at) = if kind == BLOCK_SIMPLE {
+    let (id, units, captured, original_len, data_at) = if kind == blocks::SIMPLE {
         require(body, 4, "a simple packet", start)?;
         let original = endian.u32(body, 0);
         let (_, interface) = find(0)?;
@@ -532,7 +520,7 @@ fn packet(
         (0, None, original.min(limit), original, 4)
     } else {
         require(body, 20, "a packet", start)?;
-        let id = if kind == BLOCK_ENHANCED { endian.u32(body, 0) } else { u32::from(endian.u16(body, 0)) };
+        let id = if kind == blocks::ENHANCED { endian.u32(body, 0) } else { u32::from(endian.u16(body, 0)) };
         let units = u64::from(endian.u32(body, 4)) << 32 | u64::from(endian.u32(body, 8));
         (id, Some(units), endian.u32(body, 12), endian.u32(body, 16), 20)
     };
@@ -555,7 +543,7 @@ fn packet(
             found,
         });
     }
-    let options_at = (kind != BLOCK_SIMPLE).then(|| data_at + captured.next_multiple_of(4));
+    let options_at = (kind != blocks::SIMPLE).then(|| data_at + captured.next_multiple_of(4));
     Ok(Packet { interface: id, index, units, data_at, captured, original_len, options_at })
 }
 
@@ -588,7 +576,7 @@ impl<'a> Iterator for Options<'a> {
         }
         let code = self.endian.u16(self.bytes, 0);
         let length = usize::from(self.endian.u16(self.bytes, 2));
-        if code == OPTION_END {
+        if code == blocks::OPTION_END {
             return None;
         }
         let value = self.bytes.get(4..4 + length)?;

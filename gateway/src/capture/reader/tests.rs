@@ -94,24 +94,24 @@ fn block(kind: u32, body: &[u8]) -> Vec<u8> {
 }
 
 fn section() -> Vec<u8> {
-    block(BLOCK_SECTION, &[0x1A, 0x2B, 0x3C, 0x4D, 0, 1, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255])
+    block(blocks::SECTION, &[0x1A, 0x2B, 0x3C, 0x4D, 0, 1, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255])
 }
 
 #[test]
 fn units_of_time_and_simple_and_obsolete_packets_in_big_endian() {
     let mut file = section();
     // Link type, reserved, snap length 4; no options: microseconds.
-    file.extend(block(BLOCK_INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 4]));
+    file.extend(block(blocks::INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 4]));
     // 2^-10 s, starting at 5 s.
     file.extend(block(
-        BLOCK_INTERFACE,
+        blocks::INTERFACE,
         &[0, 113, 0, 0, 0, 0, 0, 0, 0, 9, 0, 1, 0x8A, 0, 0, 0, 0, 14, 0, 8, 0, 0, 0, 0, 0, 0, 0, 5],
     ));
     // Simple packet: six bytes long, cut to the snap length.
-    file.extend(block(BLOCK_SIMPLE, &[0, 0, 0, 6, 9, 8, 7, 6]));
+    file.extend(block(blocks::SIMPLE, &[0, 0, 0, 6, 9, 8, 7, 6]));
     let fields = [0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 0, 2, 0, 0, 0, 2, 0xAB, 0xCD, 0, 0];
-    file.extend(block(BLOCK_ENHANCED, &[&[0, 0, 0, 1], &fields[..]].concat()));
-    file.extend(block(BLOCK_PACKET_OBSOLETE, &[&[0, 0, 0, 7], &fields[..]].concat()));
+    file.extend(block(blocks::ENHANCED, &[&[0, 0, 0, 1], &fields[..]].concat()));
+    file.extend(block(blocks::PACKET_OBSOLETE, &[&[0, 0, 0, 7], &fields[..]].concat()));
     file.extend(block(99, &[1, 2, 3, 4]));
     assert_eq!(
         listing(&file),
@@ -123,12 +123,12 @@ fn units_of_time_and_simple_and_obsolete_packets_in_big_endian() {
 
 #[test]
 fn errors_say_where_and_what() {
-    let good_interface = block(BLOCK_INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 0]);
+    let good_interface = block(blocks::INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 0]);
     let enhanced = |id: u8, captured: [u8; 4]| {
         let mut body = vec![0; 24];
         body[3] = id;
         body[12..16].copy_from_slice(&captured);
-        block(BLOCK_ENHANCED, &body)
+        block(blocks::ENHANCED, &body)
     };
     let mut wrong_trailer = block(99, &[0; 4]);
     wrong_trailer[15] = 20;
@@ -162,11 +162,12 @@ fn errors_say_where_and_what() {
             "offset 28: the file ends in the middle of a block: 16777208 bytes expected, 0 left",
         ),
         (
-            &[section(), block(BLOCK_INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 0, 0, 9, 0, 1, 20, 0, 0, 0])].concat(),
+            &[section(), block(blocks::INTERFACE, &[0, 1, 0, 0, 0, 0, 0, 0, 0, 9, 0, 1, 20, 0, 0, 0])]
+                .concat(),
             "offset 28: the resolution of time stamps is 0x14, expected at most 19 decimal or 64 binary digits",
         ),
         (
-            &[section(), block(BLOCK_INTERFACE, &[0, 1, 0, 0])].concat(),
+            &[section(), block(blocks::INTERFACE, &[0, 1, 0, 0])].concat(),
             "offset 28: the file ends in the middle of an interface description: 8 bytes expected, 4 left",
         ),
     ];

@@ -242,7 +242,7 @@ impl AxisChannel {
     }
 
     /// Stops the axis for a fault.
-    pub(super) fn take_fault(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
+    pub fn take_fault(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
         // What the drive has is worth more to know than that the controller had stopped it.
         let weightier =
             |known: Fault| caused_by_controller(known.cause) && !caused_by_controller(fault.cause);

@@ -1,13 +1,12 @@
-//! The hookup tests of an axis: what the motion device orders, carried out between the cycles of the drive.
+//! The hookup tests of an axis: what the north side orders, carried out between the cycles of the drive.
 //!
 //! The motor and feedback test runs in torque control ([`HookupMove`]) and only while the drive says that it is in torque
 //! control; the feedback test only watches. Either is gone the moment its order is.
 
-use profile_cip::device::drive_link::{HookupTest, TestOrder, TestReport};
-use profile_cip::wire::motion::codes::TestStatus;
-use profile_cip::wire::motion::test_service::{HookupTestData, hookup_status};
 use profile_generic::cast;
-use profile_generic::hookup::{Goal, HookupLimits, HookupMove, Outcome, Progress};
+use profile_generic::hookup::{
+    Goal, HookupLimits, HookupMove, Outcome, Progress, Test, TestOrder, TestReport, TestResult,
+};
 use profile_generic::image::{AxisFeedback, FeedbackSet};
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Position, Torque, Velocity};
@@ -77,8 +76,8 @@ pub(super) struct TestRun {
 }
 
 impl AxisChannel {
-    /// Takes the order of the motion device, or that there is none any more.
-    pub(super) fn take_test(&mut self, now: MonotonicTime, order: Option<TestOrder>) {
+    /// Takes the order of the north side, or that there is none any more.
+    pub fn take_test(&mut self, now: MonotonicTime, order: Option<TestOrder>) {
         let Some(order) = order else {
             self.test = None;
             return;
@@ -91,7 +90,7 @@ impl AxisChannel {
         let able = self.limits.hookup.is_some()
             && self.south().is_some_and(|program| program.has_mode(OperatingMode::Torque));
         if order.test.is_active() && !able {
-            self.end_test(TestStatus::FAULTED, false);
+            self.end_test(TestResult::Faulted, false);
         }
     }
 
@@ -101,18 +100,14 @@ impl AxisChannel {
     }
 
     /// The end of the test, once it has ended.
-    pub(super) fn test_report(&self) -> Option<TestReport> {
+    #[must_use]
+    pub fn test_report(&self) -> Option<TestReport> {
         self.test.and_then(|test| test.report)
     }
 
-    fn end_test(&mut self, status: TestStatus, negative: bool) {
+    fn end_test(&mut self, result: TestResult, negative: bool) {
         if let Some(test) = self.test.as_mut().filter(|test| test.report.is_none()) {
-            let data = HookupTestData {
-                status,
-                feedback_1_direction: u8::from(negative),
-                ..HookupTestData::default()
-            };
-            test.report = Some(TestReport { id: test.order.id, data });
+            test.report = Some(TestReport { id: test.order.id, result, negative });
         }
     }
 
@@ -122,24 +117,24 @@ impl AxisChannel {
         let known = self.feedback.fresh && self.feedback.present.contains(FeedbackSet::POSITION);
         let position = known.then_some(self.feedback.position);
         let Some(settings) = self.limits.hookup else {
-            self.end_test(TestStatus::FAULTED, false);
+            self.end_test(TestResult::Faulted, false);
             return Torque::ZERO;
         };
         match test.order.test {
-            HookupTest::Feedback => {
+            Test::Feedback => {
                 self.watch_feedback(now, &test, position, settings.nanounits(test.order.distance));
                 Torque::ZERO
             }
             // Not before the brake is open.
-            HookupTest::MotorFeedback
+            Test::MotorFeedback
                 if self.state() == DriveState::Testing && self.sequence_step() == SequenceStep::Running =>
             {
                 self.lead_motor(now, system, test, position, &settings)
             }
-            HookupTest::MotorFeedback => {
+            Test::MotorFeedback => {
                 // Not there yet. The start has a time limit of its own; this one is for a start that never began.
                 if now.since(test.since) > START_TIME_OUT {
-                    self.end_test(TestStatus::TIMED_OUT, false);
+                    self.end_test(TestResult::TimedOut, false);
                 }
                 Torque::ZERO
             }
@@ -159,9 +154,9 @@ impl AxisChannel {
         }
         let moved = position.zip(start).map_or(0, |(position, start)| position.saturating_sub(start).0);
         if moved.unsigned_abs() >= distance.0.unsigned_abs().max(1) {
-            self.end_test(TestStatus::SUCCESSFUL, moved < 0);
+            self.end_test(TestResult::Successful, moved < 0);
         } else if now.since(test.since) > TIME_LIMIT {
-            self.end_test(TestStatus::TIMED_OUT, false);
+            self.end_test(TestResult::TimedOut, false);
         }
     }
 
@@ -180,7 +175,7 @@ impl AxisChannel {
         {
             test.lead = motion(&test.order, settings, position);
             if test.lead.is_none() {
-                self.finish(now, system, TestStatus::FAULTED, false);
+                self.finish(now, system, TestResult::Faulted, false);
                 return Torque::ZERO;
             }
         }
@@ -194,10 +189,10 @@ impl AxisChannel {
             Progress::Torque(torque) => torque,
             Progress::Ended(outcome) => {
                 let (status, negative) = match outcome {
-                    Outcome::Done { negative } => (TestStatus::SUCCESSFUL, negative == Some(true)),
-                    Outcome::NoMotion => (hookup_status::NO_FEEDBACK_1, false),
-                    Outcome::TimedOut => (TestStatus::TIMED_OUT, false),
-                    Outcome::TooFast => (TestStatus::FAULTED, false),
+                    Outcome::Done { negative } => (TestResult::Successful, negative == Some(true)),
+                    Outcome::NoMotion => (TestResult::NoFeedback, false),
+                    Outcome::TimedOut => (TestResult::TimedOut, false),
+                    Outcome::TooFast => (TestResult::Faulted, false),
                 };
                 self.finish(now, system, status, negative);
                 Torque::ZERO
@@ -206,8 +201,8 @@ impl AxisChannel {
     }
 
     /// The test is over: the drive stops in this very cycle, and the motion device hears of it in the next.
-    fn finish(&mut self, now: MonotonicTime, system: SystemTime, status: TestStatus, negative: bool) {
-        self.end_test(status, negative);
+    fn finish(&mut self, now: MonotonicTime, system: SystemTime, result: TestResult, negative: bool) {
+        self.end_test(result, negative);
         let transition = self.drive.machine.handle(Event::TestComplete);
         self.follow(now, system, transition);
     }

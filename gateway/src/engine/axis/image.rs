@@ -1,43 +1,29 @@
-//! From the axis to the controller.
+//! From the axis to its north side.
 
 use super::{AxisChannel, Loss, PositionJump, Trip};
-use crate::mapping::CipFault;
-use profile_cip::device::drive_link::DriveImage;
+use profile_generic::capture::CaptureSet;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::Report;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 impl AxisChannel {
-    /// Writes what the motion device has to know of the drive over what it was told before.
-    pub fn fill_drive_image(&mut self, image: &mut DriveImage) {
-        image.clear();
-        image.online = self.south.is_some() && self.feedback.report != Report::Silent;
-        image.action_id = self.action_id;
-        image.reset_id = self.reset_id;
-        image.test = self.test_report();
-        image.scaling_id = self.scaling_id;
-        image.control_modes = self.control_modes;
-        let mut feedback = self.feedback;
-        // The controller is about to end it, or has a fault that says why it cannot be ended.
-        feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
-        self.north.drive_image(&feedback, &self.faults, &mut self.said, image);
-        self.sequence_image(image);
-        if let Some((program, _)) = &self.south {
-            let captures = program.captures();
-            image.events = self.said.checkable(&self.north, (self.programs, || captures.kinds()), &feedback);
-            image.events_checking = self.north.events().captured(self.captures.checking(captures));
-        }
+    /// Whether its drive is there and heard.
+    #[must_use]
+    pub fn is_heard(&self) -> bool {
+        self.south.is_some() && self.feedback.report != Report::Silent
     }
 
-    /// The fault, where the controller knows it as one of the communications node: its code, and since when.
+    /// Whether its drive has not been heard for so long that the end of its stop is waited for no longer.
     #[must_use]
-    pub fn node_fault(&self) -> Option<(u8, SystemTime)> {
-        let fault = self.fault?;
-        match self.north.fault(fault.cause) {
-            Some(CipFault::Node(code)) => Some((code, fault.at)),
-            _ => None,
-        }
+    pub fn is_unseen(&self) -> bool {
+        self.unseen
+    }
+
+    /// The captures that the drive looks for now.
+    #[must_use]
+    pub fn checked_captures(&self) -> CaptureSet {
+        self.south().map_or(CaptureSet::default(), |program| self.captures.checking(program.captures()))
     }
 
     /// The box ends: the axis stops as on a lost command, but holds nothing.

@@ -2,13 +2,15 @@
 //! bottom, and the same way back.
 //!
 //! ```text
-//! AxisCommandImage --CipProgram--> AxisCommand --BasicDrive, FineInterpolator--> AxisCommand --DriveProgram--> bus
-//! DriveImage     <--CipProgram-- AxisFeedback <--BasicDrive------------------ AxisFeedback <--DriveProgram-- bus
+//! Wish, NorthPoints, AxisCommand --BasicDrive, FineInterpolator--> AxisCommand --DriveProgram--> bus
+//! AxisFeedback, faults           <--BasicDrive------------------- AxisFeedback <--DriveProgram-- bus
 //! ```
+//!
+//! The axis knows no protocol: a north side ([`super::device`]) speaks to it in the generic model, and the program
+//! of its drive is made of the tables.
 //!
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
 
-mod action;
 pub mod capture;
 mod diagnosis;
 mod diagnostic_message;
@@ -28,16 +30,18 @@ mod set_point;
 mod trim;
 mod velocimeter;
 mod waiting;
+mod wish;
 
 pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::position_jump::PositionJump;
+pub use self::set_point::{NorthPoints, Target};
 pub use self::waiting::{Awaited, Waiting};
+pub use self::wish::{Intent, Wish};
 
 use self::hookup::TestRun;
-use crate::mapping::{CachedStatus, CipProgram, CipTrackers, DriveProgram, Told};
-use profile_cip::device::drive_link::{AbortOrder, DriveAction, Withheld};
+use crate::mapping::{CachedStatus, DriveProgram};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
@@ -113,9 +117,9 @@ pub use sequence::StopSettings;
 /// Why a command counts as lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Loss {
-    /// The motion device gives no set-points.
-    #[error("the motion connection gives no set-points: {0:?}")]
-    Withheld(Withheld),
+    /// The north side gives no set-points, for this reason.
+    #[error("the motion connection gives no set-points: {0}")]
+    Withheld(&'static str),
     /// No update came for longer than the interpolator can go on.
     #[error("no update of the controller came in time")]
     Silent,
@@ -142,16 +146,10 @@ struct Reset {
 /// One axis.
 #[derive(Debug)]
 pub struct AxisChannel {
-    north: CipProgram,
-    /// Counts the programs that were taken.
-    scaling_id: u32,
-    /// The Control Modes that the drive has, by their numbers.
-    control_modes: Option<u16>,
-    /// Counts the programs of either side that were taken or given up.
+    /// Nanounits in a count of the north side: it cannot command anything finer.
+    count: i64,
+    /// Counts the programs of the drive that were taken or given up.
     programs: u64,
-    trackers: CipTrackers,
-    /// The status that the controller was told last.
-    said: Told,
     south: Option<(DriveProgram, CachedStatus)>,
     limits: Limits,
     command_loss: Reaction,
@@ -190,10 +188,7 @@ pub struct AxisChannel {
     status: u32,
     /// Cycles for which a fault reset still stands in the control word.
     reset_cycles: u8,
-    action_id: u32,
-    north_action: DriveAction,
-    /// How the device wants the axis stopped for a fault.
-    abort: Option<AbortOrder>,
+    wish: Wish,
     reset_id: u32,
     reset: Option<Reset>,
     /// Set-points of this number were taken.
@@ -248,15 +243,10 @@ impl AxisChannel {
     /// An axis whose drive is not there yet.
     /// `moves` is whether it may ever be switched on: an encoder or a converter may not, whoever asks.
     #[must_use]
-    pub fn new(north: CipProgram, limits: Limits, command_loss: Reaction, moves: bool) -> Self {
-        let trackers = north.trackers();
+    pub fn new(limits: Limits, command_loss: Reaction, moves: bool) -> Self {
         Self {
-            north,
-            scaling_id: 0,
-            control_modes: None,
+            count: 1,
             programs: 0,
-            trackers,
-            said: Told::default(),
             south: None,
             limits,
             command_loss,
@@ -282,9 +272,7 @@ impl AxisChannel {
             control: 0,
             status: 0,
             reset_cycles: 0,
-            action_id: 0,
-            north_action: DriveAction::None,
-            abort: None,
+            wish: Wish::default(),
             reset_id: 0,
             reset: None,
             sequence: None,
@@ -321,9 +309,21 @@ impl AxisChannel {
         self.drive.machine.state()
     }
 
+    /// What the drive is told to do.
+    #[must_use]
+    pub fn action(&self) -> Action {
+        self.action
+    }
+
     /// Everything that is wrong now.
     pub fn faults(&self) -> impl Iterator<Item = &ActiveFault> {
         self.faults.iter()
+    }
+
+    /// The same, as the set that it is.
+    #[must_use]
+    pub fn fault_set(&self) -> &FaultSet {
+        &self.faults
     }
 
     /// The newest feedback.
@@ -344,43 +344,28 @@ impl AxisChannel {
         self.counters
     }
 
-    /// The program of the CIP side.
-    #[must_use]
-    pub fn north(&self) -> &CipProgram {
-        &self.north
-    }
-
     /// The program of the drive, once it is commissioned.
     #[must_use]
     pub fn south(&self) -> Option<&DriveProgram> {
         self.south.as_ref().map(|(program, _)| program)
     }
 
-    /// A number that is another one after either side has got another program, or its drive is gone: what was made of
-    /// [`Self::north`] and [`Self::south`] may be kept as long as it is the same.
+    /// A number that is another one after the drive has got another program or is gone: what was made of [`Self::south`] may be kept
+    /// as long as it is the same.
     #[must_use]
     pub fn programs(&self) -> u64 {
         self.programs
     }
 
-    /// Whether the torque may be on: then neither program may be replaced.
+    /// Whether the torque may be on: then no program may be replaced.
     #[must_use]
     pub fn may_have_torque(&self) -> bool {
         self.state().may_have_torque()
     }
 
-    /// Takes another scaling of the controller; `false`, and nothing done, while the torque may be on.
-    pub fn set_north(&mut self, program: CipProgram) -> bool {
-        if self.may_have_torque() {
-            return false;
-        }
-        self.trackers = program.trackers();
-        self.said = Told::default();
-        self.north = program;
-        self.control_modes = self.modes_of_drive();
-        self.programs += 1;
-        self.scaling_id = self.scaling_id.wrapping_add(1);
-        true
+    /// Sets how fine the north side can command, in nanounits.
+    pub fn set_count(&mut self, count: i64) {
+        self.count = count;
     }
 
     /// The drive is commissioned and will be spoken to by this program.
@@ -388,18 +373,10 @@ impl AxisChannel {
         let cached = program.cached_status();
         self.procedure.restart(program.procedures());
         self.south = Some((program, cached));
-        self.control_modes = self.modes_of_drive();
         self.programs += 1;
         self.captures.restart();
         self.action = Action::TorqueOff;
         (self.control, self.status, self.reset_cycles) = (0, 0, 0);
-    }
-
-    /// The Control Modes whose operating mode the drive has, by their numbers.
-    fn modes_of_drive(&self) -> Option<u16> {
-        let program = self.south()?;
-        let has = |number: &u8| self.north.mode(*number).is_some_and(|mode| program.has_mode(mode));
-        Some((0..16).filter(has).map(|number| 1 << number).sum())
     }
 
     /// The drive is gone: until it is commissioned again there is nobody to speak to.
@@ -420,7 +397,6 @@ impl AxisChannel {
         self.plausibility.restart();
         self.report(now, system, report);
         self.south = None;
-        self.control_modes = None;
         self.programs += 1;
         self.captures.restart();
         self.procedure.restart(&[]);

@@ -15,7 +15,6 @@
 
 use super::{AxisChannel, START_TIME_OUT};
 use crate::mapping::DriveProgram;
-use profile_cip::device::drive_link::DriveImage;
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::FeedbackSet;
 use profile_generic::interpolation::SetPoints as FinePoints;
@@ -205,21 +204,5 @@ impl AxisChannel {
                 }
             }
         }
-    }
-
-    /// What the sequence says about start and stop.
-    pub(super) fn sequence_image(&self, image: &mut DriveImage) {
-        let step = self.sequencer.step();
-        image.start_complete &= step == SequenceStep::Running;
-        image.tracking &= step == SequenceStep::Running;
-        image.stop_complete = match step {
-            SequenceStep::Holding => true,
-            // A fault that ends in a hold has stopped the axis as well: the state is Major Faulted whatever becomes of the
-            // torque (CIP Volume 9, 5-2.3.16.1.1).
-            SequenceStep::Off => image.stop_complete || self.holds(),
-            // Nobody will see its end; the drive is heard again before the axis can be switched on.
-            _ if self.unseen => image.stop_complete,
-            _ => false,
-        };
     }
 }

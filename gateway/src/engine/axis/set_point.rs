@@ -1,10 +1,9 @@
-//! From the controller's set-points to the telegram of the drive.
+//! From the set-points of the north side to the telegram of the drive.
 
 use super::guard::{Bounds, Finding, Lead, Trip, way};
-use super::{AxisChannel, Loss, MODE_TIME_OUT};
+use super::{AxisChannel, Intent, Loss, MODE_TIME_OUT};
 use crate::engine::bus::Cycle;
-use crate::mapping::{CyclicValues, DriveProgram, Order};
-use profile_cip::device::drive_link::{DriveAction, SetPoints};
+use crate::mapping::{DriveProgram, Order};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet};
 use profile_generic::interpolation::{Motion, Quality, SetPoints as FinePoints, TargetUpdate, UpdateError};
@@ -14,44 +13,76 @@ use profile_generic::quantity::{Position, Quantity, Torque, Velocity};
 use profile_generic::state::{Action, DriveState, Transition};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
+/// When set-points shall be reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// At this instant, on the way that the north side wants.
+    At(MonotonicTime, TargetUpdate),
+    /// North side and drives share no clock: as soon as the interpolator can, for an update of this instant of the north side's update
+    /// clock.
+    Paced(MonotonicTime),
+}
+
+/// Set-points of a north side, in generic units.
+#[derive(Debug, Clone, Copy)]
+pub struct NorthPoints {
+    /// Mode, set-points and offsets.
+    pub command: AxisCommand,
+    /// Another number for every fresh set of them.
+    pub sequence: u32,
+    /// When they shall be reached.
+    pub target: Target,
+    /// Values that were clamped on the way.
+    pub saturated: u32,
+    /// Values that could not be converted.
+    pub unusable: u32,
+    /// The position was put together from parts that can be of two updates.
+    pub is_counted: bool,
+}
+
 impl AxisChannel {
-    /// Takes set-points that shall be reached at `target` on the local clock; without a shared clock they are placed by the
-    /// controller's update clock as its arrivals show it.
-    pub(super) fn take_set_points(
+    /// Whether set-points of this number were taken.
+    #[must_use]
+    pub fn has_taken(&self, sequence: u32) -> bool {
+        self.sequence == Some(sequence)
+    }
+
+    /// Whether set-points in this mode would be the first ones after a start or a change of mode.
+    #[must_use]
+    pub fn begins(&self, selection: ModeSelection) -> bool {
+        self.sequence.is_none() || self.command.selection() != selection
+    }
+
+    /// The north side has no set-points: the next ones are the first.
+    pub fn end_set_points(&mut self) {
+        self.sequence = None;
+    }
+
+    /// Set-points of this number make no sense: the axis stops.
+    pub fn refuse_set_points(
         &mut self,
         now: MonotonicTime,
         system: SystemTime,
-        points: &SetPoints,
-        target: Option<MonotonicTime>,
+        sequence: u32,
+        cause: FaultCause,
     ) {
-        if self.sequence == Some(points.sequence) {
+        self.sequence = Some(sequence);
+        self.raise(now, system, Fault::new(cause, system));
+    }
+
+    /// Takes set-points of a north side that leads the axis by interpolation.
+    pub fn take_set_points(&mut self, now: MonotonicTime, system: SystemTime, points: NorthPoints) {
+        if self.has_taken(points.sequence) {
             return;
         }
-        let first = self.sequence.is_none();
+        let mut fresh = points.command;
+        let (first, begins) = (self.sequence.is_none(), self.begins(fresh.selection()));
         self.sequence = Some(points.sequence);
-        let Some(mode) = self.north.mode(points.control_mode.0) else {
-            self.raise(now, system, Fault::new(FaultCause::ILLEGAL_MODE, system));
-            return;
-        };
-        let mut fresh = self.command;
-        fresh.select(mode.into());
-        let same = self.command.selection() == fresh.selection();
-        if first || !same {
-            // Where the drive is now is where the controller counts from: turns made without position commands do not
-            // show in a command that wraps.
-            self.trackers = self.north.trackers();
-            let counts = self.north.counts(self.feedback.position.get()).value;
-            self.trackers.start(counts, points.position_reference);
-        }
-        let values = CyclicValues::from(&points.values);
-        let conversions =
-            self.north.decode(&values, points.position_reference, &mut self.trackers, &mut fresh);
-        let trims = self.north.decode_trims(&points.trims, &mut fresh);
-        let trimmed = self.take_trims(&mut fresh, first || !same);
-        let saturated = conversions.saturated + trims.saturated + u32::from(trimmed.is_none());
+        let trimmed = self.take_trims(&mut fresh, begins);
+        let saturated = points.saturated + u32::from(trimmed.is_none());
         self.count_saturated(saturated);
-        if conversions.not_finite + trims.not_finite + trims.unmapped + saturated > 0 {
-            // Half understood is not understood.
+        if points.unusable + saturated > 0 {
+            // Values that cannot be expressed are not followed in part.
             self.raise(now, system, Fault::new(FaultCause::POSITION_COMMAND_LIMIT, system));
             return;
         }
@@ -59,20 +90,17 @@ impl AxisChannel {
             self.trip(now, system, finding);
             return;
         }
-        let (target_update, target) = match target {
-            Some(target) => {
-                (TargetUpdate::ALL.get(usize::from(points.target.0)).copied().unwrap_or_default(), target)
-            }
-            None => {
+        let (target_update, target) = match points.target {
+            Target::At(at, update) => (update, at),
+            Target::Paced(paced_at) => {
                 // A period later than the drives could have it at the earliest: by then they can have the next one.
                 let period =
                     self.interpolator.as_ref().map_or(DurationNs::ZERO, |known| known.config().period);
-                (TargetUpdate::Interpolate, points.paced_at + self.ahead + period)
+                (TargetUpdate::Interpolate, paced_at + self.ahead + period)
             }
         };
-        let counted = points.values.unwind_count.is_some() && mode == OperatingMode::Position;
-        let trimmed = trimmed == Some(true) && mode == OperatingMode::Position;
-        let watched = if first || !same { trimmed } else { counted || trimmed };
+        let trimmed = trimmed == Some(true) && fresh.mode == OperatingMode::Position;
+        let watched = if begins { trimmed } else { points.is_counted || trimmed };
         if watched && let Some(finding) = self.leaps(&fresh, target) {
             // Position and count that do not belong together: one of them is of the cycle before or after. Or a trim that
             // would throw the axis aside.
@@ -151,7 +179,7 @@ impl AxisChannel {
             return None;
         }
         let (position, here) = (command.position, self.command.position);
-        let count = Position(self.north.count());
+        let count = Position(self.count);
         let above = |limit: &Position| position > *limit && position > here.saturating_add(count);
         let below = |limit: &Position| position < *limit && position < here.saturating_sub(count);
         let limit = self.limits.position_max.filter(above).or(self.limits.position_min.filter(below))?;
@@ -168,7 +196,8 @@ impl AxisChannel {
         }
     }
 
-    pub(super) fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
+    /// The command is lost: the axis stops as it is configured for that.
+    pub fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
         if self.fault.is_none() && self.state().is_running() {
             self.loss = Some(loss);
             let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(self.command_loss);
@@ -279,7 +308,7 @@ impl AxisChannel {
             cycle: span,
             elapsed,
             period: self.interpolator.as_ref().map_or(span, |known| known.config().period),
-            count: self.north.count(),
+            count: self.count,
         };
         let actual = self.feedback.velocity;
         if let Some(finding) = self.guard.judge(&mut self.command, lead, actual, &bounds, self.late) {
@@ -418,7 +447,7 @@ impl AxisChannel {
         match transition.action {
             Action::None => {}
             Action::Reject => {
-                self.enable_pending = matches!(self.north_action, DriveAction::Enable | DriveAction::Test);
+                self.enable_pending = matches!(self.wish.intent, Intent::Enable | Intent::Test);
             }
             Action::ResetFault => {
                 // The reset is a pulse, of the control word or a procedure command; the axis stays without torque.

@@ -253,7 +253,9 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
         hookup: Some(HookupSettings::new(kind(axis), axis.limits.velocity, axis.limits.torque)),
     };
     let moves = axis.function == AxisFunction::Drive;
-    Ok(AxisChannel::new(program, limits, reaction(axis.on_command_loss), moves))
+    let mut channel = AxisChannel::new(limits, reaction(axis.on_command_loss), moves);
+    channel.set_count(program.count());
+    Ok(channel)
 }
 
 /// A hundredth of the highest speed counts as standing, as the standard takes it of the rated one; where no limit is

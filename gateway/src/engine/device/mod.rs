@@ -1,5 +1,6 @@
 //! The CIP Motion side of the engine: one motion device with its axes, its I/O connection and its attributes.
 
+mod axis;
 mod stopping_torque;
 
 use std::net::SocketAddrV4;
@@ -25,6 +26,7 @@ use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
 
+pub use self::axis::CipAxis;
 use self::stopping_torque::Comparison;
 use super::access::{Access, AccessFailure, Refusal};
 use super::admission::Admission;
@@ -32,7 +34,7 @@ use super::axis::{AxisChannel, StopSettings};
 use super::bus::{Answer, Buses, Purpose};
 use super::notice::Notice;
 use super::port::{FRAME_MAX, NorthPort};
-use crate::mapping::{self, AttributeTable, CipScaling, CipType, Mapping, SequenceAttributes};
+use crate::mapping::{self, AttributeTable, CipProgram, CipScaling, CipType, Mapping, SequenceAttributes};
 use crate::north::DeviceEnd;
 
 /// Attribute accesses handled in one cycle; the rest waits for the next.
@@ -73,6 +75,8 @@ pub enum ScalingRefusal {
 struct Member {
     /// Its number in the engine.
     axis: usize,
+    /// What CIP Motion keeps of it.
+    cip: CipAxis,
     scaling: CipScaling,
     /// The scaling of the configuration, to which every new connection returns.
     configured: CipScaling,
@@ -102,15 +106,15 @@ struct Member {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct MadeOf {
     attributes: Option<u64>,
-    programs: u64,
+    programs: (u64, u32),
     control_mode: Option<ControlMode>,
 }
 
 impl MadeOf {
-    fn now(device: &MotionDevice, place: usize, axis: &AxisChannel) -> Self {
+    fn now(device: &MotionDevice, place: usize, axis: &AxisChannel, cip: &CipAxis) -> Self {
         Self {
             attributes: device.attribute_changes(place),
-            programs: axis.programs(),
+            programs: (axis.programs(), cip.scaling_id()),
             control_mode: device.control_mode(place),
         }
     }
@@ -198,9 +202,11 @@ impl DeviceChannel {
             .map(|(axis, scaling, stops)| {
                 let attributes =
                     mapping.attribute_table(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
+                let program = mapping.cip_program(scaling).ok_or(ChannelError::Scaling { axis: *axis })?;
                 let (scaling, configured) = (*scaling, *scaling);
                 Ok(Member {
                     axis: *axis,
+                    cip: CipAxis::new(program),
                     scaling,
                     configured,
                     attributes,
@@ -245,6 +251,12 @@ impl DeviceChannel {
     /// The motion device, to set its synchronization.
     pub fn device_mut(&mut self) -> &mut MotionDevice {
         &mut self.device
+    }
+
+    /// The program of the CIP side for an axis of the engine; `None` when the axis is not one of this device.
+    #[must_use]
+    pub fn program(&self, axis: usize) -> Option<&CipProgram> {
+        self.members.iter().find(|member| member.axis == axis).map(|member| member.cip.program())
     }
 
     /// Counters beside those of the motion device.
@@ -325,7 +337,7 @@ impl DeviceChannel {
         self.preset_scaling(mapping, axes);
         for (place, member) in self.members.iter_mut().enumerate() {
             self.device.update_drive(place, |image| {
-                axes[member.axis].fill_drive_image(image);
+                member.cip.fill(&axes[member.axis], image);
                 image.events = member.checkable(image.events);
                 image.captured_at = system_stamp(time, axes[member.axis].feedback().at);
             });
@@ -341,7 +353,7 @@ impl DeviceChannel {
         }
         self.events(time, axes);
         for member in &mut self.members {
-            let fault = axes[member.axis].node_fault();
+            let fault = member.cip.node_fault(&axes[member.axis]);
             if let Some((code, at)) = fault
                 && member.node_fault != Some(at)
             {
@@ -398,17 +410,18 @@ impl DeviceChannel {
                     Command::Follow(points) => points.target_time.map(SystemTime),
                     Command::Withheld(_) => None,
                 };
-                axis.from_controller(now, system, &image, target.map(|at| time.monotonic_at(at)));
+                let target = target.map(|at| time.monotonic_at(at));
+                member.cip.command(axis, (now, system), &image, target);
             }
         }
-        self.tell(axes, notice);
+        self.tell(notice);
         if let Some(strangers) = self.admission.notice(now, self.number) {
             notice(strangers);
         }
     }
 
     /// Tells what came into the logs, and how the node is.
-    fn tell(&mut self, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) {
+    fn tell(&mut self, notice: &mut dyn FnMut(Notice)) {
         let node = (self.device.node_fault(), self.device.node_alarm());
         if node != self.node {
             self.node = node;
@@ -421,7 +434,7 @@ impl DeviceChannel {
             }
             while let Some(entry) = self.device.poll_fault_log(place) {
                 let axis = u8::try_from(member.axis).unwrap_or(u8::MAX);
-                let cause = axes[member.axis].north().cause_of(entry.kind, entry.code);
+                let cause = member.cip.program().cause_of(entry.kind, entry.code);
                 notice(Notice::Logged { axis, entry, cause });
             }
         }
@@ -439,15 +452,15 @@ impl DeviceChannel {
         for (place, member) in self.members.iter().enumerate() {
             let axis = &mut axes[member.axis];
             while let Some(CaptureResult { source, edge, status, position, at, .. }) = axis.poll_capture() {
-                let events = axis.north().events();
+                let events = member.cip.program().events();
                 let event = events.event(CaptureKind::new(source, edge));
                 if let (Some(event), Some(status)) = (event, events.status(status)) {
-                    let position = axis.north().counts(position.get()).value;
+                    let position = member.cip.program().counts(position.get()).value;
                     self.device.notify_event(place, event, status, position, system_stamp(time, at));
                 }
             }
             let armed = self.device.armed_events(place).map_or(EventChecking::empty(), |(armed, _)| armed);
-            let captures = axis.north().events().captures(armed);
+            let captures = member.cip.program().events().captures(armed);
             axis.want_captures(captures);
         }
     }
@@ -693,7 +706,7 @@ impl Member {
         place: usize,
         axis: &AxisChannel,
     ) -> Stopping {
-        let now = MadeOf::now(device, place, axis);
+        let now = MadeOf::now(device, place, axis, &self.cip);
         if let Some((made_of, stopping)) = self.stopping
             && made_of == now
         {
@@ -713,7 +726,7 @@ impl Member {
         axis: &AxisChannel,
     ) -> Stopping {
         let (settings, abort) = self.stop_settings(mapping, device, place, axis);
-        let abort = axis.north().fault_action(abort);
+        let abort = self.cip.program().fault_action(abort);
         Stopping { settings, sequence: SequenceSettings { flying_start: settings.flying_start, abort } }
     }
 
@@ -744,9 +757,9 @@ impl Member {
             if by_drive { DurationNs::ZERO } else { time(id).unwrap_or_default() }
         };
         let stopping = u8::try_from(raw(rows.stopping_action)).ok();
-        let stopping = stopping.and_then(|code| axis.north().stopping(code));
+        let stopping = stopping.and_then(|code| self.cip.program().stopping(code));
         let stopping_limit = time(rows.stopping_time_limit).unwrap_or(SequenceTimes::FACTORY_LIMIT);
-        let by_velocity = device.control_mode(place).and_then(|mode| axis.north().mode(mode.0))
+        let by_velocity = device.control_mode(place).and_then(|mode| self.cip.program().mode(mode.0))
             == Some(OperatingMode::Velocity);
         let settings = StopSettings {
             plan: stopping.map(|row| row.plan).unwrap_or_default(),
@@ -810,7 +823,7 @@ impl Member {
         }
         let program = mapping.cip_program(&scaling).ok_or(ScalingRefusal::Inexact)?;
         let attributes = mapping.attribute_table(&scaling).ok_or(ScalingRefusal::Inexact)?;
-        if !axis.set_north(program) {
+        if !self.cip.set_program(axis, program) {
             return Err(ScalingRefusal::Energized);
         }
         self.attributes = attributes;

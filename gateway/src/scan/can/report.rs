@@ -46,7 +46,7 @@ pub fn text(bus: &Bus) -> String {
     }
     if bus.nodes.is_empty() && bus.unassigned.is_empty() {
         // Whoever is there may speak something else.
-        let _ = writeln!(out, "\nnobody answers by CANopen; drives on DeviceNet would not");
+        let _ = writeln!(out, "\nno node answers by CANopen; drives on DeviceNet would not");
     }
     for device in &bus.nodes {
         let _ = writeln!(out, "\nnode {}: {}", device.node, title(device));

@@ -151,7 +151,7 @@ fn nobody_is_nobody() {
     // Not even somebody who acknowledges: the first frames stay in the queue.
     let (found, took) = scan(&[]);
     assert!(took < DurationNs::from_secs(6), "{took}");
-    assert_eq!(text(&found), "0 nodes\n\nnobody answers by CANopen; drives on DeviceNet would not\n");
+    assert_eq!(text(&found), "0 nodes\n\nno node answers by CANopen; drives on DeviceNet would not\n");
     assert_eq!(starter(&found, "can0", None), None);
     assert_eq!(hints(&found), "");
 }

@@ -368,7 +368,7 @@ impl<'l> Words<'l> {
             self.next += 1;
             return Ok(time);
         }
-        problem(span, format!("`{word}` is no time"), format!("expected {}", duration::EXPECTED))
+        problem(span, format!("`{word}` is not a time"), format!("expected {}", duration::EXPECTED))
     }
 
     fn number(&mut self, what: &str, range: std::ops::RangeInclusive<f64>) -> Read<f64> {

@@ -79,7 +79,7 @@ pub(super) fn attribute(
         (Some(id), None) => problems.report(
             value.span(),
             format_args!("attribute {id} is not in the dictionary"),
-            "expected `type` beside it, such as type = \"UINT\"",
+            "expected `type` as well, such as type = \"UINT\"",
         ),
         (None, _) => wrong(value, "attribute", "the number of an attribute, 0 to 65535", problems),
     }

@@ -30,7 +30,7 @@ fn events(keys: &mut Keys<'_, '_>) -> Option<EventChecking> {
 fn counts(value: &Value<'_>, key: &str, axis: u8, keys: &Keys<'_, '_>, frame: &Frame<'_>) -> Option<i32> {
     let units = keys.finite(key, value)?;
     let Scaling::Counts(scale) = frame.config.axes[usize::from(axis) - 1].scaling else {
-        let title = format!("`{key}` is in units, and nobody has said how many counts one has");
+        let title = format!("`{key}` is in units, and the script does not say how many counts a unit has");
         return frame.problems.report(
             value.span(),
             title,

@@ -40,7 +40,7 @@ pub(super) fn misbehave(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
         return problems.report(span, title, format_args!("expected one of {}", names.join(", ")));
     };
     if let Some((second, span, _)) = kinds.next() {
-        let title = format!("`{second}` is a second misbehaviour beside `{name}`");
+        let title = format!("`{second}` is a second misbehaviour besides `{name}`");
         return problems.report(span, title, "expected one; two at once go into together = [...]");
     }
     drop(kinds);

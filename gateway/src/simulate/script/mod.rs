@@ -129,7 +129,7 @@ fn read(table: &DeTable<'_>, source: &str, mapping: &Mapping, problems: &Problem
     if unexpected? {
         let condition = Condition::NoFault;
         steps.push(Step::Expect { condition, within: DurationNs::ZERO });
-        titles.push(("No fault that nothing expected".to_owned(), None));
+        titles.push(("No unexpected fault".to_owned(), None));
     }
     Some(Script { title, places, config, steps, titles })
 }

@@ -322,7 +322,7 @@ pub(super) fn time(value: &Value<'_>, key: &str, problems: &Problems) -> Option<
         return wrong(value, key, duration::EXPECTED, problems);
     };
     duration::parse(text).or_else(|| {
-        let title = format!("`{text}` is no time");
+        let title = format!("`{text}` is not a time");
         problems.report(value.span(), title, format_args!("expected {}", duration::EXPECTED))
     })
 }

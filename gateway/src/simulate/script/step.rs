@@ -115,7 +115,7 @@ impl Modifiers<'_> {
         let left = left.or(self.refused.map(|(span, _)| (span, "refused")));
         let Some((span, key)) = left else { return Some(()) };
         let title = format!("`{key}` does not go with this step");
-        self.problems.report(span, title, "expected it beside a request, such as enable")
+        self.problems.report(span, title, "expected it together with a request, such as enable")
     }
 }
 
@@ -238,7 +238,7 @@ pub(super) fn step(value: &Value<'_>, frame: &Frame<'_>) -> Option<(Step, Option
         if let Some((first, _)) = found.replace((verb, value)) {
             return frame.problems.report(
                 span,
-                format_args!("`{name}` is a second verb beside `{}`", first.0),
+                format_args!("`{name}` is a second verb besides `{}`", first.0),
                 "expected one verb in a step; steps at once go into together = [...]",
             );
         }

@@ -8,7 +8,7 @@ use profile_cia402::wire::NodeId;
 use profile_cia402::wire::pdo::mapped_len;
 use profile_generic::can::Id;
 
-use super::{Behind, Stage, StageAxis, StageError};
+use super::{Behind, StageAxis, StageError};
 use crate::config::Config;
 use crate::engine::build::can::{described, network};
 use crate::engine::build::scaling;
@@ -78,25 +78,25 @@ pub struct CanPart {
 
 /// An axis of the box on a CiA 402 drive.
 #[derive(Debug, Clone)]
-pub struct CanMember {
+struct CanMember {
     /// Name of the axis.
-    pub name: String,
+    name: String,
     /// Number of its device.
-    pub device: usize,
+    device: usize,
     /// Its instance there.
-    pub instance: u8,
+    instance: u8,
     /// Name of its drive.
-    pub drive: String,
+    drive: String,
     /// The drive's node-id.
-    pub node: NodeId,
+    node: NodeId,
     /// The PDOs that it may have.
-    pub pdos: AxisPdos,
+    pdos: AxisPdos,
     /// The PDOs that its device has, where they are used as they are.
-    pub found: Option<FoundPdos>,
+    found: Option<FoundPdos>,
     /// What it is needed for.
-    pub needs: Cia402Axis,
+    needs: Cia402Axis,
     /// The scaling of the controller.
-    pub scaling: CipScaling,
+    scaling: CipScaling,
 }
 
 impl CanDrive {
@@ -119,13 +119,18 @@ impl CanDrive {
     #[must_use]
     pub fn spread(pdo: &CanPdo, flat: &[u8]) -> Vec<u8> {
         let mut frame = vec![0; pdo.len];
+        Self::put(pdo, flat, &mut frame);
+        frame
+    }
+
+    /// Puts the values of the program into the frame of a PDO, and leaves alone what belongs to other axes.
+    pub fn put(pdo: &CanPdo, flat: &[u8], frame: &mut [u8]) {
         for part in &pdo.parts {
             let values = flat.get(part.flat..part.flat + part.len);
             if let (Some(place), Some(values)) = (frame.get_mut(part.at..part.at + part.len), values) {
                 place.copy_from_slice(values);
             }
         }
-        frame
     }
 
     /// Takes the values of a PDO; whether the frame was long enough.
@@ -140,21 +145,6 @@ impl CanDrive {
             }
         }
         true
-    }
-}
-
-impl Stage {
-    /// Axes on CiA 402 drives, each with the data sheet of its drive.
-    ///
-    /// # Errors
-    /// A drive with this data sheet cannot be led.
-    pub fn of_sheets<'d>(
-        mapping: Mapping,
-        members: impl IntoIterator<Item = (CanMember, &'d DeviceDescription)>,
-    ) -> Result<Self, StageError> {
-        let axes = members.into_iter().map(|(member, sheet)| on_can(&mapping, member, sheet));
-        let axes = axes.collect::<Result<_, _>>()?;
-        Ok(Self { mapping, axes, layout: Default::default() })
     }
 }
 

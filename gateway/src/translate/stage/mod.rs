@@ -7,27 +7,19 @@ mod can;
 mod devicenet;
 mod values;
 
-use std::net::SocketAddrV4;
+use std::sync::{Mutex, PoisonError};
 
-use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_cip::wire::motion::Format;
 use profile_sercos::wire::layout::Layout;
 
-pub use can::{CanDrive, CanMember, CanPart, CanPdo};
+pub use can::{CanDrive, CanPart, CanPdo};
 pub use devicenet::DevicenetDrive;
 pub use values::ValuesError;
 
+use super::bench::Bench;
 use crate::config::Config;
-use crate::engine::build::{BuildError, Built, Host, build, scaling};
-use crate::engine::port::{Datagram, NorthPort, SouthPort};
+use crate::engine::build::{BuildError, scaling};
 use crate::mapping::{AttributeTable, CipProgram, CipScaling, DriveFacts, DriveProgram, Mapping, SercosAxis};
-use crate::simulate::can_bus::InProcessCan;
-use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
-
-/// Virtual time in which the drives must be ready: 511 of them take less.
-const LIMIT: DurationNs = DurationNs::from_secs(120);
-
-/// When it begins; the instant does not matter.
-const START: MonotonicTime = MonotonicTime(1_000_000_000);
 
 /// One axis with its programs.
 #[derive(Debug, Clone)]
@@ -120,6 +112,9 @@ impl StageAxis {
 /// All axes of a configuration, and where each drive has its place in the telegrams.
 #[derive(Debug)]
 pub struct Stage {
+    config: Config,
+    /// Benches that nobody uses now.
+    benches: Mutex<Vec<Bench>>,
     /// The tables.
     pub mapping: Mapping,
     /// The axes in the order of the configuration.
@@ -135,7 +130,7 @@ pub enum StageError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A drive on CANopen cannot be led by its data sheet.
-    #[error("axis {axis}: the drive of its data sheet cannot be led: {told}")]
+    #[error("axis {axis}: the drive of its data sheet cannot be used: {told}")]
     Sheet {
         /// The axis.
         axis: String,
@@ -143,7 +138,7 @@ pub enum StageError {
         told: String,
     },
     /// No program can be made for an axis.
-    #[error("axis {axis}: no program can be made: {told}")]
+    #[error("axis {axis}: its program cannot be compiled: {told}")]
     Program {
         /// The axis.
         axis: String,
@@ -160,47 +155,15 @@ pub enum StageError {
     },
 }
 
-/// Nobody is connected on this side.
-struct Silent;
-
-impl NorthPort for Silent {
-    fn receive(&mut self, _: &mut [u8]) -> Option<Datagram> {
-        None
-    }
-
-    fn send(&mut self, _: &[u8], _: SocketAddrV4) -> bool {
-        false
-    }
-}
-
 impl Stage {
     /// Commissions simulated drives as the box would.
     ///
     /// # Errors
     /// The configuration makes no box, or a drive does not come to cyclic operation with it.
     pub fn rehearse(config: &Config, mapping: Mapping) -> Result<Self, StageError> {
-        let host = Host { mac: SIMULATED_MAC, incarnation: 1 };
-        let Built { mut engine, mut notices, mut commissioners, .. } = build(config, mapping.clone(), host)?;
-        let mut sercos = config.sercos.as_ref().map(|sercos| InProcessDrives::of(config, sercos, None));
-        let mut can: Vec<_> = config.can.iter().map(|bus| InProcessCan::of(bus, None)).collect();
-        let mut south: Vec<SouthPort<'_>> = sercos.iter_mut().map(|port| SouthPort::Ethernet(port)).collect();
-        south.extend(can.iter_mut().map(|port| SouthPort::Can(port)));
-        let devicenet = config.devicenet.iter().map(|network| InProcessCan::of_devicenet(network, None));
-        let mut devicenet: Vec<_> = devicenet.collect();
-        south.extend(devicenet.iter_mut().map(|port| SouthPort::Can(port)));
-        let mut ports: Vec<Silent> = config.devices.iter().map(|_| Silent).collect();
-        let mut ports: Vec<&mut dyn NorthPort> =
-            ports.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
-        let mut now = START;
-        let mut told = Vec::new();
-        let ready = |engine: &crate::engine::Engine| engine.axes().iter().all(|axis| axis.south().is_some());
-        while !ready(&engine) && now.since(START) < LIMIT {
-            now = engine.cycle(now, &mut ports, &mut south).max(now + DurationNs(1));
-            commissioners.poll();
-            while let Ok(notice) = notices.pop() {
-                told.push(notice.to_string());
-            }
-        }
+        let mut bench = Bench::new(config, mapping.clone())?;
+        let told: Vec<String> = bench.take_notices().iter().map(ToString::to_string).collect();
+        let engine = bench.engine();
         let mut axes = Vec::with_capacity(config.axes.len());
         for bus in 0..config.can.len() {
             axes.extend(can::configured(config, bus, &mapping)?);
@@ -214,7 +177,13 @@ impl Stage {
                 StageError::Drive { axis: axis.name.clone(), told: about.unwrap_or_default() }
             };
             let south = channel.south().ok_or_else(unready)?;
-            let Some((drive, bus)) = config.sercos_drive(axis).zip(engine.sercos()) else { continue };
+            let Some((drive, bus)) = config.sercos_drive(axis).zip(engine.sercos()) else {
+                // The programs are those that the engine has made of what the drives have answered.
+                if let Some((_, known)) = axes.iter_mut().find(|(known, _)| *known == number) {
+                    known.south = south.clone();
+                }
+                continue;
+            };
             let slave = bus.master().slave_by_address(drive.address);
             let scaling = scaling(axis);
             let (Some(slave), Some((needs, facts)), Some(attributes)) =
@@ -238,7 +207,7 @@ impl Stage {
                 stands_in: !drive.set_scaling,
                 scaling,
                 attributes,
-                north: channel.north().clone(),
+                north: engine.cip_program(number).ok_or_else(unready)?.clone(),
                 south: south.clone(),
             };
             axes.push((number, on_sercos));
@@ -247,35 +216,58 @@ impl Stage {
         let axes = axes.into_iter().map(|(_, axis)| axis).collect();
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
         let layout = engine.sercos().map(|bus| bus.master().layout().to_wire(topology)).unwrap_or_default();
-        Ok(Self { axes, layout, mapping })
+        Ok(Self { config: config.clone(), axes, layout, mapping, benches: Mutex::new(vec![bench]) })
+    }
+
+    /// A bench with the programs of the stage, on which nothing was said yet.
+    pub(super) fn bench(&self) -> Result<Bench, StageError> {
+        let kept = self.benches.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut bench = match kept {
+            Some(bench) => bench,
+            None => Bench::new(&self.config, self.mapping.clone())?,
+        };
+        bench.restart(&self.axes);
+        Ok(bench)
+    }
+
+    /// Takes back a bench, for the next list.
+    pub(super) fn keep(&self, bench: Bench) {
+        self.benches.lock().unwrap_or_else(PoisonError::into_inner).push(bench);
     }
 
     /// The same axes and drives with other tables.
     ///
     /// # Errors
-    /// A program cannot be made with them.
+    /// As [`Self::rehearse`].
     pub fn with_mapping(&self, mapping: Mapping) -> Result<Self, StageError> {
-        let axes = self.axes.iter().map(|axis| {
+        Self::rehearse(&self.config, mapping)
+    }
+
+    /// The same with programs for drives that hold what is known of them now.
+    fn compiled_anew(mut self) -> Result<Self, StageError> {
+        for axis in &mut self.axes {
             let failed = |told: String| StageError::Program { axis: axis.name.clone(), told };
-            let south = match &axis.behind {
-                Behind::Sercos(drive) => mapping
+            axis.south = match &axis.behind {
+                Behind::Sercos(drive) => self
+                    .mapping
                     .sercos_program(&drive.needs, &drive.facts)
                     .map_err(|error| failed(error.to_string()))?,
-                Behind::Can(drive) => mapping
+                Behind::Can(drive) => self
+                    .mapping
                     .of_drive(&drive.facts)
                     .cia402_program(&drive.needs, &drive.facts)
                     .map_err(|error| failed(error.to_string()))?,
-                Behind::Devicenet(drive) => {
-                    mapping.devicenet_program(&drive.needs).map_err(|error| failed(error.to_string()))?
-                }
+                Behind::Devicenet(_) => continue,
             };
-            let no_ratio = || failed("a ratio of its scaling does not fit 64 bits".to_owned());
-            let north = mapping.cip_program(&axis.scaling).ok_or_else(no_ratio)?;
-            let attributes = mapping.attribute_table(&axis.scaling).ok_or_else(no_ratio)?;
-            Ok(StageAxis { south, north, attributes, ..axis.clone() })
-        });
-        let axes = axes.collect::<Result<_, StageError>>()?;
-        Ok(Self { axes, layout: self.layout.clone(), mapping })
+        }
+        // A bench gets these programs when it is used again.
+        self.benches.get_mut().unwrap_or_else(PoisonError::into_inner).iter_mut().for_each(Bench::note_use);
+        Ok(self)
+    }
+
+    /// The format of the updates of a device.
+    pub(super) fn format(&self, device: usize) -> Format {
+        self.config.devices.get(device).map_or(Format::Variable, |device| device.connection_format)
     }
 
     /// The axis with this name.

@@ -68,8 +68,7 @@ impl Stage {
             }
             axis.stands_in = false;
         }
-        let mapping = self.mapping.clone();
-        Ok(self.with_mapping(mapping)?)
+        Ok(self.compiled_anew()?)
     }
 
     /// Drives whose scaling is that of a simulated one: neither does the box set it, nor has anybody said what it is.

@@ -1,60 +1,67 @@
 //! CiA 402 drives on CANopen: updates to RPDOs, TPDOs and EMCY to the device.
 
-use profile_cia402::eds;
 use profile_cia402::master::config::Direction;
-use profile_cia402::wire::NodeId;
 use profile_cip::wire::motion::codes::AxisControl;
-use profile_generic::image::Signal;
-use profile_generic::mode::OperatingMode;
-use profile_generic::scaling::{NANO, UnitKind};
-use profile_generic::time::DurationNs;
 
 use super::*;
 use crate::capture::can::{LINK_TYPE_CAN, RECORD_LEN_MAX, emit};
-use crate::engine::bus::can::layout::{AxisPdos, SpareIds};
-use crate::mapping::{Cia402Axis, CipScaling};
-use crate::simulate::can_drive;
-
-const MODES: [OperatingMode; 3] = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
 
 /// The two axes of a simulated drive with node-id 3.
-fn stage() -> Stage {
-    stage_of(can_drive::drive(NodeId::new(3).ok(), 2).unwrap().eds())
+const BOX: &str = r#"
+[box]
+name = "box"
+
+[[device]]
+name = "front"
+listen = "127.0.0.1"
+axes = ["turntable", "index"]
+update_period = { min = "4 ms", max = "32 ms" }
+
+[device.identity]
+vendor_id = 1
+product_code = 1
+serial_number = 1
+
+[[axis]]
+name = "turntable"
+instance = 1
+drive = "drive-c"
+unit = "revolution"
+
+[[axis]]
+name = "index"
+instance = 2
+drive = "drive-d"
+unit = "revolution"
+
+[[south.can]]
+interface = "in-process"
+bit_rate = 1_000_000
+cycle_time = "4 ms"
+
+[[south.can.drive]]
+name = "drive-c"
+node = 3
+
+[[south.can.drive]]
+name = "drive-d"
+node = 3
+axis = 1
+"#;
+
+/// The same with a drive of this vendor and product.
+const ORIENTAL: &str = r#"
+[[south.can.device]]
+node = 3
+identity = { vendor_id = 0x2BE, product_code = 0x13F7 }
+"#;
+
+fn stage_of(text: &str) -> Stage {
+    Stage::rehearse(&Config::parse(text, "box.toml").unwrap(), Mapping::embedded().unwrap()).unwrap()
 }
 
-/// The same of a drive with this data sheet.
-fn stage_of(sheet: &[u8]) -> Stage {
-    let sheet = eds::read(sheet).unwrap().description;
-    let member = |axis: u16, instance: u8, name: &str| CanMember {
-        name: name.to_owned(),
-        device: 0,
-        instance,
-        drive: format!("drive-{}", char::from(b'b' + instance)),
-        node: NodeId::new(3).unwrap(),
-        pdos: AxisPdos::new(
-            axis,
-            3,
-            &mut SpareIds::new((5..=127).filter_map(|id| NodeId::new(id).ok()).collect()),
-        )
-        .unwrap(),
-        found: None,
-        needs: Cia402Axis {
-            axis,
-            modes: MODES.into_iter().map(Into::into).collect(),
-            cycle: DurationNs::from_millis(2),
-            left_out: vec![Signal::FollowingError, Signal::DigitalInputs],
-            ..Cia402Axis::default()
-        },
-        scaling: CipScaling {
-            kind: UnitKind::Rotary,
-            nanounits_per_unit: NANO,
-            counts_per_unit: 1_000_000,
-            inverted: false,
-            unwind: None,
-        },
-    };
-    let members = [member(0, 1, "turntable"), member(1, 2, "index")];
-    Stage::of_sheets(Mapping::embedded().unwrap(), members.map(|member| (member, &sheet))).unwrap()
+fn stage() -> Stage {
+    stage_of(BOX)
 }
 
 #[test]
@@ -133,28 +140,15 @@ fn what_drives_say_is_wrong_is_told_of_every_axis() {
     ));
 }
 
-/// Rows of the family that a drive is of, by its data sheet.
+/// Rows of the family that a drive is of, by its identity.
 #[test]
 fn the_rows_of_a_family_are_named_for_its_drives() {
-    let node = can_drive::drive(NodeId::new(3).ok(), 2).unwrap();
-    let sheet = String::from_utf8(node.eds().to_vec()).unwrap();
-    let with = |sub: u8, value: &str, sheet: &str| {
-        let head = format!("[1018sub{sub}]");
-        let (before, after) = sheet.split_once(&head).unwrap();
-        let (section, rest) = after.split_at(after.find("\n[").unwrap());
-        let lines = section.lines().map(|line| match line.split_once('=') {
-            Some(("DefaultValue", _)) => format!("DefaultValue={value}"),
-            _ => line.to_owned(),
-        });
-        format!("{before}{head}{}{rest}", lines.collect::<Vec<_>>().join("\n"))
-    };
-    let oriental = with(2, "0x13F7", &with(1, "0x2BE", &sheet));
     // Bit 15: the torque limit of this family, and nothing in other drives.
-    let told = |sheet: &str| {
-        let mut translator = Translator::new(stage_of(sheet.as_bytes()));
+    let told = |text: &str| {
+        let mut translator = Translator::new(stage_of(text));
         lines(&mut translator, &["can 080", "can 183 37 96 08 00 00 04 00", "can 283 00 10 00 00 f4 01"])
     };
-    let (any, own) = (told(&sheet), told(&oriental));
+    let (any, own) = (told(BOX), told(&(BOX.to_owned() + ORIENTAL)));
     assert!(!any.contains("torque limit") && !any.contains("torque_limit"), "{any}");
     assert!(own.contains("torque limit  <-") && own.contains("[[status]] torque_limit"), "{own}");
 }

@@ -1,4 +1,4 @@
-use profile_cip::wire::motion::codes::{AxisControl, ControlMode, NodeControl, TimeDataSet};
+use profile_cip::wire::motion::codes::{AxisControl, ControlMode, FeedbackMode, NodeControl, TimeDataSet};
 use profile_cip::wire::motion::{
     CommandBlock, CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter,
 };
@@ -6,9 +6,12 @@ use profile_cip::wire::motion::{
 mod can;
 mod devicenet;
 
+use profile_generic::program::{CommandProgram, Conversion, Field};
+use profile_generic::ratio::Ratio;
+
 use super::*;
 use crate::config::Config;
-use crate::mapping::Mapping;
+use crate::mapping::{CipScaling, Mapping};
 
 fn translator() -> Translator {
     let config = Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
@@ -38,6 +41,7 @@ fn update(block: CommandBlock) -> Vec<u8> {
 fn position(counts: i32) -> CommandBlock {
     CommandBlock {
         control_mode: ControlMode::POSITION,
+        feedback_mode: FeedbackMode(2),
         values: CommandValues {
             position: Some(CommandPosition::Integer(counts)),
             ..CommandValues::default()
@@ -123,6 +127,46 @@ fn what_cannot_be_translated_says_why() {
         .map(|line| translator.line(&Line::parse(line).unwrap().unwrap()).unwrap_err().to_string())
         .collect();
     insta::assert_snapshot!(errors.join("\n"));
+}
+
+/// Finding T1: with positions inverted both ways in the box, and velocities times -3, every translated frame was the same as before.
+/// Here it is the engine alone that is wrong, and the programs that the translator could look into are right.
+#[test]
+fn what_the_engine_does_wrong_is_seen() {
+    let mut right = translator();
+    let mut wrong = translator();
+    let axis = &wrong.stage.axes[0];
+    let inverted = CipScaling { inverted: true, ..axis.scaling };
+    let north = wrong.stage.mapping.cip_program(&inverted).unwrap();
+    let mut south = axis.south.clone();
+    let mut fields = CommandProgram::new();
+    for field in axis.south.command.fields() {
+        let conversion = match field.signal {
+            Signal::VelocityCommand => {
+                let ratio = field.conversion.ratio;
+                Conversion { ratio: Ratio::new(-3 * ratio.num(), ratio.den()).unwrap(), ..field.conversion }
+            }
+            _ => field.conversion,
+        };
+        fields.push(Field { conversion, ..*field }).unwrap();
+    }
+    south.command = fields;
+    let bench = wrong.bench().unwrap();
+    assert!(bench.engine_mut().axes_mut()[0].set_north(north), "it has no torque");
+    bench.engine_mut().axes_mut()[0].set_south(south);
+    let shown = |text: &str, what: &str| {
+        let line = text.lines().find(|line| line.contains(what)).map(|line| line.trim().to_owned());
+        line.unwrap_or_else(|| panic!("{what} in {text}"))
+    };
+    let values = CommandValues { velocity: Some(0.75), ..CommandValues::default() };
+    let velocity = CommandBlock { control_mode: ControlMode::VELOCITY, values, ..CommandBlock::default() };
+    for (block, what) in [(position(250_000), "S-0-0047"), (velocity, "S-0-0036")] {
+        let [good, bad] = [&mut right, &mut wrong].map(|one| text(&one.frame(&update(block)).unwrap()));
+        assert_ne!(shown(&good, what), shown(&bad, what));
+    }
+    let at = format!("at drive-a 08c0 20a10700 {}", "00".repeat(6));
+    let [good, bad] = [&mut right, &mut wrong].map(|one| lines(one, &[&at]));
+    assert_ne!(shown(&good, "Actual Position"), shown(&bad, "Actual Position"));
 }
 
 /// A drive whose scaling is another one than that of the simulated drive.

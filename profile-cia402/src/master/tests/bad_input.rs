@@ -2,8 +2,9 @@
 
 use super::peer::Wrong;
 use super::*;
+use crate::drive::ErrorCode;
 use crate::sdo::request::SdoOperation;
-use crate::wire::emcy::{Emcy, EmcyCode, ErrorRegister};
+use crate::wire::emcy::{Emcy, ErrorRegister};
 
 #[test]
 fn a_device_that_reboots_in_operation_is_told_at_once() {
@@ -315,7 +316,7 @@ fn a_storm_of_emcys_is_told_by_its_beginning_and_its_last_one() {
     let mut rig = running(2);
     rig.keep(&[1, 2]);
     let emcy = |vendor| Emcy {
-        code: EmcyCode(0x8611),
+        code: ErrorCode(0x8611),
         register: ErrorRegister::GENERIC,
         vendor: [vendor, 0, 0, 0, 0],
     };

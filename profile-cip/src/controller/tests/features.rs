@@ -381,7 +381,7 @@ fn an_axis_of_unknown_scaling_is_enabled_and_watched_but_not_moved() {
     let error = crate::controller::Controller::new(config.clone(), vec![go(1.0)]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "step 0: axis 1: does not move, since nobody knows how many counts its unit has"
+        "step 0: axis 1: does not move, because the counts of its unit are not known"
     );
     let (_, text) = fail_with(config.clone(), vec![position(0.0)]);
     assert!(text.contains("does not move"), "{text}");

@@ -5,9 +5,8 @@
 //! from it, but never less than [`DriveCondition::least`]: a drive that has already switched itself off cannot be kept
 //! running by an attribute.
 
-use profile_generic::open_code;
-
 use crate::device::attribute::{AttributeStore, AttributeTable, id};
+pub use crate::generated::motion_codes::ExceptionAction;
 use crate::wire::motion::codes::FaultType;
 
 /// Most conditions of an axis at the same time: the two diagnostic words of a drive and a few of the box.
@@ -15,22 +14,6 @@ pub const CONDITIONS_MAX: usize = 32;
 
 /// Exceptions of the standard, or of the manufacturer: the bits of an LWORD.
 pub const EXCEPTIONS: usize = 64;
-
-open_code! {
-    /// Axis Exception Action, attributes 672 and 673, Table 5-2.70.
-    pub struct ExceptionAction(u8) {
-        /// The condition shows in Axis Exceptions only.
-        IGNORE = 0 => "Ignore",
-        /// It is reported as an alarm while it lasts.
-        ALARM = 1 => "Alarm",
-        /// It is reported as a fault, which stays until a reset; the axis goes on.
-        MINOR_FAULT = 2 => "Minor Fault",
-        /// The axis stops by the best stopping action that is left, and stays faulted until a reset.
-        MAJOR_FAULT = 3 => "Major Fault",
-        /// The device does not have this exception.
-        UNSUPPORTED = 255 => "Unsupported",
-    }
-}
 
 /// One condition that is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

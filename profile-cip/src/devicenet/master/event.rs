@@ -185,7 +185,7 @@ impl fmt::Display for LossReason {
                 write!(f, "{kind}: expected assembly {expected} {what}, found ")?;
                 match found {
                     Some(found) => write!(f, "{found}")?,
-                    None => f.write_str("none that could be told")?,
+                    None => f.write_str("none that could be read")?,
                 }
                 write!(f, ", and it cannot be set: {status}")
             }

@@ -18,7 +18,7 @@ pub enum HotPlugRefusal {
     )]
     NoTelegram,
     /// The slave in front of it does not pass telegrams on.
-    #[error("the slave in front of it does not do as commanded")]
+    #[error("the slave upstream of it does not follow the command")]
     Opening,
     /// It does not answer in the hot-plug field.
     #[error("it does not answer in HP1")]
@@ -39,10 +39,10 @@ pub enum HotPlugRefusal {
     #[error("another slave with its address takes part")]
     Duplicate,
     /// It is a device with several slaves.
-    #[error("it is a device with several slaves; those come in with the next scan (CP0) only")]
+    #[error("it is a device with several slaves; such devices come in with the next scan (CP0) only")]
     Several,
     /// It does not take the place of its service channel.
-    #[error("it does not take the place of its service channel ({code:#04x})")]
+    #[error("it does not accept the place of its service channel ({code:#04x})")]
     Offset {
         /// The parameter: 0x80 in the MDT, 0x81 in the AT.
         code: u8,
@@ -69,7 +69,7 @@ pub enum HotPlugRefusal {
     #[error("telegrams do not come back past it")]
     Blind,
     /// Behind it telegrams are turned round though hot plug is off: another slave has come in on its telegrams.
-    #[error("another slave behind it has taken over its address or its telegrams")]
+    #[error("another slave downstream of it has taken over its address or its telegrams")]
     Shadow,
     /// At the end of a line telegrams are turned round though hot plug is off.
     #[error("a slave at the end of the line turns telegrams round though hot plug is off; unplug it")]

@@ -284,7 +284,7 @@ fn a_slave_that_refuses_s_0_0127_is_named_and_left_out() {
     let refused =
         Event::CheckFailed { slave: BAD_ID, phase: Phase::CP2, invalid: Invalid::from_iter([MODE]) };
     rig.run_until("refused", |rig| rig.saw(&refused));
-    let said = "slave at position 2: the check to leave CP2 failed: the slave finds invalid S-0-0032";
+    let said = "slave at position 2: the check to leave CP2 failed: the slave reports as invalid S-0-0032";
     assert_eq!(refused.to_string(), said);
     rig.state(State::Await2);
     let report: Vec<_> = rig.master.report(BAD_ID).iter().map(ToString::to_string).collect();

@@ -82,7 +82,7 @@ fn one_of_a_ring_hangs_and_the_others_miss_two_to_five_cycles() {
         if hung == 0 {
             told[0] = "topology: line on port 2".to_string();
             told.push(
-                "slave at position 1 with address 1 passes no telegrams on: nobody is reached from port 1"
+                "slave at position 1 with address 1 passes no telegrams on: no slave is reached from port 1"
                     .to_string(),
             );
         } else {
@@ -91,7 +91,7 @@ fn one_of_a_ring_hangs_and_the_others_miss_two_to_five_cycles() {
         if hung == 3 {
             told[0] = "topology: line on port 1".to_string();
             told.push(
-                "slave at position 4 with address 4 passes no telegrams on: nobody is reached from port 2"
+                "slave at position 4 with address 4 passes no telegrams on: no slave is reached from port 2"
                     .to_string(),
             );
         } else {

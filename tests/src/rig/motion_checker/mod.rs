@@ -30,6 +30,7 @@ use std::fmt;
 
 use axisbridge::config::{Config, DevicenetKind, DriveAt};
 use axisbridge::engine::axis::AxisChannel;
+use axisbridge::mapping::CipProgram;
 use profile_cia402::drive::index::AXIS_OFFSET;
 use profile_cia402::wire::cob_id;
 use profile_cip::devicenet::wire::Identifier;
@@ -84,9 +85,8 @@ struct NorthScale {
 }
 
 impl NorthScale {
-    fn of(axis: &AxisChannel) -> Self {
+    fn of(north: &CipProgram) -> Self {
         const MANY: i64 = 1_000_000_000_000_000;
-        let north = axis.north();
         let counts = f64_from_i64(north.counts(MANY).value - north.counts(0).value);
         let values = CommandValues { velocity: Some(1e3), torque: Some(100.0), ..CommandValues::default() };
         let mut command = AxisCommand::default();
@@ -275,7 +275,7 @@ impl MotionChecker {
                 .checked_sub(1)
                 .and_then(|place| config.axes.get(place))
                 .and_then(|setup| setup.unwind);
-            let scale = NorthScale::of(&rig.engine.axes()[axis.number]);
+            let scale = NorthScale::of(rig.engine.cip_program(axis.number).expect("an axis of a device"));
             let command = commanded.axes.iter().find(|command| command.instance == axis.instance);
             let (value, modulo) = match command {
                 Some(command) => (value(command, unwind, &scale), command.rolls_over()),

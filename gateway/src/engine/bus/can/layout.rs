@@ -141,7 +141,7 @@ impl fmt::Display for Only {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.0 {
             // What nobody sets would be sent as zero.
-            Direction::Receive => " with nothing but what the axis is told,",
+            Direction::Receive => " with only values that the gateway sets,",
             Direction::Transmit => ",",
         })
     }
@@ -493,7 +493,7 @@ mod tests {
         let wanted = values(&[(0x6040, 2), (0x607A, 4)]);
         let said =
             |direction, pdos: &[FoundPdo]| first().find(direction, &wanted, pdos).unwrap_err().to_string();
-        let head = "is in no RPDO that can be used, and the mapping is kept: expected one with nothing but what the axis is told, got";
+        let head = "is in no RPDO that can be used, and the mapping is kept: expected one with only values that the gateway sets, got";
         let cases: [(&[u32], &str); 5] = [
             (&[0x6040_0010], "607A:00 {} 1: 6040:00"),
             // Something else beside it, another length, half of it twice, and bits that shift it.

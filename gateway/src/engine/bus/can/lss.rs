@@ -67,9 +67,9 @@ impl fmt::Display for LssNotice {
         let Assignment { node, address, stores } = assignment;
         match self {
             Self::Given { .. } if *stores => {
-                write!(f, "the device with {address} has got node-id {node} and keeps it")
+                write!(f, "the device with {address} was given node-id {node} and stores it")
             }
-            Self::Given { .. } => write!(f, "the device with {address} has got node-id {node}"),
+            Self::Given { .. } => write!(f, "the device with {address} was given node-id {node}"),
             Self::Other { has, .. } => {
                 write!(
                     f,
@@ -77,7 +77,7 @@ impl fmt::Display for LssNotice {
                 )
             }
             Self::Failed { what, failure, .. } => {
-                write!(f, "the device with {address} has not got node-id {node}: {what}: {failure}")
+                write!(f, "the device with {address} was not given node-id {node}: {what}: {failure}")
             }
         }
     }

@@ -111,7 +111,7 @@ impl fmt::Display for Tried {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let has: Vec<_> = self.has.iter().map(|(name, _)| name.as_str()).collect();
         let has = if has.is_empty() { "none".to_owned() } else { has.join(", ") };
-        write!(f, "6502 tells no modes of operation; tried by 6060 and 6061, it has {has}")?;
+        write!(f, "6502 reports no modes of operation; tried by 6060 and 6061, it has {has}")?;
         match self.others.is_empty() {
             true => Ok(()),
             false => write!(f, " ({})", self.others.join("; ")),

@@ -1,0 +1,164 @@
+//! An `[[axis]]`.
+
+use super::{Problems, limits, value};
+use crate::config::file::{AxisTable, LimitsTable};
+use crate::config::{Axis, AxisFunction, AxisKind, DriveAt, Limits, StoppingAction};
+use crate::finding::registry as code;
+use crate::finding::{Problem, Spanned};
+use crate::mapping::CaptureMode;
+
+pub(super) fn check(
+    problems: &mut Problems,
+    table: &AxisTable,
+    device: Option<usize>,
+    drives: &[(&Spanned<String>, DriveAt)],
+) -> Option<Axis> {
+    let name = value::name(problems, "axis", &table.name);
+    let instance = value::number(problems, &table.instance, "the instance", 1..=255);
+    let drive = drives.iter().find(|(name, _)| name.get_ref() == table.drive.get_ref()).map(|(_, at)| *at);
+    if drive.is_none() {
+        problems.unknown("drive", &table.drive, drives.iter().map(|(name, _)| name.get_ref()));
+    }
+    let function = function(problems, table);
+    let kind = match table.unit.get_ref().as_str() {
+        "revolution" => Some(AxisKind::Rotary),
+        "millimetre" => Some(AxisKind::Linear),
+        other => problems.report_as(
+            code::UNKNOWN_WORD,
+            table.unit.span(),
+            format_args!("unknown axis unit `{other}`"),
+            "expected \"revolution\" or \"millimetre\"",
+        ),
+    };
+    let counts = 1..=i64::from(i32::MAX);
+    let motion_resolution = value::number_or(
+        problems,
+        &table.motion_resolution,
+        "the motion resolution",
+        counts.clone(),
+        1_000_000,
+    );
+    let unwind_counts =
+        value::optional(&table.unwind_counts, |value| value::number(problems, value, "the unwind", counts));
+    let power_structure_axis_id = value::number_or(
+        problems,
+        &table.power_structure_axis_id,
+        "the power structure axis ID",
+        0..=i64::from(u32::MAX),
+        0,
+    );
+    let limits = match &table.limits {
+        Some(limits) => limits::check(problems, limits, table.unwind_counts.as_ref()),
+        None => Some(Limits::default()),
+    };
+    // A PDO more is much of a CAN bus.
+    let usual = match drive {
+        Some(DriveAt::Can { .. }) => CaptureMode::ServiceChannel,
+        _ => CaptureMode::Cyclic,
+    };
+    let events = capture_mode(problems, table.events.as_ref(), usual);
+    let on_command_loss = stopping_action(problems, table.on_command_loss.as_ref());
+    Some(Axis {
+        name: name?,
+        instance: instance?,
+        device: device?,
+        drive: drive?,
+        function: function?,
+        kind: kind?,
+        motion_resolution: motion_resolution?,
+        unwind_counts: unwind_counts?,
+        power_structure_axis_id: power_structure_axis_id?,
+        limits: limits?,
+        on_command_loss: on_command_loss?,
+        events: events?,
+    })
+}
+
+/// What the axis is, and whether that goes with the rest of its table.
+fn function(problems: &mut Problems, table: &AxisTable) -> Option<AxisFunction> {
+    let Some(name) = &table.function else { return Some(AxisFunction::Drive) };
+    let all = AxisFunction::ALL.map(|function| (function.name(), function));
+    let function = value::word(problems, name, "axis function", &all)?;
+    if function == AxisFunction::Drive {
+        return Some(function);
+    }
+    let limits = table.limits.as_ref().and_then(LimitsTable::first);
+    let misfits = [
+        (limits, "it is never moved"),
+        (table.on_command_loss.as_ref().map(|value| ("on_command_loss", value.span())), "it is never moved"),
+        (
+            table
+                .unwind_counts
+                .as_ref()
+                .filter(|_| function == AxisFunction::Converter)
+                .map(|value| ("unwind_counts", value.span())),
+            "it has no position",
+        ),
+    ];
+    let before = problems.len();
+    for ((key, span), why) in misfits.into_iter().filter_map(|(found, why)| Some((found?, why))) {
+        let title = format!("an axis of function \"{}\" has no {key}", function.name());
+        let problem = Problem::new(code::CONTRADICTION, span).title(title);
+        let problem = problem.expected(format!("expected no {key}: {why}"));
+        problems.push(problem.related(name.span(), "the function of the axis"));
+    }
+    (problems.len() == before).then_some(function)
+}
+
+fn capture_mode(
+    problems: &mut Problems,
+    name: Option<&Spanned<String>>,
+    usual: CaptureMode,
+) -> Option<CaptureMode> {
+    let Some(name) = name else { return Some(usual) };
+    match name.get_ref().as_str() {
+        "cyclic" => Some(CaptureMode::Cyclic),
+        "service-channel" => Some(CaptureMode::ServiceChannel),
+        "off" => Some(CaptureMode::Off),
+        other => problems.report_as(
+            code::UNKNOWN_WORD,
+            name.span(),
+            "unknown way to capture events",
+            format!("expected cyclic, service-channel or off, found {other}"),
+        ),
+    }
+}
+
+fn stopping_action(problems: &mut Problems, name: Option<&Spanned<String>>) -> Option<StoppingAction> {
+    let Some(name) = name else { return Some(StoppingAction::RampedDecelAndDisable) };
+    let all = StoppingAction::ALL.map(|action| (action.name(), action));
+    value::word(problems, name, "stopping action", &all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::checked;
+    use super::*;
+
+    fn axis(drive: DriveAt, keys: &str) -> Result<Axis, Vec<String>> {
+        let text = format!("name = \"x\"\ninstance = 1\ndrive = \"a\"\nunit = \"revolution\"\n{keys}");
+        let name = Spanned::new(0..1, "a".to_owned());
+        checked(&text, |problems, table| check(problems, table, Some(0), &[(&name, drive)]))
+    }
+
+    #[test]
+    fn events_are_captured_over_the_service_channel_on_can_alone() {
+        let events = |drive, keys| axis(drive, keys).map(|axis| axis.events);
+        assert_eq!(events(DriveAt::Sercos { drive: 0 }, ""), Ok(CaptureMode::Cyclic));
+        assert_eq!(events(DriveAt::Can { bus: 0, drive: 0 }, ""), Ok(CaptureMode::ServiceChannel));
+        assert_eq!(events(DriveAt::Can { bus: 0, drive: 0 }, "events = \"off\""), Ok(CaptureMode::Off));
+    }
+
+    #[test]
+    fn an_axis_that_never_moves_has_no_limits_and_no_stopping() {
+        let keys = "function = \"converter\"\nunwind_counts = 5\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 1.0 }";
+        let titles = ["velocity", "on_command_loss", "unwind_counts"];
+        let titles = titles.map(|key| format!("an axis of function \"converter\" has no {key}"));
+        assert_eq!(axis(DriveAt::Sercos { drive: 0 }, keys), Err(titles.to_vec()));
+        let unknown = axis(DriveAt::Sercos { drive: 0 }, "function = \"pump\"\non_command_loss = \"fall\"");
+        assert_eq!(
+            unknown,
+            Err(vec!["unknown axis function `pump`".to_owned(), "unknown stopping action `fall`".to_owned()])
+        );
+    }
+}

@@ -1,0 +1,261 @@
+//! From the controller to the drive: an update goes in at the north port of the bench, and the telegram of the instant for which it is
+//! meant comes out at the south port.
+
+use profile_cip::wire::motion::codes::{AxisControl, FeedbackMode};
+use profile_cip::wire::motion::{ActualBlock, CommandBlock, CommandPosition, CommandValues, WriteBlock};
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::image::{AxisCommand, Signal};
+use profile_generic::mode::OperatingMode;
+use profile_generic::state::DriveState;
+
+use super::bench::{Telegram, Told, Update};
+use super::stage::StageAxis;
+use super::telegram::{raw, sent};
+use super::{Node, TranslateError, Translator, devicenet, shown};
+use crate::engine::bus::devicenet::end::Row;
+use crate::engine::notice::Notice;
+use crate::mapping::devicenet::ROW_LEN;
+
+impl Translator {
+    /// Hands an update with these blocks, each with the number of its instance and its cyclic write data, to the device, and pushes
+    /// what comes of each block to `node`.
+    pub(super) fn commands(
+        &mut self,
+        update: Update<'_>,
+        blocks: &[(u8, CommandBlock, Option<WriteBlock<'_>>)],
+        node: &mut Node,
+    ) -> Result<(), TranslateError> {
+        let stage = std::sync::Arc::clone(&self.stage);
+        let mut known = Vec::new();
+        for (instance, block, write) in blocks {
+            match self.axis_of_instance(*instance) {
+                Some(number) => known.push((number, block, write)),
+                None => node.push(Node::new(format!("instance {instance}: no axis of the configuration"))),
+            }
+        }
+        let allowed = stage.mapping.cip.feedback_modes;
+        let mut replaced = Vec::new();
+        for (number, block, _) in &known {
+            let place = usize::from(stage.axes[*number].instance).saturating_sub(1);
+            let bench = self.bench()?;
+            if bench.is_unheard(*number) {
+                bench.enable(*number, block.control_mode);
+                if allowed & 1 << block.feedback_mode.source().0 == 0 {
+                    replaced.push((place, block.feedback_mode));
+                }
+            }
+        }
+        let device = self.device;
+        let bench = self.bench()?;
+        bench.take_notices();
+        let places: Vec<usize> = known
+            .iter()
+            .map(|(number, ..)| usize::from(stage.axes[*number].instance).saturating_sub(1))
+            .collect();
+        let replaced_places: Vec<usize> = replaced.iter().map(|(place, _)| *place).collect();
+        let told = bench.update(device, update, &places, &replaced_places);
+        let said = bench.take_notices();
+        for ((number, block, write), told) in known.into_iter().zip(told) {
+            let instance = stage.axes[number].instance;
+            let replaced = replaced.iter().find(|(place, _)| *place + 1 == usize::from(instance));
+            let mut of_axis = self.command(number, block, replaced.map(|(_, mode)| *mode), &told, &said)?;
+            if let Some(write) = write {
+                of_axis.push(self.written_cyclically(number, write));
+            }
+            node.push(of_axis);
+        }
+        Ok(())
+    }
+
+    /// What came of the block of an axis.
+    fn command(
+        &mut self,
+        number: usize,
+        block: &CommandBlock,
+        replaced: Option<FeedbackMode>,
+        told: &Told,
+        said: &[Notice],
+    ) -> Result<Node, TranslateError> {
+        let stage = std::sync::Arc::clone(&self.stage);
+        let (axis, mapping) = (&stage.axes[number], &stage.mapping);
+        let mut node =
+            Node::new(format!("axis {} (instance {}) on {}", axis.name, axis.instance, axis.drive));
+        let control_mode = block.control_mode;
+        let mode = axis.north.mode(control_mode.0);
+        node.push(match mode {
+            Some(mode) => Node::new(format!("Control Mode {control_mode} -> mode {mode}"))
+                .by(mapping.control_mode_row(mode)),
+            None => Node::new(format!("Control Mode {control_mode}: no row")),
+        });
+        if let Some(mode) = replaced {
+            node.push(Node::new(format!(
+                "Feedback Mode {}: the box refuses to enable an axis with it; translated as one with Motor Feedback",
+                mode.source()
+            )));
+        }
+        let bench = self.bench()?;
+        let (_, state) = bench.state_of(number);
+        let fault = bench.engine().axes()[number].fault();
+        let follows = mode.is_some_and(|mode| mode != OperatingMode::None && told.command.mode == mode)
+            && state == DriveState::Operating
+            && fault.is_none();
+        let answer = self.block_of(number);
+        for (text, signal) in elements(&block.values) {
+            node.push(match told.command.get(signal).filter(|_| follows) {
+                Some(value) => Node::new(format!("{text} -> {signal} {}", shown(axis, signal, value)))
+                    .by(mapping.cyclic_row(signal)),
+                None => Node::new(format!("{text}: not followed")),
+            });
+        }
+        if let Some(count) = block.values.unwind_count {
+            node.push(Node::new(format!("Unwind Cycle Count {count}")));
+        }
+        self.request(axis, block, answer.as_ref(), &mut node);
+        push_notices(&mut node, said, number, axis);
+        for telegram in &told.before {
+            let mut before = self.telegram_of(number, telegram, false);
+            before.text.insert_str(0, "before: ");
+            node.push(before);
+        }
+        node.push(match &told.last {
+            Some(telegram) => self.telegram_of(number, telegram, true),
+            None => Node::new(format!("nothing is sent to {}", axis.drive)),
+        });
+        if !follows {
+            node.push(Node::new("the drive does not follow: set-points are withheld"));
+        }
+        Ok(node)
+    }
+
+    /// What Axis Control asks for, and the response.
+    fn request(&self, axis: &StageAxis, block: &CommandBlock, answer: Option<&ActualBlock>, node: &mut Node) {
+        let code = block.axis_control;
+        if code == AxisControl::NONE {
+            return;
+        }
+        let row = self.stage.mapping.request_row(code.0);
+        let mut request = match axis.north.request(code.0) {
+            None => Node::new(format!("Axis Control {code}: no row")),
+            Some(request) => match request.request {
+                Some(asked) => Node::new(format!("Axis Control {code} -> {asked}")).by(row),
+                None => Node::new(format!("Axis Control {code}: carried out by the device")).by(row),
+            },
+        };
+        if let Some(answer) = answer {
+            let text = match answer.axis_response {
+                AxisControl::NONE => "no response yet".to_owned(),
+                response => format!("Axis Response {response}, {}", GeneralStatus(answer.response_status)),
+            };
+            request.push(Node::new(text));
+        }
+        node.push(request);
+    }
+
+    /// What the drive is told, with its values or with its words alone.
+    fn telegram_of(&self, number: usize, told: &Telegram, values: bool) -> Node {
+        let (axis, mapping) = (&self.stage.axes[number], &self.stage.mapping);
+        let Telegram { bytes, command, action, shown } = told;
+        let status = axis.south.status(shown).unwrap_or_default();
+        let selection = command.selection();
+        let mut node = Node::new(sent(axis, bytes));
+        if let Some(drive) = axis.devicenet() {
+            let mut row: Row = [0; ROW_LEN];
+            if let Err(error) = drive.end.clone().overhear(bytes, &mut row) {
+                node.push(Node::new(format!("not readable: {error}")));
+                return node;
+            }
+            let text = format!("{}: action {action}, mode {}", devicenet::asked(axis, &row), command.mode);
+            node.push(Node::new(text).by(devicenet::rows_of(axis, mapping, &row)));
+            for field in devicenet::values_to(axis, &row).filter(|_| values) {
+                let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, &row));
+                node.push(self.made_of(axis, &format!("{name}: {raw}"), field.signal, command));
+            }
+            return node;
+        }
+        let mut heads = axis.south.heads_of_command();
+        let word_of = |item| {
+            let (at, len) = axis.south.place_of_command(item)?;
+            bytes.get(at..at + len)
+        };
+        if let Some((item, word)) = heads.next().and_then(|item| Some((item, word_of(item)?))) {
+            let word = word.first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
+            let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(item), command.mode);
+            node.push(
+                Node::new(text)
+                    .by(axis.action_row(mapping, *action, status))
+                    .by(axis.mode_row(mapping, selection)),
+            );
+        }
+        if let Some((item, &[octet])) = heads.next().and_then(|item| Some((item, word_of(item)?))) {
+            let octet = i8::from_le_bytes([octet]);
+            let text = format!("{} {octet}: mode {}", self.named(item), command.mode);
+            node.push(Node::new(text).by(axis.mode_row(mapping, selection)));
+        }
+        for (field, item) in axis.south.command_fields().filter(|_| values) {
+            let text = format!("{}: {}", self.named(item), raw(axis, field, bytes));
+            node.push(self.made_of(axis, &text, field.signal, command));
+        }
+        node
+    }
+
+    /// A value of a telegram, and what of the command it was made of.
+    fn made_of(&self, axis: &StageAxis, text: &str, signal: Signal, command: &AxisCommand) -> Node {
+        let value = command.get(signal).unwrap_or_default();
+        Node::new(format!("{text} <- {signal} {}", shown(axis, signal, value)))
+            .by(axis.signal_row(&self.stage.mapping, signal))
+    }
+}
+
+/// What the box has said about an axis and its device: changes of state, refusals, and faults with their reasons.
+pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis: &StageAxis) {
+    let own = |notice: &&Notice| match notice {
+        Notice::State { .. }
+        | Notice::AxisState { .. }
+        | Notice::Fault { .. }
+        | Notice::Refused { .. }
+        | Notice::Logged { .. }
+        | Notice::Scaling { .. }
+        | Notice::DriveSays { .. }
+        | Notice::SlaveAnswers { .. } => notice.axis().map(usize::from) == Some(number),
+        Notice::Node { device, .. } => usize::from(*device) == axis.device,
+        _ => false,
+    };
+    for notice in said.iter().filter(own) {
+        let text = notice.to_string();
+        // When it was is the bench's time, which says nothing.
+        let (text, rest) = match notice {
+            Notice::Fault { .. } => text.split_once(") at ").map_or((text.as_str(), ""), |(fault, rest)| {
+                (fault, rest.split_once(": ").map_or("", |(_, why)| why))
+            }),
+            _ => (text.as_str(), ""),
+        };
+        node.push(Node::new(match (notice, rest) {
+            (Notice::Fault { .. }, "") => format!("log: {text})"),
+            (Notice::Fault { .. }, why) => format!("log: {text}): {why}"),
+            _ => format!("log: {text}"),
+        }));
+    }
+}
+
+/// The command values as they came, each with the signal that it belongs to.
+fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
+    let mut elements = Vec::new();
+    match values.position {
+        Some(CommandPosition::Float(value)) => {
+            elements.push((format!("Command Position {value} (LREAL)"), Signal::PositionCommand));
+        }
+        Some(CommandPosition::Integer(value)) => {
+            elements.push((format!("Command Position {value} (DINT)"), Signal::PositionCommand));
+        }
+        None => {}
+    }
+    let reals = [
+        ("Command Velocity", values.velocity, Signal::VelocityCommand),
+        ("Command Acceleration", values.acceleration, Signal::AccelerationCommand),
+        ("Command Torque", values.torque, Signal::TorqueCommand),
+    ];
+    for (name, value, signal) in reals {
+        elements.extend(value.map(|value| (format!("{name} {value}"), signal)));
+    }
+    elements
+}

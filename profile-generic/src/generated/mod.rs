@@ -1,0 +1,3 @@
+//! What stands in the tables of `mappings`, as constants: written by `cargo run -p mappings --example generate`.
+
+pub(crate) mod parameters;

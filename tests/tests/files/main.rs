@@ -1,0 +1,7 @@
+//! What is shipped and what users write: tables, configurations, schemas, data sheets, and the pages that name tests.
+
+mod broken;
+mod compliance;
+mod data_sheet;
+mod device_descriptions;
+mod schemas;

@@ -1,0 +1,276 @@
+//! Clients of other makers against the box as a user starts it: pycomm3, ethernetip (both PyPI) and nmap's `enip-info`.
+//!
+//! Their scripts stand in `tests/peers/` and print what they got; what it has to be is judged here. A client that is not
+//! installed is a visible skip, in CI a failure.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axisbridge_tests::process::{Running, axisbridge};
+use axisbridge_tests::{peer, tshark};
+use serde_json::{Value, json};
+
+/// The shipped example that needs no hardware, at an address of this test; it records what passes.
+fn start_box(address: &str, name: &str) -> (Running, PathBuf) {
+    let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let config = scratch.join(format!("{name}.toml"));
+    let example = include_str!("../../../examples/two-axes-in-process.toml")
+        .replace("\"127.0.0.2\"", &format!("\"{address}\""))
+        .replace("127.0.0.1:1502", &format!("{address}:1502"));
+    std::fs::write(&config, example).expect("the scratch folder can be written");
+    let log = scratch.join(format!("{name}.log"));
+    let mut run = Command::new(axisbridge());
+    let capture = scratch.join(format!("{name}.pcapng"));
+    run.arg("run").arg("--config").arg(&config).arg("--capture").arg(&capture).env("NO_COLOR", "1");
+    run.stderr(std::fs::File::create(&log).expect("the log can be written"));
+    let mut running = Running::start("run", &mut run);
+    let end = Instant::now() + Duration::from_secs(30);
+    loop {
+        let seen = std::fs::read_to_string(&log).unwrap_or_default();
+        if seen.contains("CP4") {
+            return (running, capture);
+        }
+        assert!(running.ended().is_none(), "the box has ended: {seen}");
+        assert!(Instant::now() < end, "the drives did not come up: {seen}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Runs a client's script against the box; the JSON object that it prints.
+fn ask(python: &PathBuf, script: &str, address: &str) -> Value {
+    let script = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/peers")).join(script);
+    let output = Command::new(python)
+        .arg(&script)
+        .arg(address)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the client can be started");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{} ended with {}: {errors}", script.display(), output.status);
+    serde_json::from_slice(&output.stdout).expect("the client prints one JSON object")
+}
+
+/// Vendor 1, device type 37, product 1001, revision 1.1, status (owned or not), serial number, name.
+const IDENTITY: &str = "01002500e9030101";
+const SERIAL: &str = "40e20100";
+const NAME: &str = "13417869736272696467652074776f2061786573";
+
+/// Vendor; "attribute not supported"; Axis State Initializing.
+const PACKED: &str = "030008000e0012008e00000001008e0014008e00000000";
+
+#[test]
+fn pycomm3_reads_and_writes_by_every_way_it_knows() {
+    const ADDRESS: &str = "127.0.0.61";
+    let Some(python) = peer::python_or_skip("pycomm3_reads_and_writes_by_every_way_it_knows", "pycomm3")
+    else {
+        return;
+    };
+    let (mut running, capture) = start_box(ADDRESS, "foreign-pycomm3");
+    let got = ask(&python, "pycomm3_client.py", ADDRESS);
+
+    assert_eq!(got["list_identity"]["product_name"], "Axisbridge two axes");
+    assert_eq!(got["list_identity"]["product_type"], "CIP Motion Drive");
+    assert_eq!(got["list_identity"]["product_code"], 1001);
+    assert_eq!(got["list_identity"]["serial"], "0001e240");
+    assert_eq!(got["list_identity"]["revision"], json!({ "major": 1, "minor": 1 }));
+    let identity = got["identity_all"]["value"].as_str().expect("Get_Attributes_All answers");
+    assert!(identity.starts_with(IDENTITY) && identity.contains(SERIAL), "{identity}");
+
+    for (what, value) in [
+        ("product_name", NAME),
+        ("serial_number", SERIAL),
+        // 127.0.0.61, 255.0.0.0, no gateway, no name servers, no domain.
+        ("interface", "3d00007f000000ff0000000000000000000000000000"),
+        // The object's default for CIP transport class 0/1, urgent.
+        ("dscp_urgent", "37"),
+        ("axis_revision", "0400"),
+        ("axis_state", "00"),
+        ("set_shadow", ""),
+        ("get_shadow", "07000000"),
+        // Axis State 0 padded to four octets, Axis Faults 0; each behind ID, dimension and element size.
+        ("axis_list", "020000008a02000100000000910200080000000000000000"),
+        // The same answers over the class 3 connection.
+        ("connected_product_name", NAME),
+        ("connected_axis_state", "00"),
+    ] {
+        assert_eq!(got[what], json!({ "value": value, "error": null }), "{what}");
+    }
+    for (what, error) in [
+        ("axis_missing_attribute", "Attribute not supported"),
+        ("set_short", "Insufficient command data"),
+        ("set_read_only", "Attribute not settable"),
+    ] {
+        assert_eq!(got[what]["error"], error, "{what}");
+    }
+    let unknown = got["axis_missing_instance"]["error"].as_str().expect("refused");
+    assert!(unknown.starts_with("Destination unknown"), "{unknown}");
+    // Status 0x0A with the good items beside the bad one.
+    assert_eq!(got["identity_list"]["value"], "0300010000000100630014000600000040e20100");
+    for what in ["packed", "connected_packed"] {
+        assert_eq!(got[what]["value"], PACKED, "{what}");
+    }
+    assert_eq!((&got["connected"], &got["connection_size"]), (&json!(true), &json!(4000)));
+
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+    if peer::tshark_or_skip("pycomm3_reads_and_writes_by_every_way_it_knows") {
+        explicit_traffic(&capture);
+    }
+}
+
+#[test]
+fn pycomm3_reads_the_clock_and_uploads_the_data_sheet() {
+    const ADDRESS: &str = "127.0.0.64";
+    const TEST: &str = "pycomm3_reads_the_clock_and_uploads_the_data_sheet";
+    let Some(python) = peer::python_or_skip(TEST, "pycomm3") else { return };
+    let (mut running, capture) = start_box(ADDRESS, "foreign-device");
+    let got = ask(&python, "pycomm3_device.py", ADDRESS);
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+
+    // Of the clock what is true of a host's clock, and nothing of PTP.
+    let clock = &got["clock"];
+    for (attribute, value) in
+        [("1", "00"), ("2", "01"), ("11", "0100"), ("12", "010001000300"), ("27", "0000")]
+    {
+        assert_eq!(clock[attribute], value, "attribute {attribute}");
+    }
+    for attribute in ["5", "6", "7", "9", "14", "15", "16", "17", "18", "19", "20", "24"] {
+        assert_eq!(clock[attribute], "Attribute not supported", "attribute {attribute}");
+    }
+    assert_eq!(clock["10"].as_str().map(|local| &local[..16]), Some("024142fffe000001"));
+    let refused = got["switched_on"].as_str().expect("PTP cannot be switched on");
+    assert!(refused.ends_with("invalid attribute value"), "{refused}");
+
+    // The sheet is the one that the command writes.
+    let config = capture.with_extension("toml");
+    let written =
+        Command::new(axisbridge()).arg("eds").arg("--config").arg(config).output().expect("it starts");
+    let sheet = &got["sheet"];
+    assert_eq!(sheet["text"].as_str().map(str::as_bytes), Some(&*written.stdout));
+    assert_eq!((&sheet["size"], &sheet["total"]), (&json!(written.stdout.len()), &json!(0)));
+
+    if peer::tshark_or_skip(TEST) {
+        let frames = tshark::dissect(&capture, "cip.class == 0x43 && cip.rr == 1", &[]);
+        let shown = |name: &str| {
+            let field = frames.iter().find_map(|frame| frame.field(name));
+            field.map(|field| field.show.clone()).unwrap_or_else(|| panic!("tshark reads no {name}"))
+        };
+        assert!(frames.iter().all(|frame| !frame.has("_ws.malformed")));
+        assert_eq!(shown("cip.time_sync.gm_clock.clock_id"), "02:41:42:ff:fe:00:00:01");
+        assert_eq!(shown("cip.time_sync.gm_clock.time_source"), "144");
+        assert_eq!(shown("cip.time_sync.gm_clock.priority2"), "128");
+        assert_eq!(shown("cip.time_sync.port_state_info.port_state"), "3");
+        assert_eq!(shown("cip.time_sync.port_proto_addr_info.network_proto"), "1");
+        assert_eq!(shown("cip.time_sync.prod_desc"), ";Axisbridge two axes;0001E240");
+        assert_eq!(shown("cip.time_sync.steps_removed"), "0");
+    }
+}
+
+/// What tshark reads in the answers of the box: services and general statuses in their order.
+fn explicit_traffic(capture: &Path) {
+    let frames = tshark::dissect(capture, "enip && tcp", &[]);
+    let mut answers = Vec::new();
+    for frame in &frames {
+        assert!(!frame.has("_ws.malformed"), "frame {} is malformed", frame.number);
+        let statuses: Vec<_> = frame.all("cip.genstat").map(|field| field.value.clone()).collect();
+        // The service octets of answers, with the response bit.
+        let services: Vec<_> = frame.all("cip.sc").map(|field| field.value.clone()).collect();
+        if !statuses.is_empty() {
+            answers.push(format!("{} {}", services.join(","), statuses.join(",")));
+        }
+    }
+    let get = |status: &str| format!("8e {status}");
+    let packed = "8a,8e,8e,8e 1e,00,14,00".to_owned();
+    let mut wanted = vec!["81 00".to_owned()];
+    wanted.extend(std::iter::repeat_n(get("00"), 6));
+    wanted.extend([get("05"), get("14"), "90 00".to_owned(), get("00"), "90 13".to_owned()]);
+    wanted.extend(["90 0e", "83 0a", "cb 00"].map(str::to_owned));
+    wanted.extend([packed.clone(), "db 00".to_owned(), get("00"), get("00"), packed, "ce 00".to_owned()]);
+    assert_eq!(answers, wanted);
+    // What tshark says of the SERCOS side is judged where that side is.
+    let mut findings = tshark::warnings(capture);
+    findings.retain(|(_, message)| !message.contains("CP is unknown"));
+    assert_eq!(findings, [], "expert findings");
+}
+
+#[test]
+fn ethernetip_opens_runs_and_closes_the_motion_connection() {
+    const ADDRESS: &str = "127.0.0.62";
+    let Some(python) =
+        peer::python_or_skip("ethernetip_opens_runs_and_closes_the_motion_connection", "ethernetip")
+    else {
+        return;
+    };
+    let _running = start_box(ADDRESS, "foreign-ethernetip").0;
+    let got = ask(&python, "ethernetip_client.py", ADDRESS);
+
+    assert_eq!(
+        got["list_identity"],
+        json!({ "vendor": 1, "device_type": 37, "product_code": 1001, "product_name": "Axisbridge two axes" })
+    );
+    // CIP over TCP, and class 0 and 1 over UDP.
+    assert_eq!(got["list_services"], json!({ "capability": 0x120, "name": "Communications" }));
+    assert_eq!(got["register"], 0);
+    assert_eq!(got["product_name"], json!({ "status": 0, "value": NAME }));
+    assert_eq!(got["control_mode"], json!({ "status": 0, "value": "00" }));
+    // This client writes 16-bit segments without their pad octet and rounds the length down: a segment error.
+    assert_eq!(got["unpadded_path"], json!({ "status": 4, "value": "" }));
+    assert_eq!(got["missing_class"], json!({ "status": 5, "value": "" }));
+
+    assert_eq!(got["wrong_configuration"], 0x0126, "a configuration block of half its size");
+    assert_eq!(got["too_small"], 0x0127, "no header fits in 8 octets");
+    assert_eq!(got["open"], 0);
+    assert_eq!(got["intervals_ms"], json!([8.0, 8.0]), "the intervals granted are those asked for");
+    assert_eq!(got["second_owner"], 0x0106);
+    // On a host in a hurry the box sends on its own before it hears the first update: those have no update to name.
+    let before = |datagram: &&serde_json::Value| {
+        datagram["data"].as_str().is_some_and(|data| data.starts_with("070200"))
+    };
+    let received: Vec<_> = got["received"].as_array().expect("datagrams").iter().skip_while(before).collect();
+    assert!(received.len() >= 4, "an answer to each update: {received:?}");
+    for datagram in received {
+        assert_eq!(datagram["from"], ADDRESS);
+        assert_eq!(datagram["mine"], true, "it carries the connection ID of this originator");
+        // Format, revision 2, and the update ID of the update before.
+        let data = datagram["data"].as_str().expect("hexadecimal");
+        assert!(data.starts_with("070201"), "{data}");
+    }
+    assert_eq!(got["close"], 0);
+    assert_eq!(got["close_again"]["status"], 1, "a connection failure");
+    let again = got["close_again"]["value"].as_str().expect("hexadecimal");
+    assert!(again.starts_with("0701"), "extended status 0x0107, no such connection: {again}");
+    assert_eq!(got["second_opens_after_close"], 0, "the connection is free at once");
+    assert_eq!(got["second_closes"], 0);
+}
+
+#[test]
+fn nmap_identifies_the_box_over_tcp_and_udp() {
+    const ADDRESS: &str = "127.0.0.63";
+    const TEST: &str = "nmap_identifies_the_box_over_tcp_and_udp";
+    if !peer::nmap_or_skip(TEST) {
+        return;
+    }
+    let _running = start_box(ADDRESS, "foreign-nmap").0;
+    // Without privileges nmap cannot send UDP probes of its own.
+    let udp = peer::namespaces_or_skip(TEST);
+    for scan in [&["-sT"][..], &["-sU"]].into_iter().take(if udp { 2 } else { 1 }) {
+        let output = Command::new("nmap")
+            .args(["-n", "-Pn", "-p", "44818", "--script", "enip-info"])
+            .args(scan)
+            .arg(ADDRESS)
+            .output()
+            .expect("nmap can be started");
+        let text = String::from_utf8_lossy(&output.stdout);
+        for line in [
+            "type: CIP Motion Drive (37)",
+            "(1)\n",
+            "productName: Axisbridge two axes",
+            "serialNumber: 0x0001e240",
+            "productCode: 1001",
+            "revision: 1.1",
+            "deviceIp: 127.0.0.63",
+        ] {
+            assert!(text.contains(line), "{scan:?}: expected {line:?} in\n{text}");
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! The program as a user runs it: processes on real sockets, in real time.
+
+mod demo;
+mod doctor;
+mod ending;
+mod reload;
+mod scripts;
+mod two_clocks;

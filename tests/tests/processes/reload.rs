@@ -1,0 +1,63 @@
+//! SIGHUP: a box reads its files again, and keeps the last good ones when they are refused.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axisbridge_tests::process::{Running, axisbridge};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The example on an address of its own, without Modbus, with an overlay.
+fn configuration() -> String {
+    let example = include_str!("../../../examples/two-axes-in-process.toml");
+    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
+    let mut text = example.replace("127.0.0.2", "127.0.0.71");
+    text.replace_range(modbus, "[mappings]\noverlays = [\"own.toml\"]\n\n");
+    text
+}
+
+fn await_line(log: &Path, from: usize, wanted: &str) -> String {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let text = fs::read_to_string(log).unwrap_or_default();
+        if text.get(from..).is_some_and(|new| new.contains(wanted)) {
+            return text;
+        }
+        assert!(Instant::now() < end, "`{wanted}` was not logged:\n{text}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_refused_reload_leaves_the_box_as_it_was_and_a_good_one_starts_it_anew() {
+    let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("reload");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let own = "format = 1\noverlay = \"reload\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"reject\"\n";
+    fs::write(folder.join("own.toml"), own).unwrap();
+    fs::write(folder.join("box.toml"), configuration()).unwrap();
+    let log = folder.join("log");
+    let mut command = Command::new(axisbridge());
+    command.args(["run", "--config"]).arg(folder.join("box.toml"));
+    command.env_remove("RUST_LOG").stdout(Stdio::null()).stderr(fs::File::create(&log).unwrap());
+    let mut running = Running::start("axisbridge run", &mut command);
+    let text = await_line(&log, 0, "EtherNet/IP");
+
+    // An overlay that is broken: told with code and place, and nothing ends.
+    fs::write(folder.join("own.toml"), own.replace("\"reject\"", "\"rejekt\"")).unwrap();
+    running.signal("HUP");
+    let refused = await_line(&log, text.len(), "are refused: the box keeps those that it runs with");
+    assert!(refused[text.len()..].contains("error[AX0012]"), "{refused}");
+    assert!(refused[text.len()..].contains("own.toml:5:11"), "{refused}");
+    assert_eq!(running.ended(), None);
+    assert!(!refused[text.len()..].contains("starts anew"));
+
+    // A good one: no axis has torque, so that it counts at once.
+    fs::write(folder.join("own.toml"), own).unwrap();
+    running.signal("HUP");
+    let anew = await_line(&log, refused.len(), "starts anew");
+    await_line(&log, anew.find("starts anew").unwrap(), "EtherNet/IP");
+    assert!(running.terminate(PATIENCE).success());
+}
