@@ -1,6 +1,6 @@
 //! Child processes of a test: ended by their own id, never left behind.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -33,6 +33,15 @@ pub fn axisbridge() -> PathBuf {
                 "--target-dir",
             ]);
             build.arg(directory.parent().expect("the profile's folder has a parent"));
+            // Together with the running test, which is built: so the dependencies have the same features, and the gateway is not
+            // built a second time.
+            let program = std::env::current_exe().expect("the test knows its own path");
+            let name = program.file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-'));
+            let tests = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests"));
+            let is_test = |name: &str| tests.join(format!("{name}.rs")).exists() || tests.join(name).exists();
+            if let Some((name, _)) = name.filter(|(name, _)| is_test(name)) {
+                build.args(["--package", "axisbridge-tests", "--test", name]);
+            }
             if directory.ends_with("release") {
                 build.arg("--release");
             }
