@@ -5,6 +5,7 @@ use std::hint::black_box;
 
 use axisbridge::engine::axis::{AxisChannel, Limits};
 use axisbridge::engine::bus::{Cycle, Received};
+use axisbridge::engine::device::CipAxis;
 use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
@@ -39,6 +40,7 @@ const CYCLE: DurationNs = DurationNs::from_millis(2);
 /// One axis of the engine, in operation, and the programs that it runs.
 pub struct Axis {
     channel: AxisChannel,
+    cip: CipAxis,
     north: CipProgram,
     trackers: CipTrackers,
     south: DriveProgram,
@@ -63,7 +65,8 @@ impl Axis {
     pub fn turntable() -> Self {
         let rig = Rig::ready(Settings::default());
         let axis = &rig.engine.axes()[0];
-        Self::new(axis.north().clone(), axis.south().expect("it is commissioned").clone())
+        let north = rig.engine.cip_program(0).expect("an axis of a device").clone();
+        Self::new(north, axis.south().expect("it is commissioned").clone())
     }
 
     /// The same on a CiA 402 drive.
@@ -73,10 +76,16 @@ impl Axis {
         Self::new(stage.axes[0].north.clone(), stage.axes[0].south.clone())
     }
 
+    /// Hands on what the motion device says.
+    fn command_axis(&mut self, target: Option<MonotonicTime>) {
+        let at = (self.now, SystemTime(self.now.0));
+        self.cip.command(&mut self.channel, at, &self.order, target);
+    }
+
     fn new(north: CipProgram, south: DriveProgram) -> Self {
         let period = DurationNs::from_micros(i64::from(UPDATE_PERIOD_US));
-        let mut channel =
-            AxisChannel::new(north.clone(), Limits::default(), Reaction::DecelerateAndDisable, true);
+        let mut channel = AxisChannel::new(Limits::default(), Reaction::DecelerateAndDisable, true);
+        channel.set_count(north.count());
         channel.set_south(south.clone());
         channel.keep_update_period(period, TargetUpdate::Interpolate);
         let order = AxisCommandImage {
@@ -91,6 +100,7 @@ impl Axis {
         let mut telegram = [0; TELEGRAM_MAX];
         let mut axis = Self {
             channel,
+            cip: CipAxis::new(north.clone()),
             trackers: north.trackers(),
             north,
             south,
@@ -116,7 +126,7 @@ impl Axis {
             );
             assert!(shown, "{report} can be shown");
             axis.step(&telegram);
-            axis.channel.from_controller(axis.now, SystemTime(axis.now.0), &axis.order, None);
+            axis.command_axis(None);
         }
         axis.status = axis.south.status(&telegram).expect("it is long enough");
         assert_eq!(axis.channel.state(), DriveState::Operating);
@@ -133,7 +143,7 @@ impl Axis {
     /// No more updates come, and the axis stays where it is.
     pub fn hold(&mut self) {
         self.order.command = Command::Withheld(Withheld::NoSetPoint);
-        self.channel.from_controller(self.now, SystemTime(self.now.0), &self.order, None);
+        self.command_axis(None);
     }
 
     /// The values of an update become the generic command.
@@ -179,7 +189,7 @@ impl Axis {
             age_updates: 0,
         });
         let target = self.now + self.period * 2;
-        self.channel.from_controller(self.now, SystemTime(self.now.0), &self.order, Some(target));
+        self.command_axis(Some(target));
         for _ in 0..2 {
             self.cycle();
         }
@@ -204,7 +214,7 @@ impl Axis {
     /// Bytes of the drive become the generic feedback, and that what the device has to know of it.
     pub fn feedback(&mut self, telegram: &[u8]) {
         self.hear(telegram);
-        self.channel.fill_drive_image(&mut self.image);
+        self.cip.fill(&self.channel, &mut self.image);
         black_box(&mut self.image);
     }
 

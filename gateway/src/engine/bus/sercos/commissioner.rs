@@ -79,6 +79,7 @@ impl<T: Copy + PartialEq> Setup<T> {
     ///
     /// # Errors
     /// The tables make no plan for this drive.
+    #[expect(clippy::result_large_err, reason = "in the cycle thread, where boxing would allocate")]
     pub fn begin(&mut self, mapping: &Mapping, phase: Phase) -> Result<(), Notice> {
         self.phase = phase;
         match mapping.commissioning(&self.needs, phase.0, &self.facts) {
