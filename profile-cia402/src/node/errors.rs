@@ -68,7 +68,7 @@ impl Errors {
             self.waiting.remove(0);
         }
         let register = ErrorRegister::from_bits_retain(register);
-        self.waiting.push(Emcy { code: code, register, vendor: [source, 0, 0, 0, 0] });
+        self.waiting.push(Emcy { code, register, vendor: [source, 0, 0, 0, 0] });
     }
 
     /// The next message that may be sent now.
