@@ -70,3 +70,4 @@ pub mod servo;
 pub mod state;
 pub mod time;
 pub mod time_base;
+pub mod wire;

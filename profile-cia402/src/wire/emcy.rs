@@ -7,7 +7,7 @@ use profile_generic::open_code;
 
 use super::bytes::Bytes;
 use super::display_bits;
-use super::error::{Error, exact, u16_at};
+use profile_generic::wire::{Error, exact, u16_at};
 
 /// Bytes of EMCY.
 pub const EMCY_LEN: usize = 8;

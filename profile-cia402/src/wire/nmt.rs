@@ -5,7 +5,7 @@ use core::fmt;
 use profile_generic::open_code;
 
 use super::cob_id::NodeId;
-use super::error::{Error, exact};
+use profile_generic::wire::{Error, exact};
 
 /// Bytes of a command.
 pub const NMT_LEN: usize = 2;
