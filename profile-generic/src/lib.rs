@@ -71,3 +71,4 @@ pub mod servo;
 pub mod state;
 pub mod time;
 pub mod time_base;
+pub mod wire;

@@ -62,10 +62,11 @@ fn broken_frames_are_shown_not_refused() {
     bytes[19] ^= 1;
     assert!(describe(&bytes, &mut context).contains("CRC BAD"));
     assert!(
-        describe(&bytes[..19], &mut context).starts_with("no SERCOS frame: SERCOS header: needs 20 bytes")
+        describe(&bytes[..19], &mut context)
+            .starts_with("no SERCOS frame: SERCOS header at byte 0: expected 20 bytes")
     );
     bytes[19] ^= 1;
     let text = describe(&bytes[..40], &mut context);
-    assert!(text.contains("not readable: MDT0 of CP0: needs 40 bytes, 20 are there"), "{text}");
+    assert!(text.contains("not readable: MDT0 of CP0 at byte 0: expected 40 bytes, found 20"), "{text}");
     assert_eq!(Phase::CP0.to_string(), "CP0");
 }

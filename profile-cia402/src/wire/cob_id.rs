@@ -19,7 +19,7 @@ use core::fmt;
 
 use profile_generic::can::Id;
 
-use super::error::Error;
+use profile_generic::wire::Error;
 
 /// Number of a device on its bus, 1 to 127.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

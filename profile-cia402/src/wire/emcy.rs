@@ -9,7 +9,7 @@ use crate::drive::ErrorCode;
 
 use super::bytes::Bytes;
 use super::display_bits;
-use super::error::{Error, exact, u16_at};
+use profile_generic::wire::{Error, exact, u16_at};
 
 /// Bytes of EMCY.
 pub const EMCY_LEN: usize = 8;

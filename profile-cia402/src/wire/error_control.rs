@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use super::error::{Error, exact};
 use super::nmt::NmtState;
+use profile_generic::wire::{Error, exact};
 
 /// Bytes of a heartbeat.
 pub const HEARTBEAT_LEN: usize = 1;

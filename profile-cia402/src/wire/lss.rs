@@ -6,7 +6,7 @@ use core::fmt;
 
 use profile_generic::open_code;
 
-use super::error::{Error, exact, u16_at, u32_at};
+use profile_generic::wire::{Error, exact, u16_at, u32_at};
 
 /// Bytes of a request and of an answer.
 pub const LSS_LEN: usize = 8;

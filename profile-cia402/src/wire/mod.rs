@@ -11,7 +11,6 @@ pub mod abort;
 pub mod bytes;
 pub mod cob_id;
 pub mod emcy;
-pub mod error;
 pub mod error_control;
 pub mod lss;
 pub mod mux;
@@ -24,8 +23,8 @@ pub mod time;
 pub use abort::AbortCode;
 pub use bytes::Bytes;
 pub use cob_id::{CobId, Function, NodeId};
-pub use error::Error;
 pub use mux::Mux;
+pub use profile_generic::wire::Error;
 
 use profile_generic::can::{Frame, Id};
 

@@ -4,7 +4,7 @@ pub use crate::generated::codes::{NmtCommand, NmtState};
 use core::fmt;
 
 use super::cob_id::NodeId;
-use super::error::{Error, exact};
+use profile_generic::wire::{Error, exact};
 
 /// Bytes of a command.
 pub const NMT_LEN: usize = 2;

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::error::Error;
+use profile_generic::wire::Error;
 
 /// The largest value of the counter (1019).
 pub const COUNTER_MAX: u8 = 240;

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::error::{Error, exact, u16_at, u32_at};
+use profile_generic::wire::{Error, exact, u16_at, u32_at};
 
 /// Bytes of TIME.
 pub const TIME_LEN: usize = 6;

@@ -8,13 +8,13 @@ use super::station::Station;
 use super::{Checker, position};
 use crate::wire::cp0::CommunicationVersion;
 use crate::wire::device_control::Topology;
-use crate::wire::error::u16_at;
 use crate::wire::header::{Channel, Kind, Phase, TelegramType};
 use crate::wire::hot_plug::{BROADCAST_ADDRESS, HOT_PLUG_LEN, HotPlug, HotPlugCode};
 use crate::wire::idn::Idn;
 use crate::wire::layout::Offset;
 use crate::wire::svc::SVC_LEN;
 use profile_generic::time::MonotonicTime;
+use profile_generic::wire::u16_at;
 
 /// Control bits that mean something.
 const CONTROL_BITS: u16 = HotPlug::SUPPORTED | HotPlug::ENABLED | HotPlug::SWITCH_TO_SVC | 0x00FF;

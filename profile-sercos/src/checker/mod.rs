@@ -33,13 +33,13 @@ use self::station::Station;
 use crate::wire::connection::CONNECTION_CONTROL_LEN;
 use crate::wire::cp0::{self, CommunicationVersion, MdtRepr, NO_SLAVE, SequenceCounter, TopologyField};
 use crate::wire::cp12;
-use crate::wire::error::u16_at;
 use crate::wire::header::{
     Channel, HEADER_LEN, Header, Kind, Phase, PhaseField, TELEGRAMS_MAX, TelegramType,
 };
 use crate::wire::hot_plug::HOT_PLUG_LEN;
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::SVC_LEN;
+use profile_generic::wire::u16_at;
 
 /// Silence before telegrams with a new layout.
 pub const SILENCE: DurationNs = DurationNs::from_millis(120);

@@ -7,10 +7,10 @@ use crate::wire::connection::ConnectionControl;
 use crate::wire::cp12;
 use crate::wire::device_control::{DeviceControl, Topology};
 use crate::wire::device_status::DeviceStatus;
-use crate::wire::error::u16_at;
 use crate::wire::header::{Channel, Kind, Phase};
 use crate::wire::idn::Idn;
 use crate::wire::svc::{AtSvc, MdtSvc, SVC_LEN, SvcStatus};
+use profile_generic::wire::u16_at;
 
 /// Bits of C-SVC that are on the wire.
 const CONTROL_BITS: u16 = 0x003F;

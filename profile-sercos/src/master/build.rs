@@ -12,11 +12,11 @@ use super::station::{End, Presence, Station};
 use crate::wire::cp0::{self, AtRepr, MdtRepr, SequenceCounter};
 use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
-use crate::wire::error::put_u16;
 use crate::wire::extended::{EXTENDED_LEN, EXTENDED_OFFSET, Extended};
 use crate::wire::header::{Channel, Kind, Phase, PhaseField, TELEGRAMS_MAX};
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::SVC_LEN;
+use profile_generic::wire::put_u16;
 
 /// Telegram and offsets of a slave's service channel and device word.
 #[derive(Clone, Copy)]

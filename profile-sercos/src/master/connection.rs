@@ -18,7 +18,7 @@ use arrayvec::ArrayVec;
 
 use super::config::CONNECTION_LEN_MAX;
 use crate::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
-use crate::wire::error::put_u16;
+use profile_generic::wire::put_u16;
 
 /// Bytes of a connection's values.
 const DATA_MAX: usize = CONNECTION_LEN_MAX - CONNECTION_CONTROL_LEN;

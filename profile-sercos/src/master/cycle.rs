@@ -13,10 +13,10 @@ use super::topology::{Route, Topology};
 use crate::wire::cp0::AtRepr;
 use crate::wire::device_control::Topology as Loop;
 use crate::wire::device_status::DeviceStatus;
-use crate::wire::error::u16_at;
 use crate::wire::header::{Kind, Phase};
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::{AtSvc, SVC_LEN, SvcStatus};
+use profile_generic::wire::u16_at;
 
 /// Cycles with CPS set, at least; CP4 may have connections between slaves, which need one more.
 const LEAVE_CYCLES: u32 = 2;

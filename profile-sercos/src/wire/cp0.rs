@@ -17,7 +17,7 @@
 use crate::generated::bits::communication_version;
 use core::fmt;
 
-use super::error::{Error, need, put_u16, put_u32, u16_at, u32_at};
+use profile_generic::wire::{Error, need, put_u16, put_u32, u16_at, u32_at};
 
 /// Bytes of the data field of MDT0 in CP0.
 pub const MDT_LEN: usize = 40;

@@ -9,8 +9,8 @@
 //! Place 0 of telegram 0 stays empty. There are two MDTs and two ATs (up to 255 slaves) or four and four
 //! (up to 511).
 
-use super::error::{Error, need, put_u16, u16_at};
 use super::slot::{SLOT_LEN, SvcSlot};
+use profile_generic::wire::{Error, need, put_u16, u16_at};
 
 /// Slots in one telegram.
 pub const SLOTS: usize = 128;

@@ -3,12 +3,12 @@
 //! This is the form for tools that look at whole telegrams. Master and slave know their own offsets and read
 //! and write at them in place.
 
-use super::error::{Error, need, put_u16, u16_at};
 use super::extended::Extended;
 use super::header::Kind;
 use super::hot_plug::HotPlug;
 use super::layout::{Layout, Region};
 use super::slot::SvcSlot;
+use profile_generic::wire::{Error, need, put_u16, u16_at};
 
 /// One part of a telegram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@
 
 use core::fmt;
 
-use super::error::{Error, need, put_u16, u16_at};
+use profile_generic::wire::{Error, need, put_u16, u16_at};
 
 /// Bytes of the field.
 pub const EXTENDED_LEN: usize = 4;

@@ -16,7 +16,7 @@
 
 use core::fmt;
 
-use super::error::{Error, need};
+use profile_generic::wire::{Error, need};
 
 /// Offsets in bytes from the start of the frame.
 mod field {
@@ -327,7 +327,7 @@ impl fmt::Display for Header {
 
 /// The CRC as it stands in the frame; `frame` must hold a whole header.
 fn crc_found(frame: &[u8]) -> u32 {
-    super::error::u32_at(frame, field::CRC.start)
+    profile_generic::wire::u32_at(frame, field::CRC.start)
 }
 
 /// The CRC which the header should have; `frame` must hold a whole header.
@@ -385,7 +385,7 @@ mod tests {
         let mut bytes = [0; HEADER_LEN];
         header(0x20, 0).emit(&mut bytes).unwrap();
         for len in 0..HEADER_LEN {
-            let expected = Error::Truncated { what: "SERCOS header", needed: 20, available: len };
+            let expected = Error::Truncated { what: "SERCOS header", offset: 0, needed: 20, available: len };
             assert_eq!(Header::parse(&bytes[..len]), Err(expected));
             assert_eq!(header(0x20, 0).emit(&mut [0; HEADER_LEN][..len]), Err(expected));
         }

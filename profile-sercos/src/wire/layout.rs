@@ -4,11 +4,11 @@
 use core::fmt;
 use core::ops::Range;
 
-use super::error::Error;
 use super::extended::{EXTENDED_LEN, EXTENDED_OFFSET};
 use super::header::{DATA_LEN_MAX, Kind, TELEGRAMS_MAX};
 use super::hot_plug::HOT_PLUG_LEN;
 use super::slot::SLOT_LEN;
+use profile_generic::wire::Error;
 
 /// Bytes of a device word.
 pub const DEVICE_WORD_LEN: usize = 2;
@@ -184,7 +184,12 @@ fn close_gaps(
     let mut at = 0;
     for (range, region) in regions {
         if range.end > len {
-            return Err(Error::Truncated { what: "telegram layout", needed: range.end, available: len });
+            return Err(Error::Truncated {
+                what: "telegram layout",
+                offset: 0,
+                needed: range.end,
+                available: len,
+            });
         }
         if range.start < at {
             let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -284,7 +289,7 @@ pub(crate) mod tests {
     fn bad_layouts_are_refused() {
         assert_eq!(
             recording().regions(Kind::Mdt, 0, 45),
-            Err(Error::Truncated { what: "telegram layout", needed: 46, available: 45 })
+            Err(Error::Truncated { what: "telegram layout", offset: 0, needed: 46, available: 45 })
         );
         let mut overlap = recording();
         overlap.devices[1].device_control = Some(Offset { telegram: 0, offset: 27 });

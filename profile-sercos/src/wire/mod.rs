@@ -13,7 +13,6 @@ pub mod describe;
 pub mod device_control;
 pub mod device_status;
 pub mod drive_words;
-pub mod error;
 pub mod extended;
 pub mod header;
 pub mod hot_plug;
@@ -26,7 +25,7 @@ pub mod svc;
 pub mod svc_error;
 pub mod telegram;
 
-pub use error::Error;
+pub use profile_generic::wire::Error;
 
 /// Writes names in brackets, separated by commas; nothing if there are none.
 pub(crate) fn display_bits(

@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use super::error::{Error, need, put_u16, put_u32, u16_at, u32_at};
+use profile_generic::wire::{Error, need, put_u16, put_u32, u16_at, u32_at};
 
 /// Bytes of a slot.
 pub const SLOT_LEN: usize = 6;

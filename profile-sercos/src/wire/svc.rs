@@ -14,7 +14,7 @@ use core::fmt;
 use bitflags::bitflags;
 
 use super::Error;
-use super::error::{need, put_u16, put_u32, u16_at, u32_at};
+use profile_generic::wire::{need, put_u16, put_u32, u16_at, u32_at};
 
 mod field {
     pub const WORD: usize = 0;
@@ -387,7 +387,7 @@ mod tests {
     #[test]
     fn truncation() {
         for len in 0..SVC_LEN {
-            let error = |what| Error::Truncated { what, needed: SVC_LEN, available: len };
+            let error = |what| Error::Truncated { what, offset: 0, needed: SVC_LEN, available: len };
             assert_eq!(MdtSvc::parse(&[0; SVC_LEN][..len]), Err(error("MDT service channel")));
             assert_eq!(AtSvc::parse(&[0; SVC_LEN][..len]), Err(error("AT service channel")));
             assert_eq!(MdtSvc::default().emit(&mut [0; SVC_LEN][..len]), Err(error("MDT service channel")));

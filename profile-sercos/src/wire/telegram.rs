@@ -5,9 +5,9 @@ use core::fmt;
 use super::cp0;
 use super::cp12;
 use super::cyclic;
-use super::error::{Error, need};
 use super::header::{HEADER_LEN, Header, Kind, Phase};
 use super::layout::Layout;
+use profile_generic::wire::{Error, need};
 
 /// The data field of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -27,8 +27,8 @@ pub use self::request::SdoRequest;
 pub use self::response::SdoResponse;
 use super::abort::AbortCode;
 use super::bytes::Bytes;
-use super::error::{Error, exact, u32_at};
 use super::mux::Mux;
+use profile_generic::wire::{Error, exact, u32_at};
 
 /// Bytes of every frame.
 pub const SDO_LEN: usize = 8;

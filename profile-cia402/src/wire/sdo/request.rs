@@ -3,8 +3,8 @@
 use core::fmt;
 
 use super::{Abort, SDO_LEN, Segment, Transfer, crc_flag, toggle, unknown, with_bytes, with_mux};
-use crate::wire::error::{Error, exact, u16_at, u32_at};
 use crate::wire::mux::Mux;
+use profile_generic::wire::{Error, exact, u16_at, u32_at};
 
 /// A frame from the client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -52,8 +52,11 @@ impl From<Result<Vec<u8>, GeneralStatus>> for Answer {
 pub(crate) fn data_status(error: Error) -> GeneralStatus {
     match error {
         Error::Truncated { .. } => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Trailing { .. } => GeneralStatus::TOO_MUCH_DATA,
-        Error::Invalid { .. } | Error::OutOfRange { .. } => GeneralStatus::INVALID_PARAMETER,
+        Error::Length { expected, found, .. } if found < expected => GeneralStatus::NOT_ENOUGH_DATA,
+        Error::Trailing { .. } | Error::Length { .. } => GeneralStatus::TOO_MUCH_DATA,
+        Error::Invalid { .. } | Error::OutOfRange { .. } | Error::Value { .. } => {
+            GeneralStatus::INVALID_PARAMETER
+        }
     }
 }
 

@@ -42,8 +42,11 @@ const fn refuse<T>(status: GeneralStatus, additional: u8) -> Result<T, ServiceEr
 fn data_error(error: Error) -> ServiceError {
     let status = match error {
         Error::Truncated { .. } => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Trailing { .. } => GeneralStatus::TOO_MUCH_DATA,
-        Error::Invalid { .. } | Error::OutOfRange { .. } => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+        Error::Length { expected, found, .. } if found < expected => GeneralStatus::NOT_ENOUGH_DATA,
+        Error::Trailing { .. } | Error::Length { .. } => GeneralStatus::TOO_MUCH_DATA,
+        Error::Invalid { .. } | Error::OutOfRange { .. } | Error::Value { .. } => {
+            GeneralStatus::INVALID_ATTRIBUTE_VALUE
+        }
     };
     ServiceError { status, additional: NO_ADDITIONAL_CODE }
 }

@@ -1,4 +1,4 @@
-//! The one error of the wire code.
+//! The error of all wire code.
 
 use core::fmt;
 
@@ -47,6 +47,24 @@ pub enum Error {
         /// How many bytes are left over.
         excess: usize,
     },
+    /// A frame of a fixed length has another number of bytes.
+    Length {
+        /// The kind of frame.
+        what: &'static str,
+        /// Its length in bytes.
+        expected: usize,
+        /// Bytes that came.
+        found: usize,
+    },
+    /// A field has a value outside a range or set that is best described in words.
+    Value {
+        /// The field.
+        what: &'static str,
+        /// The permitted values, in words.
+        expected: &'static str,
+        /// The value that came.
+        found: u32,
+    },
 }
 
 impl fmt::Display for Error {
@@ -63,6 +81,12 @@ impl fmt::Display for Error {
             }
             Error::Trailing { what, offset, excess } => {
                 write!(f, "{what} ends at byte {offset}, but {excess} more bytes follow")
+            }
+            Error::Length { what, expected, found } => {
+                write!(f, "{what}: expected {expected} bytes, got {found}")
+            }
+            Error::Value { what, expected, found } => {
+                write!(f, "{what}: expected {expected}, got {found:#x}")
             }
         }
     }
