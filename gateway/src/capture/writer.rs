@@ -185,8 +185,8 @@ mod tests {
         assert_eq!(file[..section.len()], section);
         // Snap length 1518; name, description, nanoseconds, the end of the options.
         let north = [
-            1, 0, 0, 0, 56, 0, 0, 0, 1, 0, 0, 0, 0xEE, 5, 0, 0, 2, 0, 5, 0, b'n', b'o', b'r', b't', b'h', 0,
-            0, 0, 3, 0, 1, 0, b'a', 0, 0, 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0, 56, 0, 0, 0,
+            1, 0, 0, 0, 52, 0, 0, 0, 1, 0, 0, 0, 0xEE, 5, 0, 0, 2, 0, 5, 0, b'n', b'o', b'r', b't', b'h', 0,
+            0, 0, 3, 0, 1, 0, b'a', 0, 0, 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0, 52, 0, 0, 0,
         ];
         assert_eq!(file[52..52 + north.len()], north);
         let frame = [

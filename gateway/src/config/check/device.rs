@@ -187,7 +187,7 @@ mod tests {
         assert_eq!(found.update_period_min, DurationNs::from_millis(2), "no shorter than the bus cycle");
         for bad in ["128.1", "1.0", "1", "1.256"] {
             let found = device("", &format!("revision = \"{bad}\""), DurationNs::ZERO);
-            assert_eq!(found, Err(vec![format!("`{bad}` is no revision")]));
+            assert_eq!(found, Err(vec![format!("`{bad}` is not a revision")]));
         }
     }
 

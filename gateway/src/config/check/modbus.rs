@@ -20,7 +20,8 @@ mod tests {
     fn eight_clients_are_served_unless_told_otherwise() {
         let found = checked("listen = \"127.0.0.1:502\"", check).unwrap();
         assert_eq!((found.listen.port(), found.clients_max), (502, 8));
-        let both = ["`x` is no address with port", "the number of Modbus clients is 65"].map(str::to_owned);
+        let both =
+            ["`x` is not an address with a port", "the number of Modbus clients is 65"].map(str::to_owned);
         assert_eq!(checked("listen = \"x\"\nclients_max = 65", check), Err(both.to_vec()));
     }
 }

@@ -231,7 +231,7 @@ mod tests {
                 "`a b` cannot be the name of a drive",
                 "the SERCOS address is 512",
                 "the SERCOS address is 512",
-                "`2` is no torque or force",
+                "`2` is not a torque or force",
             ]
         );
     }
