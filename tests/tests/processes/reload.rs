@@ -48,7 +48,7 @@ fn a_refused_reload_leaves_the_box_as_it_was_and_a_good_one_starts_it_anew() {
     // An overlay that is broken: told with code and place, and nothing ends.
     fs::write(folder.join("own.toml"), own.replace("\"reject\"", "\"rejekt\"")).unwrap();
     running.signal("HUP");
-    let refused = await_line(&log, text.len(), "are refused: the box keeps those that it runs with");
+    let refused = await_line(&log, text.len(), "are refused: the gateway keeps the present ones");
     assert!(refused[text.len()..].contains("error[AX0012]"), "{refused}");
     assert!(refused[text.len()..].contains("own.toml:5:11"), "{refused}");
     assert_eq!(running.ended(), None);

@@ -259,7 +259,7 @@ const IDENTITY: &str =
 /// A drive that is delivered without a node-id gets that of the configuration, and is led.
 #[test]
 fn a_device_without_a_node_id_is_given_it() {
-    for (word, more) in [("assign", ""), ("store", " and keeps it")] {
+    for (word, more) in [("assign", ""), ("store", " and stores it")] {
         let mut rig = Rig::new(settings(&format!("{IDENTITY}\nlss = \"{word}\""), ""));
         assert_eq!(node(&mut rig, 0).node(), None);
         rig.run_until(millis(20_000), "the axes", |rig| {

@@ -49,7 +49,7 @@ fn four_slaves_are_in_cp4_within_two_seconds() {
 #[test]
 fn a_phase_that_takes_long_says_which_slave_and_which_parameter() {
     let mut rig = Rig::new(four("4 ms", ""));
-    rig.run_until(millis(5_000), "CP2", |rig| rig.told().contains("CP2: the application"));
+    rig.run_until(millis(5_000), "CP2", |rig| rig.told().contains("CP2: waiting for the application"));
     // The second slave is busy for 690 of each 700 ms from now on: bit 1 of its S-SVC.
     let clock = rig.clock();
     rig.tamper_frame = Some(Box::new(move |frame| {
@@ -63,7 +63,7 @@ fn a_phase_that_takes_long_says_which_slave_and_which_parameter() {
     rig.run_for(millis(11_000));
     rig.tamper_frame = None;
     let told: Vec<_> =
-        rig.told().lines().filter(|line| line.contains(" since ")).map(str::to_owned).collect();
+        rig.told().lines().filter(|line| line.contains(" has taken ")).map(str::to_owned).collect();
     let line = |seconds: u32| format!("CP2 has taken {seconds} s: waiting for slave at position 2, ");
     let rows: Vec<_> = told.iter().filter(|row| row.starts_with("CP2")).collect();
     assert_eq!(rows.len(), 2, "{told:#?}");

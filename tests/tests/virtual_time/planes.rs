@@ -368,6 +368,6 @@ fn a_drive_that_keeps_its_ends_is_told_of() {
     let configuration = endless().configuration.replacen("set_scaling = true", "set_scaling = false", 1);
     let rig = Rig::ready(Settings { configuration, ..Settings::default() });
     let told = rig.told();
-    assert!(told.contains("axis 1: unwind_counts wants an axis without ends"), "{told}");
-    assert_eq!(told.matches("unwind_counts wants").count(), 1, "{told}");
+    assert!(told.contains("axis 1: unwind_counts needs a drive that counts modulo"), "{told}");
+    assert_eq!(told.matches("unwind_counts needs").count(), 1, "{told}");
 }
