@@ -52,12 +52,12 @@ fn a_refused_reload_leaves_the_box_as_it_was_and_a_good_one_starts_it_anew() {
     assert!(refused[text.len()..].contains("error[AX0012]"), "{refused}");
     assert!(refused[text.len()..].contains("own.toml:5:11"), "{refused}");
     assert_eq!(running.ended(), None);
-    assert!(!refused[text.len()..].contains("starts anew"));
+    assert!(!refused[text.len()..].contains("axisbridge restarts"));
 
     // A good one: no axis has torque, so that it counts at once.
     fs::write(folder.join("own.toml"), own).unwrap();
     running.signal("HUP");
-    let anew = await_line(&log, refused.len(), "starts anew");
-    await_line(&log, anew.find("starts anew").unwrap(), "EtherNet/IP");
+    let anew = await_line(&log, refused.len(), "axisbridge restarts");
+    await_line(&log, anew.find("axisbridge restarts").unwrap(), "EtherNet/IP");
     assert!(running.terminate(PATIENCE).success());
 }
