@@ -205,6 +205,10 @@ impl Merger<'_> {
         let DeValue::Table(mut table) = std::mem::replace(known.get_mut(), DeValue::Boolean(false)) else {
             return;
         };
+        // What an action sends stands as a whole in the row that says it: by a name, by fields, or by both.
+        if row.contains_key("pattern") != row.contains_key("send") && section.name == "action" {
+            changed |= table.remove(if row.contains_key("send") { "pattern" } else { "send" }).is_some();
+        }
         let mut nested = false;
         for (key, value) in row {
             let is_key = section.key.contains(&key.get_ref().as_ref());

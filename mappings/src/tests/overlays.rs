@@ -133,6 +133,23 @@ fn every_list_of_the_tables_has_an_identity() {
     }
 }
 
+/// Overlays written before actions had names say the fields of the control word, and only those count.
+#[test]
+fn fields_of_an_action_take_the_place_of_its_name() {
+    let long = "format = 1\noverlay = \"test\"\n\n[[generic-cia402.action]]\naction = \"torque_off\"\npattern = [{ field = \"Quick stop\", is = 0 }]\n\n[[generic-sercos.action]]\naction = \"enable\"\npattern = [{ field = \"Drive on\", is = 1 }]\n";
+    let (mapping, findings) = over(&[long]);
+    let mapping = mapping.unwrap_or_else(|| panic!("{findings}"));
+    let file = mapping.object_action_row(Action::TorqueOff, 0).map(|origin| origin.file);
+    assert_eq!(file.as_deref(), Some("own.toml"));
+    let enable = mapping.sercos.actions.iter().find(|(action, _)| *action == Action::Enable);
+    assert_eq!(enable.map(|(_, pattern)| (pattern.mask, pattern.value)), Some((0x8000, 0x8000)));
+    // Rows that are removed in the long form are found.
+    let remove = "format = 1\noverlay = \"test\"\n\n[[generic-sercos.report]]\npattern = [{ field = \"Drive shut-down error\", is = 1 }]\nremove = true\n";
+    let (_, findings) = over(&[remove]);
+    let nothing = findings.list().iter().filter(|found| found.code == code::OVERLAY_REMOVES_NOTHING);
+    assert_eq!(nothing.count(), 0, "{findings}");
+}
+
 #[test]
 fn a_finding_in_a_row_of_an_overlay_points_into_the_overlay() {
     let text = "format = 1\noverlay = \"test\"\n\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nidn = \"S-0-4047\"\n";
