@@ -10,6 +10,7 @@ pub mod eds;
 pub mod engine;
 pub mod host;
 pub mod latest;
+pub mod local;
 pub mod log_limit;
 pub mod modbus;
 pub mod north;

@@ -26,7 +26,7 @@ fn what_is_shipped_is_good() {
         let output = check(&["--config", config, "--mappings", "examples/overlays"]);
         assert_eq!(output.status.code(), Some(0), "{}", out(&output));
         assert!(
-            out(&output).contains("checked the tables, those of 6 families of drives, 1 overlay, 2 axes"),
+            out(&output).contains("checked the tables, those of 7 families of drives, 7 overlays, 2 axes"),
             "{}",
             out(&output)
         );
@@ -40,6 +40,16 @@ fn findings_are_status_one_and_notes_are_shown_when_asked_for() {
     assert_eq!(output.status.code(), Some(1));
     assert!(out(&output).contains("warning[AX0070]") && !out(&output).contains("note["), "{}", out(&output));
     assert!(out(&check(&["--notes"])).contains("note[AX0050]"));
+    assert_eq!(
+        out(&check(&["--mappings", case, "--json"])),
+        out(&check(&["--mappings", case, "--format", "json"]))
+    );
+    let sarif: serde_json::Value =
+        serde_json::from_str(&out(&check(&["--mappings", case, "--format", "sarif"]))).unwrap();
+    let results = sarif["runs"][0]["results"].as_array().unwrap();
+    let own = results.iter().find(|result| result["ruleId"] == "AX0070").unwrap();
+    let place = &own["locations"][0]["physicalLocation"];
+    assert_eq!((&place["artifactLocation"]["uri"], own["level"].as_str()), (&case.into(), Some("warning")));
     let json: serde_json::Value =
         serde_json::from_str(&out(&check(&["--mappings", case, "--format", "json"]))).unwrap();
     assert_eq!((&json["format"], &json["errors"], &json["warnings"]), (&1.into(), &0.into(), &2.into()));
@@ -52,7 +62,25 @@ fn codes_are_explained_and_listed() {
     let output = check(&["--explain", "ax0010"]);
     assert_eq!(output.status.code(), Some(0));
     insta::assert_snapshot!(out(&output));
-    assert_eq!(check(&["--explain", "AX9999"]).status.code(), Some(2));
+    for (code, said) in [
+        ("AX9999", "error: there is no code AX9999; `axisbridge check --list` prints all codes\n"),
+        (
+            "AX99",
+            "error: `AX99` is no code: expected AX and four digits, such as AX0010; `axisbridge check --list` prints all codes\n",
+        ),
+    ] {
+        let output = check(&["--explain", code]);
+        assert_eq!(
+            (output.status.code(), String::from_utf8(output.stderr).unwrap().as_str()),
+            (Some(2), said)
+        );
+    }
+    for entry in axisbridge::finding::registry::REGISTRY {
+        let code = entry.code.to_string();
+        let explained = out(&check(&["--explain", &code]));
+        let parts = [&*code, entry.title, "Example:", entry.example.lines().next().unwrap(), "What to do: "];
+        assert!(parts.iter().all(|part| explained.contains(part)), "{explained}");
+    }
     let list = out(&check(&["--list"]));
     assert!(list.contains("AX0010 error   an unknown name\n"), "{list}");
     assert_eq!(out(&check(&["--list", "--format", "markdown"])), include_str!("../../docs/findings.md"));
@@ -62,10 +90,39 @@ fn codes_are_explained_and_listed() {
 #[test]
 fn schemas_are_written() {
     let names = out(&check(&["--schema"]));
-    assert_eq!(names.lines().count(), 18, "{names}");
+    assert_eq!(names.lines().count(), 21, "{names}");
     let schema: serde_json::Value =
         serde_json::from_str(&out(&check(&["--schema", "generic-sercos"]))).unwrap();
-    let parameter = &schema["definitions"]["SercosParameterRow"]["properties"]["parameter"]["enum"];
+    let parameter =
+        &schema["definitions"]["SercosParameterRow"]["properties"]["parameter"]["anyOf"][0]["enum"];
     assert!(parameter.as_array().unwrap().contains(&"jerk_limit".into()));
     assert_eq!(check(&["--schema", "nothing"]).status.code(), Some(2));
+}
+
+#[test]
+fn changes_against_the_shipped_tables_are_told_by_meaning() {
+    let output = check(&["--diff"]);
+    assert_eq!(
+        (output.status.code(), out(&output).as_str()),
+        (Some(0), "0 changes, 0 dangerous, 0 not acknowledged\n")
+    );
+    let overlay = "gateway/tests/diff/line-4.toml";
+    let output = check(&["--mappings", overlay, "--diff"]);
+    assert_eq!(output.status.code(), Some(1), "{}", out(&output));
+    let text = out(&output);
+    for said in [
+        "S-0-0055 bit 0 -> S-0-0055 bit 1",
+        "(60 times)",
+        "S-0-0049 -> S-0-0050",
+        "refuse -> omit",
+        "accepted  fault",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&out(&check(&["--mappings", overlay, "--diff", "--json"]))).unwrap();
+    assert_eq!((&json["dangerous"], &json["not_acknowledged"]), (&7.into(), &5.into()));
+    // Against itself it changes nothing.
+    let output = check(&["--mappings", overlay, "--diff", overlay]);
+    assert_eq!(output.status.code(), Some(0), "{}", out(&output));
 }

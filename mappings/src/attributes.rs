@@ -56,7 +56,7 @@ pub struct AttributeEntry {
     /// Value at power-up.
     pub default: i64,
     /// Least and greatest value that may be set.
-    pub range: Option<(i32, i32)>,
+    pub range: Option<(i64, i64)>,
     /// Who answers.
     pub backing: Backing,
 }
@@ -156,11 +156,12 @@ fn entry(
             let to_generic = scaling.convert(unit, turns)?;
             Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
         }
-        Served::Parameter { parameter, unit, reject } => {
+        Served::Parameter { parameter, unit, reject, range } => {
             let to_generic = scaling.convert(unit, turns)?;
+            let (low, high) = range.unwrap_or((i64::MIN, i64::MAX));
             Backing::Parameter {
                 parameter,
-                to_generic: Conversion::new(to_generic),
+                to_generic: Conversion::new(to_generic).within(low, high),
                 from_generic: Conversion::new(to_generic.inverse()?),
                 reject,
             }

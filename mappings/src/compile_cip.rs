@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 use bitflags::bitflags;
 use profile_cip::device::drive_link::{DriveAction, TRIMS_MAX, Trims};
 use profile_cip::device::fault_log::LogKind;
+use profile_cip::wire::motion::CommandValues;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
@@ -18,11 +19,11 @@ use super::attributes::behind;
 use super::cip_events::EventProgram;
 use super::cip_scaling::CipScaling;
 use super::cip_tables::{CipTables, Served};
-use super::device_link::DRIVE_ACTIONS;
+use super::device_link::{DRIVE_ACTIONS, bit, elements};
 use super::dictionary::Access;
 
 /// Elements of a data set: one per bit.
-pub const ELEMENTS: usize = 8;
+const ELEMENTS: usize = 8;
 
 /// Codes of an enumeration in a nibble.
 const NIBBLE: usize = 16;
@@ -58,10 +59,6 @@ pub enum CipValue {
     /// LREAL.
     Lreal(f64),
 }
-
-/// The values of a data set, indexed by the bit of the set.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct CyclicValues(pub [Option<CipValue>; ELEMENTS]);
 
 bitflags! {
     /// Conditions of the axis state machine (Tables 5-2.97 and 5-2.98).
@@ -232,7 +229,7 @@ pub struct CipTrackers {
     position: WrapTracker,
     /// What the controller has moved its reference system by, counts.
     reference: i64,
-    /// Counts between the cycles that the controller counts and the unrolled count; `None` until it tells a count.
+    /// Counts between the cycles that the controller counts and the unrolled count; `None` until it reports a count.
     anchor: Option<i64>,
 }
 
@@ -248,7 +245,7 @@ impl CipTrackers {
         self.anchor = None;
     }
 
-    /// Commands come in another reference system: what they have moved on is told apart from the change.
+    /// Commands come in another reference system: what they have moved on is distinguished from the change.
     fn change_reference(&mut self, reference: i64) {
         if reference != self.reference {
             self.position.shift(reference.wrapping_sub(self.reference));
@@ -370,7 +367,20 @@ impl CipProgram {
     /// cycles it is; then every position is exact.
     pub fn decode(
         &self,
-        values: &CyclicValues,
+        values: &CommandValues,
+        reference: i64,
+        trackers: &mut CipTrackers,
+        command: &mut AxisCommand,
+    ) -> CipReport {
+        let cycles = values.unwind_count.map(i64::from);
+        self.decode_elements(elements(values), cycles, reference, trackers, command)
+    }
+
+    /// [`CipProgram::decode`] of values by their bits in the Command Data Set; `cycles` is the Unwind Cycle Count.
+    pub(super) fn decode_elements(
+        &self,
+        values: impl IntoIterator<Item = (usize, CipValue)>,
+        cycles: Option<i64>,
         reference: i64,
         trackers: &mut CipTrackers,
         command: &mut AxisCommand,
@@ -378,20 +388,11 @@ impl CipProgram {
         let mut report = CipReport::default();
         command.present = profile_generic::image::CommandSet::empty();
         trackers.change_reference(reference);
-        let cycles = match values.0[super::device_link::bit::UNWIND_COUNT] {
-            Some(CipValue::Dint(cycles)) => Some(i64::from(cycles)),
-            _ => None,
-        };
-        for (bit, (value, element)) in values.0.iter().zip(&self.commands).enumerate() {
-            let (value, element) = match (value, element) {
-                (Some(value), Some(element)) => (*value, element),
-                (None, _) => continue,
-                // They tell how to take the position; they are no values of their own.
-                _ if super::device_link::bit::OF_POSITION.contains(&bit) => continue,
-                (Some(_), None) => {
-                    report.unmapped += 1;
-                    continue;
-                }
+        for (bit, value) in values {
+            let Some(element) = self.commands.get(bit).and_then(Option::as_ref) else {
+                // Elements of the position say how to take it; they are no values of their own.
+                report.unmapped += u32::from(!bit::OF_POSITION.contains(&bit));
+                continue;
             };
             let unroll = |counts| trackers.unroll(counts, self.unwind, cycles).saturating_sub(reference);
             let Some(outcome) = element.decode(value, unroll) else {

@@ -20,7 +20,7 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
         let row = dictionary.attribute_by_id(entry.id)?;
         let sets = |set: &&Enumeration| set.attributes.contains(&row.id);
         let mut definition = definition(Scope::Instance, row, dictionary, sets)?;
-        let narrowed = entry.range.map(|(low, high)| (f64::from(low), f64::from(high)));
+        let narrowed = entry.range.map(|(low, high)| (cast::f64_from_i64(low), cast::f64_from_i64(high)));
         definition.range = narrowed.or(definition.range);
         definition.element_rules = match entry.id {
             attribute::id::AXIS_EXCEPTION_ACTION => mapping.exception_rules(false),

@@ -4,14 +4,13 @@ use profile_cip::device::drive_link::{DriveAction, DriveCondition, DriveImage, E
 use profile_cip::wire::motion::codes::{AxisIoStatus, AxisStatus, EventChecking, FaultType};
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
 use profile_generic::capture::CaptureSet;
-use profile_generic::fault::Reaction;
 use profile_generic::fault_set::{ActiveFault, FaultSet, Origin};
 use profile_generic::image::{AxisFeedback, FeedbackSet, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::mode::OperatingMode;
 use profile_generic::state::{DriveState, Request};
 
-use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue, CyclicValues};
+use super::compile_cip::{CipConditions, CipFault, CipProgram, CipReport, CipValue};
 
 /// What the device asks of a drive, with its name in the tables.
 pub(super) const DRIVE_ACTIONS: [(&str, DriveAction); 7] = [
@@ -101,20 +100,21 @@ impl Told {
     }
 }
 
-impl From<&CommandValues> for CyclicValues {
-    fn from(values: &CommandValues) -> Self {
-        let mut cyclic = CyclicValues::default();
-        cyclic.0[bit::POSITION] = values.position.map(|position| match position {
-            CommandPosition::Float(value) => CipValue::Lreal(value),
-            CommandPosition::Integer(value) => CipValue::Dint(value),
-        });
-        cyclic.0[bit::VELOCITY] = values.velocity.map(CipValue::Real);
-        cyclic.0[bit::ACCELERATION] = values.acceleration.map(CipValue::Real);
-        cyclic.0[bit::TORQUE] = values.torque.map(CipValue::Real);
-        cyclic.0[bit::UNWIND_COUNT] = values.unwind_count.map(CipValue::Dint);
-        cyclic.0[bit::DISPLACEMENT] = values.position_displacement.map(CipValue::Dint);
-        cyclic
-    }
+/// The values that are there, by their bits in the Command Data Set.
+pub(super) fn elements(values: &CommandValues) -> impl Iterator<Item = (usize, CipValue)> {
+    let position = values.position.map(|position| match position {
+        CommandPosition::Float(value) => CipValue::Lreal(value),
+        CommandPosition::Integer(value) => CipValue::Dint(value),
+    });
+    let all = [
+        (bit::POSITION, position),
+        (bit::VELOCITY, values.velocity.map(CipValue::Real)),
+        (bit::ACCELERATION, values.acceleration.map(CipValue::Real)),
+        (bit::TORQUE, values.torque.map(CipValue::Real)),
+        (bit::UNWIND_COUNT, values.unwind_count.map(CipValue::Dint)),
+        (bit::DISPLACEMENT, values.position_displacement.map(CipValue::Dint)),
+    ];
+    all.into_iter().filter_map(|(bit, value)| Some((bit, value?)))
 }
 
 impl CipProgram {
@@ -124,7 +124,7 @@ impl CipProgram {
     }
 
     /// Puts what is known of an axis into the image for the device: actual values, conditions, status,
-    /// inhibits and what is wrong. `online`, `action_id` and `reset_id` belong to whoever runs the axis and stay
+    /// inhibits and what is wrong. `online`, `action_id` and `reset_id` belong to the caller that runs the axis and stay
     /// as they are. `told` is kept from one image of this program to the next.
     pub fn drive_image(
         &self,
@@ -164,7 +164,7 @@ impl CipProgram {
         let fault = active.fault;
         let CipFault::Axis { fault_type, code, .. } = self.fault(fault.cause)? else { return None };
         // The best stop that is left also for a warning that the controller wants to be a major fault.
-        let stop = if fault.reaction.stops() { fault.reaction } else { Reaction::DecelerateAndDisable };
+        let stop = fault.best_stop();
         let acted = matches!(active.origin, Origin::Drive | Origin::Event) && fault.reaction.stops();
         Some(DriveCondition {
             fault_type: FaultType(fault_type),

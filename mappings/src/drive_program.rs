@@ -26,7 +26,7 @@ pub const PROCEDURES_MAX: usize = 4;
 /// The most procedure commands of one of them.
 pub const PROCEDURE_COMMANDS_MAX: usize = 4;
 
-/// The most ways in which a status tells that a procedure has failed.
+/// The most ways in which a status reports that a procedure has failed.
 pub const PROCEDURE_FAILURES_MAX: usize = 4;
 
 /// Bytes of the control and of the status word.
@@ -374,12 +374,6 @@ impl DriveProgram {
     /// Whether the drive tells this value in every cycle.
     pub fn tells(&self, signal: Signal) -> bool {
         self.feedback.fields().any(|field| field.signal == signal)
-    }
-
-    /// Whether it is what leads the drive, or shows its state: no PDO may be without it.
-    pub fn is_head(&self, item: Item) -> bool {
-        let heads = |items: &[Item]| items.iter().take(self.heads()).any(|head| *head == item);
-        heads(&self.telegram.command) || heads(&self.telegram.feedback)
     }
 
     /// What leads the drive: the control word, and the operating mode where it has an octet of its own.

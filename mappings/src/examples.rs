@@ -18,8 +18,8 @@ use super::format::{
 use super::load::Tables;
 use super::sercos::compile::{Compiler, unit_of};
 use super::{
-    AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, CyclicValues, DriveFacts, ELEMENTS,
-    Mapping, ObjectFacts, Rated, Reference, SercosAxis, Told,
+    AxisUnits, Cia402Axis, Cia402Tables, CipScaling, CipType, CipValue, DriveFacts, Mapping, ObjectFacts,
+    Rated, Reference, SercosAxis, Told,
 };
 use crate::finding::{Findings, Problem, Source, registry as code};
 
@@ -39,26 +39,26 @@ pub(super) fn run(mapping: &Mapping, tables: &Tables, findings: &mut Findings) -
     for row in &cip.rows.cyclic {
         for example in &row.examples {
             let result = runner.mapping.cyclic_example(row, example);
-            runner.note(&cip.text, result);
+            runner.note(&cip.text, &row.element, result);
         }
     }
     for row in &cip.rows.attribute {
         for example in &row.examples {
             let result = runner.mapping.attribute_example(row, example);
-            runner.note(&cip.text, result);
+            runner.note(&cip.text, &row.attribute, result);
         }
     }
     let sercos = &tables.generic_sercos;
     for row in &sercos.rows.scaling {
         for example in &row.examples {
             let result = runner.mapping.drive_example(None, example);
-            runner.note(&sercos.text, result);
+            runner.note(&sercos.text, &row.scaling, result);
         }
     }
     for row in &sercos.rows.parameter {
         for example in &row.examples {
             let result = runner.mapping.drive_example(Parameter::from_name(row.parameter.get_ref()), example);
-            runner.note(&sercos.text, result);
+            runner.note(&sercos.text, &row.parameter, result);
         }
     }
     runner.cia402(mapping);
@@ -75,19 +75,30 @@ impl Runner<'_> {
     fn cia402(&mut self, mapping: &Mapping) -> usize {
         let file = &mapping.tables().generic_cia402;
         let mut own = 0;
-        for example in file.rows.scaling.iter().flat_map(|row| &row.examples) {
-            let (path, ..) = file.text.place(example.object.span().start);
-            own += usize::from(path != file.text.path());
-            self.note(&file.text, mapping.object_example(example));
+        for row in &file.rows.scaling {
+            for example in &row.examples {
+                let (path, ..) = file.text.place(example.object.span().start);
+                own += usize::from(path != file.text.path());
+                self.note(&file.text, &row.unit, mapping.object_example(example));
+            }
         }
         own
     }
 
-    fn note(&mut self, text: &Source, result: Result<(), Wrong>) {
+    /// Counts an example of the row of a name, and reports it if it failed.
+    fn note(&mut self, text: &Source, row: &Name, result: Result<(), Wrong>) {
         self.count += 1;
-        if let Err((span, message)) = result {
-            self.findings.push(text, Problem::new(code::EXAMPLE_FAILS, span).expected(message));
+        let Err((span, message)) = result else { return };
+        let problem = |at: &Range<usize>| Problem::new(code::EXAMPLE_FAILS, at.clone()).about(row.get_ref());
+        let place = |at: &Range<usize>| text.place(at.start).0;
+        // An example of the table that fails with the row of an overlay shows what the overlay has changed.
+        if place(&span) == place(&row.span()) {
+            return self.findings.push(text, problem(&span).expected(message));
         }
+        let title = format!("with this row, a worked example of `{}` fails", row.get_ref());
+        let problem = problem(&row.span()).title(title).expected(message).related(span, "the example");
+        let help = "if the drive is as the row says, take the example away with `remove = [\"examples\"]`, or write `examples` of its own";
+        self.findings.push(text, problem.help(help));
     }
 }
 
@@ -211,10 +222,9 @@ impl Mapping {
         let ratio = scaling.convert(element.unit, element.turns).ok_or_else(none)?;
         let generic = *example.generic.get_ref();
         if element.to_generic {
-            let mut values = CyclicValues([None; ELEMENTS]);
-            values.0[usize::from(element.bit)] = Some(value);
             let mut command = AxisCommand::default();
-            program.decode(&values, 0, &mut program.trackers(), &mut command);
+            let values = [(usize::from(element.bit), value)];
+            program.decode_elements(values, None, 0, &mut program.trackers(), &mut command);
             expect(example.generic.span(), "generic value", &Some(generic), &command.get(signal))?;
             let back = ratio.inverse().ok_or_else(none)?.to_f64(generic);
             expect(span, "value on the way back", &example.back.map_or(float, number), &back)
@@ -318,7 +328,7 @@ impl Mapping {
             Some(parameter) => {
                 let rule = self.sercos.parameters.iter().find(|rule| rule.parameter == parameter);
                 *rule
-                    .filter(|rule| rule.idn == idn)
+                    .filter(|rule| rule.at.idn == idn)
                     .ok_or_else(|| wrong(format!("the row does not map {idn}")))?
             }
             None => self

@@ -4,12 +4,10 @@ use profile_generic::capture::{CaptureEdge, CaptureKind, CaptureSource};
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::{InterpolationSource, OperatingMode};
-use profile_generic::parameter::Parameter;
-use profile_generic::quantity::Quantity;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 
-use super::dictionary::GenericDictionary;
+use super::dictionary::{GenericDictionary, GenericParameter};
 use super::format::Name;
 use super::resolver::Resolver;
 
@@ -90,18 +88,21 @@ pub(super) fn cause_and_reaction(
     Some((cause?, reaction?))
 }
 
-/// A parameter by name, and what it measures.
-pub(super) fn parameter(
+/// A parameter by name.
+pub(super) fn parameter<'g>(
     resolver: &mut Resolver<'_>,
-    generic: &GenericDictionary,
+    generic: &'g GenericDictionary,
     name: &Name,
-) -> Option<(Parameter, Quantity)> {
-    let find = |text: &str| generic.parameter(text).map(|row| (row.parameter, row.quantity));
+) -> Option<&'g GenericParameter> {
+    let find = |text: &str| generic.parameter(text);
     resolver.name("parameter", name, "a parameter of the generic model", find, generic.names())
 }
 
+/// Which ways a parameter goes: whether to the drive, and whether from it.
+pub(crate) const WAYS: [(&str, (bool, bool)); 3] =
+    [("both", (true, true)), ("to_drive", (true, false)), ("from_drive", (false, true))];
+
 /// Whether a value goes to the drive, and whether it comes from it.
 pub(super) fn directions(resolver: &mut Resolver<'_>, name: &Name) -> Option<(bool, bool)> {
-    let words = [("both", (true, true)), ("to_drive", (true, false)), ("from_drive", (false, true))];
-    resolver.word("direction", name, &words)
+    resolver.word("direction", name, &WAYS)
 }

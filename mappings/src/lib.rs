@@ -1,15 +1,62 @@
-//! The mapping tables: what corresponds between CIP Motion, the generic model and SERCOS.
+//! The mapping tables between CIP Motion, the generic drive model, SERCOS and CiA 402: format, check, compile, explain.
 //!
 //! ```text
 //! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
 //!  format                dictionary,              Telegram, CommissioningPlan, DriveProgram
-//!                        cip_tables, sercos_tables
+//!                        cip_tables, sercos, cia402
 //! ```
 //!
-//! Loading finds unknown keys and wrong types, resolving finds names that nothing has and units that do not
-//! convert; both tell file, line, column and key. Compiling makes flat programs for one axis; what can
-//! still go wrong then lies with the axis or the drive. No translation of an attribute, IDN, state, mode or
+//! Loading finds unknown keys and wrong types, resolving finds unknown names and units that do not convert; both report file,
+//! line, column and key ([`finding`]). [`check`] finds what only the whole shows. Compiling makes flat programs for one axis;
+//! what can still go wrong then lies with the axis or the drive. No translation of an attribute, IDN, object, state, mode or
 //! fault is code.
+//!
+//! # Your own tables
+//!
+//! An [`Overlay`] has the rows of your machine; the rest comes from the tables in the binary. Load it, check it, compile a
+//! program for an axis, and ask which row made a value:
+//!
+//! ```
+//! use mappings::finding::{Findings, Severity};
+//! use mappings::{AxisUnits, Mapping, Overlay, SercosAxis, TableTexts, check};
+//! use profile_generic::mode::OperatingMode;
+//! use profile_generic::parameter::Parameter;
+//!
+//! // Load: one row for the drives of one machine. `TableTexts::load` takes files and folders.
+//! let own = r#"
+//!     format = 1
+//!     overlay = "drives of line 9"
+//!
+//!     [[generic-sercos.parameter]]
+//!     parameter = "jerk_limit"
+//!     missing = "reject"
+//! "#;
+//! let mut texts = TableTexts::embedded();
+//! texts.overlays.push(Overlay::new("line-9.toml", own));
+//!
+//! // Check: findings have a code, a severity and a place.
+//! let outcome = check::texts(Some(texts), Findings::default());
+//! assert_eq!(outcome.findings.count(Severity::Error), 0, "{}", outcome.findings);
+//! let mapping: Mapping = outcome.mapping.unwrap();
+//!
+//! // Compile: a rotary axis in position control on a drive that takes whatever commissioning writes.
+//! let axis = SercosAxis {
+//!     units: AxisUnits::default(),
+//!     modes: [OperatingMode::Position.into()].into_iter().collect(),
+//!     set_scaling: true,
+//!     ..SercosAxis::default()
+//! };
+//! let facts = mapping.facts_of_obedient(&axis)?;
+//! let program = mapping.sercos_program(&axis, &facts)?;
+//! assert!(program.parameter(Parameter::JERK_LIMIT).is_some());
+//!
+//! // Explain: the row that a value comes from.
+//! let row = mapping.parameter_row(Parameter::JERK_LIMIT).unwrap();
+//! assert_eq!(row.to_string(), "line-9.toml:6 [[parameter]] jerk_limit");
+//! # Ok::<(), mappings::SercosError>(())
+//! ```
+//!
+//! `mappings/tests/own_tables.rs` is a test that a repository with tables of its own would have.
 
 mod attributes;
 mod capture_program;
@@ -24,6 +71,7 @@ mod device_link;
 pub mod devicenet;
 mod dictionary;
 mod drive_program;
+mod drive_rows;
 mod examples;
 pub mod finding;
 pub mod format;
@@ -64,7 +112,7 @@ pub use cip_tables::{
 };
 pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
-    CyclicValues, ELEMENTS, MissingValue,
+    MissingValue,
 };
 pub use device_link::Told;
 pub use dictionary::{
@@ -73,14 +121,15 @@ pub use dictionary::{
     CipAttribute, CipDictionary, CipNetwork, CipService, CipType, Clearing, Code, CodeGroup, CodeRange,
     CodeSet, Confidence, ConnectionDataFormat, DEVICE_FUNCTIONS, DataElement, Dictionaries, Document,
     Documents, ETHERNET_IP, Enumeration, ExceptionAction, FaultRecord, Field, FieldValue, GenericDictionary,
-    GroupKind, IdnFormat, IdnPart, IdnUnit, Layout, NamedCode, NetworkObject, Pattern, PolarityEffect,
-    RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode, Trust, Word,
-    networks,
+    GenericParameter, GroupKind, IdnFormat, IdnPart, IdnUnit, Layout, NamedCode, NetworkObject, Pattern,
+    PolarityEffect, RangeKind, ScaledQuantity, SercosDictionary, SercosIdn, SercosTerms, SetKind, StatusCode,
+    Trust, Word, networks,
 };
 pub use drive_program::{
     CachedStatus, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry,
     Procedure, ProcedureBy, Telegram,
 };
+pub use drive_rows::Full;
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use numbers::{LostPrecision, RowNumbers};
@@ -94,7 +143,7 @@ pub use sercos::fixed_connections::{FixedConnection, FixedConnections};
 pub use sercos::scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos::tables::{ReportRule, SercosTables};
 
-use crate::finding::Findings;
+use crate::finding::{Findings, Severity};
 use profile_cip::device::attribute::{DefaultValue, ElementRule};
 use profile_cip::device::exception;
 
@@ -173,15 +222,25 @@ impl Mapping {
 
     /// The tables in these texts, and everything that is found in them; `None` with errors.
     pub fn resolve(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
+        let mapping = Self::resolve_all(texts, findings);
+        findings.settle();
+        mapping.filter(|_| !findings.has_errors())
+    }
+
+    /// The same with what only follows from something else, and a mapping although something is wrong.
+    fn resolve_all(texts: &TableTexts, findings: &mut Findings) -> Option<Self> {
         let (tables, families) = texts.parse(findings)?;
+        let before = findings.count(Severity::Error);
         let dictionaries = Dictionaries::resolve(&tables, findings);
-        // Tables that were parsed were parsed without an error: those there are now are the dictionaries'.
-        let sound = !findings.has_errors();
+        let sound = findings.count(Severity::Error) == before;
         let mut mapping = Self::join(tables, Arc::new(dictionaries), sound, findings);
-        if !findings.has_errors() {
-            mapping.families = families.into_iter().map(|family| mapping.family(family, findings)).collect();
+        if sound {
+            let mut found = Findings::default();
+            mapping.families =
+                families.into_iter().map(|family| mapping.family(family, &mut found)).collect();
+            load::extend_with_families(findings, found);
         }
-        (!findings.has_errors()).then_some(mapping)
+        Some(mapping)
     }
 
     /// The mapping tables, resolved by the dictionaries, which are sound or were told not to be.
@@ -362,7 +421,7 @@ impl Mapping {
         CommissioningPlan::compile(&self.sercos, &self.dictionaries.sercos, axis, phase, facts)
     }
 
-    /// The program of an axis on the SERCOS side, once its drive has told its scaling.
+    /// The program of an axis on the SERCOS side, once its drive has reported its scaling.
     ///
     /// # Errors
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
@@ -383,8 +442,8 @@ impl Mapping {
         self.cia402.steps(plan, axis, facts)
     }
 
-    /// What has to be tried of a CiA 402 drive that does not tell its modes of operation; `None` where it does, or where the
-    /// configuration tells them, which is noted.
+    /// What has to be tried of a CiA 402 drive that does not report its modes of operation; `None` where it does, or where the
+    /// configuration reports them, which is noted.
     #[must_use]
     pub fn cia402_modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
         self.cia402.modes_untold(axis, facts)

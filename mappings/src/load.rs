@@ -8,7 +8,7 @@ use super::format::{
     CipNetworkFile, CipServiceFile, GenericCia402File, GenericFile, GenericSercosFile, SercosBitFile,
     SercosCodeFile, SercosIdnFile, SercosTermFile,
 };
-use super::overlay::{self, FAMILIES, Overlay, ParsedFamily};
+use super::overlay::{self, FAMILIES, Layer, Overlay, ParsedFamily};
 use super::rows;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Source, read_file};
@@ -16,28 +16,91 @@ use crate::finding::{Findings, Source, read_file};
 /// The file format this build understands.
 pub const FORMAT: u32 = 1;
 
+/// How the paths of the tables in the binary begin in messages.
+pub(crate) const SHIPPED: &str = "mappings/tables/";
+
 /// The largest table file that is read: ten times the largest one shipped.
 pub const MAX_FILE_BYTES: u64 = 2 * 1024 * 1024;
 
-/// Where each file lies below the folder, and the text built into the binary.
-pub(super) const FILES: [(&str, &str); 16] = [
-    ("dictionary/generic.toml", include_str!("../tables/dictionary/generic.toml")),
-    ("dictionary/cip-attributes.toml", include_str!("../tables/dictionary/cip-attributes.toml")),
-    ("dictionary/cip-enumerations.toml", include_str!("../tables/dictionary/cip-enumerations.toml")),
-    ("dictionary/cip-faults.toml", include_str!("../tables/dictionary/cip-faults.toml")),
-    ("dictionary/cip-services.toml", include_str!("../tables/dictionary/cip-services.toml")),
-    ("dictionary/cip-networks.toml", include_str!("../tables/dictionary/cip-networks.toml")),
-    ("dictionary/sercos-terms.toml", include_str!("../tables/dictionary/sercos-terms.toml")),
-    ("dictionary/sercos-idns.toml", include_str!("../tables/dictionary/sercos-idns.toml")),
-    ("dictionary/sercos-communication.toml", include_str!("../tables/dictionary/sercos-communication.toml")),
-    ("dictionary/sercos-bits.toml", include_str!("../tables/dictionary/sercos-bits.toml")),
-    ("dictionary/sercos-codes.toml", include_str!("../tables/dictionary/sercos-codes.toml")),
-    ("dictionary/cia402-objects.toml", include_str!("../tables/dictionary/cia402-objects.toml")),
-    ("dictionary/cia402-codes.toml", include_str!("../tables/dictionary/cia402-codes.toml")),
-    ("cip-generic.toml", include_str!("../tables/cip-generic.toml")),
-    ("generic-sercos.toml", include_str!("../tables/generic-sercos.toml")),
-    ("generic-cia402.toml", include_str!("../tables/generic-cia402.toml")),
-];
+/// Declares the texts and the rows of all table files: field, rows and place below the folder of each.
+macro_rules! table_files {
+    ($( #[$doc:meta] $field:ident: $rows:ident = $path:literal; )*) => {
+        /// Where each file lies below the folder, and the text built into the binary.
+        pub(super) const FILES: [(&str, &str); COUNT] =
+            [$( ($path, include_str!(concat!("../tables/", $path))) ),*];
+
+        const COUNT: usize = [$( $path ),*].len();
+
+        /// The texts of all table files, and what is laid over them.
+        #[derive(Debug, Clone)]
+        pub struct TableTexts {
+            $( #[$doc] pub $field: TableText, )*
+            /// Shipped settings of families of drives.
+            pub families: Vec<Overlay>,
+            /// What is laid over them, in this order.
+            pub overlays: Vec<Overlay>,
+        }
+
+        /// All table files, parsed but not resolved.
+        #[derive(Debug, Clone)]
+        pub struct Tables {
+            $( #[$doc] pub $field: Parsed<$rows>, )*
+        }
+
+        impl TableTexts {
+            /// The texts in the order of [`FILES`], with those of the families in the binary.
+            fn from_array([$( $field ),*]: [TableText; COUNT]) -> Self {
+                let family = |(path, text): (&str, &str)| Overlay::new(&format!("{SHIPPED}{path}"), text);
+                Self { $( $field, )* families: FAMILIES.map(family).to_vec(), overlays: Vec::new() }
+            }
+
+            fn as_array_mut(&mut self) -> [&mut TableText; COUNT] {
+                [$( &mut self.$field ),*]
+            }
+
+            /// The rows of every file; `None` when one of them cannot be read into rows.
+            fn rows(&self, layers: &[&Layer<'_>], findings: &mut Findings) -> Option<Tables> {
+                $( let $field = rows::parse(&self.$field, table_name($path), layers, findings); )*
+                Some(Tables { $( $field: $field? ),* })
+            }
+        }
+    };
+}
+
+table_files! {
+    /// Generic dictionary.
+    generic: GenericFile = "dictionary/generic.toml";
+    /// CIP Motion dictionary: attributes.
+    cip_attributes: CipAttributeFile = "dictionary/cip-attributes.toml";
+    /// CIP Motion dictionary: codes and bits.
+    cip_enumerations: CipEnumerationFile = "dictionary/cip-enumerations.toml";
+    /// CIP Motion dictionary: faults, alarms and inhibits.
+    cip_faults: CipFaultFile = "dictionary/cip-faults.toml";
+    /// CIP Motion dictionary: services.
+    cip_services: CipServiceFile = "dictionary/cip-services.toml";
+    /// CIP Motion dictionary: networks.
+    cip_networks: CipNetworkFile = "dictionary/cip-networks.toml";
+    /// SERCOS dictionary: sources, units, function groups.
+    sercos_terms: SercosTermFile = "dictionary/sercos-terms.toml";
+    /// SERCOS dictionary: the drive profile.
+    sercos_idns: SercosIdnFile = "dictionary/sercos-idns.toml";
+    /// SERCOS dictionary: IDNs of the communication.
+    sercos_communication: SercosIdnFile = "dictionary/sercos-communication.toml";
+    /// SERCOS dictionary: bits.
+    sercos_bits: SercosBitFile = "dictionary/sercos-bits.toml";
+    /// SERCOS dictionary: codes.
+    sercos_codes: SercosCodeFile = "dictionary/sercos-codes.toml";
+    /// CiA 402 dictionary: documents, units, objects.
+    cia402_objects: Cia402ObjectFile = "dictionary/cia402-objects.toml";
+    /// CiA 402 dictionary: codes, bits and states.
+    cia402_codes: Cia402CodeFile = "dictionary/cia402-codes.toml";
+    /// CIP Motion to generic.
+    cip_generic: CipGenericFile = "cip-generic.toml";
+    /// Generic to SERCOS.
+    generic_sercos: GenericSercosFile = "generic-sercos.toml";
+    /// Generic to CiA 402.
+    generic_cia402: GenericCia402File = "generic-cia402.toml";
+}
 
 /// The name of a table: that of its file without folder and ending.
 pub(super) fn table_name(path: &str) -> &str {
@@ -52,47 +115,6 @@ pub struct TableText {
     pub path: String,
     /// The whole text.
     pub text: String,
-}
-
-/// The texts of all table files, and what is laid over them.
-#[derive(Debug, Clone)]
-pub struct TableTexts {
-    /// Generic dictionary.
-    pub generic: TableText,
-    /// CIP Motion dictionary: attributes.
-    pub cip_attributes: TableText,
-    /// CIP Motion dictionary: codes and bits.
-    pub cip_enumerations: TableText,
-    /// CIP Motion dictionary: faults, alarms and inhibits.
-    pub cip_faults: TableText,
-    /// CIP Motion dictionary: services.
-    pub cip_services: TableText,
-    /// CIP Motion dictionary: networks.
-    pub cip_networks: TableText,
-    /// SERCOS dictionary: sources, units, function groups.
-    pub sercos_terms: TableText,
-    /// SERCOS dictionary: the drive profile.
-    pub sercos_idns: TableText,
-    /// SERCOS dictionary: IDNs of the communication.
-    pub sercos_communication: TableText,
-    /// SERCOS dictionary: bits.
-    pub sercos_bits: TableText,
-    /// SERCOS dictionary: codes.
-    pub sercos_codes: TableText,
-    /// CiA 402 dictionary: documents, units, objects.
-    pub cia402_objects: TableText,
-    /// CiA 402 dictionary: codes, bits and states.
-    pub cia402_codes: TableText,
-    /// CIP Motion to generic.
-    pub cip_generic: TableText,
-    /// Generic to SERCOS.
-    pub generic_sercos: TableText,
-    /// Generic to CiA 402.
-    pub generic_cia402: TableText,
-    /// Shipped settings of families of drives.
-    pub families: Vec<Overlay>,
-    /// What is laid over them, in this order.
-    pub overlays: Vec<Overlay>,
 }
 
 /// A parsed file together with its text; what many mappings have in common is there once.
@@ -117,51 +139,11 @@ impl<T> Clone for Parsed<T> {
     }
 }
 
-/// All table files, parsed but not resolved.
-#[derive(Debug, Clone)]
-pub struct Tables {
-    /// Generic dictionary.
-    pub generic: Parsed<GenericFile>,
-    /// CIP Motion dictionary: attributes.
-    pub cip_attributes: Parsed<CipAttributeFile>,
-    /// CIP Motion dictionary: codes and bits.
-    pub cip_enumerations: Parsed<CipEnumerationFile>,
-    /// CIP Motion dictionary: faults, alarms and inhibits.
-    pub cip_faults: Parsed<CipFaultFile>,
-    /// CIP Motion dictionary: services.
-    pub cip_services: Parsed<CipServiceFile>,
-    /// CIP Motion dictionary: networks.
-    pub cip_networks: Parsed<CipNetworkFile>,
-    /// SERCOS dictionary: sources, units, function groups.
-    pub sercos_terms: Parsed<SercosTermFile>,
-    /// SERCOS dictionary: the drive profile.
-    pub sercos_idns: Parsed<SercosIdnFile>,
-    /// SERCOS dictionary: IDNs of the communication.
-    pub sercos_communication: Parsed<SercosIdnFile>,
-    /// SERCOS dictionary: bits.
-    pub sercos_bits: Parsed<SercosBitFile>,
-    /// SERCOS dictionary: codes.
-    pub sercos_codes: Parsed<SercosCodeFile>,
-    /// CiA 402 dictionary: documents, units, objects.
-    pub cia402_objects: Parsed<Cia402ObjectFile>,
-    /// CiA 402 dictionary: codes, bits and states.
-    pub cia402_codes: Parsed<Cia402CodeFile>,
-    /// CIP Motion to generic.
-    pub cip_generic: Parsed<CipGenericFile>,
-    /// Generic to SERCOS.
-    pub generic_sercos: Parsed<GenericSercosFile>,
-    /// Generic to CiA 402.
-    pub generic_cia402: Parsed<GenericCia402File>,
-}
-
 impl TableTexts {
     /// The tables built into the binary.
     pub fn embedded() -> Self {
         Self::from_array(
-            FILES.map(|(path, text)| TableText {
-                path: format!("mappings/tables/{path}"),
-                text: text.to_owned(),
-            }),
+            FILES.map(|(path, text)| TableText { path: format!("{SHIPPED}{path}"), text: text.to_owned() }),
         )
     }
 
@@ -222,140 +204,28 @@ impl TableTexts {
         path.is_dir() && FILES.iter().any(|(file, _)| path.join(file).exists())
     }
 
-    /// The texts in the order of [`FILES`].
-    fn from_array(texts: [TableText; FILES.len()]) -> Self {
-        let [
-            generic,
-            cip_attributes,
-            cip_enumerations,
-            cip_faults,
-            cip_services,
-            cip_networks,
-            sercos_terms,
-            sercos_idns,
-            sercos_communication,
-            sercos_bits,
-            sercos_codes,
-            cia402_objects,
-            cia402_codes,
-            cip_generic,
-            generic_sercos,
-            generic_cia402,
-        ] = texts;
-        Self {
-            generic,
-            cip_attributes,
-            cip_enumerations,
-            cip_faults,
-            cip_services,
-            cip_networks,
-            sercos_terms,
-            sercos_idns,
-            sercos_communication,
-            sercos_bits,
-            sercos_codes,
-            cia402_objects,
-            cia402_codes,
-            cip_generic,
-            generic_sercos,
-            generic_cia402,
-            families: FAMILIES
-                .map(|(path, text)| Overlay::new(&format!("mappings/tables/{path}"), text))
-                .to_vec(),
-            overlays: Vec::new(),
-        }
-    }
-
-    fn as_array_mut(&mut self) -> [&mut TableText; FILES.len()] {
-        let Self {
-            generic,
-            cip_attributes,
-            cip_enumerations,
-            cip_faults,
-            cip_services,
-            cip_networks,
-            sercos_terms,
-            sercos_idns,
-            sercos_communication,
-            sercos_bits,
-            sercos_codes,
-            cia402_objects,
-            cia402_codes,
-            cip_generic,
-            generic_sercos,
-            generic_cia402,
-            families: _,
-            overlays: _,
-        } = self;
-        [
-            generic,
-            cip_attributes,
-            cip_enumerations,
-            cip_faults,
-            cip_services,
-            cip_networks,
-            sercos_terms,
-            sercos_idns,
-            sercos_communication,
-            sercos_bits,
-            sercos_codes,
-            cia402_objects,
-            cia402_codes,
-            cip_generic,
-            generic_sercos,
-            generic_cia402,
-        ]
-    }
-
-    /// Parses all files and lays over them what is to be laid over them; families of drives have tables of their own.
-    /// `None` with errors: every file that is no TOML,
-    /// or has unknown, missing or mistyped keys, with the place.
+    /// Parses all files and lays over them what is to be laid over them; families of drives have tables of their own. Rows with
+    /// unknown, missing or mistyped keys are found and left out, so that the others can still be looked at. `None` when a file is no
+    /// TOML.
     pub(super) fn parse(&self, findings: &mut Findings) -> Option<(Tables, Vec<ParsedFamily>)> {
         let (shipped, own) =
             (overlay::layers(&self.families, findings), overlay::layers(&self.overlays, findings));
         let (layers, of_families): (Vec<_>, Vec<_>) = own.iter().partition(|layer| layer.is_general());
         let of_families: Vec<_> = shipped.iter().chain(of_families).collect();
-        let generic = rows::parse(&self.generic, "generic", &layers, findings);
-        let cip_attributes = rows::parse(&self.cip_attributes, "cip-attributes", &layers, findings);
-        let cip_enumerations = rows::parse(&self.cip_enumerations, "cip-enumerations", &layers, findings);
-        let cip_faults = rows::parse(&self.cip_faults, "cip-faults", &layers, findings);
-        let cip_services = rows::parse(&self.cip_services, "cip-services", &layers, findings);
-        let cip_networks = rows::parse(&self.cip_networks, "cip-networks", &layers, findings);
-        let sercos_terms = rows::parse(&self.sercos_terms, "sercos-terms", &layers, findings);
-        let sercos_idns = rows::parse(&self.sercos_idns, "sercos-idns", &layers, findings);
-        let sercos_communication =
-            rows::parse(&self.sercos_communication, "sercos-communication", &layers, findings);
-        let sercos_bits = rows::parse(&self.sercos_bits, "sercos-bits", &layers, findings);
-        let sercos_codes = rows::parse(&self.sercos_codes, "sercos-codes", &layers, findings);
-        let cia402_objects = rows::parse(&self.cia402_objects, "cia402-objects", &layers, findings);
-        let cia402_codes = rows::parse(&self.cia402_codes, "cia402-codes", &layers, findings);
-        let cip_generic = rows::parse(&self.cip_generic, "cip-generic", &layers, findings);
-        let generic_sercos = rows::parse(&self.generic_sercos, "generic-sercos", &layers, findings);
-        let generic_cia402 = rows::parse(&self.generic_cia402, "generic-cia402", &layers, findings);
-        if findings.has_errors() {
-            return None;
-        }
-        let families = overlay::parse_families(&self.generic_cia402, &layers, &of_families, findings);
-        let tables = Tables {
-            generic: generic?,
-            cip_attributes: cip_attributes?,
-            cip_enumerations: cip_enumerations?,
-            cip_faults: cip_faults?,
-            cip_services: cip_services?,
-            cip_networks: cip_networks?,
-            sercos_terms: sercos_terms?,
-            sercos_idns: sercos_idns?,
-            sercos_communication: sercos_communication?,
-            sercos_bits: sercos_bits?,
-            sercos_codes: sercos_codes?,
-            cia402_objects: cia402_objects?,
-            cia402_codes: cia402_codes?,
-            cip_generic: cip_generic?,
-            generic_sercos: generic_sercos?,
-            generic_cia402: generic_cia402?,
-        };
+        let tables = self.rows(&layers, findings)?;
+        let mut found = Findings::default();
+        let families = overlay::parse_families(&self.generic_cia402, &layers, &of_families, &mut found);
+        extend_with_families(findings, found);
         Some((tables, families))
     }
+}
+
+/// Adds what was found in the tables of families. What an overlay for all drives makes of the shipped ones only follows from it.
+pub(crate) fn extend_with_families(findings: &mut Findings, mut found: Findings) {
+    if findings.has_errors() {
+        found.retain(|finding| !finding.file.starts_with(SHIPPED));
+    }
+    findings.extend(found);
 }
 
 fn refuse_strangers(folder: &Path, below: &Path, findings: &mut Findings) {

@@ -33,7 +33,7 @@ pub struct LostPrecision {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowNumbers {
     /// Name of the signal or parameter.
-    pub name: &'static str,
+    pub name: String,
     /// Whether it is a signal.
     pub is_signal: bool,
     /// Where the drive has it.
@@ -48,7 +48,7 @@ pub struct RowNumbers {
     pub step: f64,
     /// Whether the controller's value is a whole number.
     pub is_whole: bool,
-    /// Up to this value a floating point number tells every count of the drive apart.
+    /// Up to this value a floating point number distinguishes every count of the drive.
     pub float_exact: Option<f64>,
     /// The first whole number that does not come back.
     pub lost: Option<LostPrecision>,
@@ -135,9 +135,12 @@ impl Mapping {
                 mantissa: if width == Width::F32 { SINGLE } else { DOUBLE },
             };
             let south = South { item: row.item, width: row.width, outward, inward, wraps: false };
-            numbers.extend(end_to_end(parameter.name().unwrap_or_default(), false, &north, &south));
+            let name = self.dictionaries.generic.by_number(parameter).map_or("", |row| &row.name);
+            numbers.extend(end_to_end(name, false, &north, &south));
         }
-        numbers.sort_by_key(|row| (!row.is_signal, row.item, row.name));
+        numbers.sort_by(|one, two| {
+            (!one.is_signal, one.item, &one.name).cmp(&(!two.is_signal, two.item, &two.name))
+        });
         numbers.dedup();
         numbers
     }
@@ -158,7 +161,7 @@ impl Mapping {
     }
 }
 
-fn end_to_end(name: &'static str, is_signal: bool, north: &North, south: &South) -> Option<RowNumbers> {
+fn end_to_end(name: &str, is_signal: bool, north: &North, south: &South) -> Option<RowNumbers> {
     let to_north = north.ratio.inverse()?;
     let (low, high) = south.width.range();
     let (low, high) = (low.max(south.outward.min), high.min(south.outward.max));
@@ -169,7 +172,7 @@ fn end_to_end(name: &'static str, is_signal: bool, north: &North, south: &South)
     // Of one whole number, exactly; the limits of 64 bits are no matter to a ratio.
     let step = lsb.then_nearest(to_north).map_or(f64::NAN, |ratio| ratio.to_f64(1)).abs();
     Some(RowNumbers {
-        name,
+        name: name.to_owned(),
         is_signal,
         item: south.item,
         unit: north.unit.clone(),

@@ -51,19 +51,44 @@ impl<'a> Resolver<'a> {
         self.errors.push(self.file, Problem::new(code, span).key(key).expected(message));
     }
 
+    /// Notes that the value at `span` is wrong, and what to write.
+    pub fn helped(
+        &mut self,
+        code: Code,
+        span: Range<usize>,
+        key: &str,
+        message: impl Into<String>,
+        help: &str,
+    ) {
+        self.errors.push(self.file, Problem::new(code, span).key(key).expected(message).help(help));
+    }
+
+    /// Notes that nothing defines the name that the value at `span` needs.
+    pub fn lacks(
+        &mut self,
+        code: Code,
+        span: Range<usize>,
+        key: &str,
+        name: &str,
+        message: impl Into<String>,
+    ) {
+        self.errors.push(self.file, Problem::new(code, span).key(key).expected(message).lacks(name));
+    }
+
     /// Checks the head of a file.
     pub fn head(&mut self, format: &Spanned<u32>, key: &str, title: &Name, expected: &str) {
         if *format.get_ref() != FORMAT {
             let message = format!("expected format {FORMAT}, got {}", format.get_ref());
             self.error(code::WRONG_HEAD, format.span(), "format", message);
         }
-        if title.get_ref() != expected {
-            self.error(
-                code::WRONG_HEAD,
-                title.span(),
-                key,
-                format!("expected `{expected}`, got `{}`", title.get_ref()),
-            );
+        self.same(code::WRONG_HEAD, key, title, expected);
+    }
+
+    /// Checks that a text is the only one that it can be.
+    pub fn same(&mut self, code: Code, key: &str, text: &Name, expected: &str) {
+        if text.get_ref() != expected {
+            let message = format!("expected `{expected}`, got `{}`", text.get_ref());
+            self.error(code, text.span(), key, message);
         }
     }
 
@@ -83,6 +108,20 @@ impl<'a> Resolver<'a> {
         found
     }
 
+    /// Notes that the dictionary does not have the IDN.
+    pub fn unknown_idn<'n>(&mut self, key: &str, name: &Name, vendors: impl IntoIterator<Item = &'n str>) {
+        let text = name.get_ref().as_str();
+        let problem = Problem::new(code::UNKNOWN_NAME, name.span()).key(key).lacks(text);
+        let problem = problem.expected(format!("expected an IDN of the dictionary, got {text}"));
+        let near = closest(text, vendors).filter(|_| text.starts_with("P-"));
+        let problem = problem.help(match near {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "`axisbridge dictionary sercos` prints all; add one that the dictionary lacks as a row [[sercos-idns.idn]]"
+                .to_owned(),
+        });
+        self.errors.push(self.file, problem);
+    }
+
     /// Notes that nothing has the name.
     fn unknown<'n>(
         &mut self,
@@ -95,6 +134,7 @@ impl<'a> Resolver<'a> {
         let text = name.get_ref().as_str();
         let problem =
             Problem::new(code, name.span()).key(key).expected(format!("expected {what}, got `{text}`"));
+        let problem = if code == code::UNKNOWN_NAME { problem.lacks(text) } else { problem };
         let problem = match closest(text, known) {
             Some(closest) => problem.help(format!("did you mean `{closest}`?")),
             None => problem,

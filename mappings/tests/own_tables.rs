@@ -1,24 +1,19 @@
-//! What a repository with tables of its own tests about them: an example, and a test of what this crate offers for it.
-//!
-//! The tables are a folder as the program takes it, with an overlay for one machine. Copy this file, and write what your machine
-//! needs in place of the values here.
+//! What a repository with tables of its own tests about them. Copy this file and the overlay beside it, and write what your
+//! machine needs in place of the values here.
 
 use std::path::PathBuf;
 
 use mappings::check::{Outcome, check};
 use mappings::finding::Severity;
-use mappings::{AxisUnits, Mapping, SercosAxis};
+use mappings::{AxisUnits, DriveFacts, DriveProgram, Mapping, SercosAxis};
 use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
 use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
-fn folder() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tables"))
-}
-
-fn overlay() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/own_tables/line-9.toml"))
+/// The overlays of the machine, files or folders; `cargo test` runs in the folder of the crate.
+fn overlays() -> [PathBuf; 1] {
+    [PathBuf::from("tests/own_tables")]
 }
 
 /// A rotary axis in position control on a drive that the tables scale.
@@ -31,9 +26,16 @@ fn axis() -> SercosAxis {
     }
 }
 
+/// The program of the axis on a drive that has everything but `missing`.
+fn program(mapping: &Mapping, missing: &[Idn]) -> DriveProgram {
+    let mut facts: DriveFacts = mapping.facts_of_obedient(&axis()).unwrap();
+    missing.iter().for_each(|idn| facts.note_missing(*idn));
+    mapping.sercos_program(&axis(), &facts).unwrap()
+}
+
 #[test]
 fn the_tables_have_no_error_and_no_warning() {
-    let Outcome { findings, overlays, examples, .. } = check(Some(&folder()), &[overlay()]);
+    let Outcome { findings, overlays, examples, .. } = check(None, &overlays());
     assert_eq!(findings.count(Severity::Error), 0, "{findings}");
     assert_eq!(findings.count(Severity::Warning), 0, "{findings}");
     assert_eq!(overlays, 1);
@@ -41,12 +43,11 @@ fn the_tables_have_no_error_and_no_warning() {
 }
 
 #[test]
-fn the_window_is_written_as_the_drive_counts_it() {
-    let mapping = Mapping::load(Some(&folder()), &[overlay()]).unwrap();
-    let facts = mapping.facts_of_obedient(&axis()).unwrap();
-    let program = mapping.sercos_program(&axis(), &facts).unwrap();
+fn the_window_is_written_in_counts_of_the_drive() {
+    let mapping = Mapping::load(None, &overlays()).unwrap();
+    let program = program(&mapping, &[]);
     let window = program.parameter(Parameter::IN_POSITION_WINDOW).unwrap();
-    assert_eq!(window.item, Idn::standard(57).into());
+    assert_eq!(window.item, Idn::POSITION_WINDOW.into());
     // A quarter of a turn in nanoturns; the drive has 3 600 000 counts in a turn.
     let (bytes, len, clamped) = window.encode(250_000_000).unwrap();
     assert_eq!((&bytes[..len], clamped), (900_000_i32.to_le_bytes().as_slice(), false));
@@ -54,11 +55,19 @@ fn the_window_is_written_as_the_drive_counts_it() {
 
 #[test]
 fn a_jerk_limit_is_refused_where_the_drive_has_none() {
-    let mapping = Mapping::load(Some(&folder()), &[overlay()]).unwrap();
-    let mut facts = mapping.facts_of_obedient(&axis()).unwrap();
-    facts.note_missing(Idn::standard(349));
-    let program = mapping.sercos_program(&axis(), &facts).unwrap();
-    assert!(program.rejects(Parameter::JERK_LIMIT));
-    let shipped = Mapping::embedded().unwrap().sercos_program(&axis(), &facts).unwrap();
-    assert!(!shipped.rejects(Parameter::JERK_LIMIT), "as shipped it is kept without effect");
+    let jerk = Idn::standard(349);
+    let own = Mapping::load(None, &overlays()).unwrap();
+    assert!(program(&own, &[jerk]).rejects(Parameter::JERK_LIMIT));
+    let shipped = Mapping::embedded().unwrap();
+    assert!(
+        !program(&shipped, &[jerk]).rejects(Parameter::JERK_LIMIT),
+        "as shipped it is kept without effect"
+    );
+}
+
+#[test]
+fn the_row_of_the_jerk_limit_is_the_one_of_the_overlay() {
+    let own = Mapping::load(None, &overlays()).unwrap();
+    let row = own.parameter_row(Parameter::JERK_LIMIT).unwrap();
+    assert_eq!(row.to_string(), "line-9.toml:8 [[parameter]] jerk_limit");
 }

@@ -84,7 +84,7 @@ pub struct Traffic {
 /// A bus and what is to go on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan<'a> {
-    /// Its rate.
+    /// Nominal bit rate of the bus.
     pub rate: BitRate,
     /// From one SYNC to the next.
     pub cycle: DurationNs,

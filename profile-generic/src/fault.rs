@@ -84,9 +84,9 @@ macro_rules! fault_catalogue {
 }
 
 fault_catalogue! {
-    /// The drive reports a fault that has no generic name; the vendor code tells it.
+    /// The drive reports a fault that has no generic name; the vendor code reports it.
     DRIVE_SPECIFIC = 0x0001, "drive_specific", Axis, DecelerateAndDisable;
-    /// The drive warns of something that has no generic name; the vendor code tells it.
+    /// The drive warns of something that has no generic name; the vendor code reports it.
     DRIVE_WARNING = 0x0002, "drive_warning", Alarm, Alarm;
 
     /// The motor current exceeded its peak limit.
@@ -302,6 +302,11 @@ impl Fault {
     /// A fault with the class and reaction that its cause has by default, and no vendor code.
     pub const fn new(cause: FaultCause, at: SystemTime) -> Self {
         Self { cause, class: cause.class(), reaction: cause.default_reaction(), vendor_code: 0, at }
+    }
+
+    /// The best stop that the fault leaves. A warning leaves a controlled one.
+    pub const fn best_stop(&self) -> Reaction {
+        if self.reaction.stops() { self.reaction } else { Reaction::DecelerateAndDisable }
     }
 
     /// The same fault with the drive's own code.

@@ -168,7 +168,7 @@ impl Test {
 pub struct TestOrder {
     /// Another number for every order.
     pub id: u32,
-    /// The test.
+    /// The motor with torque, or the feedback alone.
     pub test: Test,
     /// The distance that ends it, in revolutions or metres.
     pub distance: f32,

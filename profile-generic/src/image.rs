@@ -4,91 +4,48 @@
 //! `present` is set, so that a profile that does not deliver a value cannot be mistaken for one that delivers
 //! zero.
 
-use crate::code::named_enum;
 use crate::fault::Fault;
+pub use crate::generated::signals::Signal;
 use crate::inhibit::Inhibits;
 use crate::mode::{InterpolationSource, ModeSelection, OperatingMode};
-use crate::quantity::{Acceleration, Current, Position, Quantity, Temperature, Torque, Velocity, Voltage};
+use crate::quantity::{Acceleration, Current, Position, Temperature, Torque, Velocity, Voltage};
 use crate::state::{DriveState, Report, Request};
 use crate::time::MonotonicTime;
 use bitflags::bitflags;
 
-named_enum! {
-    /// One value of the process image, as the mapping tables name it.
-    pub enum Signal {
-        /// Set-point of the position.
-        PositionCommand = "position_command",
-        /// Set-point of the velocity.
-        VelocityCommand = "velocity_command",
-        /// Set-point of the acceleration.
-        AccelerationCommand = "acceleration_command",
-        /// Set-point of the torque or force.
-        TorqueCommand = "torque_command",
-        /// Added to the position set-point.
-        PositionOffset = "position_offset",
-        /// Added to the output of the position loop: trim and feed-forward of the velocity.
-        VelocityOffset = "velocity_offset",
-        /// Added to the output of the velocity loop: trim and feed-forward of the acceleration.
-        AccelerationOffset = "acceleration_offset",
-        /// Added to the torque set-point: trim and feed-forward of the torque.
-        TorqueOffset = "torque_offset",
-        /// Digital outputs the controller sets, bit 0 first.
-        DigitalOutputs = "digital_outputs",
-        /// Where the drive is to go by itself.
-        TargetPosition = "target_position",
-        /// Highest speed on the way to the target.
-        ProfileVelocity = "profile_velocity",
-        /// Acceleration on the way to the target.
-        ProfileAcceleration = "profile_acceleration",
-        /// Deceleration on the way to the target.
-        ProfileDeceleration = "profile_deceleration",
-        /// Actual position.
-        PositionActual = "position_actual",
-        /// Actual velocity.
-        VelocityActual = "velocity_actual",
-        /// Actual acceleration.
-        AccelerationActual = "acceleration_actual",
-        /// Actual torque or force.
-        TorqueActual = "torque_actual",
-        /// Actual motor current.
-        CurrentActual = "current_actual",
-        /// Voltage of the DC bus.
-        BusVoltage = "bus_voltage",
-        /// Temperature of the motor.
-        Temperature = "temperature",
-        /// Position set-point less actual position, as the drive's loop sees it.
-        FollowingError = "following_error",
-        /// Digital inputs of the drive, bit 0 first.
-        DigitalInputs = "digital_inputs",
-    }
+/// One row per signal: variant, name, quantity, image, description.
+macro_rules! signal_rows {
+    ($( $signal:ident = $name:literal, $quantity:ident, $image:ident, $description:literal; )*) => {
+        $crate::code::named_enum! {
+            /// One value of the process image, as the mapping tables name it.
+            pub enum Signal { $( #[doc = $description] $signal = $name ),* }
+        }
+
+        impl Signal {
+            /// What the signal measures.
+            pub const fn quantity(self) -> $crate::quantity::Quantity {
+                match self { $( Self::$signal => $crate::quantity::Quantity::$quantity ),* }
+            }
+
+            /// Whether the signal belongs to the [`AxisCommand`](crate::image::AxisCommand); otherwise it belongs to the
+            /// [`AxisFeedback`](crate::image::AxisFeedback).
+            pub const fn is_command(self) -> bool {
+                match self { $( Self::$signal => signal_rows!(@$image) ),* }
+            }
+
+            /// What it is, in a sentence.
+            pub const fn description(self) -> &'static str {
+                match self { $( Self::$signal => $description ),* }
+            }
+        }
+    };
+    (@Command) => { true };
+    (@Feedback) => { false };
 }
+pub(crate) use signal_rows;
 
 impl Signal {
-    /// What the signal measures.
-    pub const fn quantity(self) -> Quantity {
-        match self {
-            Self::PositionCommand
-            | Self::PositionOffset
-            | Self::TargetPosition
-            | Self::PositionActual
-            | Self::FollowingError => Quantity::Position,
-            Self::VelocityCommand | Self::VelocityOffset | Self::ProfileVelocity | Self::VelocityActual => {
-                Quantity::Velocity
-            }
-            Self::AccelerationCommand
-            | Self::AccelerationOffset
-            | Self::ProfileAcceleration
-            | Self::ProfileDeceleration
-            | Self::AccelerationActual => Quantity::Acceleration,
-            Self::TorqueCommand | Self::TorqueOffset | Self::TorqueActual => Quantity::Torque,
-            Self::CurrentActual => Quantity::Current,
-            Self::BusVoltage => Quantity::Voltage,
-            Self::Temperature => Quantity::Temperature,
-            Self::DigitalInputs | Self::DigitalOutputs => Quantity::None,
-        }
-    }
-
-    /// What is added to set-points.
+    /// The offsets, which are added to set-points.
     pub const OFFSETS: [Self; 4] =
         [Self::PositionOffset, Self::VelocityOffset, Self::AccelerationOffset, Self::TorqueOffset];
 
@@ -108,26 +65,6 @@ impl Signal {
             OperatingMode::Torque => Some((Self::TorqueCommand, Self::TorqueOffset)),
             OperatingMode::None | OperatingMode::Homing => None,
         }
-    }
-
-    /// Whether the signal belongs to the [`AxisCommand`]; otherwise it belongs to the [`AxisFeedback`].
-    pub const fn is_command(self) -> bool {
-        matches!(
-            self,
-            Self::PositionCommand
-                | Self::VelocityCommand
-                | Self::AccelerationCommand
-                | Self::TorqueCommand
-                | Self::PositionOffset
-                | Self::VelocityOffset
-                | Self::AccelerationOffset
-                | Self::TorqueOffset
-                | Self::DigitalOutputs
-                | Self::TargetPosition
-                | Self::ProfileVelocity
-                | Self::ProfileAcceleration
-                | Self::ProfileDeceleration
-        )
     }
 }
 
@@ -246,17 +183,17 @@ bitflags! {
         const BRAKE_RELEASED = 1 << 18;
         /// A safety function is active.
         const SAFETY_ACTIVE = 1 << 19;
-        /// A set-point or actual value was clamped on its way.
+        /// A set-point or actual value was clamped in a conversion.
         const SATURATED = 1 << 20;
         /// A homing procedure has found its place: the controller that moves the axis has to stop it.
         const HOME_FOUND = 1 << 21;
         /// The homing procedure that was asked for has failed, or the drive refused it.
         const HOMING_FAILED = 1 << 22;
-        /// The drive has come to the target that it went to by itself.
+        /// The drive has reached the target of its own profile.
         const TARGET_REACHED = 1 << 23;
         /// The home switch is active.
         const HOME_SWITCH = 1 << 24;
-        /// The drive tells its limit switches; without this bit nothing follows from the two below.
+        /// The drive reports its limit switches; without this bit nothing follows from the two below.
         const LIMIT_SWITCHES = 1 << 25;
         /// The switch at the end of the way forward is active: the axis has gone too far.
         const POSITIVE_LIMIT_SWITCH = 1 << 26;
@@ -313,20 +250,20 @@ impl StatusBits {
     }
 }
 
-/// What the controller wants of one axis in this cycle.
+/// What the north side wants of one axis in this cycle. The north side sets it; the axis completes it for its drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisCommand {
-    /// What the drive shall follow.
+    /// Operating mode: which set-point the drive follows.
     pub mode: OperatingMode,
     /// Who generates the profile.
     pub interpolation: InterpolationSource,
-    /// Position set-point.
+    /// Position set-point, 1e-9 revolution or mm, unrolled.
     pub position: Position,
-    /// Velocity set-point.
+    /// Velocity set-point, 1e-9 revolution/s or mm/s.
     pub velocity: Velocity,
-    /// Acceleration set-point.
+    /// Acceleration set-point, 1e-9 revolution/s^2 or mm/s^2.
     pub acceleration: Acceleration,
-    /// Torque or force set-point.
+    /// Torque or force set-point, 1e-6 of the rated one.
     pub torque: Torque,
     /// Added to the position set-point.
     pub position_offset: Position,
@@ -338,17 +275,17 @@ pub struct AxisCommand {
     pub torque_offset: Torque,
     /// Digital outputs, bit 0 first.
     pub digital_outputs: u32,
-    /// Where the drive is to go by itself.
+    /// Target that the drive moves to with a profile of its own, 1e-9 revolution or mm.
     pub target_position: Position,
-    /// Highest speed on the way there.
+    /// Highest speed of that profile, 1e-9 revolution/s or mm/s, not negative.
     pub profile_velocity: Velocity,
-    /// Acceleration on the way there.
+    /// Acceleration of that profile, 1e-9 revolution/s^2 or mm/s^2.
     pub profile_acceleration: Acceleration,
-    /// Deceleration on the way there.
+    /// Deceleration of that profile, 1e-9 revolution/s^2 or mm/s^2.
     pub profile_deceleration: Acceleration,
     /// Which of the values above are valid.
     pub present: CommandSet,
-    /// When the set-points shall be reached; as soon as possible when `None`.
+    /// Instant on the local clock at which the set-points are to be reached; `None` for as soon as possible.
     pub target_time: Option<MonotonicTime>,
     /// A request to the state machine, if there is one.
     pub request: Option<Request>,
@@ -357,24 +294,55 @@ pub struct AxisCommand {
 }
 
 impl AxisCommand {
-    /// What a way that the drive makes by itself needs.
+    /// The signals that a profile of the drive needs.
     pub const PROFILE: CommandSet = CommandSet::TARGET_POSITION
         .union(CommandSet::PROFILE_VELOCITY)
         .union(CommandSet::PROFILE_ACCELERATION)
         .union(CommandSet::PROFILE_DECELERATION);
 
-    /// What the drive shall follow, and who makes the way.
+    /// The signals that lead the axis from cycle to cycle.
+    pub const SET_POINTS: CommandSet = CommandSet::POSITION
+        .union(CommandSet::VELOCITY)
+        .union(CommandSet::ACCELERATION)
+        .union(CommandSet::TORQUE);
+
+    /// Takes [`AxisCommand::SET_POINTS`] of another command: those that it lacks become absent. Nothing else changes.
+    pub fn take_set_points(&mut self, other: &Self) {
+        self.position = other.position;
+        self.velocity = other.velocity;
+        self.acceleration = other.acceleration;
+        self.torque = other.torque;
+        self.present = (self.present - Self::SET_POINTS) | (other.present & Self::SET_POINTS);
+    }
+
+    /// Puts position, velocity, acceleration and torque; those without a value become absent. Nothing else changes.
+    pub fn put_set_points(&mut self, values: [Option<i64>; 4]) {
+        self.present.remove(Self::SET_POINTS);
+        let signals = [
+            Signal::PositionCommand,
+            Signal::VelocityCommand,
+            Signal::AccelerationCommand,
+            Signal::TorqueCommand,
+        ];
+        for (signal, value) in signals.into_iter().zip(values) {
+            if let Some(value) = value {
+                self.set(signal, value);
+            }
+        }
+    }
+
+    /// The operating mode, and who generates the profile.
     pub const fn selection(&self) -> ModeSelection {
         ModeSelection { mode: self.mode, interpolation: self.interpolation }
     }
 
-    /// Chooses what the drive shall follow, and who makes the way.
+    /// Sets the operating mode, and who generates the profile.
     pub const fn select(&mut self, selection: ModeSelection) {
         self.mode = selection.mode;
         self.interpolation = selection.interpolation;
     }
 
-    /// Puts the offset of the set-point that leads in this mode into that set-point: what comes behind sees one value, and
+    /// Puts the offset of the set-point that leads in this mode into that set-point: the parts downstream see one value, and
     /// the offset is zero. Returns `false`, and changes nothing, when the sum does not fit.
     pub fn add_own_offset(&mut self) -> bool {
         let Some((command, offset)) = Signal::leading(self.mode) else { return true };
@@ -485,30 +453,30 @@ impl SignalImage for AxisCommand {
     }
 }
 
-/// What is known of one axis in this cycle.
+/// What is known of one axis in this cycle. The axis sets it from what its drive reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisFeedback {
     /// The state of the generic state machine.
     pub state: DriveState,
     /// What the drive itself last reported.
     pub report: Report,
-    /// What the drive follows.
+    /// Operating mode that the drive shows.
     pub mode: OperatingMode,
-    /// Who makes the way of what it follows.
+    /// Who generates the profile that the drive follows.
     pub interpolation: InterpolationSource,
-    /// Actual position.
+    /// Actual position, 1e-9 revolution or mm, unrolled.
     pub position: Position,
-    /// Actual velocity.
+    /// Actual velocity, 1e-9 revolution/s or mm/s.
     pub velocity: Velocity,
-    /// Actual acceleration.
+    /// Actual acceleration, 1e-9 revolution/s^2 or mm/s^2.
     pub acceleration: Acceleration,
-    /// Actual torque or force.
+    /// Actual torque or force, 1e-6 of the rated one.
     pub torque: Torque,
-    /// Actual motor current.
+    /// Actual motor current, uA.
     pub current: Current,
-    /// Voltage of the DC bus.
+    /// Voltage of the DC bus, uV.
     pub bus_voltage: Voltage,
-    /// Temperature of the motor.
+    /// Temperature of the motor, 0.001 degree C.
     pub temperature: Temperature,
     /// Position set-point less actual position.
     pub following_error: Position,

@@ -43,7 +43,7 @@ bitflags! {
         const RESTART_DELAY = 1 << 15;
         /// The drive reports an inhibit of its own that has no generic name.
         const DRIVE_SPECIFIC = 1 << 16;
-        /// The controller wants the limit switches checked, and the drive does not tell them.
+        /// The controller wants the limit switches checked, and the drive does not report them.
         const LIMIT_SWITCHES_NOT_TOLD = 1 << 17;
 
         // Bits above are kept when they come from a newer table.

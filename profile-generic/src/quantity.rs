@@ -50,6 +50,7 @@ named_enum! {
 
 impl Quantity {
     /// The unit of the integer, as printed in dictionaries.
+    // Flat: a table from quantity to unit.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::None => "",
@@ -73,13 +74,48 @@ impl Quantity {
     }
 }
 
-/// Writes `value` times ten to the minus `decimals`, exactly.
-fn fixed_point(f: &mut fmt::Formatter<'_>, value: i64, decimals: u32, unit: &str) -> fmt::Result {
-    let magnitude = value.unsigned_abs();
-    let whole = 10_u64.pow(decimals);
-    let sign = if value < 0 { "-" } else { "" };
-    let width = decimals as usize;
-    write!(f, "{sign}{}.{:0width$} {unit}", magnitude / whole, magnitude % whole)
+/// A number with its unit, written exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decimal<'u> {
+    /// The number, times ten to the power of `decimals`.
+    pub value: i64,
+    /// Digits after the point, 1 to 18; others count as the nearer of these.
+    pub decimals: u8,
+    /// What is counted.
+    pub unit: &'u str,
+}
+
+/// Sign, point, and the digits of the longest number.
+const DECIMAL_LEN: usize = 22;
+
+impl fmt::Display for Decimal<'_> {
+    // Without `write!`: recordings are translated to many millions of these.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let decimals = self.decimals.clamp(1, 18);
+        let mut text = [0_u8; DECIMAL_LEN];
+        let mut rest = self.value.unsigned_abs();
+        let mut from = text.len();
+        let mut digits = 0;
+        while rest > 0 || digits <= decimals {
+            if digits == decimals {
+                from -= 1;
+                text[from] = b'.';
+            }
+            let [digit, ..] = (rest % 10).to_le_bytes();
+            from -= 1;
+            text[from] = b'0' + digit;
+            rest /= 10;
+            digits += 1;
+        }
+        if self.value < 0 {
+            from -= 1;
+            text[from] = b'-';
+        }
+        // Digits, point and sign only.
+        f.write_str(core::str::from_utf8(&text[from..]).unwrap_or_default())?;
+        f.write_str(" ")?;
+        f.write_str(self.unit)
+    }
 }
 
 macro_rules! quantity {
@@ -124,7 +160,7 @@ macro_rules! quantity {
 
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                fixed_point(f, self.0, $decimals, $unit)
+                Decimal { value: self.0, decimals: $decimals, unit: $unit }.fmt(f)
             }
         }
     };
@@ -175,6 +211,11 @@ mod tests {
         assert_eq!(Torque(1_000_000).to_string(), "100.0000 %");
         assert_eq!(Temperature(-12_345).to_string(), "-12.345 degC");
         assert_eq!(Voltage(560_000_000).to_string(), "560.000000 V");
+        assert_eq!(Position(i64::MAX).to_string(), "9223372036.854775807 u");
+        assert_eq!(Position::ZERO.to_string(), "0.000000000 u");
+        let most = Decimal { value: i64::MIN, decimals: u8::MAX, unit: "x" };
+        assert_eq!(most.to_string(), "-9.223372036854775808 x");
+        assert_eq!(Decimal { value: -5, decimals: 0, unit: "x" }.to_string(), "-0.5 x");
     }
 
     #[test]

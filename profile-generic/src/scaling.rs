@@ -124,7 +124,7 @@ impl WrapTracker {
     }
 
     /// Moves the reference of the counter itself by `by` counts: the next value comes in the new reference, and what it
-    /// has moved since the last one is told apart from the change.
+    /// has moved since the last one is distinguished from the change.
     pub fn shift(&mut self, by: i64) {
         self.last = self.last.map(|last| last.wrapping_add(by));
         self.total = self.total.wrapping_add(by);

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Mutates the engine and the profiles, and asks `axisbridge snapshot tests/frames` whether it notices.
 
-    tests/mutants/run.py SCRATCH [--report FILE] [--jobs N] [--limit N]
+    tests/mutants/run.py SCRATCH [--report FILE] [--jobs N] [--limit N] [--built]
 
 The sources are copied to SCRATCH, and every mutant is put into the copy behind a number that is read once from the environment
-(`AXISBRIDGE_MUTANT`), so that one build has all of them. Mutants that do not compile are taken out again. Then the snapshot runs once
-for each of them. It needs Python 3 and cargo, no other package; it is no part of `cargo test`.
+(`AXISBRIDGE_MUTANT`), so that one build has all of them. Mutants that do not compile are taken out again. Then each mutant is
+asked about by the lists and scenes that reach it, the quickest first, until one notices. It needs Python 3 and cargo, no other package; it is no part of `cargo test`.
 
 What is changed is decided by file and form of a line, never by hand:
 
@@ -33,23 +33,22 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FILES = [
     "gateway/src/engine/axis/**/*.rs",
     "gateway/src/engine/device/**/*.rs",
+    "gateway/src/engine/local/**/*.rs",
     "mappings/src/attributes.rs",
     "mappings/src/cip_scaling.rs",
     "mappings/src/compile_cip.rs",
-    "mappings/src/compile_sercos.rs",
+    "mappings/src/sercos/compile.rs",
     "mappings/src/device_link.rs",
     "mappings/src/drive_program.rs",
-    "mappings/src/scaling.rs",
+    "mappings/src/sercos/scaling.rs",
     "profile-generic/src/program/**/*.rs",
-    "profile-generic/src/scaling*.rs",
-    "profile-generic/src/scaling/**/*.rs",
+    "profile-generic/src/scaling.rs",
     "profile-generic/src/ratio.rs",
     "profile-generic/src/interpolation/**/*.rs",
     "profile-sercos/src/master/connection.rs",
     "profile-sercos/src/wire/connection.rs",
-    "profile-cip/src/device/axis_object/**/*.rs",
-    "profile-cip/src/device/axis_report.rs",
-    "profile-cip/src/device/motion_receive.rs",
+    "profile-cip/src/device/axis/**/*.rs",
+    "profile-cip/src/device/motion/receive.rs",
 ]
 
 SWITCH = """
@@ -85,12 +84,14 @@ NAMED = re.compile(r"^(\s+let \w+ = )([^;|{}]*(?: == | != | < | > | <= | >= | &&
 OPERAND = re.compile(r"(?<=[\w)\]] )([-+*]) ((?:self\.|i128::from\()?[a-z_][\w.]*(?:\(\))?\)?)(?=[;,)]| [-+*/] )")
 
 
+TESTS = re.compile(r"#\[cfg\(test\)\]\n(?:#\[.*\]\n)*mod \w+ \{")
+
+
 def source_lines(text):
     """The lines of a file before its tests, each with whether it may be changed."""
-    tests = text.find("#[cfg(test)]")
-    lines = (text if tests < 0 else text[:tests]).split("\n")
-    rest = "" if tests < 0 else text[tests:]
-    return lines, rest
+    tests = TESTS.search(text)
+    end = tests.start() if tests else len(text)
+    return text[:end].split("\n"), text[end:]
 
 
 def mutants_of(lines, name):
@@ -147,6 +148,9 @@ def copy_sources(scratch):
 def plan():
     """Every mutant: file, line, operator, text."""
     mutants = []
+    for pattern in FILES:
+        if not any(ROOT.glob(pattern)):
+            sys.exit(f"no file is {pattern} any more")
     paths = sorted({path for pattern in FILES for path in ROOT.glob(pattern)})
     for path in paths:
         if path.name == "tests.rs" or "tests" in path.relative_to(ROOT).parts:
@@ -216,11 +220,34 @@ def build(scratch, mutants):
     return there
 
 
-def snapshot(scratch, number, traced=False):
+def units(scratch):
+    """A folder for the lists of each folder, and for each scene: what a mutant does not reach is not asked about it."""
+    found = []
+    frames = ROOT / "tests/frames"
+    for config in sorted(frames.rglob("config.toml")):
+        scenes = [path for path in sorted(config.parent.glob("*.toml")) if path != config]
+        # Lists share a bench, and what one of them shows may depend on those before it.
+        lists = sorted(config.parent.glob("*.hex"))
+        for parts in [lists, *[[scene] for scene in scenes]]:
+            if not parts:
+                continue
+            name = parts[0].stem if len(parts) == 1 else "lists"
+            unit = scratch / "units" / "-".join([*config.parent.relative_to(frames).parts, name])
+            unit.mkdir(parents=True, exist_ok=True)
+            (unit / "config.toml").write_bytes(config.read_bytes())
+            for path in parts:
+                for ending in [path.suffix, ".events", ".local", ".golden"]:
+                    if path.with_suffix(ending).exists():
+                        (unit / path.name).with_suffix(ending).write_bytes(path.with_suffix(ending).read_bytes())
+            found.append(unit)
+    return found
+
+
+def snapshot(scratch, unit, number, traced=False, accept=False):
     environment = dict(os.environ, AXISBRIDGE_MUTANT=str(number), RUST_BACKTRACE="0")
     if traced:
         environment["AXISBRIDGE_MUTANTS_TRACED"] = "1"
-    command = ["nice", str(scratch / "target/debug/axisbridge"), "snapshot", str(scratch / "src/tests/frames")]
+    command = [str(scratch / "target/debug/axisbridge"), "snapshot", str(unit), *(["--accept"] if accept else [])]
     try:
         return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30)
     except subprocess.TimeoutExpired:
@@ -233,10 +260,17 @@ def main():
     parser.add_argument("--report", type=pathlib.Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--limit", type=int, help="this many mutants of each file at most, evenly spread")
+    parser.add_argument("--built", action="store_true", help="use the program and the mutants of the last run")
     arguments = parser.parse_args()
     scratch = arguments.scratch.resolve()
-    copy_sources(scratch)
-    mutants = plan()
+    scratch.mkdir(parents=True, exist_ok=True)
+    kept_plan = scratch / "mutants.json"
+    if arguments.built:
+        mutants = json.loads(kept_plan.read_text())
+    else:
+        copy_sources(scratch)
+        mutants = build(scratch, plan())
+        kept_plan.write_text(json.dumps(mutants))
     if arguments.limit:
         kept = []
         for name in dict.fromkeys(mutant["file"] for mutant in mutants):
@@ -244,22 +278,34 @@ def main():
             step = max(1, -(-len(own) // arguments.limit))
             kept += own[::step]
         mutants = kept
-    mutants = build(scratch, mutants)
-    right = snapshot(scratch, 0, traced=True)
-    if right is None or right.returncode != 0:
-        sys.exit("without a mutant the golden texts do not stand:\n" + (right.stdout[-2000:] if right else "no end"))
-    reached = {int(number) for number in re.findall(r"mutant (\d+) runs", right.stderr)}
     began = time.monotonic()
+    # Which mutants each list and each scene reaches; the quickest are asked first.
+    reached = {}
+    for unit in units(scratch):
+        start = time.monotonic()
+        right = snapshot(scratch, unit, 0, traced=True)
+        if right is None:
+            sys.exit(f"{unit}: no end without a mutant")
+        if right.returncode != 0:
+            # The sources were changed since: what the program without a mutant makes of it is what counts.
+            print(f"{unit.name}: the golden text is not that of the program", file=sys.stderr)
+            snapshot(scratch, unit, 0, accept=True)
+        runs = {int(number) for number in re.findall(r"mutant (\d+) runs", right.stderr)}
+        reached[unit] = (time.monotonic() - start, runs)
+    order = sorted(reached, key=lambda unit: reached[unit][0])
 
     def judge(mutant):
-        if mutant["number"] not in reached:
-            return "not reached"
-        result = snapshot(scratch, mutant["number"])
-        return "survives" if result is not None and result.returncode == 0 else "noticed"
+        asked = [unit for unit in order if mutant["number"] in reached[unit][1]]
+        for unit in asked:
+            result = snapshot(scratch, unit, mutant["number"])
+            if result is None or result.returncode != 0:
+                return "noticed", unit.name
+        return ("survives" if asked else "not reached"), None
 
-    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for mutant, verdict in zip(mutants, pool.map(judge, mutants)):
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool, (scratch / "verdicts").open("w") as verdicts:
+        for mutant, (verdict, unit) in zip(mutants, pool.map(judge, mutants)):
             mutant["verdict"] = verdict
+            print(verdict, unit or "", f"{mutant['file']}:{mutant['line']}", mutant["kind"], mutant["was"], sep="\t", file=verdicts, flush=True)
     text = report(mutants, time.monotonic() - began)
     if arguments.report:
         arguments.report.write_text(text)

@@ -1,9 +1,10 @@
 """Validates TOML files against JSON Schemas with jsonschema (PyPI).
 
 Usage: json_schema.py FOLDER [FILE.toml SCHEMA good|bad]...
+       json_schema.py --documents SCHEMA.json DOCUMENTS.json
 
 Prints one line a file: `good`, or `bad` with the number of errors and the first of them. The exit status is 1 when a file is
-not what the command line says.
+not what the command line says. The second form prints one JSON list: for each document the first error, or null.
 """
 
 import json
@@ -14,7 +15,18 @@ from pathlib import Path
 from jsonschema import Draft7Validator
 
 
+def documents(schema: str, file: str) -> int:
+    schema = json.loads(Path(schema).read_text())
+    Draft7Validator.check_schema(schema)
+    validator = Draft7Validator(schema)
+    first = (next(validator.iter_errors(document), None) for document in json.loads(Path(file).read_text()))
+    print(json.dumps([error and f"{list(error.path)}: {error.message[:200]}" for error in first]))
+    return 0
+
+
 def main() -> int:
+    if sys.argv[1] == "--documents":
+        return documents(*sys.argv[2:])
     folder = Path(sys.argv[1])
     unexpected = 0
     for file, name, expected in zip(sys.argv[2::3], sys.argv[3::3], sys.argv[4::3]):

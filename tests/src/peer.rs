@@ -55,9 +55,7 @@ pub fn can_kernel_or_skip(test: &str) -> bool {
 /// Asked in this order: `AXISBRIDGE_PYTHON`, the environment that `.ci/run` makes, and `python3`.
 #[must_use]
 pub fn python_or_skip(test: &str, module: &str) -> Option<PathBuf> {
-    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/ci-tools/bin/python");
-    let candidates = std::env::var_os("AXISBRIDGE_PYTHON").map(PathBuf::from).into_iter();
-    let found = candidates.chain([PathBuf::from(own), PathBuf::from("python3")]).find(|python| {
+    let found = pythons().chain([PathBuf::from("python3")]).find(|python| {
         let import = Command::new(python)
             .args(["-c", &format!("import {module}")])
             .stdout(Stdio::null())
@@ -67,6 +65,23 @@ pub fn python_or_skip(test: &str, module: &str) -> Option<PathBuf> {
     });
     if found.is_none() {
         skip(test, &format!("a Python with the package {module}"));
+    }
+    found
+}
+
+/// The Pythons with packages of their own: `AXISBRIDGE_PYTHON`, and the environment that `.ci/run` makes.
+fn pythons() -> impl Iterator<Item = PathBuf> {
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/ci-tools/bin/python");
+    std::env::var_os("AXISBRIDGE_PYTHON").map(PathBuf::from).into_iter().chain([PathBuf::from(own)])
+}
+
+/// The taplo that is installed with one of these Pythons, or on the path; without one `test` is skipped visibly (or fails in CI).
+#[must_use]
+pub fn taplo_or_skip(test: &str) -> Option<PathBuf> {
+    let installed = pythons().map(|python| python.with_file_name("taplo"));
+    let found = installed.chain([PathBuf::from("taplo")]).find(|taplo| has_program(&taplo.to_string_lossy()));
+    if found.is_none() {
+        skip(test, "taplo");
     }
     found
 }

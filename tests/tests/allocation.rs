@@ -7,7 +7,7 @@ use std::rc::Rc;
 use allocation_counter::{measure, opt_out};
 use axisbridge::config::Config;
 use axisbridge::engine::notice::Notice;
-use axisbridge::mapping::{CyclicValues, Mapping, Told};
+use axisbridge::mapping::{Mapping, Told};
 use axisbridge::simulate::drives::linear;
 use axisbridge::status::BoxState;
 use axisbridge::translate::Stage;
@@ -87,7 +87,7 @@ fn translation_allocates_nothing() {
         let info = measure(|| {
             for mode in [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque] {
                 command.mode = mode;
-                axis.north.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+                axis.north.decode(&values, 0, &mut trackers, &mut command);
                 for action in Action::ALL {
                     for status in [0, 0x40, 0x21, 0x23, 0x27, 0x08_1037] {
                         axis.south.encode(&command, *action, 0, status, &mut telegram, &mut report);

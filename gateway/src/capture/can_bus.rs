@@ -1,5 +1,5 @@
 //! Which protocol runs on a CAN bus of a recording: CANopen and DeviceNet have the same identifiers for other things, so the
-//! frames do not tell.
+//! frames do not report.
 //!
 //! | asked in this order | says |
 //! |---|---|
@@ -82,7 +82,7 @@ impl CanBuses {
         Self { rest, ..self }
     }
 
-    /// The bus that a frame was on; `None` where nothing tells what runs there.
+    /// The bus that a frame was on; `None` where nothing reports what runs there.
     #[must_use]
     pub fn find(&self, frame: &Frame<'_>) -> Option<FoundBus> {
         let known = |number: usize| {

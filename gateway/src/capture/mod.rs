@@ -70,7 +70,7 @@ impl Side {
         }
     }
 
-    /// The one with this name.
+    /// The side with this name in a recording; `None` for other names.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::all(CAN_BUSES_MAX).find(|side| side.name() == name)

@@ -111,7 +111,7 @@ impl Synthesizer {
             self.streams.swap_remove(oldest);
         }
         self.clock += 1;
-        // Spread, so that streams are told apart in a listing of raw numbers.
+        // Spread, so that streams are distinguished in a listing of raw numbers.
         let serial = u32::try_from(self.clock & 0xFFFF).unwrap_or(0);
         let initial = serial.wrapping_mul(0x9E37_79B1);
         let halves = [

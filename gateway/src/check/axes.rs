@@ -2,8 +2,8 @@
 
 use profile_generic::parameter::Parameter;
 
-use crate::config::Written;
 use crate::config::file::AxisTable;
+use crate::config::{Axis, AxisFunction, AxisKind, Written};
 use crate::engine::build::scaling;
 use crate::engine::build::sercos::needs;
 use crate::finding::registry as code;
@@ -20,6 +20,7 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
     for (axis, table) in written.config.axes.iter().zip(&written.file.axis) {
         let table = table.get_ref();
         let scaling = scaling(axis);
+        ends(axis, table, &written.text, findings);
         let mut problem = |problem: Problem| findings.push(&written.text, problem);
         if mapping.cip_program(&scaling).is_none() {
             let span = table.motion_resolution.as_ref().unwrap_or(&table.instance).span();
@@ -55,6 +56,22 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
             }
         }
     }
+}
+
+/// A linear axis that does not unwind has an end, and limits that keep it from there.
+fn ends(axis: &Axis, table: &AxisTable, text: &Source, findings: &mut Findings) {
+    let has_end =
+        axis.function == AxisFunction::Drive && axis.kind == AxisKind::Linear && axis.unwind_counts.is_none();
+    let limited = axis.limits.position_min.is_some() && axis.limits.position_max.is_some();
+    let span = table.unit.span();
+    if !has_end || limited || text.accepts(&span).is_some() {
+        return;
+    }
+    let title = format!("the linear axis `{}` has no limits of its position", table.name.get_ref());
+    let problem = Problem::new(code::LIMITS_MISSING, span).key("unit").title(title);
+    let problem = problem.expected("nothing stops a command beyond its end");
+    let help = "add `position_min` and `position_max` to [axis.limits]; of an axis without an end, write `# accept: no end`";
+    findings.push(text, problem.help(help));
 }
 
 /// What the box writes into the drive at start fits there.
@@ -93,7 +110,9 @@ fn limits(
                     "{} holds {} to {}, and this would be {count}",
                     row.item, conversion.min, conversion.max
                 );
-                findings.push(text, Problem::new(code::LIMIT_UNFIT, value.span()).key(key).expected(message));
+                let problem = Problem::new(code::LIMIT_UNFIT, value.span()).key(key).expected(message);
+                findings.push(text, problem.about(format!("{} {key}", table.name.get_ref())));
+                break;
             }
         }
     }
@@ -150,7 +169,11 @@ fn numbers(rows: &[RowNumbers], table: &AxisTable, text: &Source, findings: &mut
                 format!("the drive ends at {} and {}: commands beyond are clamped", short(low), short(high));
             findings.push(
                 text,
-                Problem::new(code::RANGE_LOST, value.span()).key(key).title(title).expected(message),
+                Problem::new(code::RANGE_LOST, value.span())
+                    .key(key)
+                    .title(title)
+                    .expected(message)
+                    .about(format!("{} {key}", table.name.get_ref())),
             );
         }
     }

@@ -9,14 +9,15 @@ mod axes;
 mod bus;
 mod can_bus;
 mod devicenet_bus;
+mod frames;
+mod marks;
 pub mod schema;
 
 use std::path::{Path, PathBuf};
 
-use crate::config::{Config, Written};
-use crate::finding::registry as code;
-use crate::finding::{Findings, Problem};
-use crate::mapping::{self, TableTexts};
+use crate::config::{Config, Named, Written};
+use crate::finding::Findings;
+use crate::mapping::{self, Mapping, TableTexts};
 
 /// What is to be checked.
 #[derive(Debug, Default)]
@@ -25,6 +26,8 @@ pub struct Request<'a> {
     pub config: Option<&'a Path>,
     /// Folders of tables in place of the built-in ones, overlays and folders of overlays.
     pub mappings: &'a [PathBuf],
+    /// Whether frames are sent through the gateway with the tables.
+    pub frames: bool,
 }
 
 /// What was checked, and what was found.
@@ -34,30 +37,59 @@ pub struct Outcome {
     pub tables: mapping::check::Outcome,
     /// The configuration, where there is one without errors.
     pub config: Option<Config>,
+    /// How many facts were shown by frames.
+    pub frames: usize,
 }
 
-/// Checks.
+/// Checks the tables, the overlays and the configuration of a request. What is wrong is in the findings: what is wrong with the
+/// configuration does not keep the tables that it names from being checked, nor the other way round.
 #[must_use]
 pub fn check(request: &Request<'_>) -> Outcome {
     let mut findings = Findings::default();
-    let written = request.config.and_then(|path| Written::load(path, &mut findings));
-    let texts = texts(request, written.as_ref(), &mut findings);
-    let mut tables = mapping::check::texts(texts, findings);
-    if let (Some(mapping), Some(written)) = (&tables.mapping, &written) {
-        let findings = &mut tables.findings;
-        axes::check(mapping, written, findings);
-        bus::check(mapping, written, findings);
-        can_bus::check(mapping, written, findings);
-        devicenet_bus::check(mapping, written, findings);
+    let (written, named) = request.config.map(|path| Written::read(path, &mut findings)).unwrap_or_default();
+    if let Some(named) = &named {
+        marks::check(named, written.as_ref(), &mut findings);
     }
-    Outcome { tables, config: written.map(|written| written.config) }
+    let mut of_tables = Findings::default();
+    let texts = texts(request, named.as_ref(), &mut of_tables);
+    let mut tables = mapping::check::texts(texts, of_tables);
+    if let Some(written) = &written {
+        axes(&tables, written, &mut findings);
+    }
+    tables.findings.extend(findings);
+    tables.findings.settle();
+    // What is wrong with a row by itself says more than what comes of it.
+    let mapping::check::Outcome { mapping, findings, .. } = &mut tables;
+    let shown = mapping.as_ref().filter(|_| request.frames && !findings.has_errors());
+    let frames = shown.map_or(0, |mapping| frames::check(mapping, findings));
+    Outcome { tables, config: written.map(|written| written.config), frames }
+}
+
+/// What the tables make of a configuration. Of tables in which something is wrong it counts only where it is so with the
+/// shipped ones as well: the rest would only follow from the tables.
+fn axes(tables: &mapping::check::Outcome, written: &Written, findings: &mut Findings) {
+    let of = |mapping: &Mapping| {
+        let mut findings = Findings::default();
+        axes::check(mapping, written, &mut findings);
+        bus::check(mapping, written, &mut findings);
+        can_bus::check(mapping, written, &mut findings);
+        devicenet_bus::check(mapping, written, &mut findings);
+        findings
+    };
+    let own = tables.mapping.as_ref().map(of);
+    if !tables.findings.has_errors() {
+        return findings.extend(own.unwrap_or_default());
+    }
+    let mut with_shipped = Mapping::embedded().map(|mapping| of(&mapping)).unwrap_or_default();
+    if let Some(own) = own {
+        with_shipped.retain(|finding| own.list().contains(finding));
+    }
+    findings.extend(with_shipped);
 }
 
 /// The texts of the tables; `None` when some cannot be read.
-fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findings) -> Option<TableTexts> {
-    let config = written.map(|written| &written.config);
-    let mut folder = config.and_then(|config| config.mappings_dir.clone());
-    let mut overlays = config.map(|config| config.overlays.clone()).unwrap_or_default();
+fn texts(request: &Request<'_>, named: Option<&Named>, findings: &mut Findings) -> Option<TableTexts> {
+    let (mut folder, mut overlays) = named.map(|named| named.there(findings)).unwrap_or_default();
     for path in request.mappings {
         if TableTexts::replaces(path) {
             folder = Some(path.clone());
@@ -65,23 +97,5 @@ fn texts(request: &Request<'_>, written: Option<&Written>, findings: &mut Findin
             overlays.push(path.clone());
         }
     }
-    if let Some(written) = written {
-        named(written, findings);
-    }
     TableTexts::load(folder.as_deref(), &overlays).map_err(|found| findings.extend(found)).ok()
-}
-
-/// Marks what the configuration names and is not there.
-fn named(written: &Written, findings: &mut Findings) {
-    let Some(table) = &written.file.mappings else { return };
-    let config = &written.config;
-    let names = table.dir.iter().chain(&table.overlays);
-    let missing =
-        names.zip(config.mappings_dir.iter().chain(&config.overlays)).filter(|(_, path)| !path.exists());
-    for (name, _) in missing {
-        findings.push(
-            &written.text,
-            Problem::new(code::UNREADABLE, name.span()).expected("expected a file or folder that is there"),
-        );
-    }
 }

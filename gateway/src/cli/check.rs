@@ -1,19 +1,21 @@
 //! `axisbridge check`: reads tables, overlays and a configuration, and reports everything that is wrong with them.
 
 use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 use super::{CheckArguments, CheckFormat, CliError, print};
 use crate::check::{Outcome, Request, check, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
-use crate::finding::{Severity, json_report};
-use crate::mapping::Mapping;
-use crate::mapping::check::page;
+use crate::finding::{Finding, Findings, Severity, json_report, sarif_report};
+use crate::mapping::check::{diff, page};
+use crate::mapping::{Mapping, TableTexts};
 
 /// Exit status of a wrong command line, as clap has it.
 const USAGE: u8 = 2;
 
-/// Checks, or tells of the codes.
+/// Checks, or reports the codes.
 ///
 /// # Errors
 /// The output cannot be written.
@@ -22,9 +24,7 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         return match Code::parse(text) {
             Some(code) => print(format!("{}\n", code.entry()), ExitCode::SUCCESS),
             None => {
-                eprintln!(
-                    "error: there is no code `{text}`: expected AX and four digits; --list has all of them"
-                );
+                eprintln!("error: {}", unknown(text));
                 Ok(ExitCode::from(USAGE))
             }
         };
@@ -32,25 +32,84 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     if let Some(name) = &arguments.schema {
         return schema(name);
     }
+    let format = if arguments.json { CheckFormat::Json } else { arguments.format };
     if arguments.list {
-        return print(list(arguments.format), ExitCode::SUCCESS);
+        return print(list(format), ExitCode::SUCCESS);
     }
-    if arguments.format == CheckFormat::Markdown {
-        eprintln!("error: --format markdown is for --list");
+    if format == CheckFormat::Markdown || format == CheckFormat::Sarif && arguments.diff.is_some() {
+        eprintln!("error: --format markdown is for --list, and --format sarif for findings");
         return Ok(ExitCode::from(USAGE));
     }
-    let outcome = check(&Request { config: arguments.config.as_deref(), mappings: &arguments.mappings });
+    let outcome = check(&Request {
+        config: arguments.config.as_deref(),
+        mappings: &arguments.mappings,
+        // What tables change is compared row by row.
+        frames: !arguments.no_frames && arguments.diff.is_none(),
+    });
+    if let Some(old) = &arguments.diff {
+        return changes(arguments, old.as_deref(), format, &outcome);
+    }
     if let Some(path) = &arguments.report {
         std::fs::write(path, page(&outcome.tables))
             .map_err(|error| format!("{}: {error}", path.display()))?;
     }
     let findings = &outcome.tables.findings;
     let bad = findings.has_errors() || findings.count(Severity::Warning) > 0;
-    let text = match arguments.format {
+    let text = match format {
         CheckFormat::Json => format!("{:#}\n", json_report(findings)),
+        CheckFormat::Sarif => format!("{:#}\n", sarif_report(findings)),
         CheckFormat::Text | CheckFormat::Markdown => text(arguments, &outcome),
     };
     print(text, if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// What is wrong with a code that is to be explained.
+fn unknown(text: &str) -> String {
+    let digits = text.get(2..).filter(|_| text.get(..2).is_some_and(|head| head.eq_ignore_ascii_case("AX")));
+    let listed = "`axisbridge check --list` prints all codes";
+    if digits.is_some_and(|digits| digits.len() == 4 && digits.bytes().all(|digit| digit.is_ascii_digit())) {
+        format!("there is no code {}; {listed}", text.to_ascii_uppercase())
+    } else {
+        format!("`{text}` is no code: expected AX and four digits, such as AX0010; {listed}")
+    }
+}
+
+/// What the tables change against others.
+fn changes(
+    arguments: &CheckArguments,
+    old: Option<&Path>,
+    format: CheckFormat,
+    outcome: &Outcome,
+) -> Result<ExitCode, CliError> {
+    let before = match old {
+        None => Mapping::embedded(),
+        Some(old) if TableTexts::replaces(old) => Mapping::load(Some(old), &[]),
+        Some(old) => Mapping::load(None, &[old.to_owned()]),
+    };
+    let (mapping, texts) = (&outcome.tables.mapping, &outcome.tables.texts);
+    let (Ok(before), Some(mapping), Some(texts)) = (&before, mapping, texts) else {
+        let mut findings = outcome.tables.findings.clone();
+        findings.extend(before.err().unwrap_or_default());
+        findings.retain(|finding| finding.severity() == Severity::Error);
+        let text = match format {
+            CheckFormat::Json => format!("{:#}\n", json_report(&findings)),
+            _ => format!("{}the tables cannot be compared\n", shown(arguments, &findings)),
+        };
+        return print(text, ExitCode::FAILURE);
+    };
+    let changes = diff::changes(before, mapping, texts);
+    let text = match format {
+        CheckFormat::Json => format!("{:#}\n", changes.json()),
+        _ => changes.to_string(),
+    };
+    print(text, if changes.open() > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// The findings one after the other, with colours on a terminal.
+fn shown(arguments: &CheckArguments, findings: &Findings) -> String {
+    let colours =
+        std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    findings.shown(colours, |found| arguments.notes || found.asks())
 }
 
 /// A schema, or the names of all.
@@ -70,15 +129,11 @@ fn schema(name: &str) -> Result<ExitCode, CliError> {
 
 fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
     let findings = &outcome.tables.findings;
-    let mut text = String::new();
-    let shown = findings.list().iter().filter(|found| arguments.notes || found.severity() != Severity::Note);
-    for finding in shown {
-        let _ = writeln!(text, "{finding}\n");
-    }
-    if findings.beyond() > 0 {
-        let _ = writeln!(text, "{} more are not shown\n", findings.beyond());
-    }
-    let count = |severity| findings.count(severity);
+    let mut text = shown(arguments, findings);
+    let counted = |found: &&Finding| arguments.notes || found.asks();
+    let count = |severity| {
+        findings.list().iter().filter(counted).filter(|found| found.severity() == severity).count()
+    };
     let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
     let _ = write!(
         text,
@@ -87,9 +142,6 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
         plural(warnings, "warning"),
         plural(notes, "note")
     );
-    if notes > 0 && !arguments.notes {
-        text.push_str(" (--notes shows them)");
-    }
     let overlays = if outcome.tables.overlays > 0 {
         format!(", {}", plural(outcome.tables.overlays, "overlay"))
     } else {
@@ -102,9 +154,10 @@ fn text(arguments: &CheckArguments, outcome: &Outcome) -> String {
     };
     let _ = writeln!(
         text,
-        "; checked the tables, those of {}{overlays}{axes} and {}",
+        "; checked the tables, those of {}{overlays}{axes}, {} and {}",
         plural(outcome.tables.families, "family of drives"),
-        plural(outcome.tables.examples, "worked example")
+        plural(outcome.tables.examples, "worked example"),
+        plural(outcome.frames, "frame")
     );
     text
 }
@@ -134,7 +187,7 @@ fn list(format: CheckFormat) -> String {
             });
             format!("{:#}\n", serde_json::Value::Array(entries.collect()))
         }
-        CheckFormat::Text => {
+        CheckFormat::Text | CheckFormat::Sarif => {
             let mut text = String::new();
             for entry in REGISTRY {
                 let _ = writeln!(text, "{} {:7} {}", entry.code, entry.severity.name(), entry.title);

@@ -57,7 +57,7 @@ fn options(arguments: &DecodeArguments, can: CanBuses) -> Options {
         Side::Cip => Protocol::EtherNetIp,
         Side::Can => Protocol::Can,
     });
-    Options { first, last, only, can, ..Options::default() }
+    Options { first, last, only, can, format: arguments.format, ..Options::default() }
 }
 
 /// Names and lengths of the SERCOS dictionary.
@@ -89,12 +89,21 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
+    use crate::decode::Format;
 
     const RECORDING: &str =
         concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/captures/sercos3_startup_line2_part.pcap");
 
     fn arguments(file: impl Into<PathBuf>) -> DecodeArguments {
-        DecodeArguments { file: file.into(), from: 1, count: None, only: None, config: None, can: None }
+        DecodeArguments {
+            file: file.into(),
+            from: 1,
+            count: None,
+            only: None,
+            config: None,
+            can: None,
+            format: Format::Text,
+        }
     }
 
     /// The outcome, and the numbers of the frames printed.

@@ -92,6 +92,9 @@ struct RunArguments {
     /// Record both sides to this file (pcapng).
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
+    /// Offer local control of the axes on this Unix socket (docs/local-control.md).
+    #[arg(long, value_name = "SOCKET")]
+    local: Option<PathBuf>,
 }
 
 /// Arguments of `check`.
@@ -107,9 +110,20 @@ struct CheckArguments {
     /// Output format.
     #[arg(long, value_enum, default_value_t = CheckFormat::Text)]
     format: CheckFormat,
-    /// Show notes as well (JSON always has them).
+    /// The same as `--format json`.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+    /// Show what the tables and overlays change against the shipped tables, or against those in OLD (a folder or an overlay).
+    /// Exit status 1 with a dangerous change that no `# accept: reason` next to its row acknowledges.
+    #[arg(long, value_name = "OLD", num_args = 0..=1, conflicts_with_all = ["report", "list", "explain", "schema"])]
+    #[expect(clippy::option_option, reason = "the option without a value asks for the shipped tables")]
+    diff: Option<Option<PathBuf>>,
+    /// Show notes that ask for nothing as well (JSON and SARIF always have them).
     #[arg(long)]
     notes: bool,
+    /// Do not send frames through the gateway with the tables.
+    #[arg(long, conflicts_with_all = ["list", "explain"])]
+    no_frames: bool,
     /// Write the tables and the findings as a page for a browser.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -132,6 +146,8 @@ enum CheckFormat {
     Text,
     /// One JSON object, for programs.
     Json,
+    /// SARIF 2.1.0, for hosts of repositories that show findings at their lines.
+    Sarif,
     /// With `--list` only: the page of the documentation.
     Markdown,
 }
@@ -202,15 +218,36 @@ struct TranslateArguments {
     /// values are those of simulated drives.
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
-    /// Print one JSON object on standard output.
+    /// First frame to print, counted from 1. The frames before it are translated as well: what follows depends on them.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    from: u64,
+    /// Print at most this many frames of the recording or lines of the list, from the first one on.
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    /// Print only frames that go one of these ways.
+    #[arg(long, value_enum, value_name = "WAYS", value_delimiter = ',')]
+    only: Vec<crate::translate::Direction>,
+    /// Print only what is about this axis.
+    #[arg(long, value_name = "NAME")]
+    axis: Option<String>,
+    /// Print only values that are not what they were in the frame before.
     #[arg(long)]
+    changes: bool,
+    /// Output format: text for people, one JSON document, or one JSON object a value and line.
+    #[arg(long, value_enum, default_value_t)]
+    format: crate::decode::Format,
+    /// The same as `--format json`.
+    #[arg(long, conflicts_with = "format")]
     json: bool,
+    /// Draw command and feedback of each axis over time into this file, and print nothing.
+    #[arg(long, value_name = "FILE.svg", conflicts_with_all = ["format", "json", "changes"])]
+    plot: Option<PathBuf>,
 }
 
 /// Arguments of `snapshot`.
 #[derive(Debug, Args)]
 struct SnapshotArguments {
-    /// The folder with the frames: lists (*.hex) and recordings (*.pcapng, *.pcap).
+    /// The folder with the frames: lists (*.hex), recordings (*.pcapng, *.pcap) and scenes (*.toml).
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     /// Use axes, drives and tables of this configuration instead of those of DIR/config.toml or of the demonstration.
@@ -223,9 +260,16 @@ struct SnapshotArguments {
     /// values are those of simulated drives.
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
-    /// Make the present translation the golden texts.
-    #[arg(long)]
+    /// Make the present translation the golden texts: write those that have changed, and remove those without frames. What could
+    /// not be translated is not accepted.
+    #[arg(long, visible_alias = "update")]
     accept: bool,
+    /// Accept errors as well: of frames that are meant to be faulty.
+    #[arg(long, requires = "accept")]
+    with_errors: bool,
+    /// Output format.
+    #[arg(long, value_enum, default_value_t)]
+    format: snapshot::Format,
 }
 
 /// Arguments of `decode`.
@@ -248,6 +292,9 @@ struct DecodeArguments {
     /// Protocol of CAN interfaces that nothing else describes. Without it, they are read as CANopen, and the tree says so.
     #[arg(long, value_enum)]
     can: Option<CanKind>,
+    /// Output format: text for people, one JSON document, or one JSON object a frame and line.
+    #[arg(long, value_enum, default_value_t)]
+    format: crate::decode::Format,
 }
 
 /// What runs on a CAN interface of a recording.
@@ -410,7 +457,7 @@ struct CanDriveArguments {
     /// Node-id. Without it, the drive waits until LSS assigns one.
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
-    /// Serial number, by which LSS tells drives without a node-id apart [default: the node-id, or the process number]
+    /// Serial number, by which LSS distinguishes drives without a node-id [default: the node-id, or the process number]
     #[arg(long, value_name = "N")]
     serial: Option<u32>,
     /// Number of axes.
@@ -562,7 +609,12 @@ type CliError = Box<dyn std::error::Error + Send + Sync>;
 /// Prints data; the command then ends with `code`.
 fn print(data: impl AsRef<[u8]>, code: ExitCode) -> Result<ExitCode, CliError> {
     let mut out = io::stdout().lock();
-    match out.write_all(data.as_ref()).and_then(|()| out.flush()) {
+    written_to_end(out.write_all(data.as_ref()).and_then(|()| out.flush()), code)
+}
+
+/// The exit status when output was written, or why it was not.
+fn written_to_end(written: io::Result<()>, code: ExitCode) -> Result<ExitCode, CliError> {
+    match written {
         Ok(()) => Ok(code),
         // The reader has closed the pipe, as `head` does: it has seen enough.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(code),

@@ -66,7 +66,7 @@ enum After {
 
 /// Reads the configuration and its tables, as `check` does.
 fn read(path: &Path) -> Result<(Good, Findings), Findings> {
-    let outcome = check(&Request { config: Some(path), mappings: &[] });
+    let outcome = check(&Request { config: Some(path), mappings: &[], frames: false });
     match (outcome.config, outcome.tables.mapping) {
         (Some(config), Some(mapping)) if !outcome.tables.findings.has_errors() => {
             Ok((Good { config, mapping }, outcome.tables.findings))
@@ -89,7 +89,8 @@ fn run_once(
     settings: &Arc<Store>,
     asked: &Asked,
 ) -> Result<After, CliError> {
-    let running = runner::start(&good.config, good.mapping.clone(), arguments.capture.as_deref(), settings)?;
+    let extras = runner::Extras { capture: arguments.capture.as_deref(), local: arguments.local.as_deref() };
+    let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;
     let mut told = false;
     let mut next = None;
     let mut reloads = false;

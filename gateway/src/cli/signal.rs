@@ -44,7 +44,7 @@ fn flags_on_signals<const N: usize>() -> Result<[Arc<AtomicBool>; N], CliError> 
     Ok(flags)
 }
 
-/// A flag that each SIGHUP sets; whoever obeys clears it.
+/// A flag that each SIGHUP sets; the part that obeys it clears it.
 pub fn reload_on_hang_up() -> Result<Arc<AtomicBool>, CliError> {
     let reload = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&reload);

@@ -7,7 +7,7 @@ use profile_cia402::wire::lss::LssAddress;
 use profile_cia402::wire::pdo::TransmissionType;
 use profile_generic::can::timing::BitRate;
 use profile_generic::image::Signal;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::ModeSelection;
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
@@ -17,7 +17,7 @@ use profile_generic::time::DurationNs;
 pub struct Can {
     /// How it is reached.
     pub link: CanLink,
-    /// Its bit rate.
+    /// Bit rate of the nominal phase; every station of the bus must have the same.
     pub bit_rate: BitRate,
     /// Time from one SYNC to the next (1006).
     pub cycle_time: DurationNs,
@@ -27,7 +27,7 @@ pub struct Can {
     pub heartbeat_ms: u16,
     /// TPDOs in a row that may be missing.
     pub allowed_losses: u16,
-    /// The drives on it.
+    /// The configured drives, in the order of the file.
     pub drives: Vec<CanDrive>,
     /// What is said of devices as a whole; of those that are not here nothing is.
     pub devices: Vec<CanDevice>,
@@ -76,9 +76,9 @@ pub struct Lss {
 pub struct DeviceFile {
     /// Its values, in the order of writing.
     pub writes: Vec<Write>,
-    /// By what the device tells that it has them (1020); another one for other values.
+    /// By what the device reports that it has them (1020); another one for other values.
     pub stamp: Stamp,
-    /// The PDOs that it has then, where the file tells them.
+    /// The PDOs that it has then, where the file reports them.
     pub pdos: Option<[Vec<Pdo>; 2]>,
 }
 
@@ -117,7 +117,7 @@ pub struct CanDrive {
     /// Which axis of the device, from 0.
     pub axis: u16,
     /// What it is used for, the mode at start first; `None`: all that it has.
-    pub modes: Option<Vec<OperatingMode>>,
+    pub modes: Option<Vec<ModeSelection>>,
     /// Actual values that are not sent in every cycle.
     pub left_out: Vec<Signal>,
     /// Offsets that the drive adds to its set-points.
@@ -126,7 +126,7 @@ pub struct CanDrive {
     pub acknowledges: Option<bool>,
     /// Whether its statusword tells that the power stage is supplied; `None`: as the tables say.
     pub tells_voltage: Option<bool>,
-    /// Its modes of operation, where it does not tell them, or tells wrong ones.
+    /// Its modes of operation, where it does not report them, or reports wrong ones.
     pub drive_modes: Option<Vec<i8>>,
     /// Nanounits of a linear axis in a nanoturn.
     pub way_of_a_turn: Option<Ratio>,

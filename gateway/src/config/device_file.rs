@@ -56,7 +56,7 @@ pub(super) fn load(folder: &Path, written: &mut Written, findings: &mut Findings
     good
 }
 
-/// What is written, and the PDOs that the device has then, where the file tells them.
+/// What is written, and the PDOs that the device has then, where the file reports them.
 type Values = (Vec<Write>, Option<[Vec<Pdo>; 2]>);
 
 /// Reads one file.
@@ -74,7 +74,10 @@ impl Loader<'_> {
         let most = u64::try_from(eds::BYTES_MAX).unwrap_or(u64::MAX);
         let bytes = match read_bytes(self.path, most) {
             Ok(bytes) => bytes,
-            Err((code, expected)) => return self.report(Problem::new(code, self.span()).expected(expected)),
+            Err((code, expected)) => {
+                let problem = Problem::new(code, self.span()).expected(expected);
+                return self.report(problem.help("the path starts at the folder of the configuration"));
+            }
         };
         // Fewer than 2^24 entries are in a file that may be read, and no text has a zero.
         let (writes, pdos) = if bytes.get(..4).is_some_and(|count| count[3] == 0) {
@@ -123,7 +126,14 @@ impl Loader<'_> {
                 return None;
             }
         };
-        let source = Source::new(&self.path.display().to_string(), &shown(bytes));
+        let text = shown(bytes);
+        if !text.lines().any(is_of_a_data_sheet) {
+            let problem = Problem::new(code::DEVICE_FILE, self.span());
+            let problem = problem.title("the file is neither an EDS nor a DCF");
+            return self
+                .report(problem.expected("expected a file with sections such as [FileInfo] and [1000]"));
+        }
+        let source = Source::new(&self.path.display().to_string(), &text);
         let mut good = true;
         for diagnostic in reading.diagnostics.list() {
             let code = match diagnostic.severity() {
@@ -245,9 +255,19 @@ fn stamp(writes: &[Write]) -> Stamp {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3)
     });
     let number = |value: u64| u32::try_from(value).unwrap_or(u32::MAX);
-    // Not 0, which a device tells that has none.
+    // Not 0, which a device reports that has none.
     let date = number(hash / MILLISECONDS_OF_A_DAY % DAYS + 1);
     Stamp { date, time: number(hash % MILLISECONDS_OF_A_DAY) }
+}
+
+/// Whether a line is the head of a section that only data sheets have.
+fn is_of_a_data_sheet(line: &str) -> bool {
+    let Some(name) = line.trim().strip_prefix('[').and_then(|rest| rest.split(']').next()) else {
+        return false;
+    };
+    let known = ["FileInfo", "DeviceInfo", "MandatoryObjects", "OptionalObjects", "ManufacturerObjects"];
+    let is_object = name.get(..4).is_some_and(|index| index.bytes().all(|digit| digit.is_ascii_hexdigit()));
+    is_object || known.iter().any(|known| name.eq_ignore_ascii_case(known))
 }
 
 /// Whether what is wrong can cost a value that is to be written.

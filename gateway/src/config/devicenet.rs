@@ -23,7 +23,7 @@ pub struct Devicenet {
     pub mac: MacId,
     /// Answers in a row that may be missing.
     pub allowed_losses: u8,
-    /// The drives on it.
+    /// The configured drives, in the order of the file.
     pub drives: Vec<DevicenetDrive>,
 }
 
@@ -38,7 +38,7 @@ impl Devicenet {
     }
 }
 
-/// A drive on DeviceNet.
+/// A configured slave of the network: a CIP Motion drive or an AC/DC drive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DevicenetDrive {
     /// Name, unique among drives.

@@ -11,7 +11,10 @@ mod device;
 mod device_file;
 mod devicenet;
 pub(crate) mod duration;
+mod elsewhere;
 pub mod file;
+pub(crate) mod form;
+mod named;
 mod rated;
 mod sercos;
 
@@ -27,7 +30,9 @@ pub use self::device::{Device, Identity};
 pub use self::devicenet::{Devicenet, DevicenetDrive, DevicenetKind};
 pub use self::sercos::{Drive, Link, Sercos};
 
-use crate::finding::{Findings, Source, deserialize, read_file, tree};
+use crate::finding::{Findings, Problem, Source, partial, read_file, registry as code, tree};
+
+pub use self::named::Named;
 use crate::sys::realtime;
 
 /// Axes of one box: what its status block, its register map and its cycle have room for. A device has at most 16 of
@@ -160,15 +165,29 @@ pub struct Written {
 impl Written {
     /// Reads and checks a file; `None` with errors. Paths in it count from the file's own folder.
     pub fn load(path: &Path, findings: &mut Findings) -> Option<Self> {
-        let source = read_file(path, FILE_LEN_MAX).map_err(|found| findings.extend(found)).ok()?;
+        Self::read(path, findings).0
+    }
+
+    /// The same, with the tables that the file names: those are known although something else in it is wrong.
+    pub fn read(path: &Path, findings: &mut Findings) -> (Option<Self>, Option<Named>) {
+        let source = match read_file(path, FILE_LEN_MAX) {
+            Ok(source) => source,
+            Err(found) => {
+                findings.extend(found);
+                return (None, None);
+            }
+        };
         let folder = path.parent().unwrap_or(Path::new(""));
-        let mut written = Self::parse_in(folder, &source, &path.display().to_string(), findings)?;
-        let config = &mut written.config;
-        let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
-        for path in paths.chain(&mut config.settings_file) {
-            *path = folder.join(&*path);
-        }
-        Some(written)
+        let name = path.display().to_string();
+        let written = Self::parse_in(folder, &source, &name, findings).map(|mut written| {
+            let config = &mut written.config;
+            let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
+            for path in paths.chain(&mut config.settings_file) {
+                *path = folder.join(&*path);
+            }
+            written
+        });
+        (written, Some(Named::of(folder, &source, &name)))
     }
 
     /// Checks the text of a file, whose name is shown in errors; `None` with them. Paths count from the working directory.
@@ -179,14 +198,24 @@ impl Written {
     fn parse_in(folder: &Path, source: &str, name: &str, findings: &mut Findings) -> Option<Self> {
         let text = Source::new(name, source);
         let tree = tree(source, &text, findings)?;
-        let file: file::File = deserialize(tree, &text, findings)?;
+        if let Some(problem) = elsewhere::other_kind(tree.get_ref()) {
+            findings.push(&text, problem);
+            return None;
+        }
+        let hint = |problem: &Problem| elsewhere::home_of(problem).map(|home| problem.clone().help(home));
+        let read = partial::<file::File>(tree, &text, findings, &hint)?;
+        let file = read.rows;
         match check::check(&file) {
-            Ok(config) => {
+            Ok(config) if read.faultless => {
                 let mut written = Self { text, file, config };
                 device_file::load(folder, &mut written, findings).then_some(written)
             }
+            Ok(_) => None,
             Err(problems) => {
-                problems.into_iter().for_each(|problem| findings.push(&text, problem));
+                // A name or a number may be lacking because its table has been left out.
+                let follows = [code::CONFIG_REFERENCE, code::CONTRADICTION, code::CONFIG_VALUE];
+                let own = |problem: &Problem| read.whole || !follows.contains(&problem.code);
+                problems.into_iter().filter(own).for_each(|problem| findings.push(&text, problem));
                 None
             }
         }
@@ -216,6 +245,9 @@ pub enum LogLevel {
 }
 
 impl LogLevel {
+    /// All levels.
+    pub const ALL: [Self; 5] = [Self::Error, Self::Warn, Self::Info, Self::Debug, Self::Trace];
+
     /// The level's name in the file and in filters.
     #[must_use]
     pub const fn name(self) -> &'static str {

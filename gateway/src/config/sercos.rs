@@ -1,6 +1,6 @@
 //! The SERCOS III bus and its drives.
 
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::ModeSelection;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
 
@@ -50,7 +50,7 @@ pub struct Sercos {
     pub allowed_losses: u16,
     /// What to do about slaves that have no address or share one.
     pub addresses: AddressPolicy,
-    /// The drives on it.
+    /// The configured drives, in the order of the file.
     pub drives: Vec<Drive>,
 }
 
@@ -81,7 +81,7 @@ pub struct Drive {
     /// Whether its status word tells that it follows command values, and that it is halted.
     pub acknowledges: bool,
     /// The operating modes that it must have; `None`: all that it has.
-    pub modes: Option<Vec<OperatingMode>>,
+    pub modes: Option<Vec<ModeSelection>>,
     /// Rated torque or force of its motor, where it is known.
     pub rated: Option<Rated>,
     /// Whether it may be plugged in while the bus is in operation.

@@ -124,7 +124,7 @@ impl Context {
                 return used;
             };
             if header.command.name().is_none() {
-                // Lost in the stream: nothing tells where the next message begins.
+                // Lost in the stream: nothing reports where the next message begins.
                 text.line(1, format_args!("{} bytes that are no encapsulation message", rest.len()));
                 text.bytes(2, "bytes", rest);
                 return bytes.len();

@@ -173,7 +173,7 @@ pub(super) fn reply(bytes: &[u8], asked: Option<Asked>, level: usize, text: &mut
             match MultipleService::parse(reply.data) {
                 Ok(services) => {
                     for message in services.iter() {
-                        // Their requests are not remembered one by one; a reply tells its own service.
+                        // Their requests are not remembered one by one; a reply reports its own service.
                         inner_reply(message, level + 1, text);
                     }
                 }

@@ -11,13 +11,15 @@ mod devicenet;
 mod ethernet_ip;
 mod explicit;
 pub(crate) mod packet;
+pub mod record;
 mod stream;
 mod text;
 
 use std::io::{self, Read, Write};
 use std::net::Ipv4Addr;
 
-use profile_sercos::wire::describe::{DecodeContext, Names, describe};
+use profile_cip::wire::encapsulation::IO_PORT;
+use profile_sercos::wire::describe::{DecodeContext, Names, describe, follow};
 use thiserror::Error;
 
 use crate::capture::Side;
@@ -25,14 +27,16 @@ use crate::capture::can::{self, LINK_TYPE_CAN, Record};
 use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
 use crate::sys::clock::KernelTime;
+use crate::translate::fact::number_of;
 
 use canopen::Canopen;
 use devicenet::Devicenet;
 use ethernet_ip::EtherNetIp;
 use packet::Packet;
+use record::DecodeRecord;
 use text::Text;
 
-/// SERCOS buses, and CAN buses, told apart by the interface they were recorded on; frames of further ones share the last
+/// SERCOS buses, and CAN buses, distinguished by the interface they were recorded on; frames of further ones share the last
 /// place.
 const BUSES_MAX: usize = 8;
 
@@ -45,7 +49,7 @@ pub enum Protocol {
     Sercos,
     /// CAN, and CANopen or DeviceNet on it.
     Can,
-    /// Everything else; one line tells what it is.
+    /// Everything else; one line reports what it is.
     Other,
 }
 
@@ -60,6 +64,8 @@ pub struct Options {
     pub only: Option<Protocol>,
     /// Print no more lines than this.
     pub lines_max: u64,
+    /// In which form.
+    pub format: Format,
     /// What is known of its CAN buses; one that nothing is known of is read as CANopen, and the tree says so.
     pub can: CanBuses,
 }
@@ -67,8 +73,21 @@ pub struct Options {
 impl Default for Options {
     /// Everything.
     fn default() -> Self {
-        Self { first: 1, last: u64::MAX, only: None, lines_max: u64::MAX, can: CanBuses::default() }
+        let (format, can) = (Format::Text, CanBuses::default());
+        Self { first: 1, last: u64::MAX, only: None, lines_max: u64::MAX, format, can }
     }
+}
+
+/// The form in which frames are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON document.
+    Json,
+    /// One JSON object a line.
+    Ndjson,
 }
 
 /// What was read and printed.
@@ -107,6 +126,24 @@ pub fn decode<R: Read>(
 ) -> Result<Summary, DecodeError> {
     let mut decoder = Decoder { can: options.can.clone(), ..Decoder::new(names) };
     let mut summary = Summary::default();
+    if options.format == Format::Json {
+        write!(out, "{{\"schema\":{},\"frames\":[", record::SCHEMA).map_err(DecodeError::Write)?;
+    }
+    let read = frames(&mut reader, options, &mut decoder, out, &mut summary);
+    if options.format == Format::Json {
+        writeln!(out, "]}}").map_err(DecodeError::Write)?;
+    }
+    read.map(|()| summary)
+}
+
+/// Prints frame after frame.
+fn frames<R: Read>(
+    reader: &mut Reader<R>,
+    options: &Options,
+    decoder: &mut Decoder<'_>,
+    out: &mut dyn Write,
+    summary: &mut Summary,
+) -> Result<(), DecodeError> {
     let mut lines_left = options.lines_max;
     while let Some(frame) = reader.next_frame()? {
         if frame.number > options.last {
@@ -123,6 +160,14 @@ pub fn decode<R: Read>(
             break;
         }
         summary.printed += 1;
+        if options.format != Format::Text {
+            let separator = if options.format == Format::Json && summary.printed > 1 { ",\n" } else { "" };
+            let record = DecodeRecord::new(&frame, decoder.since(&frame), protocol, decoder.text.as_str());
+            let line = serde_json::to_string(&record).map_err(|error| DecodeError::Write(error.into()))?;
+            let end = if options.format == Format::Ndjson { "\n" } else { "" };
+            write!(out, "{separator}{line}{end}").map_err(DecodeError::Write)?;
+            continue;
+        }
         for line in decoder.text.as_str().lines() {
             if lines_left == 0 {
                 summary.cut = true;
@@ -132,7 +177,7 @@ pub fn decode<R: Read>(
             lines_left -= 1;
         }
     }
-    Ok(summary)
+    Ok(())
 }
 
 /// What is known of a CAN bus.
@@ -180,6 +225,24 @@ impl<'n> Decoder<'n> {
     /// when the recording has not shown how it was opened.
     pub(crate) fn connection(&self, id: u32, from: Ipv4Addr, to: Ipv4Addr) -> Option<(Ipv4Addr, bool)> {
         self.ethernet_ip.connection(id, from, to)
+    }
+
+    /// Takes in an Ethernet frame without printing it: connections that are opened, and what SERCOS service channels carry.
+    pub(crate) fn follow(&mut self, frame: &Frame<'_>, packet: &Packet<'_>) {
+        match packet {
+            Packet::Sercos => follow(frame.data, self.bus(frame)),
+            // Cyclic data change nothing of what is known.
+            Packet::Udp { to, .. } if to.port() == IO_PORT => {}
+            Packet::Udp { from, to, payload } => {
+                self.text.clear();
+                self.ethernet_ip.datagram(*from, *to, payload, &mut self.text);
+            }
+            Packet::Tcp(segment) => {
+                self.text.clear();
+                self.ethernet_ip.segment(segment, &mut self.text);
+            }
+            Packet::Other(_) => {}
+        }
     }
 
     /// Reads a frame and leaves its tree in `self.text`.
@@ -250,6 +313,12 @@ impl<'n> Decoder<'n> {
         }
     }
 
+    /// Seconds since the first frame.
+    fn since(&self, frame: &Frame<'_>) -> Option<f64> {
+        let since = i128::from(frame.at?.0) - i128::from(self.start?.0);
+        Some(number_of(i64::try_from(since).unwrap_or(i64::MAX)) / 1e9)
+    }
+
     fn heading(&mut self, frame: &Frame<'_>) {
         self.text.line(0, format_args!("frame {}", frame.number));
         if let Some(at) = frame.at {
@@ -273,7 +342,7 @@ impl<'n> Decoder<'n> {
 
     /// What is known of the bus of a frame. The two ports of this box are on the same one; each interface of another
     /// recorder is taken for a bus of its own.
-    fn bus(&mut self, frame: &Frame<'_>) -> &mut DecodeContext<'n> {
+    pub(crate) fn bus(&mut self, frame: &Frame<'_>) -> &mut DecodeContext<'n> {
         let own = frame.interface_name.and_then(Side::of_name).is_some();
         let bus = (!own).then_some(frame.interface);
         let known = self.buses.iter().position(|(other, _)| *other == bus);

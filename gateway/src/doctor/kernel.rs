@@ -93,7 +93,7 @@ impl Host<'_> {
         )
     }
 
-    /// Whether the processor tells of a hypervisor; nothing where it cannot.
+    /// Whether the processor reports a hypervisor; nothing where it cannot.
     fn virtual_machine(&self) -> Option<Check> {
         let flags = self.file("proc/cpuinfo")?;
         let flags = flags.lines().find(|line| line.starts_with("flags"))?;

@@ -19,7 +19,7 @@ use profile_cip::device::config::{
 use profile_cip::device::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX};
 use profile_cip::device::motion_open;
 use profile_cip::device::object_list::{OBJECT_CLASSES, ObjectClass};
-use profile_cip::device::router::CLASS_CONNECTION_MANAGER;
+use profile_cip::device::objects::class::CLASS_CONNECTION_MANAGER;
 use profile_cip::wire::class1::SEQUENCE_COUNT_LEN;
 use profile_cip::wire::forward_open::Trigger;
 use profile_cip::wire::network_parameters::ConnectionType;

@@ -161,7 +161,7 @@ fn the_sheet_says_what_the_adapter_does() {
         assert_eq!(number(sheet.one("Device", keyword)), value, "{keyword}");
     }
     assert_eq!(unquoted(sheet.one("Device", "ProdName")), adapter.identity.product_name.as_str());
-    assert_eq!(unquoted(sheet.one("Device", "VendName")), "Vendor 1");
+    assert_eq!(unquoted(sheet.one("Device", "VendName")), "Vendor 65535");
 
     let connection = sheet.fields("Connection Manager", "Connection1");
     assert_eq!(connection.len(), 15);
@@ -209,7 +209,7 @@ fn the_sheet_says_what_the_adapter_does() {
 fn the_sheet_follows_the_configuration_and_nothing_else() {
     let changed = EXAMPLE
         .replace(
-            "vendor_id = 1 ",
+            "vendor_id = 65_535 ",
             "vendor_name = 'Say \"A\\B\", Inc.; $5'\ncatalog = \"AB-2\"\nvendor_id = 77 ",
         )
         .replace("power_structure_class_id = 0", "power_structure_class_id = 0x01020304")

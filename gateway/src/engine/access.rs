@@ -73,9 +73,9 @@ pub enum Progress {
     None,
     /// The drive works on it, or will when it is let.
     InProcess,
-    /// It is done.
+    /// The procedure command has ended with success.
     Done,
-    /// It has failed.
+    /// The procedure command has ended with an error.
     Failed,
 }
 

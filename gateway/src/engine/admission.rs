@@ -15,7 +15,6 @@ use profile_cip::device::motion_link::OpenParameters;
 use profile_cip::wire::class1::Class1Datagram;
 use profile_generic::time::MonotonicTime;
 
-use super::notice::Notice;
 use crate::log_limit::LogLimit;
 
 /// Why a datagram is refused.
@@ -122,10 +121,10 @@ impl Admission {
         }
     }
 
-    /// What people should know, a minute after the last time at the earliest.
-    pub fn notice(&mut self, now: MonotonicTime, device: u8) -> Option<Notice> {
+    /// How many were refused, the sender of the last one and why: for the log, a minute after the last time at the earliest.
+    pub fn strangers(&mut self, now: MonotonicTime) -> Option<(u64, SocketAddrV4, Refused)> {
         let count = self.limit.take(now)?;
         let (from, why) = self.last?;
-        Some(Notice::Strangers { device, count, from, why })
+        Some((count, from, why))
     }
 }

@@ -24,11 +24,13 @@ use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
 use super::axis::{DiagnosticMessage, Loss, PositionJump, Trip};
-use super::bus::can::commissioner::{Misfit, StepFailure as ObjectFailure, Tried};
+use super::bus::can::failure::{Misfit, StepFailure as ObjectFailure};
 use super::bus::can::lss::LssNotice;
+use super::bus::can::trial::Tried;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
+use super::device::scaling::ScalingRefusal;
 use crate::mapping::{Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Object, SercosError};
 use crate::status::AxisWait;
 
@@ -51,14 +53,14 @@ pub enum Notice {
     Sercos(Event),
     /// A request of the controller was refused.
     Refused {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Which, and why.
         refused: RefusedRequest,
     },
     /// A drive on DeviceNet answers, and its answers do not count.
     SlaveAnswers {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its MAC ID.
         mac: MacId,
@@ -67,7 +69,7 @@ pub enum Notice {
     },
     /// A phase of the SERCOS bus takes long.
     Progress {
-        /// Which.
+        /// The communication phase that takes long.
         phase: Phase,
         /// For how long it goes on, whole seconds.
         seconds: u16,
@@ -78,14 +80,14 @@ pub enum Notice {
     Retry,
     /// The drive of an axis was not found on the bus.
     DriveMissing {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// The SERCOS address looked for.
         address: u16,
     },
     /// A step of the commissioning failed; the drive is left out.
     Commissioning {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// The SERCOS address of its drive.
         address: u16,
@@ -94,14 +96,14 @@ pub enum Notice {
     },
     /// Steps failed that may fail.
     PassedOver {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// What failed, in the order of the plan.
         failures: Vec<StepFailure>,
     },
     /// The drive does not fit the mapping tables; it is left out.
     Program {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// The SERCOS address of its drive.
         address: u16,
@@ -110,14 +112,14 @@ pub enum Notice {
     },
     /// The drive says of a parameter what the dictionary does not say; the value of the drive is used.
     Difference {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// What differs.
         difference: Difference,
     },
-    /// The drive of an axis without ends does not work modulo: its positions end where its 32 bits do.
+    /// The drive of an unlimited (modulo) axis does not work modulo: its positions end where its 32 bits do.
     Ends {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
     },
     /// The master of a CAN bus.
@@ -143,7 +145,7 @@ pub enum Notice {
     },
     /// A drive on DeviceNet could not be set up; it is left out for a while.
     SlaveSetup {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its MAC ID.
         mac: MacId,
@@ -152,7 +154,7 @@ pub enum Notice {
     },
     /// A step of the commissioning of a CANopen drive failed; its device is left out.
     NodeCommissioning {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
@@ -161,16 +163,16 @@ pub enum Notice {
     },
     /// The drive of a CANopen device does not fit; the device is left out.
     NodeProgram {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
         /// Why.
         error: Misfit,
     },
-    /// The drive of a CANopen device does not tell its modes of operation, and they were tried.
+    /// The drive of a CANopen device does not report its modes of operation, and they were tried.
     ModesTried {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
@@ -179,14 +181,14 @@ pub enum Notice {
     },
     /// A SERCOS drive takes a telegram only without the values that the axis can do without, if at all.
     Bare {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// SERCOS address of the drive.
         address: u16,
     },
     /// A SERCOS drive lacks operating modes that nobody asked for.
     ModesLeftOut {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// SERCOS address of the drive.
         address: u16,
@@ -195,7 +197,7 @@ pub enum Notice {
     },
     /// The drive of a CANopen device lacks operating modes that nobody asked for.
     NodeModesLeftOut {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
@@ -215,7 +217,7 @@ pub enum Notice {
     },
     /// The drive of a CANopen device expects set-points in another time than the cycle.
     Period {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
@@ -226,32 +228,39 @@ pub enum Notice {
     },
     /// Values are in none of the PDOs that a CANopen device keeps, and the axis can do without.
     NotMapped {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Its device.
         node: NodeId,
-        /// Which.
+        /// Index and sub-index of what no PDO carries.
         objects: Vec<Object>,
     },
     /// Steps failed that may fail, at a CANopen drive.
     ObjectsPassedOver {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// What failed, in the order of the plan.
         failures: Vec<ObjectFailure>,
     },
     /// An axis changed its generic state.
     State {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Before.
         from: DriveState,
         /// Now.
         to: DriveState,
     },
+    /// Local control has taken or released an axis.
+    LocalControl {
+        /// Number of the axis: its place in the configuration, from 0.
+        axis: u8,
+        /// Taken, otherwise released.
+        taken: bool,
+    },
     /// An axis changed its CIP axis state.
     AxisState {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Before.
         from: AxisState,
@@ -260,9 +269,9 @@ pub enum Notice {
     },
     /// An axis has a fault.
     Fault {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
-        /// The fault.
+        /// Cause, reaction, and the system time at which it was raised.
         fault: Fault,
         /// Why the command was lost, when that is the fault.
         loss: Option<Loss>,
@@ -273,7 +282,7 @@ pub enum Notice {
     },
     /// An axis has waited for longer than a second.
     Waiting {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// For how long, what for, and what its drive shows.
         wait: AxisWait,
@@ -285,16 +294,16 @@ pub enum Notice {
     },
     /// The diagnostic message of a drive that has a fault or warning.
     DriveSays {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Number and text.
         said: DiagnosticMessage,
     },
     /// A fault or alarm came into the log of an axis, or ended there.
     Logged {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
-        /// The entry.
+        /// The entry of the fault log, with the name of its code.
         entry: LogEntry,
         /// Its generic cause; a start inhibit has none.
         cause: Option<FaultCause>,
@@ -305,7 +314,7 @@ pub enum Notice {
         device: u8,
         /// The fault that stands.
         fault: NodeFault,
-        /// The alarm.
+        /// The alarm that stands.
         alarm: NodeAlarm,
     },
     /// Datagrams reached the UDP port of a device that are not of its motion connection. At most once a minute.
@@ -321,10 +330,10 @@ pub enum Notice {
     },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
-        /// The axis.
+        /// Number of the axis: its place in the configuration, from 0.
         axis: u8,
         /// Why.
-        error: super::device::ScalingRefusal,
+        error: ScalingRefusal,
     },
 }
 
@@ -337,6 +346,7 @@ impl Notice {
             Self::Progress { .. }
             | Self::State { .. }
             | Self::AxisState { .. }
+            | Self::LocalControl { .. }
             | Self::Waiting { .. }
             | Self::PassedOver { .. }
             | Self::ObjectsPassedOver { .. }
@@ -413,6 +423,7 @@ impl Notice {
             | Self::Ends { axis }
             | Self::State { axis, .. }
             | Self::AxisState { axis, .. }
+            | Self::LocalControl { axis, .. }
             | Self::Waiting { axis, .. }
             | Self::Fault { axis, .. }
             | Self::DriveSays { axis, .. }
@@ -423,6 +434,7 @@ impl Notice {
 }
 
 impl fmt::Display for Notice {
+    // A flat match: one arm for each variant.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sercos(event) => write!(f, "{event}"),
@@ -509,6 +521,8 @@ impl fmt::Display for Notice {
             ),
             Self::State { from, to, .. } => write!(f, "drive {from} -> {to}"),
             Self::AxisState { from, to, .. } => write!(f, "axis {from} -> {to}"),
+            Self::LocalControl { taken: true, .. } => f.write_str("under local control"),
+            Self::LocalControl { taken: false, .. } => f.write_str("released by local control"),
             Self::Fault { fault, loss: Some(loss), .. } => write!(f, "{fault}: {loss}"),
             Self::Fault { fault, trip: Some(trip), .. } => write!(f, "{fault}: {trip}"),
             Self::Fault { fault, jump: Some(jump), .. } => write!(f, "{fault}: {jump}"),

@@ -1,6 +1,6 @@
-//! What the engine sends through and receives from: sockets in the box, queues in the virtual-time tests.
+//! The ports of the engine: sockets in the box, queues in the virtual-time tests.
 //!
-//! All are non-blocking and called from the cycle: they neither wait nor allocate.
+//! All methods are called in the cycle: they neither wait nor allocate.
 
 use std::net::SocketAddrV4;
 
@@ -8,24 +8,24 @@ use profile_generic::can::Frame;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 
-/// Longest frame or datagram that is taken; longer ones are none of ours.
+/// Longest frame or datagram in bytes. Longer ones are not for the gateway.
 pub const FRAME_MAX: usize = 1518;
 
-/// A datagram that came.
+/// A received datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Datagram {
-    /// Its octets in the buffer.
+    /// Its length in the buffer, in bytes.
     pub len: usize,
     /// Its sender.
     pub from: SocketAddrV4,
-    /// When it arrived at the host, where that is known better than by when it is taken.
+    /// When it arrived at the host, if the kernel has stamped it.
     pub arrived_at: Option<MonotonicTime>,
 }
 
 /// The class 1 UDP port of one CIP Motion device.
 pub trait NorthPort {
-    /// The next datagram that came. One that is longer than the buffer has length 0: it counts as one that came, so that whoever
-    /// bounds the datagrams of a cycle has bounded these as well.
+    /// Receives the next datagram; `None` if none waits. A datagram that is longer than the buffer has length 0, so that it
+    /// counts towards a limit on the datagrams of a cycle.
     fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram>;
 
     /// Sends a datagram now or not at all; `false` when it could not be sent.
@@ -34,48 +34,48 @@ pub trait NorthPort {
 
 /// The Ethernet ports of the SERCOS III master.
 pub trait EthernetPort {
-    /// The next frame that came: the port it came in on and its length in `buffer`.
+    /// Receives the next frame: its port and its length in `buffer`, in bytes; `None` if none waits.
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)>;
 
     /// Sends a frame now or not at all; `false` when it could not be sent.
     fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool;
 }
 
-/// What comes from a CAN controller.
+/// An input from a CAN controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CanInput {
     /// A frame of another station.
     Frame(Frame),
     /// The controller is off the bus, or its interface is down.
     BusOff,
-    /// It is back.
+    /// The controller is on the bus again.
     BusOn,
 }
 
-/// What came of a frame to be sent.
+/// The result of sending a CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CanSent {
     /// It is in the transmit queue.
     Sent,
-    /// The queue is full: it can be tried again when the bus has carried something.
+    /// The queue is full. Try again when the bus has carried a frame.
     Full,
-    /// It will not be sent.
+    /// The frame is not sent and must not be tried again.
     Failed,
 }
 
 /// A CAN controller.
 pub trait CanPort {
-    /// What came next.
+    /// The next input; `None` if none waits.
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput>;
 
-    /// Hands a frame to the transmit queue.
+    /// Puts a frame into the transmit queue.
     fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent;
 }
 
-/// The port of one bus.
+/// The port of one bus, by the kind of its interface.
 pub enum SouthPort<'a> {
     /// Of SERCOS III.
     Ethernet(&'a mut dyn EthernetPort),
-    /// Of CAN.
+    /// The controller of a CANopen or DeviceNet bus.
     Can(&'a mut dyn CanPort),
 }

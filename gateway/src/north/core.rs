@@ -85,7 +85,7 @@ impl Core {
             self.adapter.complete(now, &reply);
         }
         if self.adapter.wake_at().is_some_and(|at| at <= now) {
-            self.adapter.handle_timeout(now);
+            self.adapter.handle_time(now);
         }
         self.admit();
         self.send_requests(now);

@@ -85,7 +85,7 @@ impl Stream {
         }
     }
 
-    /// Moves what can be moved now, and tells whether anything was. The task is woken when there is more.
+    /// Moves what can be moved now, and reports whether anything was. The task is woken when there is more.
     ///
     /// One buffer is read at most, so that the others get their turn.
     ///

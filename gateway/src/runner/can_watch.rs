@@ -24,7 +24,7 @@ pub struct CanWatch {
     restarts: bool,
     back: Arc<BackOnBus>,
     told: Option<BusState>,
-    /// A restart that failed is told once, until one succeeds.
+    /// A restart that failed is reported once, until one succeeds.
     refusal_told: bool,
 }
 

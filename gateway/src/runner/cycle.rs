@@ -39,7 +39,7 @@ pub enum Ended {
 
 /// What the thread gets.
 pub struct Setup {
-    /// The engine.
+    /// The engine; the cycle thread takes it over.
     pub engine: Engine,
     /// A port for each device.
     pub north: Vec<UdpPort>,

@@ -1,4 +1,4 @@
-//! What the indicators show, as log lines whenever it changes: a box without lamps tells it to whoever reads its log.
+//! What the indicators show, as log lines whenever it changes, for a box without lamps.
 
 use profile_cip::device::visualization::{self, Indication};
 

@@ -38,12 +38,15 @@ use self::strangers::DropWatch;
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
 use crate::config::{AxisKind, CanLink, Config, Link};
+use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
+use crate::engine::local::LocalNorth;
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
 use crate::host::HostPort;
 use crate::latest::Reader;
+use crate::local::{LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
 use crate::modbus::ModbusServer;
 use crate::north::{self, ExplicitServer, ServeError};
@@ -118,6 +121,14 @@ pub enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// The socket of local control is not to be had.
+    #[error("cannot serve local control on {path}: {source}")]
+    Local {
+        /// The path.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
     /// A thread or runtime cannot be started.
     #[error("cannot start {what}: {source}")]
     Thread {
@@ -140,6 +151,8 @@ pub struct RunningBox {
     restart: Arc<AtomicBool>,
     /// Name and kind of each axis.
     axes: Vec<(String, AxisKind)>,
+    /// The socket of local control, removed at the end.
+    _socket: Option<SocketFile>,
 }
 
 /// How a box has ended.
@@ -151,14 +164,23 @@ pub struct Stopped {
     pub unrested: Vec<String>,
 }
 
-/// Starts a box with these tables; `capture` records both sides, and `settings` has what controllers set.
+/// What a box does besides its configuration.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Extras<'a> {
+    /// Records both sides to this file.
+    pub capture: Option<&'a Path>,
+    /// Offers local control on this Unix socket.
+    pub local: Option<&'a Path>,
+}
+
+/// Starts a box with these tables; `settings` has what controllers set.
 ///
 /// # Errors
 /// [`StartError`]; nothing runs then.
 pub fn start(
     config: &Config,
     mapping: Mapping,
-    capture: Option<&Path>,
+    extras: Extras<'_>,
     settings: &Arc<Store>,
 ) -> Result<RunningBox, StartError> {
     let wire = match config.sercos.as_ref().map(|sercos| &sercos.link) {
@@ -172,7 +194,7 @@ pub fn start(
     let sync = SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 };
     engine.set_sync(sync);
 
-    let (recorder, mut taps) = record(config, capture)?;
+    let (recorder, mut taps) = record(config, extras.capture)?;
     let mut tap = || taps.pop();
     let mut south = Vec::with_capacity(engine.buses().len());
     if let Some(sercos) = &config.sercos {
@@ -275,6 +297,8 @@ pub fn start(
             }
         });
     }
+    let socket =
+        extras.local.map(|path| serve_local(path, config, &mut engine, &status, &runtime)).transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
     let names = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_notices(notices, names, Arc::clone(&stop_notices)));
@@ -289,7 +313,29 @@ pub fn start(
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
     let axes = config.axes.iter().map(|axis| (axis.name.clone(), axis.kind)).collect();
-    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart, axes })
+    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart, axes, _socket: socket })
+}
+
+/// Offers local control of all axes on a socket.
+fn serve_local(
+    path: &Path,
+    config: &Config,
+    engine: &mut Engine,
+    status: &Reader<BoxStatus>,
+    runtime: &tokio::runtime::Runtime,
+) -> Result<SocketFile, StartError> {
+    let (local, end) = LocalNorth::new(config.axes.len());
+    let shared = Shared {
+        names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
+        kinds: config.axes.iter().map(|axis| axis.kind).collect(),
+        status: status.clone(),
+    };
+    let (server, file) = LocalServer::bind(path, shared, end)
+        .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;
+    engine.set_local(local);
+    info!(socket = %path.display(), "local control");
+    runtime.spawn(server.run());
+    Ok(file)
 }
 
 /// The port of a bus on CAN.

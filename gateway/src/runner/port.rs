@@ -24,7 +24,7 @@ use crate::sys::udp::IoSocket;
 pub enum OpenPort {
     /// Of SERCOS III.
     Ethernet(Box<dyn EthernetPort + Send>),
-    /// Of CAN.
+    /// The controller of a CANopen or DeviceNet bus.
     Can(Box<dyn CanPort + Send>),
 }
 
@@ -212,7 +212,7 @@ impl CanSocketPort {
         Ok(Self { socket, off: false, back: Arc::default(), tap: None, _lock: lock })
     }
 
-    /// Where whoever watches the interface says that it is back on the bus.
+    /// Where the thread that watches the interface reports that it is back on the bus.
     #[must_use]
     pub fn back(&self) -> Arc<BackOnBus> {
         Arc::clone(&self.back)

@@ -17,7 +17,7 @@ const WORTH_A_LINE: u32 = 16;
 pub(super) struct DropWatch {
     gate: Arc<Gate>,
     address: SocketAddrV4,
-    /// The kernel's count that has been told.
+    /// The kernel's count that has been reported.
     seen: u32,
     limit: LogLimit,
 }

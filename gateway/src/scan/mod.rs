@@ -120,7 +120,7 @@ pub struct Bus {
 enum Stage {
     /// On the way to CP2.
     Up,
-    /// Asking.
+    /// In CP2, the questions are asked.
     Asking,
     /// On the way down.
     Down,

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use profile_sercos::wire::idn::Idn;
 use serde_json::{Value, json};
 
-use super::questions as ask;
 use super::{Bus, Found};
 use crate::mapping::SercosDictionary;
 
@@ -16,21 +15,21 @@ const FSP: &str = "FSP type";
 
 /// Texts of a slave that take one line: what they are called, and their IDN.
 const LINES: [(&str, Idn); 7] = [
-    ("hardware", ask::HARDWARE),
-    ("software", ask::SOFTWARE),
-    ("serial number", ask::SERIAL_NUMBER),
-    ("communication hardware", ask::COMMUNICATION_HARDWARE),
-    ("manufacturer version", ask::MANUFACTURER_VERSION),
-    ("controller", ask::CONTROLLER_TYPE),
-    ("motor", ask::MOTOR_TYPE),
+    ("hardware", Idn::HARDWARE_REVISION),
+    ("software", Idn::SOFTWARE_REVISION),
+    ("serial number", Idn::SERIAL_NUMBER),
+    ("communication hardware", Idn::HARDWARE_VERSION),
+    ("manufacturer version", Idn::MANUFACTURER_VERSION),
+    ("controller", Idn::CONTROLLER_TYPE),
+    ("motor", Idn::MOTOR_TYPE),
 ];
 
 /// The scaling types of a drive.
 const SCALINGS: [(&str, Idn); 4] = [
-    ("position", ask::POSITION_SCALING),
-    ("velocity", ask::VELOCITY_SCALING),
-    ("acceleration", ask::ACCELERATION_SCALING),
-    ("torque", ask::TORQUE_SCALING),
+    ("position", Idn::POSITION_DATA_SCALING_TYPE),
+    ("velocity", Idn::VELOCITY_DATA_SCALING_TYPE),
+    ("acceleration", Idn::ACCELERATION_DATA_SCALING_TYPE),
+    ("torque", Idn::TORQUE_FORCE_DATA_SCALING_TYPE),
 ];
 
 /// The findings as lines of text.
@@ -71,7 +70,7 @@ pub fn text(bus: &Bus, dictionary: &SercosDictionary) -> String {
                 line(&format!("{what} scaling"), &scaling(dictionary, idn, value));
             }
         }
-        if let Some(text) = slave.text(ask::DIAGNOSIS) {
+        if let Some(text) = slave.text(Idn::DIAGNOSTIC_MESSAGE) {
             line("diagnosis", &text);
         }
         for answer in &slave.answers {
@@ -92,18 +91,18 @@ pub fn json(bus: &Bus, dictionary: &SercosDictionary) -> Value {
         let scalings = SCALINGS
             .iter()
             .filter_map(|(what, idn)| slave.number(*idn).map(|value| ((*what).to_owned(), json!(value))));
-        let modes: Vec<u16> = slave.words(ask::OPERATION_MODES).collect();
+        let modes: Vec<u16> = slave.words(Idn::OPERATION_MODES).collect();
         json!({
             "position": slave.id.topology_address(),
             "address": slave.address,
             "lost": slave.lost,
-            "vendor": slave.text(ask::VENDOR_NAME),
-            "vendor_code": slave.number(ask::VENDOR_CODE),
-            "device": slave.text(ask::DEVICE_NAME),
-            "device_id": slave.text(ask::DEVICE_ID),
-            "hardware": slave.text(ask::HARDWARE),
-            "software": slave.text(ask::SOFTWARE),
-            "serial_number": slave.text(ask::SERIAL_NUMBER),
+            "vendor": slave.text(Idn::VENDOR_NAME),
+            "vendor_code": slave.number(Idn::VENDOR_CODE),
+            "device": slave.text(Idn::DEVICE_NAME),
+            "device_id": slave.text(Idn::DEVICE_ID),
+            "hardware": slave.text(Idn::HARDWARE_REVISION),
+            "software": slave.text(Idn::SOFTWARE_REVISION),
+            "serial_number": slave.text(Idn::SERIAL_NUMBER),
             "profile": profile(slave, dictionary),
             "classes": slave.facts.classes.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "connections": slave.facts.connections,
@@ -126,16 +125,16 @@ fn place(slave: &Found) -> String {
 
 /// What a slave calls itself.
 pub(super) fn title(slave: &Found) -> String {
-    let name = slave.text(ask::DEVICE_NAME).or_else(|| slave.text(ask::CONTROLLER_TYPE));
+    let name = slave.text(Idn::DEVICE_NAME).or_else(|| slave.text(Idn::CONTROLLER_TYPE));
     let name = name.unwrap_or_else(|| "a slave that does not tell its name".to_owned());
-    match slave.text(ask::DEVICE_ID) {
+    match slave.text(Idn::DEVICE_ID) {
         Some(id) => format!("{name} ({id})"),
         None => name,
     }
 }
 
 fn vendor(slave: &Found) -> Option<String> {
-    match (slave.text(ask::VENDOR_NAME), slave.number(ask::VENDOR_CODE)) {
+    match (slave.text(Idn::VENDOR_NAME), slave.number(Idn::VENDOR_CODE)) {
         (Some(name), Some(code)) => Some(format!("{name} (code {code})")),
         (Some(name), None) => Some(name),
         (None, code) => code.map(|code| format!("code {code}")),
@@ -153,7 +152,7 @@ fn profile(slave: &Found, dictionary: &SercosDictionary) -> String {
 fn modes(slave: &Found, dictionary: &SercosDictionary) -> Vec<String> {
     let name =
         |mode: u16| named(dictionary, MODES, u32::from(mode)).unwrap_or_else(|| "vendor's own".to_owned());
-    slave.words(ask::OPERATION_MODES).map(|mode| format!("0x{mode:04X} {}", name(mode))).collect()
+    slave.words(Idn::OPERATION_MODES).map(|mode| format!("0x{mode:04X} {}", name(mode))).collect()
 }
 
 fn named(dictionary: &SercosDictionary, set: &str, code: u32) -> Option<String> {

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use profile_cip::device::config::AXES_MAX as DEVICE_AXES_MAX;
 
-use super::questions as ask;
 use super::report::title;
 use super::{Bus, Found};
 use crate::config::{AXES_MAX, Link};
+use profile_sercos::wire::idn::Idn;
 
 /// What S-0-1302.0.1 is for a drive.
 const FSP_DRIVE: u32 = 2;
@@ -101,7 +101,7 @@ power_structure_class_id = 0
 update_period = {{ {update_period} }}
 
 [device.identity]
-vendor_id = 1 # CHANGE: the number ODVA gave you
+vendor_id = 65_535 # CHANGE: the number that ODVA has assigned to you
 product_code = 1
 revision = \"1.1\"
 serial_number = {number} # CHANGE: every box has its own
@@ -114,11 +114,12 @@ product_name = \"Axisbridge\"
 
 /// Whether a slave says that it is a drive, or has operation modes as a drive has.
 fn is_drive(slave: &Found) -> bool {
-    slave.facts.fsp_type == Some(FSP_DRIVE) || slave.words(ask::OPERATION_MODES).next().is_some()
+    slave.facts.fsp_type == Some(FSP_DRIVE) || slave.words(Idn::OPERATION_MODES).next().is_some()
 }
 
 fn axis(out: &mut String, instance: usize, slave: &Found) {
-    let linear = slave.number(ask::POSITION_SCALING).is_some_and(|word| word & 0b111 == METHOD_LINEAR);
+    let linear =
+        slave.number(Idn::POSITION_DATA_SCALING_TYPE).is_some_and(|word| word & 0b111 == METHOD_LINEAR);
     // Slow enough for a first look at any machine.
     let (unit, resolution, velocity, acceleration) = if linear {
         ("millimetre", 10_000, "10.0", "100.0")

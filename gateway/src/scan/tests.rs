@@ -148,7 +148,7 @@ fn the_same_address_twice_is_told_and_gets_no_axis() {
 fn more_slaves_than_two_telegrams_hold_are_scanned_again_with_four() {
     let bus = scan((1..=260).map(|address| (address, UnitKind::Rotary)));
     assert_eq!((bus.slaves.len(), bus.findings.as_slice()), (260, [].as_slice()));
-    assert!(bus.slaves.iter().all(|slave| slave.text(questions::DEVICE_ID).is_some()));
+    assert!(bus.slaves.iter().all(|slave| slave.text(Idn::DEVICE_ID).is_some()));
 }
 
 /// A port from which nothing comes back.

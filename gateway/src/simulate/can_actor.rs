@@ -3,6 +3,7 @@
 use std::fmt;
 
 use profile_generic::can::Frame;
+use profile_generic::quantity::Position;
 use profile_generic::servo::Servo;
 use profile_generic::time::MonotonicTime;
 
@@ -22,6 +23,11 @@ pub trait ActingNode: CanNode {
 
     /// Switches the main power of a drive.
     fn set_power(&mut self, drive: u16, on: bool);
+
+    /// Places the limit switches of a drive; `false` where it has none.
+    fn set_limit_switches(&mut self, _drive: u16, _lower: Position, _upper: Position) -> bool {
+        false
+    }
 
     /// Why it cannot carry out a change.
     fn refuses(&self, _change: Change) -> Option<&'static str> {
@@ -59,7 +65,7 @@ impl<N> Actor<N> {
         Self { node, silent: false }
     }
 
-    /// The node.
+    /// The node that the script acts on.
     pub const fn node(&self) -> &N {
         &self.node
     }
@@ -78,21 +84,36 @@ impl<N: ActingNode> SimulatedDrives for Actor<N> {
     }
 
     fn apply(&mut self, drive: u16, change: Change) -> Result<(), &'static str> {
-        if let Some(reason) = self.node.refuses(change) {
-            return Err(reason);
-        }
-        let servo = self.node.servo_mut(drive).ok_or("there is no such drive")?;
-        if change.apply_to(servo) {
-            return Ok(());
-        }
-        match change {
-            Change::Power(on) => self.node.set_power(drive, on),
-            // All axes of a device share its bus.
-            Change::Silence(silent) => self.silent = silent,
-            _ => {}
-        }
-        Ok(())
+        act_on(&mut self.node, drive, change, |silent| self.silent = silent)
     }
+}
+
+/// Carries out a change in a node. Silence is that of all its axes, and left to `silence`.
+///
+/// # Errors
+/// Why this drive cannot do it.
+pub fn act_on<N: ActingNode>(
+    node: &mut N,
+    drive: u16,
+    change: Change,
+    silence: impl FnOnce(bool),
+) -> Result<(), &'static str> {
+    if let Some(reason) = node.refuses(change) {
+        return Err(reason);
+    }
+    let servo = node.servo_mut(drive).ok_or("there is no such drive")?;
+    if change.apply_to(servo) {
+        return Ok(());
+    }
+    match change {
+        Change::Power(on) => node.set_power(drive, on),
+        Change::Silence(silent) => silence(silent),
+        Change::LimitSwitches(lower, upper) if !node.set_limit_switches(drive, lower, upper) => {
+            return Err("it has no limit switches");
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 impl<N: CanNode> CanNode for Actor<N> {

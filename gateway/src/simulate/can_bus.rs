@@ -21,6 +21,9 @@ use crate::sys::clock;
 /// Frames and events for the box that it has not taken yet: more than a bus carries between two calls.
 const INBOUND_MAX: usize = 1024;
 
+/// Cycles without a SYNC that a drive stands in any case.
+const SYNC_CYCLES: u16 = 3;
+
 /// Frames that the box's transmit queue holds.
 const QUEUE: usize = 64;
 
@@ -135,9 +138,12 @@ impl InProcessCan {
                 None => devices.push((known.node, axes)),
             }
         }
-        let devices = devices
-            .into_iter()
-            .map(|(node, axes)| stand_in(node, axes, config.device(node)).expect("1 to 8 axes"));
+        let devices = devices.into_iter().map(|(node, axes)| {
+            let mut drive = stand_in(node, axes, config.device(node)).expect("1 to 8 axes");
+            // A drive misses as many SYNCs as the gateway may miss of its telegrams.
+            drive.set_sync_cycles(config.allowed_losses.max(SYNC_CYCLES));
+            drive
+        });
         Self::new(Bus::new(config.bit_rate), devices.collect(), tap)
     }
 }
@@ -194,7 +200,7 @@ impl<N: CanNode> InProcessCan<N> {
         self.nodes.iter_mut().map(|(_, node)| node)
     }
 
-    /// The bus.
+    /// The bus in virtual time below the nodes.
     #[must_use]
     pub fn bus(&self) -> &Bus {
         &self.bus

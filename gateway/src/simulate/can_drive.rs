@@ -7,6 +7,7 @@ use profile_cia402::node::drive::{Axis, Device, DeviceError, identity};
 use profile_cia402::node::{Config, Node};
 use profile_cia402::wire::NodeId;
 use profile_cia402::wire::nmt::NmtState;
+use profile_generic::quantity::Position;
 use profile_generic::servo::{Servo, ServoParameters};
 use profile_generic::time::DurationNs;
 
@@ -118,6 +119,13 @@ impl ActingNode for DriveNode {
         if let Some(axis) = axis_mut(self, drive) {
             axis.set_main_power(on);
         }
+    }
+
+    fn set_limit_switches(&mut self, drive: u16, lower: Position, upper: Position) -> bool {
+        let Some(axis) = axis_mut(self, drive) else { return false };
+        axis.set_limit_switches(lower, upper);
+        axis.set_ignores_limit_switches(true);
+        true
     }
 }
 

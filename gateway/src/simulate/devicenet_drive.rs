@@ -217,7 +217,7 @@ impl ActingNode for DevicenetNode {
         };
         let actual = self.actual();
         let (fault, warning) = (actual.fault, actual.warning);
-        // The requests of the check are not told apart.
+        // The requests of the check are not distinguished.
         let access =
             if matches!(access, AccessState::Checking(_)) { AccessState::Checking(0) } else { access };
         let shown = Shown { link: OnNetwork(access), state, fault, warning, silent: false };

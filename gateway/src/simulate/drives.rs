@@ -12,7 +12,6 @@ use profile_generic::time::MonotonicTime;
 use profile_sercos::master::event::Port;
 use profile_sercos::slave::communication::FixedConnection;
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::drive::scaling;
 use profile_sercos::slave::phase::State;
 use profile_sercos::slave::{Config as SlaveConfig, Network, Slave, communication};
 use profile_sercos::wire::idn::Idn;
@@ -119,8 +118,8 @@ fn built(
         };
         let mut slave = Slave::new(&config, drive);
         if let Some((motor, load)) = setup.gear(address) {
-            slave.preset(scaling::idn::GEAR_INPUT, i64::from(motor));
-            slave.preset(scaling::idn::GEAR_OUTPUT, i64::from(load));
+            slave.preset(Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR, i64::from(motor));
+            slave.preset(Idn::OUTPUT_REVOLUTIONS_OF_LOAD_GEAR, i64::from(load));
         }
         Ok(slave)
     });
@@ -132,7 +131,7 @@ fn built(
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("drive {address} cannot work as it is set up: {error}")]
 pub struct DriveError {
-    /// Its address.
+    /// SERCOS address.
     address: u16,
     /// What is wrong with its servo.
     error: ServoError,
@@ -219,17 +218,26 @@ impl SimulatedDrives for DriveLine {
 
     fn apply(&mut self, drive: u16, change: Change) -> Result<(), &'static str> {
         let index = self.index(drive).ok_or("there is no such drive")?;
-        let application = self.network.slaves_mut()[index].application_mut();
-        if change.apply_to(application.servo_mut()) {
-            return Ok(());
-        }
-        match change {
-            Change::Power(on) => application.set_main_power(on),
-            Change::Silence(silent) => self.network.set_mute(index, silent),
-            _ => {}
-        }
-        Ok(())
+        act_on(&mut self.network, index, change)
     }
+}
+
+/// Carries out a change in the drive at a place of the line.
+///
+/// # Errors
+/// Why this drive cannot do it.
+pub fn act_on(network: &mut DriveNetwork, place: usize, change: Change) -> Result<(), &'static str> {
+    let drive = network.slaves_mut().get_mut(place).ok_or("there is no such drive")?.application_mut();
+    if change.apply_to(drive.servo_mut()) {
+        return Ok(());
+    }
+    match change {
+        Change::Power(on) => drive.set_main_power(on),
+        Change::Silence(silent) => network.set_mute(place, silent),
+        Change::LimitSwitches(..) => return Err("it has no limit switches"),
+        _ => {}
+    }
+    Ok(())
 }
 
 /// Drives inside this process: what is sent comes back at once, changed as the slaves change it. The frames are the

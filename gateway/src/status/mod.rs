@@ -18,7 +18,11 @@ pub use self::wait::AxisWait;
 
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
+use crate::engine::axis::Owner;
 use crate::latest::Words;
+
+/// Owners of an axis by their number in the published form.
+const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 
 /// Words of one axis in the published form.
 const AXIS_WORDS: usize = 11 + WAIT_WORDS;
@@ -29,19 +33,19 @@ const BOX_WORDS: usize = 9;
 const WORDS: usize = BOX_WORDS + AXES_MAX * AXIS_WORDS;
 
 open_code! {
-    /// What the box as a whole is doing.
+    /// State of the whole gateway.
     pub struct BoxState(u8) {
-        /// Reading configuration, opening sockets.
+        /// The gateway reads its configuration and opens sockets.
         STARTING = 0 => "starting",
-        /// The bus is on its way up to cyclic operation.
+        /// At least one bus is not in cyclic operation yet.
         PHASE_UP = 1 => "phase_up",
-        /// The bus is in cyclic operation; no controller is connected.
+        /// All buses are in cyclic operation; no controller is connected.
         READY = 2 => "ready",
-        /// The bus is in cyclic operation and a controller is connected.
+        /// All buses are in cyclic operation, and a controller is connected.
         RUNNING = 3 => "running",
-        /// The bus has failed and is being brought up again.
+        /// A bus that was in cyclic operation has failed and is brought up again.
         BUS_LOST = 4 => "bus_lost",
-        /// The box is ending.
+        /// The gateway ends.
         STOPPING = 5 => "stopping",
     }
 }
@@ -49,16 +53,16 @@ open_code! {
 /// SERCOS phase value when there is none: no bus is running.
 pub const PHASE_NONE: u8 = 0xFF;
 
-/// What has been counted since the box started.
+/// Counters since the gateway started; they are never reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
-    /// Cycles run.
+    /// Bus cycles, of all buses together.
     pub cycles: u64,
-    /// Cycles that began later than half a cycle after their time.
+    /// Calls of the engine that were late by more than half of the shortest cycle.
     pub late_cycles: u64,
-    /// Updates from controllers that did not come or came too late.
+    /// Updates from controllers that were lost or late.
     pub lost_updates: u64,
-    /// Bus cycles from which a drive's data did not come back.
+    /// Cyclic telegrams of drives that were not received in time.
     pub lost_telegrams: u64,
     /// Frames and datagrams that were malformed or from a stranger.
     pub refused_frames: u64,
@@ -75,39 +79,41 @@ pub struct AxisStatus {
     pub device: u8,
     /// Generic drive state.
     pub state: DriveState,
+    /// Who controls it.
+    pub owner: Owner,
     /// Motion Device Axis Object, attribute Axis State.
     pub cip_axis_state: u8,
-    /// What is controlled.
+    /// Operating mode that the drive shows.
     pub mode: OperatingMode,
     /// Status bits of the drive.
     pub status: StatusBits,
-    /// Why the axis cannot be enabled: also [`Inhibits::NO_POWER`] and [`Inhibits::NO_DRIVE`] while it waits for either.
+    /// Reasons why the axis cannot be enabled: also [`Inhibits::NO_POWER`] and [`Inhibits::NO_DRIVE`] while it waits for either.
     pub inhibits: Inhibits,
     /// What the axis waits for, when it has waited for longer than a second.
     pub wait: Option<AxisWait>,
     /// The fault present, if any.
     pub fault: Option<FaultCause>,
-    /// The drive's own code for the fault, 0 when it gave none.
+    /// The drive's own code for the fault; 0 if it reported none.
     pub fault_vendor_code: u32,
-    /// Actual position.
+    /// Actual position, 1e-9 revolution or mm.
     pub position: Position,
-    /// Actual position in counts of the controller.
+    /// Actual position in counts of the controller; wraps at 32 bits.
     pub position_counts: i32,
-    /// Actual velocity.
+    /// Actual velocity, 1e-9 revolution/s or mm/s.
     pub velocity: Velocity,
-    /// Actual torque.
+    /// Actual torque, 1e-6 of the rated torque.
     pub torque: Torque,
-    /// Commanded less actual position.
+    /// Commanded less actual position, 1e-9 revolution or mm.
     pub following_error: Position,
-    /// Commands taken over from the controller.
+    /// Set-points and targets taken from the north side.
     pub commands: u64,
     /// Updates of the controller that were lost or late.
     pub lost_updates: u32,
-    /// Bus cycles without fresh data of the drive.
+    /// Bus cycles without fresh data from the drive.
     pub lost_telegrams: u32,
-    /// Values that were clamped on their way.
+    /// Values that were clamped in a conversion.
     pub saturated: u32,
-    /// Faults that have occurred.
+    /// Faults raised since the start.
     pub faults: u32,
     /// What the indicators show for the axis and its device.
     pub indicators: Indicators,
@@ -179,6 +185,7 @@ impl AxisStatus {
         instance: 0,
         device: 0,
         state: DriveState::NotReady,
+        owner: Owner::Nobody,
         cip_axis_state: 0,
         mode: OperatingMode::None,
         status: StatusBits::empty(),
@@ -200,10 +207,10 @@ impl AxisStatus {
     };
 }
 
-/// The state of the box.
+/// The status that the gateway publishes: at each change, and every 10 ms otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoxStatus {
-    /// What it is doing.
+    /// State of the whole gateway.
     pub state: BoxState,
     /// SERCOS communication phase 0 to 4, or [`PHASE_NONE`].
     pub phase: u8,
@@ -211,13 +218,13 @@ pub struct BoxStatus {
     pub connections: u8,
     /// Axes configured; the rest of `axes` is [`AxisStatus::NONE`].
     pub axis_count: u8,
-    /// Length of the bus cycle in nanoseconds.
+    /// Shortest cycle of all buses, ns.
     pub cycle_time_ns: u32,
-    /// The latest that a cycle has begun after its time, in nanoseconds.
+    /// Largest lateness of a call of the engine since the start, ns.
     pub lateness_max_ns: u32,
-    /// Since the box started.
+    /// Time since the first cycle.
     pub uptime: DurationNs,
-    /// What has been counted.
+    /// Counters since the start.
     pub counters: Counters,
     /// The axes in the order of the configuration.
     pub axes: [AxisStatus; AXES_MAX],
@@ -244,7 +251,7 @@ impl BoxStatus {
         axes: [AxisStatus::NONE; AXES_MAX],
     };
 
-    /// The configured axes.
+    /// The axes of the configuration, without the unused rest of the array.
     #[must_use]
     pub fn configured_axes(&self) -> &[AxisStatus] {
         self.axes.get(..usize::from(self.axis_count)).unwrap_or(&self.axes)
@@ -301,7 +308,7 @@ impl AxisStatus {
             state_code(self.state),
             self.cip_axis_state,
             mode_code(self.mode),
-            u8::from(self.fault.is_some()),
+            u8::from(self.fault.is_some()) | ((self.owner as u8) << 1),
             cause_high,
             cause_low,
         ];
@@ -339,7 +346,7 @@ impl AxisStatus {
             indicators,
             wait @ ..,
         ] = *words;
-        let [instance, device, state, cip_axis_state, mode, faulted, cause_high, cause_low] =
+        let [instance, device, state, cip_axis_state, mode, flags, cause_high, cause_low] =
             head.to_be_bytes();
         let (status, inhibits) = split(bits);
         let (fault_vendor_code, counts) = split(codes);
@@ -351,12 +358,13 @@ impl AxisStatus {
             instance,
             device,
             state: state.unwrap_or_default(),
+            owner: OWNERS[usize::from(flags >> 1) % OWNERS.len()],
             cip_axis_state,
             mode: mode.unwrap_or_default(),
             status: StatusBits::from_bits_retain(status),
             inhibits: Inhibits::from_bits_retain(inhibits),
             wait: AxisWait::from_words(&wait),
-            fault: (faulted != 0).then(|| FaultCause(u16::from_be_bytes([cause_high, cause_low]))),
+            fault: (flags & 1 != 0).then(|| FaultCause(u16::from_be_bytes([cause_high, cause_low]))),
             fault_vendor_code,
             position: Position(position.cast_signed()),
             position_counts: counts.cast_signed(),
@@ -463,6 +471,7 @@ pub(crate) mod tests {
             instance: 1,
             device: 0,
             state: DriveState::Operating,
+            owner: Owner::Local,
             cip_axis_state: 4,
             mode: OperatingMode::Position,
             status: StatusBits::READY | StatusBits::TRACKING,
@@ -493,6 +502,7 @@ pub(crate) mod tests {
             instance: 200,
             device: 1,
             state: DriveState::Faulted,
+            owner: Owner::Controller,
             cip_axis_state: 8,
             mode: OperatingMode::Homing,
             inhibits: Inhibits::SAFETY,

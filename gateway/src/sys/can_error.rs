@@ -57,7 +57,7 @@ bitflags! {
     }
 }
 
-/// Error state that a controller tells of.
+/// Error state that a controller reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum BusState {
     /// Fewer than 96 errors counted.
@@ -81,7 +81,7 @@ impl fmt::Display for BusState {
     }
 }
 
-/// One event.
+/// What a CAN controller reports by an error frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusEvent {
     /// The controller is off the bus.
@@ -148,7 +148,7 @@ impl fmt::Display for BusEvent {
     }
 }
 
-/// An error frame.
+/// An error frame of the kernel (`CAN_ERR_FLAG`): no frame of the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorFrame {
     classes: Classes,

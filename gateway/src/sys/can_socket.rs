@@ -135,14 +135,14 @@ pub struct Received {
     pub at: Option<KernelTime>,
     /// Whether this socket has sent it.
     pub own: bool,
-    /// It.
+    /// A frame of the bus, or what the controller reports.
     pub content: Content,
 }
 
 /// A frame of the bus or word of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
-    /// A frame.
+    /// A frame of another station, or one of this socket.
     Frame(Frame),
     /// What the controller says of the bus.
     Error(ErrorFrame),
@@ -155,7 +155,7 @@ pub struct CanSocket {
     name: String,
     index: i32,
     time_stamps: bool,
-    /// The kernel's count of frames that were not fetched in time, and how much of it has been told.
+    /// The kernel's count of frames that were not fetched in time, and how much of it has been reported.
     dropped: u32,
     dropped_told: u32,
     unreadable: u32,

@@ -8,7 +8,7 @@
 //! A connected socket would need the source port from the start, could not look at the connection ID, and would leave
 //! nobody at the port between two connections. The filter is exchanged in one step while datagrams come.
 //!
-//! One dropped datagram in [`SAMPLE`], chosen at random, passes nevertheless: whoever receives refuses it again, and can say
+//! One dropped datagram in [`SAMPLE`], chosen at random, passes nevertheless: the receiver refuses it again, and can say
 //! where such datagrams come from, which the kernel does not.
 //!
 //! The functions here are system calls that take a lock of the socket and allocate: they are for threads beside the cycle.

@@ -95,7 +95,7 @@ impl InterfaceLock {
         let process = std::process::id();
         match bind(&place) {
             Ok(place_socket) => {
-                // Who it is comes second: whoever reads in between is told less.
+                // Who it is comes second: a reader in between learns less.
                 let holder = format!("{place}/{process}/{}", own_command());
                 Ok(Self { _place: place_socket, _holder: bind(&holder).map_err(system)? })
             }

@@ -11,7 +11,7 @@ use nix::sys::socket::SockaddrStorage;
 pub struct InterfaceAddress {
     /// Name of the interface.
     pub name: String,
-    /// The address.
+    /// IPv4 address of the interface.
     pub address: Ipv4Addr,
     /// Its subnet mask.
     pub netmask: Ipv4Addr,

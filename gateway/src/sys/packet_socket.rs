@@ -264,7 +264,7 @@ mod tests {
         ip("link set south1 up");
     }
 
-    /// The kernel tells of a carrier in its own time, up to a second later.
+    /// The kernel reports a carrier in its own time, up to a second later.
     fn comes_to(socket: &PacketSocket, state: LinkState) {
         let end = std::time::Instant::now() + Duration::from_secs(5);
         while socket.link_state() != state && std::time::Instant::now() < end {

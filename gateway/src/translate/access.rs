@@ -5,6 +5,7 @@ use std::sync::Arc;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::fault_set::{ActiveFault, Origin};
 
+use super::fact::{Carrier, Direction, Fact, Raw, What};
 use super::tree::hex;
 use super::{Node, TranslateError, Translator, quantity};
 use crate::mapping::{Access, Backing, CipFault, Item, ValueError};
@@ -43,8 +44,10 @@ impl Translator {
             Backing::Signal { signal, .. } => (format!("shows {signal}, cannot be set"), None),
             Backing::Parameter { parameter, .. } => {
                 let value = match entry.to_generic(bytes) {
-                    Ok(value) => parameter
-                        .row()
+                    Ok(value) => mapping
+                        .dictionaries
+                        .generic
+                        .by_number(parameter)
                         .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value)),
                     Err(error @ (ValueError::Length { .. } | ValueError::NotConvertible)) => {
                         return Err(TranslateError::Value(format!("attribute {id} {}: {error}", known.name)));
@@ -53,7 +56,8 @@ impl Translator {
                 };
                 let place = axis.south.parameter(parameter);
                 let lacks = if place.is_none() { ": the drive has no such parameter" } else { "" };
-                (format!("{parameter} {value}{lacks}"), place)
+                let name = &mapping.parameter_name(parameter);
+                (format!("{name} {value}{lacks}"), place)
             }
         };
         node.push(Node::new(what).by(row));
@@ -91,11 +95,12 @@ impl Translator {
                 );
                 return Err(TranslateError::Value(text));
             };
-            let measured = place
-                .parameter
-                .row()
+            let measured = mapping
+                .dictionaries
+                .generic
+                .by_number(place.parameter)
                 .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
-            let mut read = Node::new(format!("{} {measured}", place.parameter))
+            let mut read = Node::new(format!("{} {measured}", mapping.parameter_name(place.parameter)))
                 .by(axis.parameter_row(mapping, place.parameter));
             for entry in axis.attributes.entries() {
                 let Backing::Parameter { parameter, .. } = entry.backing else { continue };
@@ -162,7 +167,14 @@ impl Translator {
             let (cause, reaction) = (fault.cause, fault.reaction);
             let has_row = axis.south.faults(item, word).any(|(known, _)| known == cause);
             let row = has_row.then(|| axis.fault_row(mapping, item, word, cause)).flatten();
-            let mut shown = Node::new(format!("{cause}, reaction {reaction}")).by(row);
+            let fact = Fact {
+                axis: number,
+                direction: Direction::FromDrive,
+                recorded: true,
+                what: What::Fault(cause),
+                raw: Some(Raw::new(bytes, Some(word.into()), Some(0), Carrier::Object)),
+            };
+            let mut shown = Node::new(format!("{cause}, reaction {reaction}")).by(row).shows([fact]);
             let seen = match axis.north.fault(cause) {
                 Some(CipFault::Axis { fault_type, alarm_type, code }) => {
                     let alarm =

@@ -1,5 +1,7 @@
 //! Frames of a CAN bus: PDOs, EMCY, SYNC.
 
+use std::sync::Arc;
+
 use profile_cia402::master::config::Direction;
 use profile_cia402::wire::Function;
 use profile_cia402::wire::emcy::Emcy;
@@ -18,18 +20,24 @@ impl Translator {
         if frame.is_remote() || frame.is_fd() {
             return None;
         }
+        let stage = Arc::clone(&self.stage);
         let mut found = Vec::new();
         let on_bus = |axis: &StageAxis| axis.may_be_on(bus);
-        for (number, axis) in self.stage.axes.iter().enumerate().filter(|(_, axis)| on_bus(axis)) {
+        for (number, axis) in stage.axes.iter().enumerate().filter(|(_, axis)| on_bus(axis)) {
             let pdos = axis.can().map(|drive| drive.pdos.as_slice()).unwrap_or_default();
-            found.extend(pdos.iter().filter(|pdo| pdo.id == id).map(|pdo| (number, pdo.clone())));
+            found.extend(pdos.iter().filter(|pdo| pdo.id == id).map(|pdo| (number, pdo)));
+        }
+        if let Some((number, _)) = found.iter().find(|(number, _)| self.unfit.contains(number)) {
+            let drive = &stage.axes[*number].drive;
+            let text = format!("{drive}: not translated, the recording does not fit the configuration");
+            return Some(Err(TranslateError::Value(text)));
         }
         if let [(_, first), ..] = found.as_slice() {
             let mut node = Node::new(format!("{first}: {}", hex(frame.data())));
-            for (number, pdo) in &found {
+            for (number, pdo) in found {
                 let told = match pdo.direction {
-                    Direction::Receive => self.rpdo(*number, pdo, frame.data()),
-                    Direction::Transmit => self.tpdo(*number, pdo, frame.data()),
+                    Direction::Receive => self.rpdo(number, pdo, frame.data()),
+                    Direction::Transmit => self.tpdo(number, pdo, frame.data()),
                 };
                 match told {
                     Ok(told) => node.push(told),
@@ -52,7 +60,7 @@ impl Translator {
     /// What a drive is told, read back.
     fn rpdo(&self, number: usize, pdo: &CanPdo, data: &[u8]) -> Result<Node, TranslateError> {
         let axis = &self.stage.axes[number];
-        let mut node = Node::new(format!("axis {} on {}", axis.name, axis.drive));
+        let mut node = Node::new(format!("axis {} on {}", axis.name, axis.drive)).about(number);
         let mut values = vec![0; usize::from(axis.south.telegram.command_bytes)];
         if !CanDrive::gather(pdo, data, &mut values) {
             return Err(short(pdo, data));
@@ -63,11 +71,16 @@ impl Translator {
                 continue;
             };
             let bytes = values.get(at..at + len).unwrap_or_default();
-            node.push(Node::new(match *bytes {
+            let fact = match *bytes {
+                [low, high] => Some(self.sent_word(number, u16::from_le_bytes([low, high]), at, &values)),
+                _ => None,
+            };
+            let word = Node::new(match *bytes {
                 [low, high] => format!("{} {:#06x}", self.named(item), u16::from_le_bytes([low, high])),
                 [octet] => format!("{} {}", self.named(item), i8::from_le_bytes([octet])),
                 _ => format!("{} {}", self.named(item), hex(bytes)),
-            }));
+            });
+            node.push(word.shows(fact));
         }
         for (field, item) in axis.south.command_fields().filter(|(field, _)| there(field.offset.into())) {
             node.push(self.command_value(number, field, item, &values));
@@ -95,7 +108,7 @@ impl Translator {
             .collect();
         if !rest.is_empty() {
             let text = format!("axis {} on {}: {} to come", axis.name, axis.drive, rest.join(", "));
-            return Ok(Node::new(text));
+            return Ok(Node::new(text).about(number));
         }
         state.heard.clear();
         let values = state.came.clone();
@@ -117,7 +130,7 @@ impl Translator {
         let words = |number: usize| self.stage.axes[number].south.diagnostic_words(true).collect();
         let words: Vec<Vec<Item>> = of_node.iter().map(|(number, ..)| words(*number)).collect();
         for ((number, name, _), words) in of_node.iter().zip(words) {
-            let mut axis = Node::new(format!("axis {name}"));
+            let mut axis = Node::new(format!("axis {name}")).about(*number);
             for word in words {
                 // The box reads the code where the drive keeps it; the message alone stops no axis.
                 if let Err(error) = self.causes(*number, word, &emcy.code.0.to_le_bytes(), &mut axis) {

@@ -9,12 +9,18 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::state::DriveState;
 
 use super::bench::{Telegram, Told, Update};
+use super::fact::{Carrier, Direction, Fact, Raw, What, of_command};
 use super::stage::StageAxis;
 use super::telegram::{raw, sent};
+use super::tree::Mark;
 use super::{Node, TranslateError, Translator, devicenet, shown};
 use crate::engine::bus::devicenet::end::Row;
 use crate::engine::notice::Notice;
 use crate::mapping::devicenet::ROW_LEN;
+
+/// Places in a command block.
+const CONTROL_MODE_AT: usize = 0;
+const AXIS_CONTROL_AT: usize = 2;
 
 impl Translator {
     /// Hands an update with these blocks, each with the number of its instance and its cyclic write data, to the device, and pushes
@@ -79,14 +85,26 @@ impl Translator {
         let stage = std::sync::Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let mut node =
-            Node::new(format!("axis {} (instance {}) on {}", axis.name, axis.instance, axis.drive));
+            Node::new(format!("axis {} (instance {}) on {}", axis.name, axis.instance, axis.drive))
+                .about(number);
+        let asked = |what, raw| Fact {
+            axis: number,
+            direction: Direction::FromController,
+            recorded: true,
+            what,
+            raw,
+        };
         let control_mode = block.control_mode;
         let mode = axis.north.mode(control_mode.0);
-        node.push(match mode {
+        let raw =
+            Raw::new(&[control_mode.0], Some(control_mode.0.into()), Some(CONTROL_MODE_AT), Carrier::Block);
+        let fact = asked(What::Mode(mode), Some(raw));
+        let shown_mode = match mode {
             Some(mode) => Node::new(format!("Control Mode {control_mode} -> mode {mode}"))
-                .by(mapping.control_mode_row(mode)),
+                .by(axis.control_mode_row(mapping, mode)),
             None => Node::new(format!("Control Mode {control_mode}: no row")),
-        });
+        };
+        node.push(shown_mode.shows([fact]));
         if let Some(mode) = replaced {
             node.push(Node::new(format!(
                 "Feedback Mode {}: the box refuses to enable an axis with it; translated as one with Motor Feedback",
@@ -100,17 +118,19 @@ impl Translator {
             && state == DriveState::Operating
             && fault.is_none();
         let answer = self.block_of(number);
-        for (text, signal) in elements(&block.values) {
-            node.push(match told.command.get(signal).filter(|_| follows) {
+        for ((text, signal), (_, raw)) in elements(&block.values).into_iter().zip(of_command(block)) {
+            let value = told.command.get(signal).filter(|_| follows);
+            let element = match value {
                 Some(value) => Node::new(format!("{text} -> {signal} {}", shown(axis, signal, value)))
-                    .by(mapping.cyclic_row(signal)),
+                    .by(axis.cyclic_row(mapping, signal)),
                 None => Node::new(format!("{text}: not followed")),
-            });
+            };
+            node.push(element.shows([asked(What::Signal(signal, value), Some(raw))]));
         }
         if let Some(count) = block.values.unwind_count {
             node.push(Node::new(format!("Unwind Cycle Count {count}")));
         }
-        self.request(axis, block, answer.as_ref(), &mut node);
+        self.request(number, block, answer.as_ref(), &mut node);
         push_notices(&mut node, said, number, axis);
         for telegram in &told.before {
             let mut before = self.telegram_of(number, telegram, false);
@@ -128,11 +148,20 @@ impl Translator {
     }
 
     /// What Axis Control asks for, and the response.
-    fn request(&self, axis: &StageAxis, block: &CommandBlock, answer: Option<&ActualBlock>, node: &mut Node) {
+    fn request(&self, number: usize, block: &CommandBlock, answer: Option<&ActualBlock>, node: &mut Node) {
+        let axis = &self.stage.axes[number];
         let code = block.axis_control;
         if code == AxisControl::NONE {
             return;
         }
+        let raw = Raw::new(&[code.0], Some(code.0.into()), Some(AXIS_CONTROL_AT), Carrier::Block);
+        let fact = Fact {
+            axis: number,
+            direction: Direction::FromController,
+            recorded: true,
+            what: What::Request(code),
+            raw: Some(raw),
+        };
         let row = self.stage.mapping.request_row(code.0);
         let mut request = match axis.north.request(code.0) {
             None => Node::new(format!("Axis Control {code}: no row")),
@@ -148,7 +177,7 @@ impl Translator {
             };
             request.push(Node::new(text));
         }
-        node.push(request);
+        node.push(request.shows([fact]));
     }
 
     /// What the drive is told, with its values or with its words alone.
@@ -157,7 +186,9 @@ impl Translator {
         let Telegram { bytes, command, action, shown } = told;
         let status = axis.south.status(shown).unwrap_or_default();
         let selection = command.selection();
-        let mut node = Node::new(sent(axis, bytes));
+        let mut node = Node::new(sent(axis, bytes)).about(number);
+        let made =
+            |what, raw| Fact { axis: number, direction: Direction::ToDrive, recorded: false, what, raw };
         if let Some(drive) = axis.devicenet() {
             let mut row: Row = [0; ROW_LEN];
             if let Err(error) = drive.end.clone().overhear(bytes, &mut row) {
@@ -165,10 +196,12 @@ impl Translator {
                 return node;
             }
             let text = format!("{}: action {action}, mode {}", devicenet::asked(axis, &row), command.mode);
-            node.push(Node::new(text).by(devicenet::rows_of(axis, mapping, &row)));
+            let facts = [What::Action(*action), What::Mode(Some(command.mode))].map(|what| made(what, None));
+            node.push(Node::new(text).by(devicenet::rows_of(axis, mapping, &row)).shows(facts));
             for field in devicenet::values_to(axis, &row).filter(|_| values) {
                 let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, &row));
-                node.push(self.made_of(axis, &format!("{name}: {raw}"), field.signal, command));
+                let fact = Raw::of_field(axis, field, &row);
+                node.push(self.made_of(number, &format!("{name}: {raw}"), field.signal, command, fact));
             }
             return node;
         }
@@ -178,12 +211,15 @@ impl Translator {
             bytes.get(at..at + len)
         };
         if let Some((item, word)) = heads.next().and_then(|item| Some((item, word_of(item)?))) {
+            let at = axis.south.place_of_command(item).map_or(0, |(at, _)| at);
+            let raw = Raw::of_word(axis, true, at, bytes);
             let word = word.first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
             let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(item), command.mode);
             node.push(
                 Node::new(text)
                     .by(axis.action_row(mapping, *action, status))
-                    .by(axis.mode_row(mapping, selection)),
+                    .by(axis.mode_row(mapping, selection))
+                    .shows([made(What::Action(*action), raw), made(What::Mode(Some(command.mode)), raw)]),
             );
         }
         if let Some((item, &[octet])) = heads.next().and_then(|item| Some((item, word_of(item)?))) {
@@ -193,16 +229,25 @@ impl Translator {
         }
         for (field, item) in axis.south.command_fields().filter(|_| values) {
             let text = format!("{}: {}", self.named(item), raw(axis, field, bytes));
-            node.push(self.made_of(axis, &text, field.signal, command));
+            let fact = Raw::of_field(axis, field, bytes);
+            node.push(self.made_of(number, &text, field.signal, command, fact));
         }
         node
     }
 
     /// A value of a telegram, and what of the command it was made of.
-    fn made_of(&self, axis: &StageAxis, text: &str, signal: Signal, command: &AxisCommand) -> Node {
+    fn made_of(&self, number: usize, text: &str, signal: Signal, command: &AxisCommand, raw: Raw) -> Node {
+        let axis = &self.stage.axes[number];
         let value = command.get(signal).unwrap_or_default();
         Node::new(format!("{text} <- {signal} {}", shown(axis, signal, value)))
             .by(axis.signal_row(&self.stage.mapping, signal))
+            .shows([Fact {
+                axis: number,
+                direction: Direction::ToDrive,
+                recorded: false,
+                what: What::Signal(signal, Some(value)),
+                raw: Some(raw),
+            }])
     }
 }
 
@@ -229,11 +274,22 @@ pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis
             }),
             _ => (text.as_str(), ""),
         };
-        node.push(Node::new(match (notice, rest) {
+        let line = Node::new(match (notice, rest) {
             (Notice::Fault { .. }, "") => format!("log: {text})"),
             (Notice::Fault { .. }, why) => format!("log: {text}): {why}"),
             _ => format!("log: {text}"),
-        }));
+        });
+        let fault = match notice {
+            Notice::Fault { fault, .. } => Some(Fact {
+                axis: number,
+                direction: Direction::ToController,
+                recorded: false,
+                what: What::Fault(fault.cause),
+                raw: None,
+            }),
+            _ => None,
+        };
+        node.push(line.about(number).marked(Mark::Log).shows(fault));
     }
 }
 

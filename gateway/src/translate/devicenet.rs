@@ -12,11 +12,11 @@ use profile_generic::program::{Field, Width};
 
 use super::stage::{DevicenetDrive, StageAxis};
 use super::telegram::{bytes_of, generic_of};
-use super::tree::hex;
+use super::tree::{Row as TableRow, hex};
 use super::{Node, TranslateError, Translator, flags, shown};
 use crate::engine::bus::devicenet::end::{End, Row};
+use crate::mapping::Mapping;
 use crate::mapping::devicenet::{DevicenetAxis, MODE_AT, ROW_LEN, motion, speed};
-use crate::mapping::{Mapping, Origin};
 
 /// What is heard of the poll connection of a drive.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(super) struct Listener {
     answer: IoReceiver,
     /// Messages to the drive.
     cycle: u64,
-    /// What its answers have told.
+    /// What its answers have reported.
     row: Row,
 }
 
@@ -93,7 +93,7 @@ impl Translator {
     /// What a drive is told, read back.
     fn polled(&mut self, number: usize, message: &[u8]) -> Node {
         let (axis, state) = (&self.stage.axes[number], &mut self.states[number]);
-        let mut node = Node::new(poll_of(axis, message));
+        let mut node = Node::new(poll_of(axis, message)).about(number);
         let Some(listener) = &mut state.listener else { return node };
         listener.cycle += 1;
         if message.is_empty() {
@@ -146,7 +146,7 @@ impl Translator {
             generic_of(field, row).map_or_else(String::new, |value| shown(axis, field.signal, value));
         let text =
             format!("{}: {} = {} {generic}", drive.value(field).0, raw(drive, field, row), field.signal);
-        Node::new(text).by(axis.signal_row(&self.stage.mapping, field.signal))
+        self.sent_value(number, text, field, row)
     }
 }
 
@@ -168,12 +168,12 @@ pub(super) fn asked(axis: &StageAxis, row: &Row) -> String {
 }
 
 /// The rows of what is asked for, and of the mode.
-pub(super) fn rows_of(axis: &StageAxis, mapping: &Mapping, row: &Row) -> Vec<Origin> {
+pub(super) fn rows_of(axis: &StageAxis, mapping: &Mapping, row: &Row) -> Vec<TableRow> {
     if !axis.devicenet().is_some_and(DevicenetDrive::is_motion) {
         return Vec::new();
     }
     let mode = axis.south.mode(word_of(row)).and_then(|selection| axis.mode_row(mapping, selection));
-    mapping.request_row(row[0]).into_iter().chain(mode).collect()
+    mapping.request_row(row[0]).map(TableRow::from).into_iter().chain(mode).collect()
 }
 
 /// Status or control as a program sees it: two bytes and the mode.

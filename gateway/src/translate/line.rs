@@ -10,7 +10,7 @@
 //! object drive-c 603F:00 20 23      an object, as the drive gives it
 //! set turntable 473 00 00 20 41     the controller sets an attribute
 //! writes turntable 431 491          the attributes of the controller's cyclic write data
-//! restart                           forgets what the frames before have told
+//! restart                           forgets what the frames before have reported
 //! ```
 
 use profile_generic::can::{Frame, Id};
@@ -21,7 +21,7 @@ use crate::mapping::{Item, Object};
 /// The longest frame.
 const BYTES_MAX: usize = 1600;
 
-/// One line.
+/// What a line of a list means.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Line<'t> {
     /// A frame, a datagram or an update.
@@ -46,7 +46,7 @@ pub enum Line<'t> {
     Can(Frame),
     /// A frame of DeviceNet.
     Devicenet(Frame),
-    /// What the frames before have told is forgotten.
+    /// What the frames before have reported is forgotten.
     Restart,
     /// The list of an axis's cyclic write data.
     Writes {

@@ -1,21 +1,9 @@
-//! Whole lists of frames and whole recordings, each frame with what came before it.
+//! Whole lists of frames, each frame with what came before it.
 
-use std::io::Read;
 use std::sync::Arc;
 
-use profile_cia402::wire::cob_id;
-use profile_cip::wire::class1::Class1Datagram;
-use profile_cip::wire::encapsulation::IO_PORT;
-use profile_sercos::wire::describe::Names;
-use profile_sercos::wire::header::{Header, Phase};
-
-use super::{Line, LineError, Node, Stage, TranslateError, Translator};
-use crate::capture::can::{self, LINK_TYPE_CAN, Record};
-use crate::capture::can_bus::{CanBuses, CanProtocol};
-use crate::capture::reader::{ReadError, Reader};
-use crate::config::Config;
-use crate::decode::Decoder;
-use crate::decode::packet::{self, Packet};
+use super::entry::{Counts, Entry, Place, Sink};
+use super::{Line, LineError, Node, Stage, Translator};
 
 /// Characters of a line that stand in its heading.
 const HEADING_MAX: usize = 60;
@@ -25,10 +13,8 @@ const HEADING_MAX: usize = 60;
 pub struct List {
     /// A tree for each frame.
     pub frames: Vec<Node>,
-    /// Frames of a recording that carry nothing to translate.
-    pub passed_over: usize,
-    /// Frames that could not be translated.
-    pub failed: usize,
+    /// What else was found.
+    pub counts: Counts,
 }
 
 /// What is wrong with a list.
@@ -42,16 +28,14 @@ pub struct ListError {
 }
 
 impl List {
-    fn push(&mut self, heading: String, translated: Result<Node, super::TranslateError>) {
-        let mut frame = Node::new(heading);
-        match translated {
-            Ok(node) => frame.push(node),
-            Err(error) => {
-                self.failed += 1;
-                frame.push(Node::new(format!("error: {error}")));
-            }
-        }
-        self.frames.push(frame);
+    /// What is handed to the sink of a translation, all of it.
+    pub(crate) fn of<E>(translate: impl FnOnce(Sink<'_>) -> Result<Counts, E>) -> Result<Self, E> {
+        let mut frames = Vec::new();
+        let counts = translate(&mut |entry| {
+            frames.push(entry.tree);
+            true
+        })?;
+        Ok(Self { frames, counts })
     }
 }
 
@@ -60,18 +44,36 @@ impl List {
 /// # Errors
 /// The first line that is no line of such a list.
 pub fn translate_list(stage: &Arc<Stage>, text: &str) -> Result<List, ListError> {
+    List::of(|sink| translate_list_to(stage, text, u64::MAX, sink))
+}
+
+/// The same, frame by frame, up to the line `last`.
+///
+/// # Errors
+/// As [`translate_list`].
+pub fn translate_list_to(
+    stage: &Arc<Stage>,
+    text: &str,
+    last: u64,
+    sink: Sink<'_>,
+) -> Result<Counts, ListError> {
     let mut translator = Translator::new(Arc::clone(stage));
-    let mut list = List::default();
-    for (number, line) in (1..).zip(text.lines()) {
+    let mut counts = Counts::default();
+    let last = usize::try_from(last).unwrap_or(usize::MAX);
+    for (number, line) in (1..=last).zip(text.lines()) {
         let Some(frame) = Line::parse(line).map_err(|error| ListError { line: number, error })? else {
             continue;
         };
         let translated = translator.line(&frame);
-        if frame != Line::Restart {
-            list.push(format!("line {number}: {}", heading(line)), translated);
+        if frame == Line::Restart {
+            continue;
+        }
+        let entry = Entry::of(Place::line(number), format!("line {number}: {}", heading(line)), translated);
+        if !counts.push(sink, entry) {
+            break;
         }
     }
-    Ok(list)
+    Ok(counts)
 }
 
 /// The comment behind a frame says best what it is, else the frame itself does.
@@ -82,86 +84,6 @@ fn heading(line: &str) -> String {
         Some((end, _)) => format!("{} ...", &shown[..end]),
         None => shown.to_owned(),
     }
-}
-
-/// Translates the updates of CIP Motion connections, the cyclic SERCOS telegrams, PDOs and EMCY of CiA 402 drives, and polls of
-/// drives on DeviceNet in a recording.
-///
-/// # Errors
-/// The recording cannot be read on.
-pub fn translate_capture<R: Read>(
-    stage: &Arc<Stage>,
-    config: &Config,
-    mut reader: Reader<R>,
-    names: &dyn Names,
-) -> Result<List, ReadError> {
-    let mut translator = Translator::new(Arc::clone(stage));
-    let mut decoder = Decoder::new(names);
-    let mut list = List::default();
-    let buses = CanBuses::of(config);
-    let mut unknown: Vec<u32> = Vec::new();
-    while let Some(frame) = reader.next_frame()? {
-        if frame.link_type == LINK_TYPE_CAN {
-            let record = can::parse(frame.data);
-            let translated = match (&record, buses.find(&frame)) {
-                (Ok(Record::Frame(record)), Some(bus)) if bus.protocol == CanProtocol::Devicenet => {
-                    translator.devicenet(bus.number, record)
-                }
-                // Without CAN buses in the configuration the drives come from data sheets, and those are of CANopen.
-                (Ok(Record::Frame(record)), bus)
-                    if bus.is_some() || config.can.len() + config.devicenet.len() == 0 =>
-                {
-                    // One each cycle, and nothing in it to read.
-                    let number = bus.and_then(|bus| bus.number);
-                    translator.can(number, record).filter(|_| record.id() != cob_id::SYNC)
-                }
-                (Ok(_), None) if !unknown.contains(&frame.interface) => {
-                    unknown.push(frame.interface);
-                    let text =
-                        "expected a CAN interface of the configuration, which has CANopen and DeviceNet, got";
-                    let name = frame
-                        .interface_name
-                        .map_or_else(|| "one without name".to_owned(), |name| format!("`{name}`"));
-                    Some(Err(TranslateError::Value(format!("{text} {name}: all its frames are left out"))))
-                }
-                _ => None,
-            };
-            match (translated, record) {
-                (Some(translated), Ok(record)) => {
-                    list.push(format!("frame {} {record}", frame.number), translated)
-                }
-                _ => list.passed_over += 1,
-            }
-            continue;
-        }
-        decoder.frame(&frame);
-        let wanted = match packet::parse(frame.data) {
-            Packet::Sercos => {
-                let phase = Header::parse(frame.data).map(|header| header.phase.phase());
-                phase == Ok(Phase::CP4)
-            }
-            Packet::Udp { from, to, payload } if to.port() == IO_PORT => match Class1Datagram::parse(payload)
-            {
-                Ok(datagram) => match decoder.connection(datagram.connection_id, *from.ip(), *to.ip()) {
-                    Some((target, motion)) => {
-                        let device = config.devices.iter().position(|device| device.listen == target);
-                        translator.set_device(device.unwrap_or(0));
-                        motion
-                    }
-                    // Opened before the recording began: the data tell.
-                    None => super::recognise(frame.data).is_ok(),
-                },
-                Err(_) => false,
-            },
-            _ => false,
-        };
-        if wanted {
-            list.push(format!("frame {}", frame.number), translator.frame(frame.data));
-        } else {
-            list.passed_over += 1;
-        }
-    }
-    Ok(list)
 }
 
 #[cfg(test)]

@@ -27,38 +27,50 @@ mod bench;
 mod can;
 mod commanded;
 mod devicenet;
+mod entry;
+pub mod fact;
+mod filter;
 mod frame;
+pub mod golden;
 mod line;
 mod list;
+mod plot;
+pub mod record;
+mod recording;
 mod reported;
 mod rows;
+pub mod scene;
 mod stage;
 mod telegram;
 mod tree;
 mod written;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use profile_cip::wire::motion::Format;
 use profile_cip::wire::motion::codes::{CommandTarget, ControlStatus};
+use profile_cip::wire::motion::{ActualBlock, Format};
 use profile_generic::image::Signal;
-use profile_generic::quantity::{
-    Acceleration, Current, Position, Quantity, Temperature, Torque, TorqueAbsolute, Velocity, Voltage,
-};
-use profile_generic::scaling::UnitKind;
+use profile_generic::quantity::{Current, Decimal, Quantity, Temperature, Torque, TorqueAbsolute, Voltage};
 use profile_sercos::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind, Phase};
+use profile_sercos::wire::layout::DeviceLayout;
 
 use bench::{Bench, Update};
 use devicenet::Listener;
+pub use entry::{Counts, Entry, Place, Sink};
+pub use fact::Direction;
+use fact::{Carrier, Fact, Raw, What, of_actual};
+pub use filter::Filter;
 pub use frame::{FrameError, Recognised, recognise};
 pub use line::{Line, LineError};
-pub use list::{List, ListError, translate_capture, translate_list};
+pub use list::{List, ListError, translate_list, translate_list_to};
+pub use plot::Plot;
+pub use recording::{Captured, translate_capture};
 pub use stage::{
     Behind, CanDrive, CanPart, CanPdo, DevicenetDrive, SercosDrive, Stage, StageAxis, StageError, ValuesError,
 };
-pub use tree::{Node, RowNames};
+pub use tree::{Mark, Node, Row, RowNames};
 
 /// Connection of a drive with its command values, and with its actual values.
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
@@ -81,7 +93,11 @@ pub struct Translator {
     /// Attributes of the cyclic write data of axes, in their order.
     writes: BTreeMap<usize, Vec<u16>>,
     device: usize,
-    bench: Option<Bench>,
+    bench: Option<Box<Bench>>,
+    /// Where a recording has the values of each axis in its SERCOS telegrams, if it says so.
+    places: Vec<Option<DeviceLayout>>,
+    /// Axes whose drive in the recording is not that of the configuration.
+    unfit: BTreeSet<usize>,
 }
 
 impl Drop for Translator {
@@ -119,7 +135,9 @@ impl Translator {
     #[must_use]
     pub fn new(stage: impl Into<Arc<Stage>>) -> Self {
         let stage = stage.into();
-        Self { states: Self::unheard(&stage), stage, writes: BTreeMap::new(), device: 0, bench: None }
+        let (states, places) = (Self::unheard(&stage), vec![None; stage.axes.len()]);
+        let (writes, unfit) = (BTreeMap::new(), BTreeSet::new());
+        Self { states, stage, writes, device: 0, bench: None, places, unfit }
     }
 
     /// Axes of which no frame has told anything.
@@ -132,6 +150,13 @@ impl Translator {
         states.collect()
     }
 
+    /// Goes on with the programs of another stage of the same box.
+    fn change_stage(&mut self, stage: Arc<Stage>) {
+        self.bench.take().into_iter().for_each(|bench| self.stage.keep(bench));
+        self.states = Self::unheard(&stage);
+        self.stage = stage;
+    }
+
     /// The bench on which the frames are.
     fn bench(&mut self) -> Result<&mut Bench, TranslateError> {
         let bench = match self.bench.take() {
@@ -141,7 +166,7 @@ impl Translator {
         Ok(self.bench.insert(bench))
     }
 
-    /// Forgets what the frames before have told.
+    /// Forgets what the frames before have reported.
     fn restart(&mut self) {
         self.states = Self::unheard(&self.stage);
         self.writes.clear();
@@ -155,7 +180,7 @@ impl Translator {
         self.device = device;
     }
 
-    /// The stage.
+    /// The commissioned drives that frames are translated for.
     #[must_use]
     pub fn stage(&self) -> &Stage {
         &self.stage
@@ -237,12 +262,37 @@ impl Translator {
                 self.commands(Update::Fixed(block, update.node_control), &[(1, block, None)], &mut node)?;
                 node
             }
-            Recognised::Actual(frame) => decoded("D-to-C update", &frame.to_string()),
+            Recognised::Actual(frame) => {
+                let mut facts = Vec::new();
+                for instance in frame.instances() {
+                    facts.extend(instance.cyclic.map(|block| self.reported(instance.number, &block)));
+                }
+                decoded("D-to-C update", &frame.to_string()).shows(facts.into_iter().flatten())
+            }
             Recognised::FixedActual(update) => {
-                decoded("D-to-C update of the fixed format", &update.to_string())
+                let facts = self.reported(1, &update.block());
+                decoded("D-to-C update of the fixed format", &update.to_string()).shows(facts)
             }
             Recognised::Sercos(frame) => self.telegram(frame)?,
         })
+    }
+
+    /// What the device has told the controller of an axis.
+    fn reported(&self, instance: u8, block: &ActualBlock) -> Vec<Fact> {
+        let Some(axis) = self.axis_of_instance(instance) else { return Vec::new() };
+        let fact = |what, raw| Fact {
+            axis,
+            direction: Direction::ToController,
+            recorded: true,
+            what,
+            raw: Some(raw),
+        };
+        let state = block.axis_state.0;
+        let raw = Raw::new(&[state], Some(state.into()), Some(reported::AXIS_STATE_AT), Carrier::Block);
+        let mut facts = vec![fact(What::AxisState(block.axis_state), raw)];
+        let values = of_actual(block, &self.stage.axes[axis].scaling);
+        facts.extend(values.map(|(signal, value, raw)| fact(What::Signal(signal, Some(value)), raw)));
+        facts
     }
 
     /// The format of the updates of the device that is spoken to.
@@ -265,12 +315,19 @@ impl Translator {
         let wanted = if kind == Kind::At { FEEDBACK_CONNECTION } else { COMMAND_CONNECTION };
         for axis in 0..self.stage.axes.len() {
             let Some(topology) = self.stage.axes[axis].sercos().map(|drive| drive.topology) else { continue };
-            let places = self.stage.layout.devices.iter().find(|device| device.address == topology);
+            let places = self.places[axis]
+                .as_ref()
+                .or_else(|| self.stage.layout.devices.iter().find(|device| device.address == topology));
             let place = places.and_then(|device| {
                 device.connections.iter().find(|place| place.index == wanted && place.at.telegram == number)
             });
             let Some(place) = place else { continue };
             let name = &self.stage.axes[axis].drive;
+            if self.unfit.contains(&axis) {
+                let text = format!("{name}: not translated, the recording does not fit the configuration");
+                node.push(Node::new(text).about(axis).marked(Mark::Error));
+                continue;
+            }
             let Some(bytes) = data.get(place.at.range(usize::from(place.len))) else {
                 let text = format!(
                     "{name}: expected {} bytes at {}, the telegram has {}",
@@ -278,7 +335,7 @@ impl Translator {
                     place.at.offset,
                     data.len()
                 );
-                node.push(Node::new(text));
+                node.push(Node::new(text).about(axis).marked(Mark::Error));
                 continue;
             };
             let (control, values) = bytes.split_at(CONNECTION_CONTROL_LEN.min(bytes.len()));
@@ -338,15 +395,12 @@ fn shown(axis: &StageAxis, signal: Signal, value: i64) -> String {
 
 /// A value in a quantity with its unit.
 fn quantity(axis: &StageAxis, quantity: Quantity, value: i64) -> String {
-    // The generic model counts in units of the axis, whatever they are.
-    let of_axis = |text: String| match axis.scaling.kind {
-        UnitKind::Rotary => text.replace(" u", " rev"),
-        UnitKind::Linear => text.replace(" u", " mm"),
-    };
     match quantity {
-        Quantity::Position => of_axis(Position(value).to_string()),
-        Quantity::Velocity => of_axis(Velocity(value).to_string()),
-        Quantity::Acceleration => of_axis(Acceleration(value).to_string()),
+        // The generic model counts in units of the axis, whatever they are.
+        Quantity::Position | Quantity::Velocity | Quantity::Acceleration => {
+            let (unit, decimals) = fact::unit(axis.scaling.kind, quantity);
+            Decimal { value, decimals, unit }.to_string()
+        }
         Quantity::Torque => Torque(value).to_string(),
         Quantity::TorqueAbsolute => TorqueAbsolute(value).to_string(),
         Quantity::Current => Current(value).to_string(),

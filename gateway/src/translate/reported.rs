@@ -9,14 +9,18 @@ use profile_generic::image::Signal;
 use profile_generic::mode::OperatingMode;
 
 use super::commanded::push_notices;
+use super::fact::{Carrier, Direction as Way, Fact, Raw, What, of_actual};
 use super::stage::Behind;
 use super::telegram::{frames, raw};
-use super::tree::hex;
+use super::tree::{Mark, Row, hex};
 use super::{Node, TranslateError, Translator, devicenet, flags, shown};
 use crate::engine::notice::Notice;
 
 /// Octets of the longest cyclic actual block.
 const BLOCK_MAX: usize = 128;
+
+/// Place of the Axis State in it.
+pub(super) const AXIS_STATE_AT: usize = 7;
 
 impl Translator {
     /// Takes what a drive sent in a cycle, without C-CON.
@@ -90,26 +94,33 @@ impl Translator {
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let needed = usize::from(axis.south.telegram.feedback_bytes);
         let Some(word) = axis.south.status(row) else {
-            node.push(Node::new(format!("expected {needed} bytes")));
+            node.push(Node::new(format!("expected {needed} bytes")).marked(Mark::Error));
             return Ok(node);
         };
         let mode = axis.south.mode(word);
         let bench = self.bench()?;
         let channel = &bench.engine().axes()[number];
         let (told, feedback) = (channel.feedback().report, *channel.feedback());
+        node.axis = Some(number);
+        let heard = |what, raw| Fact { axis: number, direction: Way::FromDrive, recorded: true, what, raw };
+        let generic_mode = mode.map(|mode| mode.mode);
         let shown_mode = mode.map_or_else(|| "none that was set up".to_owned(), |mode| mode.to_string());
         let mode_row = || mode.and_then(|mode| axis.mode_row(mapping, mode));
         let mut heads = axis.south.telegram.feedback.iter();
         if let Some(item) = heads.next() {
             let text = format!("{} {:#06x}: {told}, mode {shown_mode}", self.named(*item), word & 0xFFFF);
-            let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row());
+            let raw = Raw::of_word(axis, false, 0, row);
+            let facts = [heard(What::Report(told), raw), heard(What::Mode(generic_mode), raw)];
+            let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row()).shows(facts);
             let words = axis.south.status_words(row);
             for (idn, word) in &words {
                 status.push(Node::new(format!("{} {word:#06x}", self.named(*idn))));
             }
             if !feedback.status.is_empty() {
                 let rows = axis.status_rows(mapping, word, &words);
-                status.push(Node::new(format!("status: {}", flags(feedback.status.iter_names()))).by(rows));
+                let fact = heard(What::Status(feedback.status), None);
+                let text = format!("status: {}", flags(feedback.status.iter_names()));
+                status.push(Node::new(text).by(rows).shows([fact]));
             }
             node.push(status);
             if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
@@ -120,7 +131,8 @@ impl Translator {
         }
         if let Some(drive) = axis.devicenet() {
             let text = format!("{}: {told}, mode {shown_mode}", devicenet::told(axis, row));
-            let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row());
+            let facts = [heard(What::Report(told), None), heard(What::Mode(generic_mode), None)];
+            let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row()).shows(facts);
             if !feedback.status.is_empty() {
                 status.push(Node::new(format!("status: {}", flags(feedback.status.iter_names()))));
             }
@@ -130,7 +142,9 @@ impl Translator {
                 let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, row));
                 let generic = shown(axis, field.signal, value);
                 let text = format!("{name}: {raw} -> {} {generic}", field.signal);
-                node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
+                let fact =
+                    heard(What::Signal(field.signal, Some(value)), Some(Raw::of_field(axis, field, row)));
+                node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)).shows([fact]));
             }
         }
         for (field, item) in axis.south.feedback_fields() {
@@ -142,7 +156,8 @@ impl Translator {
                 field.signal,
                 shown(axis, field.signal, value)
             );
-            node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)));
+            let fact = heard(What::Signal(field.signal, Some(value)), Some(Raw::of_field(axis, field, row)));
+            node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)).shows([fact]));
         }
         if row.len() < needed {
             node.push(Node::new(format!(
@@ -172,12 +187,30 @@ impl Translator {
             "D-to-C cyclic block of instance {}, {len} bytes: {}",
             axis.instance,
             hex(&bytes[..len])
-        ));
+        ))
+        .about(number);
+        let report =
+            |what, raw| Fact { axis: number, direction: Way::ToController, recorded: false, what, raw };
+        let raw = Raw::new(
+            &[block.axis_state.0],
+            Some(block.axis_state.0.into()),
+            Some(AXIS_STATE_AT),
+            Carrier::Block,
+        );
         node.push(
             Node::new(format!("Axis State {} from drive state {state}", block.axis_state))
-                .by(mapping.state_row(state)),
+                .by(axis.state_row(mapping, state))
+                .shows([
+                    report(What::State(state), None),
+                    report(What::AxisState(block.axis_state), Some(raw)),
+                ]),
         );
-        push_values(&mut node, &block, |signal| mapping.cyclic_row(signal));
+        let values: Vec<_> = of_actual(&block, &axis.scaling).collect();
+        push_values(&mut node, &block, |signal| {
+            let found = values.iter().find(|(known, ..)| *known == signal);
+            let fact = found.map(|(_, value, raw)| report(What::Signal(signal, Some(*value)), Some(*raw)));
+            (axis.cyclic_row(mapping, signal), fact)
+        });
         Ok(node)
     }
 
@@ -194,7 +227,7 @@ impl Translator {
 }
 
 /// Actual values and status words of a block.
-fn push_values(node: &mut Node, block: &ActualBlock, row: impl Fn(Signal) -> Option<crate::mapping::Origin>) {
+fn push_values(node: &mut Node, block: &ActualBlock, of: impl Fn(Signal) -> (Option<Row>, Option<Fact>)) {
     let actual = &block.actual;
     let position = actual.position.map(|position| match position {
         ActualPosition::Dint(value) => value.to_string(),
@@ -211,7 +244,8 @@ fn push_values(node: &mut Node, block: &ActualBlock, row: impl Fn(Signal) -> Opt
     ];
     for (element, value, signal) in values {
         let Some(value) = value else { continue };
-        node.push(Node::new(format!("{element} {value}")).by(row(signal)));
+        let (row, fact) = of(signal);
+        node.push(Node::new(format!("{element} {value}")).by(row).shows(fact));
     }
     if let Some((status, _)) = block.status.axis_status {
         let text = format!("Axis Status {:#010x}: {}", status.bits(), flags(status.iter_names()));

@@ -1,13 +1,85 @@
-//! Which row of its table made a value of a drive, whatever its profile.
+//! Which row of its table made a value of a drive, whatever its profile. Rows are looked up by name once and kept.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
 
 use profile_generic::fault::FaultCause;
 use profile_generic::image::Signal;
-use profile_generic::mode::ModeSelection;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
-use profile_generic::state::Action;
+use profile_generic::state::{Action, DriveState};
 
 use super::stage::{Behind, StageAxis};
+use super::tree::Row;
 use crate::mapping::{Cia402Dictionary, Item, Mapping, Object, Origin};
+
+/// Rows that are kept of an axis: status words with a counter in them have many.
+const KEPT_MAX: usize = 1024;
+
+/// What a row was looked up by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Key {
+    Cyclic(Signal),
+    Signal(Signal),
+    ControlMode(OperatingMode),
+    Mode(ModeSelection),
+    State(DriveState),
+    Report(u32),
+    Action(Action, u32),
+}
+
+/// Rows of an axis that were looked up before.
+#[derive(Debug, Default)]
+pub struct RowCache(Mutex<HashMap<Key, Option<Row>>>);
+
+/// A copy of an axis may get other tables.
+impl Clone for RowCache {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl RowCache {
+    fn get(&self, key: Key, find: impl FnOnce() -> Option<Origin>) -> Option<Row> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.len() >= KEPT_MAX {
+            kept.clear();
+        }
+        kept.entry(key).or_insert_with(|| find().map(Row::from)).clone()
+    }
+}
+
+/// Rows, looked up once.
+impl StageAxis {
+    pub(super) fn cyclic_row(&self, mapping: &Mapping, signal: Signal) -> Option<Row> {
+        self.rows.get(Key::Cyclic(signal), || mapping.cyclic_row(signal))
+    }
+
+    pub(super) fn control_mode_row(&self, mapping: &Mapping, mode: OperatingMode) -> Option<Row> {
+        self.rows.get(Key::ControlMode(mode), || mapping.control_mode_row(mode))
+    }
+
+    pub(super) fn state_row(&self, mapping: &Mapping, state: DriveState) -> Option<Row> {
+        self.rows.get(Key::State(state), || mapping.state_row(state))
+    }
+
+    pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Row> {
+        self.rows.get(Key::Signal(signal), || self.find_signal_row(mapping, signal))
+    }
+
+    pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Row> {
+        self.rows.get(Key::Mode(selection), || self.find_mode_row(mapping, selection))
+    }
+
+    /// `status` is what the drive has shown.
+    pub(super) fn action_row(&self, mapping: &Mapping, action: Action, status: u32) -> Option<Row> {
+        self.rows.get(Key::Action(action, status), || self.find_action_row(mapping, action, status))
+    }
+
+    pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Row> {
+        self.rows.get(Key::Report(status), || self.find_report_row(mapping, status))
+    }
+}
 
 impl StageAxis {
     /// The tables that count for the drive.
@@ -18,7 +90,7 @@ impl StageAxis {
         }
     }
 
-    pub(super) fn signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
+    pub(super) fn find_signal_row(&self, mapping: &Mapping, signal: Signal) -> Option<Origin> {
         let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.signal_row(signal),
@@ -33,7 +105,7 @@ impl StageAxis {
         }
     }
 
-    pub(super) fn mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
+    pub(super) fn find_mode_row(&self, mapping: &Mapping, selection: ModeSelection) -> Option<Origin> {
         let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.mode_row(selection),
@@ -45,8 +117,7 @@ impl StageAxis {
         }
     }
 
-    /// `status` is what the drive has shown.
-    pub(super) fn action_row(&self, mapping: &Mapping, action: Action, status: u32) -> Option<Origin> {
+    pub(super) fn find_action_row(&self, mapping: &Mapping, action: Action, status: u32) -> Option<Origin> {
         let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(_) => mapping.action_row(action),
@@ -56,7 +127,7 @@ impl StageAxis {
         }
     }
 
-    pub(super) fn report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
+    pub(super) fn find_report_row(&self, mapping: &Mapping, status: u32) -> Option<Origin> {
         let mapping = self.tables(mapping);
         match &self.behind {
             Behind::Sercos(drive) => mapping.report_row(status, drive.silent),

@@ -1,20 +1,29 @@
 //! The values of a drive's telegrams as text, and telegrams to it that were recorded, read back.
 
+use std::fmt::Write as _;
+use std::sync::Arc;
+
 use profile_cia402::master::config::Direction;
 use profile_generic::program::{Field, Width};
 
+use super::fact::{Direction as Way, Fact, Raw, What};
 use super::stage::{Behind, CanDrive, StageAxis};
 use super::tree::hex;
 use super::{Node, Translator, devicenet, shown};
-use crate::mapping::{Cia402Dictionary, Item};
+use crate::mapping::Item;
+
+/// Room for a number, its bytes and their place.
+const RAW_LEN: usize = 48;
 
 impl Translator {
     /// What stands in a telegram from the master, read back.
     pub(super) fn command_values(&self, number: usize, bytes: &[u8]) -> Node {
         let axis = &self.stage.axes[number];
-        let mut node = Node::new(sent(axis, bytes));
+        let mut node = Node::new(sent(axis, bytes)).about(number);
         if let (Some(item), Some(word)) = (axis.south.telegram.command.first(), bytes.first_chunk()) {
-            node.push(Node::new(format!("{} {:#06x}", self.named(*item), u16::from_le_bytes(*word))));
+            let word = u16::from_le_bytes(*word);
+            let fact = self.sent_word(number, word, 0, bytes);
+            node.push(Node::new(format!("{} {word:#06x}", self.named(*item))).shows([fact]));
         }
         for (field, item) in axis.south.command_fields() {
             node.push(self.command_value(number, field, item, bytes));
@@ -28,25 +37,27 @@ impl Translator {
         let value =
             generic_of(field, bytes).map_or_else(String::new, |value| shown(axis, field.signal, value));
         let text = format!("{}: {} = {} {value}", self.named(item), raw(axis, field, bytes), field.signal);
-        Node::new(text).by(axis.signal_row(&self.stage.mapping, field.signal))
+        self.sent_value(number, text, field, bytes)
+    }
+
+    /// The line of a value that was sent to a drive.
+    pub(super) fn sent_value(&self, number: usize, text: String, field: &Field, bytes: &[u8]) -> Node {
+        let axis = &self.stage.axes[number];
+        let what = What::Signal(field.signal, generic_of(field, bytes));
+        let raw = Some(Raw::of_field(axis, field, bytes));
+        let fact = Fact { axis: number, direction: Way::ToDrive, recorded: true, what, raw };
+        Node::new(text).by(axis.signal_row(&self.stage.mapping, field.signal)).shows([fact])
+    }
+
+    /// A control word that was sent to a drive.
+    pub(super) fn sent_word(&self, number: usize, word: u16, at: usize, bytes: &[u8]) -> Fact {
+        let raw = Raw::of_word(&self.stage.axes[number], true, at, bytes);
+        Fact { axis: number, direction: Way::ToDrive, recorded: true, what: What::ControlWord(word), raw }
     }
 
     /// An IDN or object with its name.
-    pub(super) fn named(&self, item: Item) -> String {
-        let dictionaries = &self.stage.mapping.dictionaries;
-        let name = match item {
-            Item::Idn(idn) => dictionaries.sercos.idn(idn).map(|row| row.name.clone()),
-            Item::Attribute(_) => None,
-            Item::Object(object) => {
-                let index = Cia402Dictionary::on_first_axis(object.index);
-                let row = dictionaries.cia402.object(index);
-                row.map(|row| match row.sub(object.sub).map(|sub| sub.name.as_str()) {
-                    Some(sub) if object.sub > 0 && !sub.is_empty() => format!("{}, {sub}", row.name),
-                    _ => row.name.clone(),
-                })
-            }
-        };
-        name.map_or_else(|| item.to_string(), |name| format!("{item} {name}"))
+    pub(super) fn named(&self, item: Item) -> Arc<str> {
+        self.stage.label(item)
     }
 }
 
@@ -71,15 +82,18 @@ pub(super) fn frames(name: &str, drive: &CanDrive, direction: Direction, bytes: 
 /// The bytes of a field, the number in them, and where they stand in which frame.
 pub(super) fn raw(axis: &StageAxis, field: &Field, telegram: &[u8]) -> String {
     let (start, bytes) = (usize::from(field.offset), bytes_of(field, telegram));
-    let number = field.width.integer(bytes).filter(|_| !field.width.is_float());
-    let number = number.map_or_else(String::new, |number| format!("{number} "));
+    let mut text = String::with_capacity(RAW_LEN);
+    // Writing to a string does not fail.
+    if let Some(number) = field.width.integer(bytes).filter(|_| !field.width.is_float()) {
+        let _ = write!(text, "{number} ");
+    }
     let way = if field.signal.is_command() { Direction::Receive } else { Direction::Transmit };
-    let place = match axis.can().map(|drive| drive.place(way, start)) {
-        None => start.to_string(),
-        Some(Some((pdo, at))) => format!("{at} of {}{}", pdo.kind(), pdo.number),
-        Some(None) => "no place".to_owned(),
+    let _ = match axis.can().map(|drive| drive.place(way, start)) {
+        None => write!(text, "({} at {start})", hex(bytes)),
+        Some(Some((pdo, at))) => write!(text, "({} at {at} of {}{})", hex(bytes), pdo.kind(), pdo.number),
+        Some(None) => write!(text, "({} at no place)", hex(bytes)),
     };
-    format!("{number}({} at {place})", hex(bytes))
+    text
 }
 
 /// The bytes of a field; none of one that is not there.

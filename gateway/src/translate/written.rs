@@ -10,7 +10,7 @@ use super::{Node, TranslateError, Translator, shown};
 use crate::mapping::{AttributeEntry, Backing};
 
 impl Translator {
-    /// What cyclic write data say, by the list that a line before has told, and what became of the trims among them.
+    /// What cyclic write data say, by the list that a line before has reported, and what became of the trims among them.
     pub(super) fn written_cyclically(&mut self, number: usize, block: &WriteBlock<'_>) -> Node {
         let mut node = Node::new(format!("cyclic write block: {}", block.to_string().trim()));
         let stage = std::sync::Arc::clone(&self.stage);

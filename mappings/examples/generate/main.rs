@@ -1,4 +1,4 @@
-//! Writes the Rust constants of the profile crates from the tables of this crate.
+//! Writes what is generated from the tables of this crate: the Rust constants of the profile crates, and the page of all kinds of rows.
 //!
 //! Run it after a change of a dictionary in `mappings/tables/dictionary`:
 //!
@@ -11,6 +11,7 @@
 
 mod plan;
 mod render;
+mod rows_page;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -26,7 +27,12 @@ fn main() -> ExitCode {
         eprintln!("{findings}");
         return ExitCode::FAILURE;
     };
-    for (path, text) in render::files(&dictionaries, &texts.generic.text) {
+    let mut files = render::files(&dictionaries, &texts.generic.text);
+    // A page of tables that do not resolve yet stays as it is.
+    if let Some(mapping) = Mapping::resolve(&texts, &mut findings) {
+        files.push((rows_page::PATH, rows_page::page(&mapping, &texts)));
+    }
+    for (path, text) in files {
         let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
         if let Err(error) = std::fs::write(&place, text) {
             eprintln!("error: {}: {error}", place.display());

@@ -1,6 +1,6 @@
 //! What is generated: which sets of the dictionaries the profile crates have as Rust constants, and under which names.
 
-use Item::{Bits, Codes as OfCodes, Masks};
+use Item::{Attributes as OfAttributes, Bits, Codes as OfCodes, Elements, Masks, Numbers};
 use Letters::{AsTheyAre, BehindTheirLetter, Lower, LowerWithoutAbbreviation, WithoutRequest};
 
 /// A file of constants.
@@ -28,6 +28,37 @@ pub enum Item {
         set: Set,
         constants: &'static [(&'static str, &'static str)],
     },
+    /// Numbers of rows: `of` has those that the code uses.
+    Numbers { rows: Rows, of: &'static str, constants: &'static [(&'static str, &'static str)] },
+    /// Numbers of the elements of a structure of SERCOS.
+    Elements {
+        module: &'static str,
+        block: u16,
+        of: &'static [u8],
+        constants: &'static [(&'static str, &'static str)],
+    },
+    /// Attributes of the Motion Device Axis Object.
+    Attributes(Attributes),
+}
+
+/// Attributes of the Motion Device Axis Object that the code uses, by number.
+pub struct Attributes {
+    /// Of instance 0: those that every device has.
+    pub class: &'static str,
+    /// Of an axis: those that every device has.
+    pub axis: &'static str,
+    /// Of an axis: those that a device has by its tables.
+    pub others: &'static str,
+    /// Constants that are not just the words of the name.
+    pub constants: &'static [(&'static str, &'static str)],
+}
+
+/// Rows that have a number.
+pub enum Rows {
+    /// Parameters of SERCOS, without `S-0-`; `x` stands for any structure instance.
+    Idns,
+    /// Objects of CANopen and CiA 402, in hexadecimal.
+    Objects,
 }
 
 /// A type for codes.
@@ -90,6 +121,9 @@ pub enum Letters {
     BehindTheirLetter,
 }
 
+/// The signals of the process image.
+pub const SIGNALS: &str = "profile-generic/src/generated/signals.rs";
+
 /// The catalogue of generic parameters.
 pub const PARAMETERS: &str = "profile-generic/src/generated/parameters.rs";
 
@@ -104,7 +138,7 @@ const CODES: Codes = Codes {
     constants: &[],
 };
 
-/// Every file but the catalogue.
+/// Every file but those of the generic model.
 pub const FILES: &[File] = &[
     File {
         path: "profile-cip/src/generated/motion_codes.rs",
@@ -594,6 +628,43 @@ pub const FILES: &[File] = &[
                 ],
                 ..CODES
             }),
+            OfCodes(Codes {
+                name: "LssMode",
+                doc: &["State that `switch state global` brings about."],
+                set: Set::Cia402("LSS mode"),
+                letters: Lower,
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "LssError",
+                doc: &["Error code in answers to 11 (node-id) and 13 (bit timing), and to 17 (store)."],
+                set: Set::Cia402("LSS error"),
+                letters: Lower,
+                constants: &[
+                    ("Out of range or not supported", "REFUSED"),
+                    ("Storage error", "STORAGE"),
+                    ("Manufacturer error", "MANUFACTURER"),
+                ],
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "BitTiming",
+                doc: &["Entry of table 0 of bit rates."],
+                set: Set::Cia402("LSS bit timing"),
+                letters: Lower,
+                constants: &[
+                    ("1000 kbit/s", "K1000"),
+                    ("800 kbit/s", "K800"),
+                    ("500 kbit/s", "K500"),
+                    ("250 kbit/s", "K250"),
+                    ("125 kbit/s", "K125"),
+                    ("50 kbit/s", "K50"),
+                    ("20 kbit/s", "K20"),
+                    ("10 kbit/s", "K10"),
+                    ("Automatic", "AUTO"),
+                ],
+                ..CODES
+            }),
         ],
     },
     File {
@@ -760,6 +831,236 @@ pub const FILES: &[File] = &[
                 set: Set::SercosWord("Service channel status (S-SVC)"),
                 constants: &[],
             },
+        ],
+    },
+    File {
+        path: "profile-sercos/src/generated/idns.rs",
+        about: "Parameters and procedure commands of SERCOS.",
+        tables: "`sercos-idns.toml` and `sercos-communication.toml` in `mappings/tables/dictionary`",
+        items: &[
+            Numbers {
+                rows: Rows::Idns,
+                of: "0011 0012 0013 0014 0017 0021 0022 0025 0030 0032 0036 0037 0040 0041 0042 0043 0044 \
+                     0045 0046 0047 0048 0049 0050 0051 0052 0053 0055 0057 0076 0077 0078 0079 0080 0081 \
+                     0082 0083 0084 0085 0086 0091 0092 0093 0094 0095 0099 0103 0104 0108 0121 0122 0123 \
+                     0124 0125 0126 0127 0128 0129 0130 0131 0132 0133 0134 0135 0136 0137 0138 0140 0141 \
+                     0146 0147 0148 0150 0159 0160 0161 0162 0169 0170 0171 0172 0173 0175 0179 0187 0188 \
+                     0189 0191 0192 0206 0207 0208 0258 0259 0260 0292 0296 0359 0380 0383 0384 0386 0390 \
+                     0400 0401 0402 0403 0405 0406 0408 0409 0410 0411 0412 0440 0442 0447 1000 1000.0.1 1002 \
+                     1003 1005 1006 1007 1008 1009 1010 1011 1012 1013 1014 1015 1017 1023 1024 1026 1027.0.1 \
+                     1027.0.2 1028 1032 1035 1036 1037 1040 1044 1045 1046 1047 1051 1061 1300.x.2 1300.x.3 \
+                     1300.x.4 1300.x.5 1300.x.8 1300.x.9 1300.x.12 1302.x.1",
+                constants: &[
+                    ("IDN-list of invalid operation data for CP2", "INVALID_CP2"),
+                    ("IDN-list of invalid operation data for CP3", "INVALID_CP3"),
+                    ("Reset class 1 diagnostic", "RESET_C1D"),
+                    ("Communication phase 3 transition check", "CP3_CHECK"),
+                    ("Communication phase 4 transition check", "CP4_CHECK"),
+                    ("Drive status word", "DRIVE_STATUS"),
+                    ("List of SCP classes", "SCP_CLASSES"),
+                    ("List of active SCP classes", "SCP_ACTIVE"),
+                    ("Communication cycle time", "CYCLE_TIME"),
+                    ("Allowed MST losses in CP3 and CP4", "MST_LOSSES"),
+                    ("Minimum feedback processing time", "FEEDBACK_TIME"),
+                    ("AT0 transmission starting time", "AT_START"),
+                    ("Synchronization time", "SYNC_TIME"),
+                    ("Command value valid time", "COMMAND_VALID"),
+                    ("Device control offset in MDT", "CONTROL_OFFSET"),
+                    ("Lengths of MDTs", "MDT_LENGTHS"),
+                    ("Device status offset in AT", "STATUS_OFFSET"),
+                    ("Lengths of ATs", "AT_LENGTHS"),
+                    ("Service channel offset in MDT", "SVC_MDT_OFFSET"),
+                    ("Service channel offset in AT", "SVC_AT_OFFSET"),
+                    ("UC channel transmission time", "UC_TIMES"),
+                    ("Synchronization jitter", "SYNC_JITTER"),
+                    ("Synchronization delay measuring procedure command", "DELAY_MEASURING"),
+                    ("Requested MTU", "MTU_REQUESTED"),
+                    ("Effective MTU", "MTU_EFFECTIVE"),
+                    ("SERCOS address", "ADDRESS"),
+                    ("Maximum consumer activation time", "CONSUMER_TIME"),
+                    ("Image of connection setups", "CONNECTION_IMAGE"),
+                    ("Maximum TSref counter", "TSREF_MAX"),
+                    ("Position loop K_V-factor", "POSITION_LOOP_KV"),
+                    ("List of supported operation modes", "OPERATION_MODES"),
+                    ("Vendor code", "VENDOR_CODE"),
+                ],
+            },
+            Elements {
+                module: "connection",
+                block: 1050,
+                of: &[1, 2, 3, 4, 5, 6, 8, 10, 11, 12],
+                constants: &[
+                    ("Connection setup", "SETUP"),
+                    ("Connection number", "NUMBER"),
+                    ("Telegram assignment", "ASSIGNMENT"),
+                    ("Maximum length of connection", "LENGTH_MAX"),
+                    ("Current length of connection", "LENGTH"),
+                    ("Configuration list", "LIST"),
+                    ("Current connection control (C-CON)", "CONTROL"),
+                    ("Producer cycle time", "CYCLE"),
+                    ("Allowed data losses", "LOSSES_MAX"),
+                    ("Error counter data losses", "LOSSES"),
+                ],
+            },
+        ],
+    },
+    File {
+        path: "profile-cia402/src/generated/objects.rs",
+        about: "Indices of objects; those of CiA 402 are for the first axis of a device.",
+        tables: "`mappings/tables/dictionary/cia402-objects.toml`",
+        items: &[Numbers {
+            rows: Rows::Objects,
+            of: "1000 1001 1003 1005 1006 1007 1008 1009 100A 100C 100D 1010 1011 1012 1014 1015 1016 \
+                     1017 1018 1019 1020 1021 1029 1200 1400 1600 1800 1A00 6007 603F 6040 6041 6042 6043 \
+                     6044 6046 6048 6049 604A 604C 605A 605B 605C 605D 605E 6060 6061 6062 6063 6064 6065 \
+                     6066 6067 6068 6069 606B 606C 606D 606E 606F 6070 6071 6072 6073 6074 6075 6076 6077 \
+                     6078 6079 607A 607B 607C 607D 607E 607F 6080 6081 6082 6083 6084 6085 6086 6087 608F \
+                     6091 6092 6096 6097 6098 6099 609A 60B0 60B1 60B2 60B8 60B9 60BA 60BB 60BC 60BD 60C0 \
+                     60C1 60C2 60C5 60C6 60D5 60D6 60D7 60D8 60E0 60E1 60E3 60F4 60FA 60FC 60FD 60FE 60FF \
+                     6402 6502 6503 6504 67FF",
+            constants: &[
+                ("Error code", "ERROR_CODE"),
+                ("vl velocity min max amount", "VL_VELOCITY_LIMITS"),
+                ("vl velocity acceleration", "VL_ACCELERATION"),
+                ("vl velocity deceleration", "VL_DECELERATION"),
+                ("vl velocity quick stop", "VL_QUICK_STOP"),
+                ("Disable operation option code", "DISABLE_OPTION"),
+                ("Modes of operation", "MODE"),
+                ("Modes of operation display", "MODE_DISPLAY"),
+                ("Position actual internal value", "POSITION_INTERNAL"),
+                ("Following error window", "FOLLOWING_WINDOW"),
+                ("Following error time out", "FOLLOWING_TIME_OUT"),
+                ("Velocity sensor actual value", "VELOCITY_SENSOR"),
+                ("Motor rated current", "RATED_CURRENT"),
+                ("Motor rated torque", "RATED_TORQUE"),
+                ("DC link circuit voltage", "DC_LINK_VOLTAGE"),
+                ("Position range limit", "RANGE_LIMIT"),
+                ("Software position limit", "SOFTWARE_LIMIT"),
+                ("Motion profile type", "PROFILE_TYPE"),
+                ("Position encoder resolution", "ENCODER_RESOLUTION"),
+                ("Touch probe function", "PROBE_FUNCTION"),
+                ("Touch probe status", "PROBE_STATUS"),
+                ("Touch probe 1 positive edge", "PROBE_1_RISING"),
+                ("Touch probe 1 negative edge", "PROBE_1_FALLING"),
+                ("Touch probe 2 positive edge", "PROBE_2_RISING"),
+                ("Touch probe 2 negative edge", "PROBE_2_FALLING"),
+                ("Interpolation sub mode select", "INTERPOLATION_SUB_MODE"),
+                ("Interpolation data record", "INTERPOLATION_DATA"),
+                ("Interpolation time period", "INTERPOLATION_PERIOD"),
+                ("Touch probe 1 positive edge counter", "PROBE_1_RISING_COUNTER"),
+                ("Touch probe 1 negative edge counter", "PROBE_1_FALLING_COUNTER"),
+                ("Touch probe 2 positive edge counter", "PROBE_2_RISING_COUNTER"),
+                ("Touch probe 2 negative edge counter", "PROBE_2_FALLING_COUNTER"),
+                ("Following error actual value", "FOLLOWING_ERROR"),
+                ("Supported drive modes", "SUPPORTED_MODES"),
+                ("Drive catalogue number", "DRIVE_CATALOGUE"),
+                ("Single device type", "AXIS_DEVICE_TYPE"),
+                ("COB-ID SYNC message", "COB_ID_SYNC"),
+                ("COB-ID time stamp message", "COB_ID_TIME"),
+                ("COB-ID emergency message", "COB_ID_EMCY"),
+                ("Inhibit time emergency message", "INHIBIT_TIME_EMCY"),
+                ("Identity object", "IDENTITY"),
+                ("Synchronous counter overflow value", "SYNC_OVERFLOW"),
+                ("RPDO communication parameter", "RPDO_COMMUNICATION"),
+                ("RPDO mapping parameter", "RPDO_MAPPING"),
+                ("TPDO communication parameter", "TPDO_COMMUNICATION"),
+                ("TPDO mapping parameter", "TPDO_MAPPING"),
+            ],
+        }],
+    },
+    File {
+        path: "profile-cip/src/generated/attributes.rs",
+        about: "Attributes of the Motion Device Axis Object that the protocol engine itself works with.",
+        tables: "`mappings/tables/dictionary/cip-attributes.toml`",
+        items: &[OfAttributes(Attributes {
+            class: "1 14 15 16 17 18 19 20 21 22 31 32 33 34 35",
+            axis: "40 42 60 61 89 90 91 92 93 94 650 651 652 653 654 655 656 657 658 659 660 661 662 663 664 665 \
+                   666 667 668 669 670 674 675 676 677",
+            others: "62 66 70 71 72 95 96 97 360 361 362 363 364 672 673 756 757 760 761 762 763 764",
+            constants: &[
+                ("Controller Update Delay High Limit", "UPDATE_DELAY_HIGH_LIMIT"),
+                ("Controller Update Delay Low Limit", "UPDATE_DELAY_LOW_LIMIT"),
+                ("Lost Controller Updates", "LOST_UPDATES"),
+                ("Late Controller Updates", "LATE_UPDATES"),
+                ("Drive Power Structure Class ID", "POWER_STRUCTURE_CLASS_ID"),
+                ("Axis I/O Status", "AXIS_IO_STATUS"),
+                ("Axis I/O Status - Mfg", "AXIS_IO_STATUS_MFG"),
+                ("Registration 1 Positive Edge Position", "REGISTRATION_POSITION"),
+                ("Registration 1 Positive Edge Time", "REGISTRATION_TIME"),
+                ("Watch 1 Event Time", "WATCH_EVENT_TIME"),
+                ("Controller Position Command - Integer", "POSITION_COMMAND_INTEGER"),
+                ("Controller Position Command - Float", "POSITION_COMMAND_FLOAT"),
+                ("Controller Velocity Command", "VELOCITY_COMMAND"),
+                ("Controller Acceleration Command", "ACCELERATION_COMMAND"),
+                ("Controller Torque Command", "TORQUE_COMMAND"),
+            ],
+        })],
+    },
+    File {
+        path: "profile-cip/src/generated/devicenet.rs",
+        about: "Codes and bits of DeviceNet.",
+        tables: "`mappings/tables/dictionary/cip-enumerations.toml`",
+        items: &[
+            OfCodes(Codes {
+                name: "BodyFormat",
+                doc: &["Message body format: the widths of class and instance in a request."],
+                set: Set::Cip("DeviceNet Body Format"),
+                letters: Lower,
+                constants: &[
+                    ("DeviceNet (8/8)", "CLASS_8_INSTANCE_8"),
+                    ("DeviceNet (8/16)", "CLASS_8_INSTANCE_16"),
+                    ("DeviceNet (16/16)", "CLASS_16_INSTANCE_16"),
+                    ("DeviceNet (16/8)", "CLASS_16_INSTANCE_8"),
+                ],
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "AcknowledgeStatus",
+                doc: &["Status in the acknowledge of a fragment."],
+                set: Set::Cip("DeviceNet Fragment Status"),
+                letters: Lower,
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "ConnectionState",
+                doc: &["State, attribute 1 of the Connection object."],
+                set: Set::Cip("DeviceNet Connection State"),
+                letters: Lower,
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "WatchdogAction",
+                doc: &["Watchdog time-out action, attribute 12 of the Connection object."],
+                set: Set::Cip("DeviceNet Watchdog Action"),
+                letters: Lower,
+                constants: &[("Transition to timed out", "TIME_OUT")],
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "Assembly",
+                doc: &["Instance of the Assembly object (class 4)."],
+                set: Set::Cip("DeviceNet Drive Assembly"),
+                letters: Lower,
+                constants: &[
+                    ("Basic speed and torque control", "BASIC_TORQUE_CONTROL"),
+                    ("Extended speed and torque control", "EXTENDED_TORQUE_CONTROL"),
+                    ("Basic speed control status", "BASIC_SPEED_STATUS"),
+                    ("Extended speed control status", "EXTENDED_SPEED_STATUS"),
+                    ("Basic speed and torque control status", "BASIC_TORQUE_STATUS"),
+                    ("Extended speed and torque control status", "EXTENDED_TORQUE_STATUS"),
+                ],
+                ..CODES
+            }),
+            OfCodes(Codes {
+                name: "SupervisorState",
+                doc: &["State of the Control Supervisor object, attribute 6."],
+                set: Set::Cip("DeviceNet Drive State"),
+                letters: Lower,
+                constants: &[("Vendor specific", "VENDOR")],
+                ..CODES
+            }),
+            Bits { module: "speed_control", set: Set::Cip("DeviceNet Speed Control"), constants: &[] },
+            Bits { module: "speed_status", set: Set::Cip("DeviceNet Speed Status"), constants: &[] },
         ],
     },
 ];

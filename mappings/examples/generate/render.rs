@@ -3,9 +3,15 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use mappings::{Cia402CodeSet, Dictionaries, Enumeration, RangeKind, Word};
+use mappings::{
+    Access, Cia402CodeSet, Cia402Dictionary, CipDictionary, Dictionaries, Enumeration, IdnUnit, RangeKind,
+    SercosDictionary, Word,
+};
 
-use super::plan::{Codes, FILES, File, Item, Letters, PARAMETERS, Set};
+use super::plan::{Attributes, Codes, FILES, File, Item, Letters, PARAMETERS, Rows, SIGNALS, Set};
+
+/// Where signals and parameters of the generic model stand.
+const GENERIC: &str = "`mappings/tables/dictionary/generic.toml`";
 
 /// One named value of a set.
 struct Named {
@@ -17,7 +23,8 @@ struct Named {
 /// Every generated file: its path from the root of the repository, and its text.
 pub fn files(dictionaries: &Dictionaries, generic: &str) -> Vec<(&'static str, String)> {
     let mut files: Vec<_> = FILES.iter().map(|file| (file.path, file_text(file, dictionaries))).collect();
-    files.push((PARAMETERS, parameters(generic)));
+    let generic: toml::Table = generic.parse().expect("the generic dictionary is TOML");
+    files.extend([(SIGNALS, signals(&generic)), (PARAMETERS, parameters(&generic))]);
     files
 }
 
@@ -41,6 +48,16 @@ fn file_text(file: &File, dictionaries: &Dictionaries) -> String {
             Item::Masks { module, repr, set, constants } => {
                 masks(&mut text, module, repr, set, constants, dictionaries);
             }
+            Item::Numbers { rows: Rows::Idns, of, constants } => {
+                idns(&mut text, of, constants, &dictionaries.sercos);
+            }
+            Item::Numbers { rows: Rows::Objects, of, constants } => {
+                objects(&mut text, of, constants, &dictionaries.cia402);
+            }
+            Item::Elements { module, block, of, constants } => {
+                elements(&mut text, (module, *block), of, constants, &dictionaries.sercos);
+            }
+            Item::Attributes(list) => attributes(&mut text, list, &dictionaries.cip),
         }
     }
     text
@@ -57,7 +74,7 @@ fn open_code(text: &mut String, codes: &Codes, dictionaries: &Dictionaries) {
         if codes.without.contains(&row.value) {
             continue;
         }
-        let constant = constant(&row.name, codes.constants);
+        let constant = constant(&row.name, codes.constants, &row.name);
         assert!(constants.insert(constant.clone()), "{}: two constants {constant}", codes.name);
         let note = if row.note.is_empty() { String::new() } else { format!(": {}", row.note) };
         let value = if codes.digits == 0 {
@@ -106,7 +123,7 @@ fn bits(text: &mut String, module: &str, set: &Set, constants: &[(&str, &str)], 
     let _ = writeln!(text, "/// {}: number and name of each bit.\npub mod {module} {{", set.name());
     let mut seen = BTreeSet::new();
     for row in values(set, dictionaries) {
-        let constant = constant(&row.name, constants);
+        let constant = constant(&row.name, constants, &row.name);
         assert!(seen.insert(constant.clone()), "{module}: two constants {constant}");
         let _ = writeln!(text, "    /// Bit {}.", row.value);
         let _ = writeln!(text, "    pub const {constant}: (u32, &str) = ({}, {:?});", row.value, row.name);
@@ -126,7 +143,7 @@ fn masks(
     let _ = writeln!(text, "/// {}: mask of each field.\npub mod {module} {{", set.name());
     let mut seen = BTreeSet::new();
     for (name, mask, width) in fields(set, dictionaries) {
-        let constant = constant(&name, constants);
+        let constant = constant(&name, constants, &name);
         assert!(seen.insert(constant.clone()), "{module}: two constants {constant}");
         let _ = writeln!(text, "    /// {name}.");
         let _ = writeln!(text, "    pub const {constant}: {repr} = 0x{mask:0digits$X};", digits = width / 4);
@@ -134,12 +151,114 @@ fn masks(
     text.push_str("}\n");
 }
 
-/// The name of a constant: that of the plan, or the words of the name.
-fn constant(name: &str, constants: &[(&str, &str)]) -> String {
+/// Parameters of SERCOS.
+fn idns(text: &mut String, of: &str, constants: &[(&str, &str)], dictionary: &SercosDictionary) {
+    text.push_str("use crate::wire::idn::Idn;\n\nimpl Idn {\n");
+    let mut seen = BTreeSet::new();
+    for number in of.split_whitespace() {
+        let idn = format!("S-0-{number}").replacen(".x.", ".0.", 1);
+        let row = idn.parse().ok().and_then(|idn| dictionary.idn(idn));
+        let row = row.unwrap_or_else(|| panic!("no parameter {idn}"));
+        let constant = constant(in_short(&row.name), constants, &row.name);
+        assert!(seen.insert(constant.clone()), "two constants {constant}");
+        let unit = match &row.unit {
+            IdnUnit::Fixed { unit, .. } if unit != "1" => format!(", {unit}"),
+            _ => String::new(),
+        };
+        let _ = writeln!(text, "    /// {}: {}{unit}.", row.number(), row.name);
+        let (block, at) = (row.idn.block(), (row.idn.instance(), row.idn.element()));
+        let _ = match at {
+            (0, 0) => writeln!(text, "    pub const {constant}: Idn = Idn::standard({block});"),
+            (instance, element) => writeln!(
+                text,
+                "    pub const {constant}: Idn = Idn::structured({block}, {instance}, {element});"
+            ),
+        };
+    }
+    text.push_str("}\n");
+}
+
+/// Elements of a structure of SERCOS.
+fn elements(
+    text: &mut String,
+    (module, block): (&str, u16),
+    of: &[u8],
+    constants: &[(&str, &str)],
+    dictionary: &SercosDictionary,
+) {
+    let _ = writeln!(text, "/// Elements of S-0-{block}.x.\npub mod {module} {{");
+    for element in of {
+        let idn = format!("S-0-{block}.0.{element}");
+        let row = idn.parse().ok().and_then(|idn| dictionary.idn(idn));
+        let row = row.unwrap_or_else(|| panic!("no parameter {idn}"));
+        let constant = constant(&row.name, constants, &row.name);
+        let _ = writeln!(text, "    /// {}.\n    pub const {constant}: u8 = {element};", row.name);
+    }
+    text.push_str("}\n");
+}
+
+/// Objects of CANopen and CiA 402.
+fn objects(text: &mut String, of: &str, constants: &[(&str, &str)], dictionary: &Cia402Dictionary) {
+    let mut seen = BTreeSet::new();
+    for number in of.split_whitespace() {
+        let index = u16::from_str_radix(number, 16).unwrap_or_else(|_| panic!("{number} is no index"));
+        let row = dictionary.object(index).unwrap_or_else(|| panic!("no object {number}"));
+        let constant = constant(in_short(&row.name), constants, &row.name);
+        assert!(seen.insert(constant.clone()), "two constants {constant}");
+        let _ = writeln!(text, "/// {}.\npub const {constant}: u16 = 0x{index:04X};", row.name);
+    }
+}
+
+/// A name without abbreviations in parentheses and without the last word where all rows of its kind have it.
+fn in_short(name: &str) -> &str {
+    let name = name.split(" (").next().unwrap_or(name);
+    let ends = [" value", " code", " procedure command"];
+    ends.iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name)
+}
+
+/// Attributes of the Motion Device Axis Object.
+fn attributes(text: &mut String, list: &Attributes, dictionary: &CipDictionary) {
+    text.push_str("use crate::device::attribute::attributes;\n\nattributes! {\n    always {\n");
+    let mut seen = BTreeSet::new();
+    let mut row = |scope, number: &str| {
+        let id: u16 = number.parse().unwrap_or_else(|_| panic!("{number} is no number"));
+        let row = match scope {
+            "Class" => dictionary.class_attribute_by_id(id),
+            _ => dictionary.attribute_by_id(id),
+        };
+        let row = row.unwrap_or_else(|| panic!("no attribute {id}"));
+        let constant = constant(&row.name, list.constants, &row.name);
+        assert!(seen.insert(constant.clone()), "two constants {constant}");
+        let unit = if row.unit.is_empty() { String::new() } else { format!(" [{:?}]", row.unit) };
+        (row, format!("        {scope} {constant} = {id}"), format!("{:?}{unit}", row.name))
+    };
+    for (scope, of) in [("Class", list.class), ("Instance", list.axis)] {
+        for number in of.split_whitespace() {
+            let (row, constant, name) = row(scope, number);
+            let access = match row.access {
+                Access::Get => "Get",
+                Access::Set => "Set",
+                Access::SetCyclic => "Cyclic",
+            };
+            let kind = camel(&row.data_type.name().to_lowercase());
+            let default = row.default.unwrap_or(0);
+            let _ = writeln!(text, "{constant}, {kind}, {access}, {default}, {name};");
+        }
+    }
+    text.push_str("    }\n    else {\n");
+    for number in list.others.split_whitespace() {
+        let (_, constant, name) = row("Instance", number);
+        let _ = writeln!(text, "{constant}, {name};");
+    }
+    text.push_str("    }\n}\n");
+}
+
+/// The constant of a row: that of the plan for its name, or the words of its name in short.
+fn constant(short: &str, constants: &[(&str, &str)], name: &str) -> String {
     if let Some((_, constant)) = constants.iter().find(|(known, _)| *known == name) {
         return (*constant).to_owned();
     }
-    let letters = name.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { ' ' });
+    let letters = short.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { ' ' });
     letters.collect::<String>().split_whitespace().collect::<Vec<_>>().join("_").to_uppercase()
 }
 
@@ -217,28 +336,46 @@ fn cia402<'d>(set: &Set, dictionaries: &'d Dictionaries) -> &'d Cia402CodeSet {
     dictionaries.cia402.codes(set.name()).unwrap_or_else(|| panic!("no set {}", set.name()))
 }
 
-/// The catalogue of generic parameters. It is read as it stands: the program knows none that have no constant yet.
-fn parameters(generic: &str) -> String {
-    let mut text = head("The catalogue of generic parameters.", "`mappings/tables/dictionary/generic.toml`");
+/// What is read of the generic model as it stands: the program knows no signal and no parameter that has no constant yet.
+fn generic<'t>(table: &'t toml::Table, list: &str) -> impl Iterator<Item = (&'t toml::Value, i64)> {
+    let rows = table[list].as_array().unwrap_or_else(|| panic!("no list of {list}s"));
+    rows.iter().map(|row| (row, row.get("number").and_then(toml::Value::as_integer).unwrap_or_default()))
+}
+
+fn word<'t>(row: &'t toml::Value, key: &str) -> &'t str {
+    row.get(key).and_then(toml::Value::as_str).unwrap_or_else(|| panic!("{key}: {row}"))
+}
+
+/// The signals of the process image.
+fn signals(table: &toml::Table) -> String {
+    let mut text = head("The signals of the process image.", GENERIC);
+    text.push_str("\nuse crate::image::signal_rows;\n\nsignal_rows! {\n");
+    for (row, _) in generic(table, "signal") {
+        let [signal, quantity, image] = ["name", "quantity", "access"].map(|key| camel(word(row, key)));
+        let (name, about) = (word(row, "name"), word(row, "about"));
+        let _ = writeln!(text, "    {signal} = {name:?}, {quantity}, {image}, {about:?};");
+    }
+    text.push_str("}\n");
+    text
+}
+
+/// The catalogue of generic parameters.
+fn parameters(table: &toml::Table) -> String {
+    let mut text = head("The catalogue of generic parameters.", GENERIC);
     text.push_str("\nuse crate::parameter::parameter_rows;\n\nparameter_rows! {\n");
-    let table: toml::Table = generic.parse().expect("the generic dictionary is TOML");
     let mut group = None;
-    for row in table["parameter"].as_array().expect("a list of parameters") {
-        let word =
-            |key: &str| row.get(key).and_then(toml::Value::as_str).unwrap_or_else(|| panic!("{key}: {row}"));
-        let number =
-            row.get("number").and_then(toml::Value::as_integer).unwrap_or_else(|| panic!("number: {row}"));
+    for (row, number) in generic(table, "parameter") {
         if group.replace(number >> 8).is_some_and(|group| group != number >> 8) {
             text.push('\n');
         }
         let [element, quantity, kind, access] =
-            ["element", "quantity", "type", "access"].map(|key| camel(word(key)));
-        let name = word("name");
+            ["element", "quantity", "type", "access"].map(|key| camel(word(row, key)));
+        let name = word(row, "name");
         let _ = writeln!(
             text,
             "    {} = 0x{number:04X}, {name:?}, {element}, {quantity}, {kind}, {access},\n        {:?};",
             name.to_uppercase(),
-            word("about")
+            word(row, "about")
         );
     }
     text.push_str("}\n");

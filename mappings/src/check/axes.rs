@@ -7,6 +7,7 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 
+use super::vendor;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::{
@@ -62,23 +63,28 @@ const WAY_OF_A_TURN: i64 = 10;
 /// Parts per million of the rated torque in a count.
 const TORQUE_COUNT: i64 = 1_000;
 
-/// Makes programs of the tables alone: for a turning and a sliding axis with the usual resolution, SERCOS drives scaled by the box, and
-/// CiA 402 drives that count in increments of their encoder.
-pub(super) fn tables(mapping: &Mapping, findings: &mut Findings) {
-    for kind in [UnitKind::Rotary, UnitKind::Linear] {
-        let scaling = CipScaling {
-            kind,
-            nanounits_per_unit: profile_generic::scaling::NANO,
-            counts_per_unit: 10_000,
-            inverted: false,
-            unwind: None,
-        };
-        sercos(mapping, &scaling, findings);
-        cia402(mapping, &scaling, findings);
-    }
+/// A turning and a sliding axis with the usual resolution.
+fn axes() -> [CipScaling; 2] {
+    [UnitKind::Rotary, UnitKind::Linear].map(|kind| CipScaling {
+        kind,
+        nanounits_per_unit: profile_generic::scaling::NANO,
+        counts_per_unit: 10_000,
+        inverted: false,
+        unwind: None,
+    })
 }
 
-fn sercos(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
+/// Makes programs of the tables alone for SERCOS drives that are scaled by the box.
+pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
+    axes().iter().for_each(|scaling| sercos_axis(mapping, scaling, findings));
+}
+
+/// The same for CiA 402 drives that count in increments of their encoder.
+pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
+    axes().iter().for_each(|scaling| cia402_axis(mapping, scaling, findings));
+}
+
+fn sercos_axis(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let axis = SercosAxis {
         units: AxisUnits { kind: scaling.kind, ..AxisUnits::default() },
@@ -89,20 +95,29 @@ fn sercos(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     let made = mapping.telegram(&axis, &DriveFacts::new()).and_then(|_| obedient(mapping, &axis));
     let place = |row: &RowNumbers| {
         let rows = &file.rows;
-        let signal = rows.signal.iter().find(|known| row.is_signal && known.signal.get_ref() == row.name);
+        let signal = rows.signal.iter().find(|known| row.is_signal && *known.signal.get_ref() == row.name);
         let mut parameters = rows.parameter.iter();
-        let parameter = parameters.find(|known| !row.is_signal && known.parameter.get_ref() == row.name);
+        let parameter = parameters.find(|known| !row.is_signal && *known.parameter.get_ref() == row.name);
         signal.map(|known| known.idn.span()).or(parameter.map(|known| known.idn.span()))
     };
     match made {
-        Ok(program) => rows(mapping, scaling, &program, (&file.text, "idn"), place, findings),
+        Ok(program) => {
+            rows(mapping, scaling, &program, (&file.text, "idn"), place, findings);
+            if scaling.kind == UnitKind::Rotary {
+                let rows = || file.rows.parameter.iter();
+                let place =
+                    |name: &str| rows().find(|row| row.parameter.get_ref() == name).map(|row| row.idn.span());
+                vendor::attributes(mapping, scaling, findings);
+                vendor::held(mapping, &program, (&file.text, "idn"), place, findings);
+            }
+        }
         Err(error) => {
             none(scaling.kind, "", &error.to_string(), &file.text, file.rows.mapping.span(), findings)
         }
     }
 }
 
-fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
+fn cia402_axis(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     let file = &mapping.tables().generic_cia402;
     let unit = match scaling.kind {
         UnitKind::Rotary => profile_generic::scaling::NANO,
@@ -123,13 +138,22 @@ fn cia402(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings) {
     };
     let place = |row: &RowNumbers| {
         let rows = &file.rows;
-        let signal = rows.signal.iter().find(|known| row.is_signal && known.signal.get_ref() == row.name);
+        let signal = rows.signal.iter().find(|known| row.is_signal && *known.signal.get_ref() == row.name);
         let mut parameters = rows.parameter.iter();
-        let parameter = parameters.find(|known| !row.is_signal && known.parameter.get_ref() == row.name);
+        let parameter = parameters.find(|known| !row.is_signal && *known.parameter.get_ref() == row.name);
         signal.map(|known| known.object.span()).or(parameter.map(|known| known.object.span()))
     };
     match mapping.cia402_program(&axis, &ObjectFacts::new()) {
-        Ok(program) => rows(mapping, scaling, &program, (&file.text, "object"), place, findings),
+        Ok(program) => {
+            rows(mapping, scaling, &program, (&file.text, "object"), place, findings);
+            if scaling.kind == UnitKind::Rotary {
+                let rows = || file.rows.parameter.iter();
+                let place = |name: &str| {
+                    rows().find(|row| row.parameter.get_ref() == name).map(|row| row.object.span())
+                };
+                vendor::held(mapping, &program, (&file.text, "object"), place, findings);
+            }
+        }
         Err(error) => {
             none(
                 scaling.kind,

@@ -8,12 +8,16 @@ use crate::finding::registry as code;
 use crate::finding::{Findings, Problem};
 use crate::format::CipFaultRow;
 
-/// Looks at the faults of both sides, and at the rows of which the first that fits wins.
+/// Looks at the faults of the controller and of SERCOS drives, and at the rows of which the first that fits wins.
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     causes(mapping, findings);
-    exceptions(mapping, findings);
     sercos_faults(mapping, findings);
     sercos_reports(mapping, findings);
+}
+
+/// The same for CiA 402 drives.
+pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
+    exceptions(mapping, findings);
     cia402_faults(mapping, findings);
     cia402_reports(mapping, findings);
 }

@@ -5,15 +5,18 @@
 
 mod attributes;
 pub mod axes;
+pub mod diff;
 mod faults;
 mod page;
 mod rows;
 pub mod schema;
 mod states;
+mod trade;
+mod vendor;
 
 use std::path::{Path, PathBuf};
 
-pub use page::page;
+pub use page::{escaped, page};
 
 use crate::finding::Findings;
 use crate::{Mapping, TableTexts};
@@ -55,17 +58,35 @@ pub fn texts(texts: Option<TableTexts>, findings: Findings) -> Outcome {
     if let Some(mapping) = &outcome.mapping {
         outcome.families = mapping.families().len();
         outcome.examples = mapping.run_examples(findings);
-        tables(mapping, findings);
-        mapping.families().iter().for_each(|family| tables(&family.mapping, findings));
+        let mut walks = states::Walks::of(mapping);
+        for_all_drives(mapping, &mut walks, findings);
+        mapping.families().iter().for_each(|family| for_cia402(&family.mapping, &mut walks, findings));
     }
+    findings.settle();
     outcome
 }
 
 /// What can be seen in the tables alone, beyond what keeps them from being read.
 pub fn tables(mapping: &Mapping, findings: &mut Findings) {
+    for_all_drives(mapping, &mut states::Walks::of(mapping), findings);
+}
+
+fn for_all_drives(mapping: &Mapping, walks: &mut states::Walks, findings: &mut Findings) {
     attributes::check(mapping, findings);
     faults::check(mapping, findings);
-    states::check(mapping, findings);
+    states::check(mapping, walks, findings);
     rows::check(mapping, findings);
-    axes::tables(mapping, findings);
+    vendor::bindings(mapping, findings);
+    axes::sercos(mapping, findings);
+    trade::check(mapping, findings);
+    for_cia402(mapping, walks, findings);
+}
+
+/// What depends on the rows for CiA 402 drives, of which a family can have its own.
+fn for_cia402(mapping: &Mapping, walks: &mut states::Walks, findings: &mut Findings) {
+    faults::cia402(mapping, findings);
+    states::cia402(mapping, walks, findings);
+    rows::cia402(mapping, findings);
+    axes::cia402(mapping, findings);
+    trade::cia402(mapping, findings);
 }

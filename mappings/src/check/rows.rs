@@ -9,10 +9,15 @@ use crate::{DriveFacts, IdnUnit, Mapping, SercosIdn};
 
 /// Looks at modes, units and values.
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
-    modes(mapping, findings);
     units(mapping, findings);
     commissioning(mapping, findings);
     attributes(mapping, findings);
+}
+
+/// The same for CiA 402 drives, and the modes of all.
+pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
+    modes(mapping, findings);
+    cia402_units(mapping, findings);
 }
 
 fn modes(mapping: &Mapping, findings: &mut Findings) {
@@ -86,8 +91,11 @@ fn units(mapping: &Mapping, findings: &mut Findings) {
             findings.push(&sercos.text, problem.expected("no [[mode]] row has it in a telegram"));
         }
     }
+}
+
+fn cia402_units(mapping: &Mapping, findings: &mut Findings) {
     let cia402 = &mapping.tables().generic_cia402;
-    let objects = dictionaries.cia402.objects();
+    let objects = mapping.dictionaries.cia402.objects();
     for name in
         cia402.rows.unit.iter().map(|row| &row.unit).chain(cia402.rows.scaling.iter().map(|row| &row.unit))
     {

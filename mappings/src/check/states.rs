@@ -15,7 +15,7 @@ use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::format::Name;
 
-/// More situations than the machine has; a bound for whoever changes it.
+/// More situations than the machine has; a bound in case the machine is changed.
 const SITUATIONS_MAX: usize = 20_000;
 
 /// Something that can happen.
@@ -28,53 +28,93 @@ enum Happening {
     FaultGone,
 }
 
-/// Walks the machine, for drives that acknowledge and for those that do not, of both profiles.
-pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
-    let tables = mapping.tables();
-    let cip = &tables.cip_generic.rows;
-    let (sercos, cia402) = (&tables.generic_sercos, &tables.generic_cia402);
-    let requests = cip.request.iter().filter_map(|row| row.request.as_ref());
-    let requests = requests.chain(cip.drive_action.iter().filter_map(|row| row.request.as_ref()));
-    let mut requests: Vec<Request> = requests.filter_map(|name| Request::parse(name.get_ref())).collect();
-    // Stop and Coast are what the stopping actions come to.
-    requests.extend([Request::Stop, Request::Coast]);
+/// Walks the machine for SERCOS drives, those that acknowledge and those that do not.
+pub(super) fn check(mapping: &Mapping, walks: &mut Walks, findings: &mut Findings) {
+    let file = &mapping.tables().generic_sercos;
     for told in [true, false] {
-        let counts = |wanted: Option<bool>| wanted.is_none_or(|wanted| wanted == told);
-        let rows = sercos.rows.report.iter().filter(|row| counts(row.acknowledges));
+        let rows = file.rows.report.iter().filter(|row| row.acknowledges.is_none_or(|wanted| wanted == told));
         let drives = if told { "acknowledges" } else { "does not acknowledge" };
-        let place = (&*sercos.text, sercos.rows.mapping.span());
-        walk(&requests, rows.map(|row| &row.report), &format!("a drive that {drives}"), place, findings);
-        let rows = cia402.rows.report.iter().filter(|row| counts(row.follows));
-        let drives = if told { "tells" } else { "does not tell" };
-        let drives = format!("a CiA 402 drive that {drives} whether it follows");
-        let place = (&*cia402.text, cia402.rows.mapping.span());
-        walk(&requests, rows.map(|row| &row.report), &drives, place, findings);
+        let place = (&*file.text, file.rows.mapping.span());
+        walks.check(rows.map(|row| &row.report), &format!("a drive that {drives}"), place, findings);
     }
 }
 
-/// Walks the machine with what some drives report.
-fn walk<'r>(
-    requests: &[Request],
-    reports: impl Iterator<Item = &'r Name>,
-    drives: &str,
-    (text, span): (&Source, Range<usize>),
-    findings: &mut Findings,
-) {
-    let mut reports: Vec<Report> = reports.filter_map(|name| Report::parse(name.get_ref())).collect();
-    // The box itself says so.
-    reports.extend([Report::Silent, Report::NotReady]);
-    let walk = Walk::new(&happenings(requests, &reports));
-    for state in DriveState::ALL {
-        let (code, what) = match (walk.comes_in(*state), walk.comes_out(*state)) {
-            (false, _) => (code::NO_WAY_IN, "never comes to"),
-            (_, false) => (code::NO_WAY_OUT, "never comes back to `ready` from"),
-            _ => continue,
-        };
-        let missing = missing(requests, &reports);
-        let problem = Problem::new(code, span.clone());
-        let problem = problem.title(format!("an axis {what} the state `{state}`, with {drives}"));
-        findings.push(text, problem.expected(format!("no row brings {missing}")));
+/// The same for CiA 402 drives, those that tell whether they follow and those that do not.
+pub(super) fn cia402(mapping: &Mapping, walks: &mut Walks, findings: &mut Findings) {
+    let file = &mapping.tables().generic_cia402;
+    for told in [true, false] {
+        let rows = file.rows.report.iter().filter(|row| row.follows.is_none_or(|wanted| wanted == told));
+        let drives = if told { "tells" } else { "does not tell" };
+        let drives = format!("a CiA 402 drive that {drives} whether it follows");
+        let place = (&*file.text, file.rows.mapping.span());
+        walks.check(rows.map(|row| &row.report), &drives, place, findings);
     }
+}
+
+/// The machine with what a controller can ask, walked once for each set of reports that drives have.
+pub(super) struct Walks {
+    requests: Vec<Request>,
+    known: HashMap<Vec<Report>, Vec<(DriveState, Gap)>>,
+}
+
+/// What is wrong with a state.
+#[derive(Clone, Copy)]
+enum Gap {
+    NoWayIn,
+    NoWayOut,
+}
+
+impl Walks {
+    pub(super) fn of(mapping: &Mapping) -> Self {
+        let cip = &mapping.tables().cip_generic.rows;
+        let requests = cip.request.iter().filter_map(|row| row.request.as_ref());
+        let requests = requests.chain(cip.drive_action.iter().filter_map(|row| row.request.as_ref()));
+        let mut requests: Vec<Request> = requests.filter_map(|name| Request::parse(name.get_ref())).collect();
+        // Stop and Coast are what the stopping actions come to.
+        requests.extend([Request::Stop, Request::Coast]);
+        Self { requests, known: HashMap::new() }
+    }
+
+    /// Walks the machine with what some drives report.
+    fn check<'r>(
+        &mut self,
+        reports: impl Iterator<Item = &'r Name>,
+        drives: &str,
+        (text, span): (&Source, Range<usize>),
+        findings: &mut Findings,
+    ) {
+        let mut reports: Vec<Report> = reports.filter_map(|name| Report::parse(name.get_ref())).collect();
+        // The box itself says so.
+        reports.extend([Report::Silent, Report::NotReady]);
+        reports.sort_unstable();
+        reports.dedup();
+        let missing = missing(&self.requests, &reports);
+        let requests = &self.requests;
+        let gaps = self.known.entry(reports).or_insert_with_key(|reports| gaps(requests, reports));
+        for (state, gap) in gaps {
+            let (code, what) = match gap {
+                Gap::NoWayIn => (code::NO_WAY_IN, "never comes to"),
+                Gap::NoWayOut => (code::NO_WAY_OUT, "never comes back to `ready` from"),
+            };
+            let problem = Problem::new(code, span.clone());
+            let problem = problem.title(format!("an axis {what} the state `{state}`, with {drives}"));
+            findings.push(text, problem.expected(format!("no row brings {missing}")));
+        }
+    }
+}
+
+/// The states that an axis does not come into or out of.
+fn gaps(requests: &[Request], reports: &[Report]) -> Vec<(DriveState, Gap)> {
+    let walk = Walk::new(&happenings(requests, reports));
+    let leading = walk.leading_to_ready();
+    let of = |state: DriveState| {
+        let mut there = walk.situations.iter().zip(&leading).filter(|(at, _)| at.state() == state).peekable();
+        match there.peek() {
+            None => Some((state, Gap::NoWayIn)),
+            Some(_) => (!there.any(|(_, leads)| *leads)).then_some((state, Gap::NoWayOut)),
+        }
+    };
+    DriveState::ALL.iter().filter_map(|state| of(*state)).collect()
 }
 
 /// What no row brings, of what could lead on.
@@ -144,24 +184,16 @@ impl Walk {
         walk
     }
 
-    fn comes_in(&self, state: DriveState) -> bool {
-        self.situations.iter().any(|situation| situation.state() == state)
-    }
-
-    /// Whether something leads from the state to that from which an axis is started.
-    fn comes_out(&self, state: DriveState) -> bool {
+    /// For each situation whether something leads from it to the state from which an axis is started.
+    fn leading_to_ready(&self) -> Vec<bool> {
         let is_ready = |at: &usize| self.situations[*at].state() == DriveState::Ready;
         let mut reached: Vec<usize> = (0..self.situations.len()).filter(is_ready).collect();
-        let mut seen = vec![false; self.situations.len()];
+        let mut leads = vec![false; self.situations.len()];
         while let Some(at) = reached.pop() {
-            if std::mem::replace(&mut seen[at], true) {
-                continue;
+            if !std::mem::replace(&mut leads[at], true) {
+                reached.extend(&self.before[at]);
             }
-            if self.situations[at].state() == state {
-                return true;
-            }
-            reached.extend(&self.before[at]);
         }
-        false
+        leads
     }
 }

@@ -2,22 +2,22 @@
 
 use std::collections::BTreeSet;
 
-use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
-use profile_generic::ratio::Ratio;
-use profile_generic::state::Action;
 use profile_generic::time::DurationNs;
 
 use super::captures::{CaptureRule, LatchRule};
 use super::{
-    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, FixedUnit, Handshake, Method, ModeRule,
-    Object, ParameterRule, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind,
-    StepRule, Tells, VOLTAGE_BIT, Value, Words,
+    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, Handshake, Method, ModeRule, Object,
+    ParameterAt, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Tells,
+    VOLTAGE_BIT, Value, Words,
 };
 use crate::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::drive_program::FaultRow;
+use crate::drive_rows::{
+    FAILS, every_action, fixed_unit, mapped, mode_row, once, parameter_row, signal_row, written_parameter,
+};
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{
@@ -26,8 +26,7 @@ use crate::format::{
     Cia402SignalRow, Cia402UnboundRow, FieldValueRow, GenericCia402File, Name,
 };
 use crate::generic_names::{
-    action, capture_kind, cause_and_reaction, directions, interpolation, operating_mode, parameter, report,
-    signal, status_bit,
+    action, capture_kind, cause_and_reaction, interpolation, operating_mode, report, status_bit,
 };
 use crate::item::Item;
 use crate::load::Parsed;
@@ -150,7 +149,8 @@ impl<'a> Builder<'a> {
         let row = self.dictionaries.cia402.sub(object.index, object.sub);
         if row.is_none() {
             let message = format!("expected an object of the dictionary, got {object}");
-            self.resolver.error(code::UNKNOWN_NAME, name.span(), key, message);
+            let index = format!("0x{:04X}", object.index);
+            self.resolver.lacks(code::UNKNOWN_NAME, name.span(), key, &index, message);
         }
         self.bound.insert((object.index, self.resolver.path_of(name)));
         Some((object, row?))
@@ -173,19 +173,12 @@ impl<'a> Builder<'a> {
 
     fn units(&mut self, rows: &GenericCia402File) {
         for row in &rows.unit {
-            if let Some(times) = &row.times {
-                let message = "expected no `times` for a fixed unit";
-                self.resolver.error(code::CONTRADICTION, times.span(), "times", message);
-            }
             let known = self.dictionaries.cia402.units();
             let find = |text: &str| known.iter().any(|(unit, _)| unit == text).then_some(());
             let names = known.iter().map(|(unit, _)| unit.as_str());
             let named = self.resolver.name("unit", &row.unit, "a unit of the dictionary", find, names);
-            let quantity = quantity(&mut self.resolver, &row.quantity);
-            let ratio = self.resolver.ratio("generic_per_unit", &row.generic_per_unit);
-            if let (Some(()), Some(quantity), Some(ratio)) = (named, quantity, ratio) {
-                self.tables.units.push(FixedUnit { unit: row.unit.get_ref().clone(), quantity, ratio });
-            }
+            let unit = fixed_unit(&mut self.resolver, row);
+            self.tables.units.extend(unit.filter(|_| named.is_some()));
         }
     }
 
@@ -193,9 +186,8 @@ impl<'a> Builder<'a> {
         let Some(quantity) = quantity(&mut self.resolver, &row.quantity) else { return };
         let methods = row.methods.iter().filter_map(|method| self.method(row, method)).collect();
         let unit = row.unit.get_ref().clone();
-        if self.tables.scalings.iter().any(|known| known.unit == unit) {
-            self.resolver.error(code::TWICE, row.unit.span(), "unit", "the unit is defined twice");
-        }
+        let known = self.tables.scalings.iter().any(|known| known.unit == unit);
+        once(&mut self.resolver, known, "unit", &row.unit);
         self.tables.scalings.push(ScalingRule { unit, quantity, methods });
     }
 
@@ -270,20 +262,9 @@ impl<'a> Builder<'a> {
     }
 
     fn signal(&mut self, row: &Cia402SignalRow) {
-        let signal = signal(&mut self.resolver, "signal", &row.signal);
+        let head = signal_row(&mut self.resolver, &row.signal, &row.direction, &row.missing);
         let value = self.value("object", &row.object);
-        let ways = [("to_drive", true), ("from_drive", false)];
-        let to_drive = self.resolver.word("direction", &row.direction, &ways);
-        let refuse = self.resolver.word("missing", &row.missing, &[("refuse", true), ("omit", false)]);
-        let (Some(signal), Some((value, entry)), Some(to_drive), Some(refuse)) =
-            (signal, value, to_drive, refuse)
-        else {
-            return;
-        };
-        if signal.is_command() != to_drive {
-            let message = format!("{signal} cannot go {}", row.direction.get_ref());
-            return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
-        }
+        let (Some((signal, to_drive, refuse)), Some((value, entry))) = (head, value) else { return };
         if !self.measures(&value, signal.quantity()) {
             let message = format!("the unit of {} is not a unit of {}", value.object, signal.quantity());
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
@@ -293,9 +274,8 @@ impl<'a> Builder<'a> {
         let shared = |known: &SignalRule| {
             known.modes.is_empty() && modes.is_empty() || known.modes.iter().any(|mode| modes.contains(mode))
         };
-        if self.tables.signals.iter().any(|known| known.signal == signal && shared(known)) {
-            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is defined twice");
-        }
+        let known = self.tables.signals.iter().any(|known| known.signal == signal && shared(known));
+        once(&mut self.resolver, known, "signal", &row.signal);
         let polarity = row.polarity.as_ref().and_then(|name| self.polarity("polarity", name));
         self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse });
     }
@@ -328,12 +308,7 @@ impl<'a> Builder<'a> {
     }
 
     fn mode(&mut self, row: &Cia402ModeRow) {
-        let mode = operating_mode(&mut self.resolver, &row.mode);
-        let interpolation = match &row.interpolation {
-            None => Some(InterpolationSource::Controller),
-            Some(name) => interpolation(&mut self.resolver, name),
-        };
-        let optional = self.resolver.word("missing", &row.missing, &[("refuse", false), ("omit", true)]);
+        let head = mode_row(&mut self.resolver, &row.mode, row.interpolation.as_ref(), &row.missing);
         let modes = self.drive_modes(&row.modes);
         if row.modes.is_empty() {
             let message = "expected at least one mode of operation";
@@ -344,19 +319,15 @@ impl<'a> Builder<'a> {
             None => Some(None),
             Some(handshake) => self.handshake(handshake).map(Some),
         };
-        let command = self.mapped("command", &row.command, &modes);
-        let actual = self.mapped("actual", &row.actual, &modes);
-        let (Some(mode), Some(interpolation), Some(optional), Some(control), Some(handshake)) =
-            (mode, interpolation, optional, control, handshake)
-        else {
+        let has = |signal| modes.iter().all(|mode| self.tables.signal(signal, mode.code).is_some());
+        let command = mapped(&mut self.resolver, "command", &row.command, has);
+        let actual = mapped(&mut self.resolver, "actual", &row.actual, has);
+        let (Some((selection, optional)), Some(control), Some(handshake)) = (head, control, handshake) else {
             return;
         };
-        let selection = ModeSelection { mode, interpolation };
         let same = |known: &&ModeRule| known.selection == selection;
         let mut known = self.tables.modes.iter().filter(same).flat_map(|known| &known.modes);
-        if known.any(|known| modes.contains(known)) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
-        }
+        once(&mut self.resolver, known.any(|known| modes.contains(known)), "mode", &row.mode);
         let rule = ModeRule { selection, optional, modes, control, handshake, command, actual };
         self.tables.modes.push(rule);
     }
@@ -387,25 +358,10 @@ impl<'a> Builder<'a> {
             return;
         };
         let selection = ModeSelection { mode, interpolation };
-        if self.tables.procedures.iter().any(|known| known.selection == selection) {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
-        }
+        let known = self.tables.procedures.iter().any(|known| known.selection == selection);
+        once(&mut self.resolver, known, "mode", &row.mode);
         let time_out = DurationNs::from_secs(i64::from(*row.seconds.get_ref()));
         self.tables.procedures.push(ProcedureRule { selection, modes, start, done, failed, time_out });
-    }
-
-    /// Signals that have an object in each of these modes of operation.
-    fn mapped(&mut self, key: &str, names: &[Name], modes: &[DriveMode]) -> Vec<Signal> {
-        let mut signals = Vec::with_capacity(names.len());
-        for name in names {
-            let Some(signal) = signal(&mut self.resolver, key, name) else { continue };
-            if modes.iter().any(|mode| self.tables.signal(signal, mode.code).is_none()) {
-                let message = format!("expected a [[signal]] row for {signal}, got none");
-                self.resolver.error(code::ROW_MISSING, name.span(), key, message);
-            }
-            signals.push(signal);
-        }
-        signals
     }
 
     /// Mask and value of fields of a word, by the set of its bits.
@@ -459,17 +415,15 @@ impl<'a> Builder<'a> {
                 continue;
             };
             let pattern = over(pattern, sent);
-            if self.tables.actions.iter().any(|known| known.action == action && known.when == when) {
-                self.resolver.error(code::TWICE, row.action.span(), "action", "the action is defined twice");
-            }
+            let known = self.tables.actions.iter().any(|known| known.action == action && known.when == when);
+            once(&mut self.resolver, known, "action", &row.action);
             self.tables.actions.push(ActionRule { action, when, pattern });
         }
-        for action in Action::ALL {
-            if !self.tables.actions.iter().any(|rule| rule.action == *action && rule.when.is_none()) {
-                let message = format!("expected a row for {action} without `when`, got none");
-                self.resolver.error(code::ROW_MISSING, rows.mapping.span(), "action", message);
-            }
-        }
+        let actions = &self.tables.actions;
+        let has = |action| actions.iter().any(|rule| rule.action == action && rule.when.is_none());
+        every_action(&mut self.resolver, &rows.mapping, has, |action| {
+            format!("expected a row for {action} without `when`, got none")
+        });
         for row in &rows.report {
             let report = report(&mut self.resolver, &row.report);
             let state = self.state("state", &row.state);
@@ -554,47 +508,22 @@ impl<'a> Builder<'a> {
     }
 
     fn parameter(&mut self, row: &Cia402ParameterRow) {
-        let parameter = parameter(&mut self.resolver, &self.dictionaries.generic, &row.parameter);
+        let generic = &self.dictionaries.generic;
+        let words = (&row.direction, &row.missing, row.factor.as_ref());
+        let rule = parameter_row(&mut self.resolver, generic, &row.parameter, words);
         let value = self.value("object", &row.object);
         let inverted = self.like("inverted", row.inverted.as_ref(), value.as_ref());
         let common = self.like("common", row.common.as_ref(), value.as_ref());
-        let direction = directions(&mut self.resolver, &row.direction);
-        let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
-        let factor = match &row.factor {
-            None => Some(Ratio::ONE),
-            Some(factor) => self.resolver.ratio("factor", factor),
-        };
-        let (
-            Some((parameter, quantity)),
-            Some((value, entry)),
-            Some((to_drive, from_drive)),
-            Some(reject),
-            Some(factor),
-        ) = (parameter, value, direction, reject, factor)
-        else {
-            return;
-        };
+        let (Some(rule), Some((value, entry))) = (rule, value) else { return };
+        let quantity = rule.quantity;
         if !self.measures(&value, quantity) {
             let message = format!("the unit of {} is not a unit of {quantity}", value.object);
             return self.resolver.error(code::UNIT, row.object.span(), "object", message);
         }
-        self.writable(entry, to_drive, &row.direction, value.object);
-        if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
-            let message = "the parameter is defined twice";
-            self.resolver.error(code::TWICE, row.parameter.span(), "parameter", message);
-        }
-        let rule = ParameterRule {
-            parameter,
-            quantity,
-            value,
-            inverted,
-            common,
-            to_drive,
-            from_drive,
-            reject,
-            factor,
-        };
-        self.tables.parameters.push(rule);
+        self.writable(entry, rule.to_drive, &row.direction, value.object);
+        let known = self.tables.parameters.iter().any(|known| known.parameter == rule.parameter);
+        once(&mut self.resolver, known, "parameter", &row.parameter);
+        self.tables.parameters.push(rule.at(ParameterAt { value, inverted, common }));
     }
 
     /// An object that takes the place of another one, whose unit it has.
@@ -638,9 +567,8 @@ impl<'a> Builder<'a> {
                 return self.resolver.error(code::CONTRADICTION, row.capture.span(), "value", message);
             }
         };
-        if self.tables.captures.iter().any(|known| known.kind == kind) {
-            self.resolver.error(code::TWICE, row.capture.span(), "capture", "the capture is defined twice");
-        }
+        let known = self.tables.captures.iter().any(|known| known.kind == kind);
+        once(&mut self.resolver, known, "capture", &row.capture);
         self.tables.captures.push(CaptureRule { kind, word, pattern, latch });
     }
 
@@ -655,7 +583,7 @@ impl<'a> Builder<'a> {
             ("write_mode", Verb::WriteMode),
         ];
         let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
-        let fail = self.resolver.word("refused", &row.refused, &[("fail", true), ("continue", false)]);
+        let fail = self.resolver.word("refused", &row.refused, &FAILS);
         let modes = self.mode_codes(&row.modes);
         let (Some(kind), Some(fail)) = (self.kind(row, verb), fail) else { return };
         self.tables.steps.push(StepRule { kind, modes, fail });
@@ -678,13 +606,9 @@ impl<'a> Builder<'a> {
                 Some(StepKind::Write(held, *number.get_ref()))
             }
             (Verb::Write, None, None, None, Some(name)) => {
-                let (parameter, _) = parameter(&mut self.resolver, &self.dictionaries.generic, name)?;
-                let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
-                if rule.is_none_or(|rule| !rule.to_drive) {
-                    let message = "expected a parameter with a [[parameter]] row that goes to the drive";
-                    self.resolver.error(code::ROW_MISSING, name.span(), "parameter", message);
-                }
-                Some(StepKind::WriteParameter(parameter))
+                let generic = &self.dictionaries.generic;
+                written_parameter(&mut self.resolver, generic, &self.tables.parameters, name)
+                    .map(StepKind::WriteParameter)
             }
             (Verb::WriteCycle, Some(object), Some(exponent), None, None) => {
                 let (held, _) = self.value("object", object)?;

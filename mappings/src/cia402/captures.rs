@@ -18,7 +18,7 @@ use crate::sercos::captures::index_of;
 #[derive(Debug, Clone)]
 pub(crate) struct CaptureRule {
     pub kind: CaptureKind,
-    /// The word that tells of it, and what it shows.
+    /// The word that reports it, and what it shows.
     pub word: Value,
     pub pattern: BitPattern,
     pub latch: Option<LatchRule>,

@@ -80,7 +80,7 @@ impl Cia402Tables {
                     steps.extend(values.iter().map(|value| ObjectStep::Read { object: value.object, fail }));
                 }
                 (Plan::Ask, StepKind::ReadParameters) => {
-                    let parameters = self.parameters.iter().map(|rule| rule.value.object);
+                    let parameters = self.parameters.iter().map(|rule| rule.at.value.object);
                     for object in self.asked_signals(axis).chain(parameters) {
                         let step = ObjectStep::Read { object, fail };
                         if !steps.contains(&step) {
@@ -163,10 +163,10 @@ impl Cia402Tables {
         let Some(rule) = self.parameters.iter().find(|rule| rule.parameter == parameter) else {
             return Ok(None);
         };
-        let (object, bytes) = match (self.entry(rule, axis, facts)?, &rule.common) {
+        let (object, bytes) = match (self.entry(rule, axis, facts)?, &rule.at.common) {
             (Some(entry), _) => {
-                let inverted = rule.inverted.as_ref().filter(|_| self.inverts_positions(facts));
-                let object = inverted.unwrap_or(&rule.value).object;
+                let inverted = rule.at.inverted.as_ref().filter(|_| self.inverts_positions(facts));
+                let object = inverted.unwrap_or(&rule.at.value).object;
                 (object, octets(object, &entry, generic)?)
             }
             (None, Some(common)) => (common.object, self.least_of(common, axis, facts)?),
@@ -184,8 +184,9 @@ impl Cia402Tables {
     ) -> Result<Option<Vec<u8>>, Cia402Error> {
         let mut least: Option<(u64, Option<Vec<u8>>)> = None;
         for (parameter, generic) in &axis.parameters {
-            let falls =
-                |rule: &&ParameterRule| rule.parameter == *parameter && rule.common.as_ref() == Some(common);
+            let falls = |rule: &&ParameterRule| {
+                rule.parameter == *parameter && rule.at.common.as_ref() == Some(common)
+            };
             let Some(rule) = self.parameters.iter().find(falls) else { continue };
             if self.entry(rule, axis, facts)?.is_some() {
                 continue;

@@ -11,7 +11,8 @@ use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
 use super::{
-    Cia402Tables, DriveMode, FULL_RANGE, ModeRule, Object, ParameterRule, ProcedureRule, SignalRule, Value,
+    Cia402Tables, DriveMode, FULL_RANGE, ModeRule, Object, ParameterAt, ParameterRule, ProcedureRule,
+    SignalRule, Value,
 };
 use crate::capture_program::{CaptureMode, Place};
 use crate::dictionary::Cia402Dictionary;
@@ -19,6 +20,7 @@ use crate::drive_program::{
     DriveProgram, FaultRow, Handshake, MAX_MODES, MODE_SHIFT, ModeEntry, ModeProcedure,
     PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
+use crate::drive_rows::Full;
 use crate::item::Item;
 use crate::sercos::scaling::AxisUnits;
 
@@ -48,7 +50,7 @@ pub struct Cia402Axis {
     pub acknowledges: Option<bool>,
     /// Whether it tells by bit 4 that its power stage is supplied; `None`: as the tables say.
     pub tells_voltage: Option<bool>,
-    /// Its modes of operation, where it does not tell them by 6502, or tells wrong ones; `None`: as the tables say.
+    /// Its modes of operation, where it does not report them by 6502, or reports wrong ones; `None`: as the tables say.
     pub drive_modes: Option<Vec<i8>>,
     /// Values that are not wanted in every cycle; those without which a mode does not work are there nevertheless.
     pub left_out: Vec<Signal>,
@@ -131,7 +133,7 @@ pub enum Cia402Error {
         /// The unit.
         unit: String,
     },
-    /// The drive has told nothing that a unit follows from, and the configuration does not say it either.
+    /// The drive has reported nothing that a unit follows from, and the configuration does not say it either.
     #[error(
         "the size of a count of {0} is not known: expected a factor group in the drive, or `counts` in the configuration"
     )]
@@ -157,8 +159,8 @@ pub enum Cia402Error {
     #[error("expected an axis from 0 to 7 of a device, got {0}")]
     Axis(u16),
     /// A table does not fit the program.
-    #[error("{0} does not fit the program of an axis")]
-    Full(&'static str),
+    #[error(transparent)]
+    Full(#[from] Full),
 }
 
 /// Signals, and where they stand in their telegram.
@@ -259,7 +261,7 @@ impl Cia402Tables {
         u32::try_from(facts.integer(self.words.modes_supported, Width::U32)?).ok()
     }
 
-    /// What has to be tried of a drive that does not tell its modes of operation, as one without 6502 and one with a 6502 of 0.
+    /// What has to be tried of a drive that does not report its modes of operation, as one without 6502 and one with a 6502 of 0.
     pub(crate) fn modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
         if let Some(codes) = axis.drive_modes.as_ref().or(self.drive.modes.as_ref()) {
             self.has_modes(facts, codes.iter().copied());
@@ -352,38 +354,21 @@ impl Cia402Tables {
         program.mode_octets = Some([WORD_BYTES, WORD_BYTES]);
         program.shares_target = shares_target;
         for field in fields {
-            let full = match field.signal.is_command() {
-                true => program.command.push(field),
-                false => program.feedback.push(field),
-            };
-            full.map_err(|_| Cia402Error::Full("the cyclic values"))?;
+            program.add_field(field)?;
         }
         self.mode_entries(&chosen, &self.procedures_of(axis, facts), &mut program)?;
         for (rule, at) in &places {
             let object = rule.value.object;
             if object != self.words.status && self.status.iter().any(|rule| rule.object == object) {
                 let place = Place { item: item(object)?, width: rule.value.width, offset: Some(*at) };
-                program
-                    .status_words
-                    .try_push(place)
-                    .map_err(|_| Cia402Error::Full("the words of status bits"))?;
+                program.status_words.try_push(place).map_err(|_| Full("the words of status bits"))?;
             }
         }
         self.words(axis, &chosen, facts, &mut program)?;
         program.captures = self.capture_program(axis, facts, &program.telegram, &places)?;
         let error = item(self.words.error)?;
-        for row in &self.faults {
-            let row = FaultRow { word: error, ..*row };
-            program.faults.try_push(row).map_err(|_| Cia402Error::Full("the table of faults"))?;
-        }
-        for rule in &self.parameters {
-            match self.entry(rule, axis, facts)? {
-                Some(entry) => program.parameters.push(entry),
-                None if rule.reject => program.rejected.push(rule.parameter),
-                None => {}
-            }
-        }
-        program.parameters.sort_by_key(|entry| entry.parameter);
+        program.add_faults(self.faults.iter().map(|row| FaultRow { word: error, ..*row }))?;
+        program.add_parameters(&self.parameters, |rule| self.entry(rule, axis, facts))?;
         Ok(program)
     }
 
@@ -490,23 +475,15 @@ impl Cia402Tables {
                 needs: CommandSet::empty(),
                 carried: CommandSet::empty(),
             };
-        let full = |_| Cia402Error::Full("the table of modes");
         for (rule, mode) in chosen {
-            let there = |signal: &&Signal| program.command.fields().any(|field| field.signal == **signal);
-            let needed = |signal: &&Signal| self.signal(**signal, mode.code).is_some_and(|row| row.refuse);
-            let set =
-                |signals: Vec<&Signal>| signals.into_iter().map(|signal| signal.command_bit()).collect();
-            let entry = ModeEntry {
-                needs: set(rule.command.iter().filter(needed).collect()),
-                carried: set(rule.command.iter().filter(there).collect()),
-                ..entry(rule.selection, mode, rule.control, rule.handshake)
-            };
-            program.modes.try_push(entry).map_err(full)?;
+            let refuse = |signal| self.signal(signal, mode.code).is_some_and(|row| row.refuse);
+            let (needs, carried) = program.command_sets(&rule.command, refuse);
+            let entry = entry(rule.selection, mode, rule.control, rule.handshake);
+            program.add_mode(ModeEntry { needs, carried, ..entry })?;
         }
         for (rule, mode) in procedures {
             let start = Handshake { ask: rule.start, taken: rule.done };
-            let entry = entry(rule.selection, mode, BitPattern::default(), Some(start));
-            program.modes.try_push(entry).map_err(full)?;
+            program.add_mode(entry(rule.selection, mode, BitPattern::default(), Some(start)))?;
             let mut failed = [None; PROCEDURE_FAILURES_MAX];
             for (place, pattern) in failed.iter_mut().zip(&rule.failed) {
                 *place = Some(*pattern);
@@ -517,9 +494,7 @@ impl Cia402Tables {
                 failed,
                 time_out: rule.time_out,
             });
-            let procedure = Procedure { selection: rule.selection, led_in: None, by };
-            let full = |_| Cia402Error::Full("the table of procedures");
-            program.procedures.try_push(procedure).map_err(full)?;
+            program.add_procedure(Procedure { selection: rule.selection, led_in: None, by })?;
         }
         Ok(())
     }
@@ -573,7 +548,7 @@ impl Cia402Tables {
             match rule.when {
                 Some(when) => {
                     let row = StepRow { action: rule.action, when, control: rule.pattern };
-                    program.steps.try_push(row).map_err(|_| Cia402Error::Full("the table of actions"))?;
+                    program.steps.try_push(row).map_err(|_| Full("the table of actions"))?;
                 }
                 None => program.actions.set(rule.action, rule.pattern),
             }
@@ -584,21 +559,20 @@ impl Cia402Tables {
                 // A drive that carries out something by itself need not follow command values.
                 let led = rule.drives.follows == Some(true) || program.led_reports.push(pattern, rule.report);
                 if !led || !program.reports.push(pattern, rule.report) {
-                    return Err(Cia402Error::Full("the table of reports"));
+                    return Err(Full("the table of reports").into());
                 }
             }
         }
         for rule in self.status.iter().filter(|rule| rule.drives.include(tells)) {
             let word = (rule.object != self.words.status).then(|| axis.item(rule.object)).flatten();
-            if word.is_some_and(|word| !program.status_words.iter().any(|place: &Place| place.item == word)) {
+            if !program.carries_word(word) {
                 continue;
             }
             let bit = if self.inverts_positions(facts) { rule.inverted } else { rule.bit };
-            for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
-                let row = StatusRow { word, pattern, bit };
-                program.status.try_push(row).map_err(|_| Cia402Error::Full("the table of status bits"))?;
-            }
             program.known_status |= bit;
+            for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
+                program.add_status(StatusRow { word, pattern, bit })?;
+            }
         }
         Ok(())
     }
@@ -610,8 +584,8 @@ impl Cia402Tables {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Option<ParameterEntry>, Cia402Error> {
-        let inverted = rule.inverted.as_ref().filter(|_| self.inverts_positions(facts));
-        self.entry_at(inverted.unwrap_or(&rule.value), rule, axis, facts)
+        let inverted = rule.at.inverted.as_ref().filter(|_| self.inverts_positions(facts));
+        self.entry_at(inverted.unwrap_or(&rule.at.value), rule, axis, facts)
     }
 
     /// The entry of a parameter in this object.
@@ -645,18 +619,8 @@ impl Cia402Tables {
     /// A rule that only converts a value, both ways, to the quantity that its unit measures; for worked examples.
     pub(crate) fn plain_rule(&self, value: Value) -> ParameterRule {
         let scaling = self.scalings.iter().find(|rule| rule.unit == value.unit);
-        ParameterRule {
-            // The number of the parameter does not matter for the conversion.
-            parameter: Parameter::default(),
-            quantity: scaling.map_or(Quantity::None, |rule| rule.quantity),
-            value,
-            inverted: None,
-            common: None,
-            to_drive: true,
-            from_drive: true,
-            reject: false,
-            factor: Ratio::ONE,
-        }
+        let quantity = scaling.map_or(Quantity::None, |rule| rule.quantity);
+        ParameterRule::plain(quantity, ParameterAt { value, inverted: None, common: None })
     }
 }
 

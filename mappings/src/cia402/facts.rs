@@ -68,6 +68,12 @@ impl ObjectFacts {
         self.facts.get(&object).is_some_and(|fact| fact.missing)
     }
 
+    /// The bytes that the drive has given.
+    #[must_use]
+    pub fn data(&self, object: Object) -> Option<&[u8]> {
+        self.facts.get(&object)?.data.as_deref()
+    }
+
     /// The value, if the drive has given it in the length that belongs to it.
     pub(super) fn number(&self, value: &Value) -> Option<i64> {
         self.integer(value.object, value.width)

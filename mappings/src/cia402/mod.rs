@@ -29,6 +29,7 @@ pub use self::facts::{DriveIdentity, ObjectFacts};
 
 use self::captures::CaptureRule;
 use super::drive_program::{FaultRow, Handshake, MAX_MODES};
+use super::drive_rows::FixedUnit;
 use super::item::Object;
 
 /// Wraps of a position: the range of its 32 bits.
@@ -41,13 +42,6 @@ pub(super) struct Value {
     pub width: Width,
     /// Unit as the dictionary names it; empty without.
     pub unit: String,
-}
-
-#[derive(Debug, Clone)]
-pub(super) struct FixedUnit {
-    pub unit: String,
-    pub quantity: Quantity,
-    pub ratio: Ratio,
 }
 
 /// What a count is.
@@ -182,20 +176,17 @@ pub(super) struct StatusRule {
     pub inverted: StatusBits,
 }
 
+/// Where a drive keeps a parameter.
 #[derive(Debug, Clone)]
-pub(super) struct ParameterRule {
-    pub parameter: Parameter,
-    pub quantity: Quantity,
+pub(crate) struct ParameterAt {
     pub value: Value,
     /// The same in a drive that inverts its positions, where it is another one.
     pub inverted: Option<Value>,
     /// What limits both directions in a drive without it.
     pub common: Option<Value>,
-    pub to_drive: bool,
-    pub from_drive: bool,
-    pub reject: bool,
-    pub factor: Ratio,
 }
+
+pub(crate) type ParameterRule = super::drive_rows::ParameterRule<ParameterAt>;
 
 #[derive(Debug, Clone)]
 pub(super) enum StepKind {
@@ -272,7 +263,7 @@ impl Cia402Tables {
         }
     }
 
-    /// Whether bit 4 of a drive of which the configuration says nothing tells that there is power.
+    /// Whether bit 4 of a drive of which the configuration says nothing reports that there is power.
     #[cfg(test)]
     pub(super) fn drive_tells_voltage(&self) -> bool {
         self.drive.tells.voltage

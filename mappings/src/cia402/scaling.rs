@@ -12,7 +12,7 @@ impl Cia402Tables {
     /// Generic units of `quantity` in one count of a value.
     ///
     /// # Errors
-    /// The unit is not known, or the drive has told nothing that it follows from.
+    /// The unit is not known, or the drive has reported nothing that it follows from.
     pub(super) fn count(
         &self,
         value: &Value,

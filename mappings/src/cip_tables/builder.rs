@@ -5,7 +5,7 @@ use profile_generic::capture::CaptureStatus;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
-use profile_generic::parameter::ParameterType;
+use profile_generic::parameter::{Access as Write, ParameterType};
 use profile_generic::quantity::Quantity;
 use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
@@ -21,7 +21,8 @@ use crate::compile_cip::{
     StatusRule,
 };
 use crate::device_link::DRIVE_ACTIONS;
-use crate::dictionary::{Access, CipAttribute, Dictionaries, quantity};
+use crate::dictionary::{Access, CipAttribute, Dictionaries, GenericParameter, quantity};
+use crate::drive_rows::{REJECTED, never_shadowed};
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{
@@ -317,7 +318,7 @@ impl Builder<'_> {
     ) {
         for (name, _) in names.zip(seen).filter(|(_, seen)| !**seen) {
             let message = format!("expected a row for {} {name}, got none", key.replace('_', " "));
-            self.resolver.error(code::ROW_MISSING, rows.mapping.span(), key, message);
+            self.resolver.lacks(code::ROW_MISSING, rows.mapping.span(), key, name, message);
         }
     }
 
@@ -630,7 +631,7 @@ impl Builder<'_> {
             (Some(name), None, None) => self.parameter(row, attribute, name),
             (None, Some(name), None) => self.signal_attribute(attribute, name),
             (None, None, Some(name)) => {
-                let value = row.value.or(attribute.default).unwrap_or(0);
+                let value = self.constant(row, attribute, name);
                 let words = [
                     ("device", Served::Device),
                     ("connection", Served::Connection),
@@ -654,8 +655,28 @@ impl Builder<'_> {
                 "the attribute is defined twice",
             );
         }
-        let range = row.range.map(|[low, high]| (low, high));
+        let range = match served {
+            // What never changes can only be set to what it is.
+            Served::Constant(value) => Some((value, value)),
+            _ => row.range.map(|[low, high]| (i64::from(low), i64::from(high))),
+        };
         self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
+    }
+
+    /// The value of a constant; 0 for anything else.
+    fn constant(&mut self, row: &CipAttributeRow, attribute: &CipAttribute, name: &Name) -> i64 {
+        let value = row.value.or(attribute.default);
+        if name.get_ref() == "constant" {
+            if value.is_none() {
+                let message = "expected the `value` of a constant, got none";
+                self.resolver.error(code::MISSING_KEY, name.span(), "value", message);
+            }
+            if row.range.is_some() {
+                let message = "expected no `range` for a constant: it can only be set to what it is";
+                self.resolver.error(code::CONTRADICTION, name.span(), "range", message);
+            }
+        }
+        value.unwrap_or(0)
     }
 
     fn reject(&mut self, row: &RejectRow) {
@@ -703,12 +724,37 @@ impl Builder<'_> {
             );
             return None;
         };
-        let reject = self.resolver.word("missing", missing, &[("shadow", false), ("reject", true)])?;
+        let reject = self.resolver.word("missing", missing, &REJECTED)?;
+        if parameter.parameter.is_of_vendor() {
+            never_shadowed(&mut self.resolver, reject, missing);
+            self.settable(attribute, parameter, name);
+        }
         let Some(unit) = self.tables.unit(&attribute.unit, parameter.quantity) else {
             self.resolver.error(code::UNIT, name.span(), "parameter", no_unit(attribute, parameter.quantity));
             return None;
         };
-        Some(Served::Parameter { parameter: parameter.parameter, unit, reject })
+        Some(Served::Parameter { parameter: parameter.parameter, unit, reject, range: parameter.range })
+    }
+
+    /// The attribute of a vendor's parameter is set only where and when the drive takes a value.
+    fn settable(&mut self, attribute: &CipAttribute, parameter: &GenericParameter, name: &Name) {
+        let message = match (attribute.access, parameter.access) {
+            (Access::Get, _) | (Access::Set, Write::Write) => None,
+            (Access::Set, Write::WriteWhileDisabled) if !attribute.running => None,
+            (Access::Set, Write::WriteWhileDisabled) => Some(
+                "which is not to be written while the drive has torque: expected an attribute with `running = false`",
+            ),
+            (Access::Set, Write::Read) => {
+                Some("which is only read: expected an attribute with `access = \"get\"`")
+            }
+            (Access::SetCyclic, _) => {
+                Some("which no update carries: expected an attribute with `access = \"get\"` or `\"set\"`")
+            }
+        };
+        if let Some(message) = message {
+            let message = format!("{} is {}, {message}", attribute.name, parameter.name);
+            self.resolver.error(code::READ_ONLY, name.span(), "parameter", message);
+        }
     }
 
     fn signal_attribute(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {

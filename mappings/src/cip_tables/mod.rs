@@ -159,6 +159,8 @@ pub enum Served {
         unit: CipUnit,
         /// Whether a drive without the parameter makes the attribute unsupported; it is a shadow otherwise.
         reject: bool,
+        /// Least and greatest value that may be set, in the generic unit.
+        range: Option<(i64, i64)>,
     },
 }
 
@@ -170,7 +172,7 @@ pub struct ServedAttribute {
     /// Who answers for it.
     pub served: Served,
     /// Least and greatest value that may be set.
-    pub range: Option<(i32, i32)>,
+    pub range: Option<(i64, i64)>,
 }
 
 /// Who finds a fault.

@@ -29,6 +29,7 @@ use super::cip_tables::{CipTables, Served};
 use super::compile_cip::CipFault;
 use super::dictionary::CipType;
 use super::drive_program::{DriveProgram, FaultRow, MODE_SHIFT, ModeEntry, StatusRow, StepRow, Telegram};
+use super::drive_rows::Full;
 use super::item::Item;
 use super::{Cia402Tables, Mapping};
 
@@ -134,8 +135,8 @@ pub enum DevicenetError {
     #[error("the scaling does not fit 64 bits")]
     Overflow,
     /// A table does not fit the program.
-    #[error("{0} does not fit the program of an axis")]
-    Full(&'static str),
+    #[error(transparent)]
+    Full(#[from] Full),
 }
 
 impl Mapping {
@@ -258,17 +259,8 @@ const fn status_of(state: DriveState) -> StatusBits {
 }
 
 /// Rows for status bits, one for each bit.
-fn push_status(
-    program: &mut DriveProgram,
-    pattern: BitPattern,
-    bits: StatusBits,
-) -> Result<(), DevicenetError> {
-    for bit in bits.iter() {
-        let row = StatusRow { word: None, pattern, bit };
-        program.status.try_push(row).map_err(|_| DevicenetError::Full("the table of status bits"))?;
-        program.known_status |= bit;
-    }
-    Ok(())
+fn push_status(program: &mut DriveProgram, pattern: BitPattern, bits: StatusBits) -> Result<(), Full> {
+    bits.iter().try_for_each(|bit| program.add_status(StatusRow { word: None, pattern, bit }))
 }
 
 /// What is asked of the drive for an action, while it is in a state. The request stands only as long as it changes something;
@@ -298,11 +290,10 @@ const fn may_run(action: Action) -> bool {
 fn motion_program(tables: &CipTables, axis: &MotionAxis) -> Result<DriveProgram, DevicenetError> {
     let mut program = DriveProgram::new(Telegram::default(), false);
     program.mode_octets = Some([mode_at(); 2]);
-    let full = |_| DevicenetError::Full("the cyclic values");
     let mut carried = CommandSet::empty();
     for mode in &axis.modes {
         let (signal, _) = Signal::leading(*mode).ok_or(DevicenetError::Mode((*mode).into()))?;
-        program.command.push(field(tables, &axis.scaling, signal)?).map_err(full)?;
+        program.add_field(field(tables, &axis.scaling, signal)?)?;
         carried |= signal.command_bit();
     }
     if carried.is_empty() {
@@ -310,11 +301,10 @@ fn motion_program(tables: &CipTables, axis: &MotionAxis) -> Result<DriveProgram,
     }
     for mode in &axis.modes {
         let own = Signal::leading(*mode).map_or(CommandSet::empty(), |(signal, _)| signal.command_bit());
-        let entry = mode_entry(control_mode(tables, *mode)?, *mode, own);
-        program.modes.try_push(entry).map_err(|_| DevicenetError::Full("the table of modes"))?;
+        program.add_mode(mode_entry(control_mode(tables, *mode)?, *mode, own))?;
     }
     for signal in [Signal::PositionActual, Signal::VelocityActual] {
-        program.feedback.push(field(tables, &axis.scaling, signal)?).map_err(full)?;
+        program.add_field(field(tables, &axis.scaling, signal)?)?;
     }
     let axis_state = |state: DriveState| {
         let found = DriveState::ALL.iter().zip(&tables.states).find(|(known, _)| **known == state);
@@ -329,7 +319,7 @@ fn motion_program(tables: &CipTables, axis: &MotionAxis) -> Result<DriveProgram,
     let known = DriveState::ALL.iter().filter_map(|state| Some((*state, report_of(*state)?)));
     reports.extend(known.map(|(state, report)| (shown(state), report)));
     if !reports.into_iter().all(|(pattern, report)| program.reports.push(pattern, report)) {
-        return Err(DevicenetError::Full("the table of reports"));
+        return Err(Full("the table of reports").into());
     }
     for state in DriveState::ALL {
         push_status(&mut program, shown(*state), status_of(*state))?;
@@ -347,7 +337,7 @@ fn motion_program(tables: &CipTables, axis: &MotionAxis) -> Result<DriveProgram,
         let row = tables.requests.iter().find(|row| row.request == Some(request));
         let code = row.ok_or(DevicenetError::Request)?.axis_control;
         let step = StepRow { action, when: shown(state), control: word(action, code) };
-        program.steps.try_push(step).map_err(|_| DevicenetError::Full("the table of actions"))?;
+        program.steps.try_push(step).map_err(|_| Full("the table of actions"))?;
     }
     // A fault of the node goes by Node Control, for which the same request stands.
     let reset = tables.requests.iter().find(|row| row.request == Some(Request::FaultReset));
@@ -357,27 +347,20 @@ fn motion_program(tables: &CipTables, axis: &MotionAxis) -> Result<DriveProgram,
         when: BitPattern::new(node_fault, node_fault),
         control: word(Action::ResetFault, code),
     };
-    program.steps.try_push(step).map_err(|_| DevicenetError::Full("the table of actions"))?;
+    program.steps.try_push(step).map_err(|_| Full("the table of actions"))?;
     let item = Item::attribute(motion::CLASS, motion::AXIS_FAULT);
     for (cause, fault) in &tables.faults {
         if let CipFault::Axis { fault_type, code, .. } = *fault {
             let value = u32::from(code) | u32::from(fault_type) << 8;
-            push_fault(&mut program, item, BitPattern::new(0xFFFF, value), *cause)?;
+            program.add_faults([stopped(item, BitPattern::new(0xFFFF, value), *cause)])?;
         }
     }
     Ok(program)
 }
 
 /// A fault of the drive that has stopped it: it is none that only warns.
-fn push_fault(
-    program: &mut DriveProgram,
-    word: Item,
-    pattern: BitPattern,
-    cause: FaultCause,
-) -> Result<(), DevicenetError> {
-    let reaction = cause.default_reaction().max(Reaction::DecelerateAndDisable);
-    let row = FaultRow { word, pattern, cause, reaction };
-    program.faults.try_push(row).map_err(|_| DevicenetError::Full("the table of faults"))
+fn stopped(word: Item, pattern: BitPattern, cause: FaultCause) -> FaultRow {
+    FaultRow { word, pattern, cause, reaction: cause.default_reaction().max(Reaction::DecelerateAndDisable) }
 }
 
 fn speed_program(
@@ -392,12 +375,11 @@ fn speed_program(
     let to_drive = Conversion::new(axis.speed.inverse().ok_or(DevicenetError::Overflow)?);
     // The basic assembly has no reverse: such a command cannot be carried out.
     let to_drive = if axis.extended { to_drive } else { to_drive.within(0, i64::from(i16::MAX)) };
-    let full = |_| DevicenetError::Full("the cyclic values");
-    program.command.push(value(Signal::VelocityCommand, to_drive)).map_err(full)?;
-    program.feedback.push(value(Signal::VelocityActual, Conversion::new(axis.speed))).map_err(full)?;
+    program.add_field(value(Signal::VelocityCommand, to_drive))?;
+    program.add_field(value(Signal::VelocityActual, Conversion::new(axis.speed)))?;
     let velocity = OperatingMode::Velocity;
-    let entry = mode_entry(control_mode(cip, velocity)?, velocity, Signal::VelocityCommand.command_bit());
-    program.modes.try_push(entry).map_err(|_| DevicenetError::Full("the table of modes"))?;
+    let carried = Signal::VelocityCommand.command_bit();
+    program.add_mode(mode_entry(control_mode(cip, velocity)?, velocity, carried))?;
     for action in
         Action::ALL.iter().copied().filter(|action| !matches!(action, Action::None | Action::Reject))
     {
@@ -410,7 +392,7 @@ fn speed_program(
     }
     for (pattern, report) in if axis.extended { extended_reports() } else { basic_reports() } {
         if !program.reports.push(pattern, report) {
-            return Err(DevicenetError::Full("the table of reports"));
+            return Err(Full("the table of reports").into());
         }
         push_status(&mut program, pattern, speed_status_of(report))?;
     }
@@ -421,17 +403,11 @@ fn speed_program(
         // What it warns of has codes of the vendor.
         let word = Item::attribute(speed::CLASS_SUPERVISOR, speed::WARNING_CODE);
         let (cause, reaction) = (FaultCause::DRIVE_WARNING, Reaction::Alarm);
-        let row = FaultRow { word, pattern: BitPattern::default(), cause, reaction };
-        program.faults.try_push(row).map_err(|_| DevicenetError::Full("the table of faults"))?;
+        program.add_faults([FaultRow { word, pattern: BitPattern::default(), cause, reaction }])?;
     }
     // The codes of FaultCode are those of the emergency object of CiA 402, both from DRIVECOM.
-    for row in cia402.faults() {
-        let item = Item::attribute(speed::CLASS_SUPERVISOR, speed::FAULT_CODE);
-        program
-            .faults
-            .try_push(FaultRow { word: item, ..*row })
-            .map_err(|_| DevicenetError::Full("the table of faults"))?;
-    }
+    let word = Item::attribute(speed::CLASS_SUPERVISOR, speed::FAULT_CODE);
+    program.add_faults(cia402.faults().iter().map(|row| FaultRow { word, ..*row }))?;
     Ok(program)
 }
 

@@ -85,7 +85,7 @@ pub struct NetworkObject {
     pub note: String,
 }
 
-/// The networks as they are built in, for whoever has no tables loaded. Empty if they are faulty, which a test excludes.
+/// The networks as they are built in, for callers without loaded tables. Empty if they are faulty, which a test excludes.
 pub fn networks() -> &'static [CipNetwork] {
     static NETWORKS: LazyLock<Vec<CipNetwork>> = LazyLock::new(|| {
         let mut errors = Findings::default();

@@ -10,6 +10,7 @@ mod cip_faults;
 mod cip_networks;
 mod cip_services;
 mod documents;
+mod generic;
 mod sercos;
 mod sercos_bits;
 mod sercos_codes;
@@ -27,112 +28,20 @@ pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use cip_networks::{CipNetwork, ConnectionDataFormat, ETHERNET_IP, NetworkObject, networks};
 pub use cip_services::CipService;
 pub use documents::{Confidence, Document, Documents, Trust};
+pub use generic::{GenericDictionary, GenericParameter};
 pub use sercos::SercosDictionary;
 pub use sercos_bits::{Field, FieldValue, Layout, Pattern, Word};
 pub use sercos_codes::{CodeGroup, CodeSet, GroupKind, NamedCode};
 pub use sercos_idns::{IdnFormat, IdnPart, IdnUnit, SercosIdn};
 pub use sercos_terms::{ScaledQuantity, SercosTerms};
 
-use profile_generic::image::Signal;
-use profile_generic::parameter::{Parameter, ParameterRow};
 use profile_generic::quantity::Quantity;
 
-use super::format::{GenericFile, Name};
-use super::load::{Parsed, Tables};
+use super::format::Name;
+use super::load::Tables;
 use super::resolver::Resolver;
 use crate::finding::Findings;
 use crate::finding::registry as code;
-
-/// Signals and parameters of the generic model, as the generic dictionary lists them. The signals are the fields of the
-/// process image, and the constants of the parameters are generated from the shipped dictionary: another one that says
-/// otherwise is refused.
-#[derive(Debug, Clone, Default)]
-pub struct GenericDictionary {
-    signals: Vec<Signal>,
-    parameters: Vec<&'static ParameterRow>,
-}
-
-impl GenericDictionary {
-    fn resolve(file: &Parsed<GenericFile>, errors: &mut Findings) -> Self {
-        let mut resolver = Resolver::new(&file.text, errors);
-        let rows = &file.rows;
-        resolver.head(&rows.format, "profile", &rows.profile, "generic");
-        let mut dictionary = Self::default();
-        for row in &rows.signal {
-            let signals = Signal::ALL.iter().map(|signal| signal.name());
-            let what = "a signal of the generic model";
-            let Some(signal) = resolver.name("name", &row.name, what, Signal::parse, signals) else {
-                continue;
-            };
-            let access = if signal.is_command() { "command" } else { "feedback" };
-            same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
-            same(&mut resolver, "access", &row.access, access);
-            if dictionary.signals.contains(&signal) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the signal is defined twice");
-            }
-            dictionary.signals.push(signal);
-        }
-        for row in &rows.parameter {
-            let names = Parameter::NAMED.iter().map(|(_, name)| *name);
-            let what = "a parameter of the generic model";
-            let find = |name: &str| Parameter::from_name(name).and_then(Parameter::row);
-            let Some(known) = resolver.name("name", &row.name, what, find, names) else { continue };
-            if let Some(number) = row.number.as_ref().filter(|number| *number.get_ref() != known.parameter.0)
-            {
-                let (expected, got) = (known.parameter.0, number.get_ref());
-                let message = format!("expected 0x{expected:04X}, got 0x{got:04X}");
-                resolver.error(code::CONTRADICTS_CATALOGUE, number.span(), "number", message);
-            }
-            if let Some(element) = &row.element {
-                same(&mut resolver, "element", element, known.element.name());
-            }
-            if let Some(about) = &row.about {
-                same(&mut resolver, "about", about, known.description);
-            }
-            same(&mut resolver, "quantity", &row.quantity, known.quantity.name());
-            same(&mut resolver, "type", &row.data_type, known.kind.name());
-            same(&mut resolver, "access", &row.access, known.access.name());
-            if dictionary.parameters.iter().any(|other| other.parameter == known.parameter) {
-                resolver.error(code::TWICE, row.name.span(), "name", "the parameter is defined twice");
-            }
-            dictionary.parameters.push(known);
-        }
-        dictionary
-    }
-
-    /// All signals.
-    pub fn signals(&self) -> &[Signal] {
-        &self.signals
-    }
-
-    /// All parameters.
-    pub fn parameters(&self) -> &[&'static ParameterRow] {
-        &self.parameters
-    }
-
-    /// The parameter with this name.
-    pub fn parameter(&self, name: &str) -> Option<&'static ParameterRow> {
-        let row = Parameter::from_name(name)?.row()?;
-        self.parameters.iter().copied().find(|known| known.parameter == row.parameter)
-    }
-
-    /// The names of all parameters.
-    pub fn names(&self) -> impl Iterator<Item = &'static str> + Clone + '_ {
-        self.parameters.iter().filter_map(|row| row.parameter.name())
-    }
-}
-
-/// Checks that a dictionary says what the program was built with.
-fn same(resolver: &mut Resolver<'_>, key: &str, name: &Name, expected: &str) {
-    if name.get_ref() != expected {
-        resolver.error(
-            code::CONTRADICTS_CATALOGUE,
-            name.span(),
-            key,
-            format!("expected `{expected}`, got `{}`", name.get_ref()),
-        );
-    }
-}
 
 /// A generic quantity by name.
 pub(super) fn quantity(resolver: &mut Resolver<'_>, name: &Name) -> Option<Quantity> {

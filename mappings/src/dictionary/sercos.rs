@@ -8,7 +8,6 @@ use super::sercos_codes::{CodeSet, resolve_codes};
 use super::sercos_idns::{IdnPart, SercosIdn, parse_idn, resolve_idns};
 use super::sercos_terms::SercosTerms;
 use crate::finding::Findings;
-use crate::finding::registry as code;
 use crate::format::{Name, SercosTermFile};
 use crate::load::{Parsed, Tables};
 use crate::resolver::Resolver;
@@ -111,12 +110,10 @@ impl SercosDictionary {
         let (idn, _) = parse_idn(key, name, resolver)?;
         let row = self.idn(idn);
         if row.is_none() {
-            resolver.error(
-                code::UNKNOWN_NAME,
-                name.span(),
-                key,
-                format!("expected an IDN of the dictionary, got {}", name.get_ref()),
-            );
+            // Standard numbers lie next to each other: only those of vendors can be told apart by a letter.
+            let vendors: Vec<String> =
+                self.idns.iter().map(SercosIdn::number).filter(|number| number.starts_with("P-")).collect();
+            resolver.unknown_idn(key, name, vendors.iter().map(String::as_str));
         }
         row
     }

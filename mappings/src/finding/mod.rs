@@ -4,10 +4,12 @@
 //! with its line. Whoever reads a file makes [`Problem`]s of it, by their place in the text; [`Findings`] collects them.
 
 mod closest;
+mod consequences;
 mod document;
 mod json;
 pub mod registry;
 mod render;
+mod sarif;
 mod source;
 mod spanned;
 mod toml_error;
@@ -17,9 +19,10 @@ use std::ops::Range;
 use std::path::Path;
 
 pub use closest::closest;
-pub use document::{deserialize, tree};
+pub use document::{Hint, Partial, deserialize, partial, tree};
 pub use json::report as json_report;
 pub use registry::{Code, Severity};
+pub use sarif::report as sarif_report;
 pub use source::Source;
 pub use spanned::Spanned;
 
@@ -28,6 +31,12 @@ use registry as code;
 /// The most findings that are kept of one look: nobody reads more, and a file that is wrong throughout must not take
 /// memory and time without end.
 pub const FINDINGS_MAX: usize = 500;
+
+/// So many times the same is shown once.
+const REPEATED_MIN: usize = 4;
+
+/// The most other places that are named of it.
+const PLACES_MAX: usize = 4;
 
 /// Something that is wrong, by its place in a text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,13 +55,27 @@ pub struct Problem {
     pub help: String,
     /// Another place that explains this one, and what is there.
     pub related: Option<(Range<usize>, String)>,
+    /// What it is about: the value that a row binds; empty when that is of no account.
+    pub about: String,
+    /// The name that nothing defines; empty when none is lacking.
+    pub lacks: String,
 }
 
 impl Problem {
     /// A problem that is yet to be described.
     pub fn new(code: Code, span: Range<usize>) -> Self {
         let none = String::new;
-        Self { code, span, key: none(), title: none(), expected: none(), help: none(), related: None }
+        Self {
+            code,
+            span,
+            key: none(),
+            title: none(),
+            expected: none(),
+            help: none(),
+            related: None,
+            about: none(),
+            lacks: none(),
+        }
     }
 
     /// The key whose value is wrong.
@@ -83,6 +106,18 @@ impl Problem {
     #[must_use]
     pub fn related(self, span: Range<usize>, what: impl Into<String>) -> Self {
         Self { related: Some((span, what.into())), ..self }
+    }
+
+    /// The value that the row binds. An error that explains others about the same value hides them.
+    #[must_use]
+    pub fn about(self, name: impl Into<String>) -> Self {
+        Self { about: name.into(), ..self }
+    }
+
+    /// The name that nothing defines. An error in the row that defines it hides this one.
+    #[must_use]
+    pub fn lacks(self, name: impl Into<String>) -> Self {
+        Self { lacks: name.into(), ..self }
     }
 
     /// What is wrong, in words.
@@ -131,7 +166,9 @@ pub struct Finding {
     pub help: String,
     /// Another place that explains this one.
     pub related: Option<Related>,
+    origin: consequences::Origin,
     rendered: String,
+    styled: String,
 }
 
 impl Finding {
@@ -139,6 +176,19 @@ impl Finding {
     #[must_use]
     pub fn severity(&self) -> Severity {
         self.code.severity()
+    }
+
+    /// The same text with colours, for a terminal.
+    #[must_use]
+    pub fn styled(&self) -> &str {
+        &self.styled
+    }
+
+    /// Whether it asks for something to be done: an error, a warning, or a note about a row that a user has written.
+    #[must_use]
+    pub fn asks(&self) -> bool {
+        let fact = registry::FACTS.contains(&self.code);
+        self.severity() != Severity::Note || !fact && !self.file.starts_with(crate::load::SHIPPED)
     }
 
     fn order(&self) -> (&str, usize, usize, Code, &str) {
@@ -168,7 +218,7 @@ impl Findings {
         }
         let finding = render::finding(source, problem);
         let at = self.list.partition_point(|known| known.order() <= finding.order());
-        // The same thing is told once, however many ways lead to it.
+        // The same thing is reported once, however many ways lead to it.
         if self.list[..at].last().is_none_or(|last| *last != finding) {
             self.list.insert(at, finding);
         }
@@ -187,6 +237,11 @@ impl Findings {
         self.list.dedup();
         self.beyond += self.list.len().saturating_sub(FINDINGS_MAX);
         self.list.truncate(FINDINGS_MAX);
+    }
+
+    /// Forgets what only follows from something else that was found: the cause stands alone.
+    pub fn settle(&mut self) {
+        consequences::forget(&mut self.list);
     }
 
     /// Forgets those that are not to be kept.
@@ -235,16 +290,46 @@ impl Findings {
 
 impl fmt::Display for Findings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, finding) in self.list.iter().enumerate() {
-            if index > 0 {
-                f.write_str("\n\n")?;
+        f.write_str(self.shown(false, |_| true).trim_end())
+    }
+}
+
+impl Findings {
+    /// Those that are to be shown, one after the other, each with an empty line after it. What is the same at many places is
+    /// shown at the first of them, with the others named.
+    #[must_use]
+    pub fn shown(&self, styled: bool, keep: impl Fn(&Finding) -> bool) -> String {
+        let kept: Vec<&Finding> = self.list.iter().filter(|finding| keep(finding)).collect();
+        let same =
+            |a: &Finding, b: &Finding| (a.code, &a.title, &a.expected) == (b.code, &b.title, &b.expected);
+        let mut text = String::new();
+        for (index, finding) in kept.iter().enumerate() {
+            let others: Vec<&&Finding> =
+                kept[index + 1..].iter().filter(|other| same(other, finding)).collect();
+            let before = kept[..index].iter().filter(|other| same(other, finding)).count();
+            let repeated = before + others.len() >= REPEATED_MIN;
+            if repeated && before > 0 {
+                continue;
             }
-            write!(f, "{finding}")?;
+            text.push_str(if styled { &finding.styled } else { &finding.rendered });
+            if repeated {
+                let place = |other: &&&Finding| match other.file == finding.file {
+                    true => format!("line {}", other.line),
+                    false => format!("{}:{}", other.file, other.line),
+                };
+                let more = match others.len().saturating_sub(PLACES_MAX) {
+                    0 => String::new(),
+                    more => format!(" and at {more} more places"),
+                };
+                let places: Vec<String> = others.iter().take(PLACES_MAX).map(place).collect();
+                text.push_str(&format!("\n  = the same at {}{more}", places.join(", ")));
+            }
+            text.push_str("\n\n");
         }
         if self.beyond > 0 {
-            write!(f, "\n\n{} more are not shown", self.beyond)?;
+            text.push_str(&format!("{} more are not shown\n\n", self.beyond));
         }
-        Ok(())
+        text
     }
 }
 
@@ -274,6 +359,12 @@ pub fn read_file(path: &Path, most: u64) -> Result<String, Findings> {
     let mut findings = Findings::default();
     match read_bytes(path, most) {
         Err((code, expected)) => findings.push_file(code, path, expected),
+        Ok(bytes) if kind(&bytes).is_some() => {
+            let [what, help] = kind(&bytes).unwrap_or_default();
+            let problem = Problem::new(code::NOT_UTF8, 0..0).title("the file is not a text");
+            let problem = problem.expected(format!("expected a text, got {what}")).help(help);
+            findings.push(&Source::new(&path.display().to_string(), ""), problem);
+        }
         Ok(bytes) => match String::from_utf8(bytes) {
             Ok(text) => return Ok(text),
             Err(error) => {
@@ -287,4 +378,18 @@ pub fn read_file(path: &Path, most: u64) -> Result<String, Findings> {
         },
     }
     Err(findings)
+}
+
+/// What a file is that begins with these bytes and is no text, and what reads it.
+fn kind(bytes: &[u8]) -> Option<[&'static str; 2]> {
+    const RECORDING: [&str; 2] =
+        ["a recording", "`axisbridge decode` and `axisbridge translate` read recordings"];
+    match bytes {
+        [0x0A, 0x0D, 0x0D, 0x0A, ..]
+        | [0xD4 | 0x4D, 0xC3 | 0x3C, 0xB2, 0xA1, ..]
+        | [0xA1, 0xB2, 0xC3 | 0x3C, 0xD4 | 0x4D, ..] => Some(RECORDING),
+        [0x1F, 0x8B, ..] | [b'P', b'K', 3, 4, ..] => Some(["a compressed file", "unpack it first"]),
+        _ if bytes.iter().take(1_000).any(|byte| *byte == 0) => Some(["a binary file", ""]),
+        _ => None,
+    }
 }

@@ -110,7 +110,7 @@ pub fn page() -> String {
     let mut page = String::from(
         "# Findings\n\nWhat `axisbridge check` and `axisbridge run` find in mapping tables and configurations. \
          `axisbridge check --explain AX0010`\nprints one of them, `--list` the list. An error keeps the files from being \
-         used; a warning does not; notes are shown with\n`--notes`. A code never changes its meaning. This page is written by \
+         used; a warning does not; `--notes` also shows\nnotes that ask for nothing. A code never changes its meaning. This page is written by \
          `axisbridge check --list --format markdown`.\n",
     );
     for entry in REGISTRY {
@@ -121,6 +121,10 @@ pub fn page() -> String {
     }
     page
 }
+
+/// Notes that report a fact and ask for nothing.
+pub const FACTS: &[Code] =
+    &[ROW_NUMBERS, REQUIRED_UNSERVED, MODE_UNSERVED, DRIVE_SCALING, DRIVE_MAPPING, FACT_ACCEPTED];
 
 macro_rules! registry {
     ($($name:ident = $number:literal $severity:ident $title:literal: $explanation:literal, $example:literal, $remedy:literal;)*) => {
@@ -194,7 +198,7 @@ registry! {
         "Give a value within the shown range.";
     TWICE = 14 Error "defined twice":
         "The same thing is defined twice, so one of the two would be used and the other ignored silently.",
-        "[[axis]]\nname = \"x\"\n[[axis]]\nname = \"x\"",
+        "[[south.sercos.drive]]\nname = \"a\"\naddress = 1\n\n[[south.sercos.drive]]\nname = \"a\"\naddress = 2",
         "Keep one of them. To change a shipped row, put it into an overlay.";
     CONTRADICTION = 15 Error "keys that exclude each other":
         "The keys of a row or table exclude each other, or one needs another that is missing.",
@@ -259,7 +263,7 @@ registry! {
         "Correct the value, or the field.";
     RANGE_LOST = 38 Warning "the range of one end does not fit the other":
         "Types and scalings allow values at one end of the row that the other end cannot represent. They are clamped, and the axis does less than commanded. The finding names the first value that is lost.",
-        "[[axis]]\nunit = \"revolution\"\nmotion_resolution = 100_000 # 21474 turns, and the drive ends at 596",
+        "[axis.limits]\nposition_min = -10.0\nposition_max = 1_000.0 # turns, and the drive ends at 596",
         "Adapt the scalings, or keep the axis within the smaller range by its limits.";
     PRECISION_LOST = 39 Warning "precision is lost":
         "One step of one end is several steps of the other, or not a whole number of them. Values are rounded; the finding says by how much at most, and at which value first.",
@@ -267,12 +271,45 @@ registry! {
         "Use a resolution that the coarser side can represent, or a finer scaling of the drive.";
     EXAMPLE_FAILS = 40 Error "a worked example fails":
         "The numbers of an example do not agree with the row: one of the two is wrong. Examples were computed by hand and keep a table from changing by accident.",
-        "[[generic-sercos.parameter]]\nparameter = \"torque_limit_negative\"\nfactor = [1, 1]",
-        "Compute the example again, and correct whichever is wrong.";
+        "[[generic-sercos.parameter]]\nparameter = \"brake_release_time\"\nidn = \"S-0-0114\"",
+        "If an overlay has changed the row, take the example away with `remove = [\"examples\"]`, or write examples of your own. Otherwise compute the example again, and correct whichever is wrong.";
     ROW_NUMBERS = 41 Note "what a row can hold":
         "Range and step of a value, computed with the conversions of the cycle from types and scalings of both ends: of the drive as Axisbridge scales it, in the unit of the controller. A floating point number has 24 bits, or 53: beyond the shown value it is coarser than the drive.",
         "[[generic-sercos.signal]]\nsignal = \"torque_command\"",
         "Nothing. Compare it with what the axis has to do.";
+    WRONG_SIGN = 42 Error "the sign does not follow the drive":
+        "A drive inverts values by bits of its own: S-0-0043, S-0-0055 and S-0-0085, or 607Eh. The row of a value names the bit that inverts this value, in both directions. Without it, or with the bit of another value, an axis of a drive that has the bit set turns the other way.",
+        "[[generic-sercos.signal]]\nsignal = \"position_actual\"\npolarity = { idn = \"S-0-0055\", bit = 0 }",
+        "Write the polarity that the finding names. If this drive is really different, write `# accept: reason` next to the row.";
+    WRONG_SHAFT = 43 Error "gear or feed at the wrong shaft":
+        "S-0-0121 has the turns of the motor and S-0-0122 those of the load that belong to them; a torque goes through the gear the other way. 608Fh, 6091h and 6092h have what is divided by in sub-index 1. A gear that is turned round makes values wrong by its square.",
+        "[[generic-sercos.scaling]]\nscaling = \"velocity\"\nload = { pattern = [0x40, 0x40], gear = [\"S-0-0122\", \"S-0-0121\"] }",
+        "Write gear and feed as the finding says, the same for position, velocity, acceleration and jerk.";
+    WRONG_SCALE = 44 Error "a count is something else by the standard":
+        "`check` computes what a count is twice for each scaling type: by the table, and by the formula of the standard. The two differ, and the finding says by which factor.",
+        "[[generic-sercos.unit]]\nunit = \"1/min\"\nquantity = \"velocity\"\ngeneric_per_unit = [1_000_000_000, 1]",
+        "Correct base, exponent, divisor, ratio or pattern. If this drive really counts differently, write `# accept: reason` next to the row.";
+    WRONG_BINDING = 45 Error "bound to another value":
+        "By the standard the IDN, object or attribute holds another value than the row says. Values that a vendor defines (P parameters, objects 2000h to 5FFFh) are not compared.",
+        "[[generic-sercos.signal]]\nsignal = \"position_command\"\nidn = \"S-0-0051\"",
+        "Bind the value that the finding names.";
+    NOT_CYCLIC = 46 Error "it may not be cyclic":
+        "Drives do not let the value be mapped into this telegram or PDO: it only goes the other way, or over the service channel.",
+        "[[generic-sercos.signal]]\nsignal = \"velocity_actual\"\nidn = \"S-0-0036\"",
+        "Name an IDN or object that may stand in the telegram.";
+
+    FACT_FAILS = 47 Error "a drive would not do what it is commanded":
+        "`check` sends frames through the gateway with these tables. Each shows a fact of the standards: a positive velocity turns a drive forward, an enable request switches it on, an error is reported as the exception that it is. With these tables a direction, a state or a request comes out differently.",
+        "[[cip-generic.fault]]\ncause = \"over_voltage\"\nexception = \"Bus Undervoltage FL\"\n\n[[cip-generic.fault]]\ncause = \"under_voltage\"\nexception = \"Bus Overvoltage FL\"",
+        "Correct the row. If the drive really is so, write `# accept: reason` next to the row.";
+    FACT_DIFFERS = 48 Warning "a value differs from the standard":
+        "As for AX0047, but the value has the right sign and a wrong magnitude: a scaling, a unit, a limit.",
+        "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nfactor = [1, 2]",
+        "Correct the row. If the drive really is so, write `# accept: reason` next to the row.";
+    FACT_ACCEPTED = 49 Note "a difference that is accepted":
+        "A frame shows that a value differs from the standard, and `# accept: reason` next to the row says why.",
+        "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nfactor = [1, 2] # accept: this drive counts half of it",
+        "Nothing.";
 
     REQUIRED_UNSERVED = 50 Note "a required attribute is not served":
         "The standard requires the attribute of a device with a position, velocity or torque loop. A [[reject]] row says why it is missing.",
@@ -284,11 +321,11 @@ registry! {
         "Add it to a [[reject]] row.";
     NO_WAY_IN = 52 Error "a state with no way in":
         "With the requests, actions and reports of the tables, an axis never reaches the state. `check` walks the state machine to find this.",
-        "# no [[report]] row says `operating`",
+        "[[generic-sercos.report]]\npattern = [{ field = \"Ready to operate\", is = 3 }, { field = \"Command value processing\", is = 1 }]\nremove = true\n\n[[generic-sercos.report]]\npattern = [{ field = \"Ready to operate\", is = 3 }]\nacknowledges = false\nremove = true",
         "Add the row of the request or report that leads to it.";
     NO_WAY_OUT = 53 Error "a state with no way out":
         "Once in this state, no request and no report of the tables leads back to the state from which an axis can be started.",
-        "# no [[request]] row makes `fault_reset`",
+        "[[cip-generic.request]]\naxis_control = \"Shutdown Reset Request\"\nremove = true\n\n[[cip-generic.drive_action]]\ndrive_action = \"power_up\"\nremove = [\"request\"]",
         "Add the row of the request or report that leads out of it.";
     MODE_UNSERVED = 54 Note "an operating mode that only one side has":
         "The controller can request the mode but the drives have no row for it, or the other way round. The mode is refused.",
@@ -322,6 +359,22 @@ registry! {
         "No row of a drive's table leads to the standard exception, neither the gateway nor the device detects it, and no [[unraised]] row says why. The controller would wait for it in vain.",
         "[[cip-generic.unraised]]\nreason = \"The holding brake is the drive's own; no bit says that it slips.\"\nremove = true",
         "Add the row that raises it, or name it in an [[unraised]] row.";
+    WRONG_STATE = 62 Error "a state or mode means something else":
+        "The word of the drive or of the controller means another state, mode or status bit by the standard than the tables make of it. All values of the words are tried; the first row that fits decides, so a row before the right one may be the reason.",
+        "[[generic-sercos.report]]\npattern = [{ field = \"Ready to operate\", is = 1 }]\nreport = \"ready\"",
+        "Correct the row, or the order of the rows.";
+    WRONG_ORDER = 63 Error "the drive would do something else":
+        "The action writes a control word that the drive takes for another command. For CiA 402 the state machine of the profile is walked: torque is switched on by shutdown, switch on, enable operation, one state at a time, and never by another action than `enable`.",
+        "[[generic-cia402.action]]\naction = \"disable\"\nwhen = \"Operation enabled\"\nsend = \"Enable operation\"",
+        "Write the command that reaches the state that the finding names.";
+    REQUEST_LOST = 64 Error "a request that is lost or confused":
+        "Each request of the controller has one row, which asks for what its name says and gives the answer that the controller waits for.",
+        "[[cip-generic.request]]\naxis_control = \"Enable Request\"\nrequest = \"disable\"",
+        "Correct the row, or add the missing one.";
+    WEAKER_REACTION = 65 Error "a reaction weaker than the drive's own":
+        "The drive has already switched itself off for this error. A row that makes a warning of it lets the controller believe that the axis still moves.",
+        "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overload shut-down\", is = 1 }]\ncause = \"motor_overload_user_limit\"\nreaction = \"alarm\"",
+        "Remove `reaction`.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",
@@ -329,7 +382,7 @@ registry! {
         "Remove the row.";
     OVERLAY_CYCLE = 71 Error "overlays that build on each other":
         "`base` names an overlay that itself builds on this one, so there is no order in which they could be applied.",
-        "overlay = \"builds on itself\"\nbase = [\"this-file.toml\"]",
+        "format = 1\noverlay = \"builds on itself\"\nbase = [\"this-file.toml\"]",
         "Remove one of the `base` entries.";
     OVERLAY_REMOVES_NOTHING = 72 Error "nothing to remove":
         "`remove` names a row or a key that the table does not have.",
@@ -352,13 +405,17 @@ registry! {
         "An axis names its drive, and a device its axes. Each of them must exist, and belong to exactly one.",
         "[[axis]]\nname = \"x\"\ndrive = \"no-such-drive\"",
         "Correct the name, or add what it names.";
+    LIMITS_MISSING = 82 Warning "a linear axis without limits of its position":
+        "A linear axis that does not unwind has an end. Without `position_min` and `position_max` neither the gateway nor, through it, the drive stops a command beyond.",
+        "[[axis]]\nname = \"x\"\nunit = \"millimetre\"",
+        "Add `position_min` and `position_max` to `[axis.limits]`.";
     CYCLE_FULL = 83 Error "cyclic data that the bus cannot carry":
         "The values of an axis are more than its connection can carry, those of all drives are more than the telegrams can carry, or the telegrams take longer on the wire than the cycle. This is computed with the layout of the master, and with drives that need no time themselves.",
         "[south.sercos]\ncycle_time = \"31.25 us\" # with 60 drives",
         "Use a longer cycle, fewer drives on the bus, or fewer signals and captures (`events = \"service-channel\"`).";
     AXIS_TABLES = 84 Error "no program for the axis":
         "With these tables no program can be compiled for the axis: a mode or a slot is missing, or a scaling does not fit 64 bits.",
-        "[[generic-sercos.mode_slot]]\nslot = 2\nremove = true",
+        "[[generic-sercos.mode_slot]]\nslot = 2\nremove = true\n\n[[generic-sercos.mode_slot]]\nslot = 3\nremove = true\n\n[[generic-sercos.mode_slot]]\nslot = 4\nremove = true\n\n[[generic-sercos.mode_slot]]\nslot = 5\nremove = true\n\n[[generic-sercos.mode_slot]]\nslot = 6\nremove = true\n\n[[generic-sercos.mode_slot]]\nslot = 7\nremove = true",
         "Correct the tables, or the axis.";
     LIMIT_UNFIT = 85 Error "a limit that the drive cannot hold":
         "Axisbridge writes the limit to a parameter of the drive whose range is smaller. Commissioning would refuse the axis.",
@@ -380,6 +437,18 @@ registry! {
         "With `pdo_mapping = \"keep\"` Axisbridge uses the PDOs as they are when the drive is there. Without a `configuration` that lists them, the load of the bus is computed with the PDOs that Axisbridge would have mapped.",
         "[[south.can.device]]\nnode = 1\npdo_mapping = \"keep\"",
         "Nothing, or name the data sheet of the drive (EDS, DCF) as its `configuration`.";
+    PLACEHOLDER = 90 Warning "a mark of a starter configuration is left":
+        "`axisbridge scan` marks with `CHANGE` what it cannot know: addresses, identity, limits. A mark that is left says that nobody has looked at the line. The gateway logs it at start.",
+        "[[device]]\nlisten = \"127.0.0.2\" # CHANGE: an address of this host",
+        "Edit the line as the mark says, and remove the mark.";
+    VENDOR_ID = 91 Warning "the vendor ID of another company":
+        "ODVA assigns vendor IDs. 1 is that of Rockwell Automation: a controller would take the gateway for one of its products, and a profile of that product for that of the gateway.",
+        "[device.identity]\nvendor_id = 1",
+        "Use the vendor ID that ODVA has assigned to you. Until then, use 65535.";
+    VENDOR_NONE = 92 Note "no vendor ID yet":
+        "65535 stands in the examples for a vendor ID that is still to be assigned. It is good for tests on your own network, and not for a product.",
+        "[device.identity]\nvendor_id = 65_535",
+        "Use the vendor ID that ODVA has assigned to you, or write `# accept: reason` next to the key.";
     SCRIPT = 95 Error "a script that cannot be run":
         "A step of a script for the simulated controller, or an event of a script for simulated drives, is unknown or cannot be executed.",
         "[[step]]\nenabel = 1",

@@ -3,6 +3,7 @@
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
+use super::consequences::Origin;
 use super::source::Place;
 use super::{Finding, Problem, Related, Severity, Source};
 
@@ -19,7 +20,7 @@ pub(super) fn finding(source: &Source, problem: Problem) -> Finding {
     }
     let related =
         problem.related.as_ref().and_then(|(span, text)| Some((source.locate(span)?, text.as_str())));
-    let rendered = show(&problem, &title, &place, related.as_ref());
+    let [rendered, styled] = show(&problem, &title, &place, related.as_ref());
     Finding {
         code: problem.code,
         file: place.part.path.to_string(),
@@ -36,7 +37,9 @@ pub(super) fn finding(source: &Source, problem: Problem) -> Finding {
             column: place.column,
             text: text.to_owned(),
         }),
+        origin: Origin::new(&place, problem.about, problem.lacks),
         rendered,
+        styled,
     }
 }
 
@@ -59,11 +62,19 @@ fn bare(path: &str, problem: Problem, title: String) -> Finding {
         expected: problem.expected,
         help: problem.help,
         related: None,
+        origin: Origin::default(),
+        styled: rendered.clone(),
         rendered,
     }
 }
 
-fn show(problem: &Problem, title: &str, place: &Place<'_>, related: Option<&(Place<'_>, &str)>) -> String {
+/// The finding without and with colours.
+fn show(
+    problem: &Problem,
+    title: &str,
+    place: &Place<'_>,
+    related: Option<&(Place<'_>, &str)>,
+) -> [String; 2] {
     let level = match problem.code.severity() {
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
@@ -83,7 +94,9 @@ fn show(problem: &Problem, title: &str, place: &Place<'_>, related: Option<&(Pla
     if !problem.help.is_empty() {
         group = group.element(Level::HELP.message(problem.help.as_str()));
     }
-    Renderer::plain().decor_style(DecorStyle::Ascii).render(&[group])
+    let groups = [group];
+    [Renderer::plain(), Renderer::styled()]
+        .map(|renderer| renderer.decor_style(DecorStyle::Ascii).render(&groups))
 }
 
 /// The lines of a place, and of another one in the same file.

@@ -1,6 +1,6 @@
 //! The texts that findings point into.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
 /// One or more files whose texts are counted through: a span of the second begins where the first ends. So the rows
@@ -77,6 +77,47 @@ impl Source {
         (1..=part.lines.len()).map(|line| part.line(line)).find(|line| wanted(&part.text[line.clone()]))
     }
 
+    /// A line (1 first) of the file with this name, without its indentation; the last such file, as the ones laid over others are.
+    #[must_use]
+    pub fn line_of(&self, file: &str, line: usize) -> Option<Range<usize>> {
+        let named = |part: &&Part| part.path.rsplit('/').next() == Some(file);
+        let part = self.parts.iter().rfind(named).filter(|part| (1..=part.lines.len()).contains(&line))?;
+        let whole = part.line(line);
+        let text = &part.text[whole.clone()];
+        let start = whole.start + text.len() - text.trim_start().len();
+        Some(part.start + start..part.start + whole.end)
+    }
+
+    /// The reason for which a row is accepted as it is: `# accept: reason` in one of its lines, or in the comment above it.
+    #[must_use]
+    pub fn accepts(&self, span: &Range<usize>) -> Option<&str> {
+        let place = self.locate(span)?;
+        let line = |at: usize| &place.part.text[place.part.line(at)];
+        let rows = place.row();
+        let mut first = *rows.start();
+        while first > 1 && line(first - 1).trim_start().starts_with('#') {
+            first -= 1;
+        }
+        (first..=*rows.end())
+            .filter_map(|at| line(at).split_once("# accept:"))
+            .map(|(_, reason)| reason.trim())
+            .find(|reason| !reason.is_empty())
+    }
+
+    /// The text of a place, as far as it lies in one line.
+    #[must_use]
+    pub fn slice(&self, span: &Range<usize>) -> &str {
+        self.locate(span).map_or("", |place| &place.part.text[place.span])
+    }
+
+    /// What stands in the line of a place before it, and from it on.
+    pub(super) fn line_around(&self, at: usize) -> (&str, &str) {
+        self.locate(&(at..at)).map_or(("", ""), |place| {
+            let line = place.part.line(place.line);
+            (&place.part.text[line.start..place.span.start], &place.part.text[place.span.start..line.end])
+        })
+    }
+
     pub(super) fn locate(&self, span: &Range<usize>) -> Option<Place<'_>> {
         let at = self.parts.partition_point(|part| part.start <= span.start).checked_sub(1)?;
         let part = &self.parts[at];
@@ -87,6 +128,25 @@ impl Source {
         let line_end = part.line(line).end;
         let span = start..end.min(line_end).max(start);
         Some(Place { part, span, line, column: part.text[begin..start].chars().count() + 1 })
+    }
+}
+
+impl Place<'_> {
+    /// The lines (1 first) of the row that the place is in: a line of a list, or the lines from a head to the next one.
+    pub fn row(&self) -> RangeInclusive<usize> {
+        let line = |at: usize| &self.part.text[self.part.line(at)];
+        let begins = |at: usize| line(at).trim_start().starts_with(['{', '[']);
+        let mut first = self.line;
+        while first > 1 && !begins(first) && !line(first - 1).trim().is_empty() {
+            first -= 1;
+        }
+        let mut last = self.line;
+        let alone = line(first).trim_start().starts_with('{');
+        while !alone && last < self.part.lines.len() && !begins(last + 1) && !line(last + 1).trim().is_empty()
+        {
+            last += 1;
+        }
+        first..=last
     }
 }
 
@@ -111,6 +171,20 @@ fn floor(text: &str, offset: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_row_is_accepted_beside_it() {
+        let text = "rows = [\n  # accept: above\n  { a = 1 },\n  { b = 1 }, # accept: at its end\n  { c = 1 },\n]\n\n\
+            [[x]]\nd = 1\n# accept: inside\n\n[[y]]\ne = 1 # accept:\n";
+        let source = Source::new("folder/a.toml", text);
+        let reason = |line| source.accepts(&source.line_of("a.toml", line).unwrap());
+        assert_eq!(
+            [3, 4, 5, 9, 12].map(reason),
+            [Some("above"), Some("at its end"), None, Some("inside"), None]
+        );
+        assert_eq!(source.line_of("a.toml", 99), None);
+        assert_eq!(source.line_of("b.toml", 1), None);
+    }
 
     #[test]
     fn spans_are_found_in_the_file_they_belong_to() {

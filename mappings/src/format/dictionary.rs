@@ -31,13 +31,15 @@ pub struct SignalRow {
     pub quantity: Name,
     /// `command` or `feedback`.
     pub access: Name,
+    /// What it is, in a sentence.
+    pub about: Option<Name>,
 }
 
 /// A parameter of the generic model.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterRow {
-    /// Number; the high byte groups them.
+    /// Number; the high byte groups them. A parameter of an overlay has a number from 0x8000 to 0xFFFF.
     pub number: Option<Spanned<u16>>,
     /// Name in snake case.
     pub name: Name,
@@ -52,4 +54,6 @@ pub struct ParameterRow {
     pub access: Name,
     /// What it is, in a sentence.
     pub about: Option<Name>,
+    /// Least and greatest value that may be set, in the unit of the quantity. Only a parameter of an overlay has one.
+    pub range: Option<Spanned<[i64; 2]>>,
 }

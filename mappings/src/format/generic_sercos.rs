@@ -143,6 +143,17 @@ pub struct FieldValueRow {
     pub is: Spanned<FieldIs>,
 }
 
+/// `Ready to operate = 3`.
+impl fmt::Display for FieldValueRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let field = self.field.get_ref();
+        match self.is.get_ref() {
+            FieldIs::Number(number) => write!(f, "{field} = {number}"),
+            FieldIs::Name(word) => write!(f, "{field} = {word}"),
+        }
+    }
+}
+
 /// The value of a field.
 #[derive(Debug, Clone, JsonSchema)]
 #[serde(untagged)]
@@ -456,7 +467,7 @@ pub struct SercosParameterRow {
     pub missing: Name,
     /// Factor between parameter and IDN, for signs (`[-1, 1]`) and reciprocals of units.
     pub factor: Option<RatioRow>,
-    /// No source tells the unit: the drive's element 4 does, or the parameter is missing.
+    /// No source reports the unit: the drive's element 4 does, or the parameter is missing.
     #[serde(default)]
     pub unit_by_drive: bool,
     /// Where it comes from.

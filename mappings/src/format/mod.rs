@@ -35,6 +35,13 @@ pub type Name = Spanned<String>;
 /// Where a row comes from: document and clause, or a vendor document.
 pub type Source = Spanned<String>;
 
+/// Names with commas between them.
+#[must_use]
+pub fn listed(names: &[Name]) -> String {
+    let names: Vec<&str> = names.iter().map(|name| name.get_ref().as_str()).collect();
+    names.join(", ")
+}
+
 /// A ratio `[numerator, denominator]`.
 pub type RatioRow = Spanned<[i64; 2]>;
 
@@ -50,7 +57,7 @@ pub struct UnitRow {
     pub generic_per_unit: RatioRow,
     /// What multiplies the ratio: a scaling of the axis.
     pub times: Option<Name>,
-    /// How drives spell the unit, beside the dictionary.
+    /// How drives spell the unit, in addition to the dictionary.
     #[serde(default)]
     pub texts: Vec<String>,
     /// Where it comes from.

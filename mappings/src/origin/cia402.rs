@@ -95,7 +95,7 @@ impl Mapping {
     #[must_use]
     pub fn object_parameter_row(&self, parameter: Parameter) -> Option<Origin> {
         let file = &self.tables.generic_cia402;
-        let name = parameter.to_string();
+        let name = self.parameter_name(parameter);
         find(&file.text, "parameter", &file.rows.parameter, |row| &row.parameter, &name)
     }
 }

@@ -3,17 +3,19 @@
 mod cia402;
 
 use core::fmt;
+use core::ops::Range;
 
 use profile_generic::fault::FaultCause;
 use profile_generic::image::Signal;
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
+use profile_generic::quantity::Quantity;
 use profile_generic::state::{Action, DriveState};
 use profile_sercos::wire::idn::Idn;
 use serde::Serialize;
 
 use super::format::Name;
-use super::{Item, Mapping};
+use super::{Item, Mapping, Tables};
 use crate::finding::Source;
 
 /// Where a row stands.
@@ -110,6 +112,58 @@ impl Mapping {
     }
 }
 
+/// Rows of any table.
+impl Mapping {
+    /// Where a row stands: the table with its text, and the line of the row in it.
+    #[must_use]
+    pub fn place_of(&self, row: &Origin) -> Option<(&Source, Range<usize>)> {
+        let Tables { cip_generic, generic_sercos, generic_cia402, .. } = &self.tables;
+        let texts = [&cip_generic.text, &generic_sercos.text, &generic_cia402.text];
+        texts.into_iter().find_map(|text| Some((&**text, text.line_of(&row.file, row.line)?)))
+    }
+
+    /// The `[[scaling]]` row of a quantity on SERCOS drives.
+    #[must_use]
+    pub fn scaling_row(&self, quantity: Quantity) -> Option<Origin> {
+        let file = &self.tables.generic_sercos;
+        let quantity = quantity.to_string();
+        let name =
+            file.rows.scaling.iter().map(|row| &row.scaling).find(|name| *name.get_ref() == quantity)?;
+        Some(origin(&file.text, "scaling", name))
+    }
+
+    /// The `[[scaling]]` row of a quantity on CiA 402 drives.
+    #[must_use]
+    pub fn object_scaling_row(&self, quantity: Quantity) -> Option<Origin> {
+        let file = &self.tables.generic_cia402;
+        let quantity = quantity.to_string();
+        let row = file.rows.scaling.iter().find(|row| *row.quantity.get_ref() == quantity)?;
+        Some(origin(&file.text, "scaling", &row.unit))
+    }
+
+    /// The first `[[commission]]` row that writes or reads an IDN or object.
+    #[must_use]
+    pub fn commission_row(&self, item: Item) -> Option<Origin> {
+        let wanted = item.to_string();
+        match item {
+            Item::Idn(_) => {
+                let file = &self.tables.generic_sercos;
+                let names = file.rows.commission.iter().filter_map(|row| row.idn.as_ref());
+                let name = names.into_iter().find(|name| *name.get_ref() == wanted)?;
+                Some(origin(&file.text, "commission", name))
+            }
+            // Rows that write one object have it as their only one.
+            Item::Object(_) => {
+                let file = &self.tables.generic_cia402;
+                let names = file.rows.commission.iter().filter_map(|row| row.object.as_ref());
+                let name = names.into_iter().find(|name| *name.get_ref() == wanted)?;
+                Some(origin(&file.text, "commission", name))
+            }
+            Item::Attribute(_) => None,
+        }
+    }
+}
+
 /// Rows between the generic model and SERCOS.
 impl Mapping {
     /// The `[[signal]]` row of a signal.
@@ -173,11 +227,18 @@ impl Mapping {
         Some(origin(&file.text, "fault", &file.rows.fault.get(at)?.cause))
     }
 
+    /// The name of a parameter, or its number.
+    #[must_use]
+    pub fn parameter_name(&self, parameter: Parameter) -> String {
+        let own = self.dictionaries.generic.by_number(parameter);
+        own.map_or_else(|| parameter.to_string(), |row| row.name.clone())
+    }
+
     /// The `[[parameter]]` row of a parameter.
     #[must_use]
     pub fn parameter_row(&self, parameter: Parameter) -> Option<Origin> {
         let file = &self.tables.generic_sercos;
-        let name = parameter.to_string();
+        let name = self.parameter_name(parameter);
         find(&file.text, "parameter", &file.rows.parameter, |row| &row.parameter, &name)
     }
 }

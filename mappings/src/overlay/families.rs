@@ -33,18 +33,19 @@ pub(crate) struct ParsedFamily {
 
 /// The tables of all families that overlays are for, with their rows over those for all drives. A drive whose product code is
 /// named has the rows of that and those that all drives of its vendor have.
-pub(crate) fn parse(
-    table: &TableText,
-    general: &[&Layer<'_>],
-    of_families: &[&Layer<'_>],
+pub(crate) fn parse<'t>(
+    table: &'t TableText,
+    general: &[&Layer<'t>],
+    of_families: &[&Layer<'t>],
     findings: &mut Findings,
 ) -> Vec<ParsedFamily> {
     let mut families = Vec::new();
+    let Some((text, tree)) = rows::read(table, findings) else { return families };
     for (vendor, products, own) in groups(of_families) {
         let names: Vec<_> = own.iter().map(|layer| layer.name.as_str()).collect();
         let layers: Vec<_> = general.iter().copied().chain(own.iter().copied()).collect();
         let mut found = Findings::default();
-        let parsed = rows::parse(table, OF_FAMILIES, &layers, &mut found);
+        let parsed = rows::lay_over(text.clone(), tree.clone(), OF_FAMILIES, &layers, &mut found);
         if general.iter().any(|layer| layer.touches(OF_FAMILIES)) {
             // A family says nothing wrong where all drives are what it says already.
             let said = [code::OVERLAY_NO_EFFECT, code::OVERLAY_REMOVES_NOTHING];

@@ -1,6 +1,7 @@
 //! Laying the rows of one tree over those of another.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
@@ -19,7 +20,39 @@ const LAST: &str = "last";
 
 type Value<'t> = Spanned<DeValue<'t>>;
 
-/// Lays what a layer has of a table over it. `base` is where the layer begins in the source.
+/// What is known of new rows, by their places.
+pub(crate) type Hints = Vec<(Range<usize>, Hint)>;
+
+/// What is known of a row that the table does not have.
+#[derive(Debug)]
+pub(crate) struct Hint {
+    /// The key that identifies it.
+    key: String,
+    /// The place of its value.
+    span: Range<usize>,
+    /// Key and value.
+    written: String,
+    /// The value of a row that the table has, if it is close.
+    near: Option<String>,
+}
+
+impl Hint {
+    /// What to say of a key that the row lacks.
+    pub fn about(&self, missing: &Problem) -> Problem {
+        let title = format!("the table has no row with {}", self.written);
+        match &self.near {
+            Some(near) => Problem::new(code::UNKNOWN_NAME, self.span.clone())
+                .key(&self.key)
+                .title(title)
+                .expected("expected the name of a row of the table, or all keys of a new row")
+                .help(format!("did you mean `{near}`?")),
+            None => missing.clone().help(format!("{title}, and a new row needs all keys")),
+        }
+    }
+}
+
+/// Lays what a layer has of a table over it. `base` is where the layer begins in the source. What to do about keys that a new row
+/// lacks comes back.
 pub(crate) fn lay<'t>(
     layer: &Layer<'t>,
     base: usize,
@@ -27,18 +60,21 @@ pub(crate) fn lay<'t>(
     table: &mut DeTable<'t>,
     source: &Source,
     findings: &mut Findings,
-) {
-    let Some(rows) = layer.rows(name) else { return };
-    let mut merger = Merger { source, findings };
+) -> Hints {
+    let Some(rows) = layer.rows(name) else { return Hints::new() };
+    let mut merger = Merger { source, findings, table: name, hints: Hints::new() };
     let rows = shifted(rows, base);
     let span = rows.span();
     let DeValue::Table(mut rows) = rows.into_inner() else {
-        return merger.problem(
-            code::WRONG_TYPE,
-            span,
-            name,
-            "expected rows, such as [[generic-sercos.parameter]]",
-        );
+        let lists: Vec<String> =
+            sections(name).iter().take(3).map(|section| format!("[[{name}.{}]]", section.name)).collect();
+        let problem =
+            Problem::new(code::WRONG_TYPE, span).title(format!("`{name}` without the list of its rows"));
+        let problem = problem.expected("expected the name of a table and of a list in it");
+        merger
+            .findings
+            .push(source, problem.help(format!("write the list as well, as in {}", lists.join(", "))));
+        return merger.hints;
     };
     groups::spread(&mut rows);
     if name == "cip-generic" {
@@ -72,15 +108,20 @@ pub(crate) fn lay<'t>(
             }
         }
     }
+    merger.hints
 }
 
 struct Merger<'a> {
     source: &'a Source,
     findings: &'a mut Findings,
+    /// The table that rows are laid over.
+    table: &'a str,
+    /// What to do about keys that new rows lack.
+    hints: Hints,
 }
 
 impl Merger<'_> {
-    fn problem(&mut self, code: Code, span: std::ops::Range<usize>, key: &str, expected: impl Into<String>) {
+    fn problem(&mut self, code: Code, span: Range<usize>, key: &str, expected: impl Into<String>) {
         self.findings.push(self.source, Problem::new(code, span).key(key).expected(expected));
     }
 
@@ -88,10 +129,12 @@ impl Merger<'_> {
     fn list<'t>(&mut self, section: &Section, list: &mut Value<'t>, rows: Value<'t>) {
         let span = rows.span();
         let (DeValue::Array(list), DeValue::Array(rows)) = (list.get_mut(), rows.into_inner()) else {
-            return self.problem(code::WRONG_TYPE, span, section.name, "expected a list of rows");
+            let problem = Problem::new(code::WRONG_TYPE, span).key(section.name);
+            let help = format!("write the head in double brackets: [[{}.{}]]", self.table, section.name);
+            return self.findings.push(self.source, problem.expected("expected a list of rows").help(help));
         };
         let mut known: Vec<Value<'t>> = std::mem::replace(list, DeArray::new()).into_iter().collect();
-        let mut seen: Vec<String> = Vec::new();
+        let mut seen: Vec<(String, Range<usize>)> = Vec::new();
         // Rows that are added in front keep the order in which they stand.
         let mut added = 0;
         for row in rows {
@@ -101,25 +144,22 @@ impl Merger<'_> {
                 continue;
             };
             let Some(id) = identity(section, &row) else {
-                let keys: Vec<String> = section.key.iter().map(|key| format!("`{key}`")).collect();
-                let message = format!("expected {}: what tells one row from another", keys.join(", "));
-                self.problem(code::OVERLAY_NO_KEY, span, section.name, message);
+                self.no_identity(section, &row, span, &known);
                 continue;
             };
-            if seen.contains(&id) {
-                self.problem(
-                    code::TWICE,
-                    span,
-                    section.name,
-                    "expected one row of this overlay for the same thing",
-                );
+            if let Some((_, first)) = seen.iter().find(|(known, _)| *known == id) {
+                let problem = Problem::new(code::TWICE, span).key(section.name);
+                let problem = problem.expected("expected one row of this overlay for the same thing");
+                let problem =
+                    problem.related(first.clone(), "the row is here first").help("put all keys into one row");
+                self.findings.push(self.source, problem);
                 continue;
             }
             let at = known.iter().position(|known| match known.get_ref() {
                 DeValue::Table(known) => identity(section, known).as_ref() == Some(&id),
                 _ => false,
             });
-            seen.push(id);
+            seen.push((id, span.clone()));
             let remove = row.remove(REMOVE);
             let last = row.remove(LAST).map(|value| (value.span(), value.get_ref().clone()));
             let last = match (last, at.is_none() && section.first_wins) {
@@ -146,7 +186,11 @@ impl Merger<'_> {
                 }
                 (None, Some((place, _))) => {
                     let message = format!("expected a row of `{}` that is there", section.name);
-                    self.problem(code::OVERLAY_REMOVES_NOTHING, place, REMOVE, message);
+                    let problem =
+                        Problem::new(code::OVERLAY_REMOVES_NOTHING, place).key(REMOVE).expected(message);
+                    let near = hint(section, &row, &known).and_then(|hint| hint.near);
+                    let help = near.map(|near| format!("did you mean `{near}`?"));
+                    self.findings.push(self.source, problem.help(help.unwrap_or_default()));
                 }
                 (Some(at), remove) => {
                     let removed =
@@ -154,6 +198,7 @@ impl Merger<'_> {
                     self.row(section, &mut known[at], row, span, removed);
                 }
                 (None, None) => {
+                    self.hints.extend(hint(section, &row, &known).map(|hint| (span.clone(), hint)));
                     let row = Spanned::new(span, DeValue::Table(row));
                     if section.first_wins && !last {
                         known.insert(added, row);
@@ -167,13 +212,34 @@ impl Merger<'_> {
         *list = known.into_iter().collect();
     }
 
+    /// Reports a row that does not say which one it is.
+    fn no_identity(&mut self, section: &Section, row: &DeTable<'_>, span: Range<usize>, known: &[Value<'_>]) {
+        let first = section.key.first().copied().unwrap_or_default();
+        let unknown = row.keys().find(|key| {
+            let name = key.get_ref().as_ref();
+            closest(name, section.key.iter().copied()).is_some() && !section.key.contains(&name)
+        });
+        let keys: Vec<String> = section.key.iter().map(|key| format!("`{key}`")).collect();
+        if let Some(key) = unknown {
+            let name = key.get_ref().as_ref();
+            let meant = closest(name, section.key.iter().copied()).unwrap_or(first);
+            let problem = Problem::new(code::UNKNOWN_KEY, key.span()).key(name);
+            let problem = problem.title(format!("unknown key `{name}`"));
+            let problem =
+                problem.expected(format!("expected {}, by which the row is found", keys.join(", ")));
+            return self.findings.push(self.source, problem.help(format!("did you mean `{meant}`?")));
+        }
+        let message = format!("expected {}, by which the row is found", keys.join(", "));
+        let example = known
+            .iter()
+            .find_map(|known| known.get_ref().as_table()?.get(first).map(|value| canonical(value.get_ref())));
+        let problem = Problem::new(code::OVERLAY_NO_KEY, span).key(section.name).expected(message);
+        let help = example.map(|value| format!("add it, as in `{first} = {value}`")).unwrap_or_default();
+        self.findings.push(self.source, problem.help(help));
+    }
+
     /// Takes keys of a row away; whether there were any.
-    fn remove_keys(
-        &mut self,
-        row: &mut Value<'_>,
-        place: std::ops::Range<usize>,
-        keys: &DeValue<'_>,
-    ) -> bool {
+    fn remove_keys(&mut self, row: &mut Value<'_>, place: Range<usize>, keys: &DeValue<'_>) -> bool {
         let (DeValue::Table(row), DeValue::Array(keys)) = (row.get_mut(), keys) else {
             self.problem(code::WRONG_TYPE, place, REMOVE, "expected true, or a list of keys");
             return true;
@@ -181,12 +247,9 @@ impl Merger<'_> {
         for key in keys {
             let found = key.get_ref().as_str().and_then(|name| row.remove(name));
             if found.is_none() {
-                self.problem(
-                    code::OVERLAY_REMOVES_NOTHING,
-                    key.span(),
-                    REMOVE,
-                    "expected a key that the row has",
-                );
+                let keys: Vec<String> = row.keys().map(|key| format!("`{}`", key.get_ref())).collect();
+                let message = format!("expected a key that the row has: {}", keys.join(", "));
+                self.problem(code::OVERLAY_REMOVES_NOTHING, key.span(), REMOVE, message);
             }
         }
         true
@@ -198,16 +261,17 @@ impl Merger<'_> {
         section: &Section,
         known: &mut Value<'t>,
         row: DeTable<'t>,
-        span: std::ops::Range<usize>,
+        span: Range<usize>,
         mut changed: bool,
     ) {
         let before = known.span();
         let DeValue::Table(mut table) = std::mem::replace(known.get_mut(), DeValue::Boolean(false)) else {
             return;
         };
-        // What an action sends stands as a whole in the row that says it: by a name, by fields, or by both.
-        if row.contains_key("pattern") != row.contains_key("send") && section.name == "action" {
-            changed |= table.remove(if row.contains_key("send") { "pattern" } else { "send" }).is_some();
+        if section.either.iter().any(|key| row.contains_key(*key)) {
+            for key in section.either.iter().filter(|key| !row.contains_key(**key)) {
+                changed |= table.remove(*key).is_some();
+            }
         }
         let mut nested = false;
         for (key, value) in row {
@@ -253,6 +317,20 @@ impl Merger<'_> {
             self.problem(code::OVERLAY_NO_EFFECT, span, name, "every key of this table is as it was");
         }
     }
+}
+
+/// What is known of a row that the table does not have.
+fn hint(section: &Section, row: &DeTable<'_>, known: &[Value<'_>]) -> Option<Hint> {
+    let key = *section.key.first()?;
+    let own = row.get(key)?;
+    let names = known.iter().filter_map(|row| row.get_ref().as_table()?.get(key)?.get_ref().as_str());
+    let near = own.get_ref().as_str().and_then(|own| closest(own, names.filter(|name| *name != own)));
+    Some(Hint {
+        key: key.to_owned(),
+        span: own.span(),
+        written: format!("`{key} = {}`", canonical(own.get_ref())),
+        near: near.map(str::to_owned),
+    })
 }
 
 /// What tells the row from others; `None` without the first of the keys.

@@ -31,10 +31,10 @@ use toml::de::{DeTable, DeValue};
 
 use super::load::{FILES, FORMAT, MAX_FILE_BYTES, TableTexts, table_name};
 use crate::finding::registry as code;
-use crate::finding::{Findings, Problem, Source, Spanned, closest, deserialize, read_file, tree};
+use crate::finding::{Findings, Problem, Source, Spanned, closest, partial, read_file, tree};
 
 pub(super) use families::{FAMILIES, ParsedFamily, parse as parse_families};
-pub(super) use merge::lay;
+pub(super) use merge::{Hints, lay};
 pub use sections::{Section, sections};
 
 /// The most overlays: one for the family of drives, one for the drive, one for the machine are usual.
@@ -129,7 +129,16 @@ pub(super) fn layers<'t>(overlays: &'t [Overlay], findings: &mut Findings) -> Ve
 fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>> {
     let source = Source::new(&overlay.path, &overlay.text);
     let tree = tree(&overlay.text, &source, findings)?;
-    let head: Option<OverlayHead> = deserialize(tree.clone(), &source, findings);
+    if let Some(problem) = other_kind(tree.get_ref()) {
+        findings.push(&source, problem);
+        return None;
+    }
+    let hint = |problem: &Problem| {
+        let help = "begin the file with `format = 1` and `overlay = \"what it is for\"`";
+        (problem.code == code::MISSING_KEY).then(|| problem.clone().help(help))
+    };
+    let head = partial(tree.clone(), &source, findings, &hint).filter(|head| head.faultless);
+    let head: Option<OverlayHead> = head.map(|head| head.rows);
     if let Some(head) = &head
         && *head.format.get_ref() != FORMAT
     {
@@ -149,14 +158,14 @@ fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>>
         if !names.contains(&name) {
             let problem = Problem::new(code::UNKNOWN_TABLE, key.span()).key(name);
             let problem = problem.expected("expected rows of a table, such as [[generic-sercos.parameter]]");
-            let close = closest(name, names.iter().copied());
-            findings.push(
-                &source,
-                match close {
-                    Some(close) => problem.help(format!("did you mean `{close}`?")),
-                    None => problem.help(format!("the tables are {}", names.join(", "))),
+            let help = match closest(name, names.iter().copied()) {
+                Some(close) => format!("did you mean `{close}`?"),
+                None => match tables_with(name, &names).as_slice() {
+                    [] => format!("the tables are {}", names.join(", ")),
+                    heads => format!("write the name of the table as well: {}", heads.join(" or ")),
                 },
-            );
+            };
+            findings.push(&source, problem.help(help));
         } else if drives.is_some() && name != OF_FAMILIES {
             let problem = Problem::new(code::CONTRADICTION, key.span()).key(name);
             findings.push(
@@ -168,6 +177,42 @@ fn layer<'t>(overlay: &'t Overlay, findings: &mut Findings) -> Option<Layer<'t>>
         }
     }
     Some(Layer { overlay, tree, name, drives })
+}
+
+/// The heads that a list has in the tables that have it.
+fn tables_with(list: &str, names: &[&str]) -> Vec<String> {
+    let has = |name: &&&str| sections(name).iter().any(|section| section.name == list);
+    names.iter().filter(has).map(|name| format!("[[{name}.{list}]]")).collect()
+}
+
+/// What is wrong with a file of another kind that was named as an overlay.
+fn other_kind(tree: &DeTable<'_>) -> Option<Problem> {
+    const CONFIGURATION: [&str; 4] = ["box", "south", "device", "axis"];
+    if tree.contains_key("overlay") {
+        return None;
+    }
+    let (key, value) = tree
+        .iter()
+        .filter(|(key, _)| !HEAD.contains(&key.get_ref().as_ref()))
+        .min_by_key(|(key, _)| key.span().start)?;
+    let problem = |title: &str| {
+        Problem::new(code::WRONG_HEAD, key.span())
+            .title(title)
+            .expected("expected the head `overlay = \"...\"`")
+    };
+    if ["mapping", "profile"].contains(&key.get_ref().as_ref()) && value.get_ref().as_str().is_some() {
+        let help = "a table replaces a shipped one under the same file name, in a folder that `dir` of [mappings] or --mappings names";
+        return Some(problem("this file is a table, not an overlay").help(help));
+    }
+    if CONFIGURATION.iter().filter(|key| tree.contains_key(**key)).count() > 1 {
+        return Some(problem("this file is a configuration, not an overlay").help("name it with --config"));
+    }
+    if tree.contains_key("step") {
+        return Some(
+            problem("this file is a script, not an overlay").help("`axisbridge simulate` runs scripts"),
+        );
+    }
+    None
 }
 
 impl TableTexts {
@@ -233,11 +278,18 @@ impl Reader<'_> {
         let text = match read_file(path, MAX_FILE_BYTES) {
             Ok(text) => text,
             Err(found) => {
-                if let Some((source, name)) = asked {
-                    let problem = Problem::new(code::UNREADABLE, name.span()).key("base");
-                    self.findings.push(source, problem.expected("expected an overlay"));
+                // What another overlay names is reported where it is named.
+                match asked {
+                    Some((source, name)) => {
+                        let problem = Problem::new(code::UNREADABLE, name.span()).key("base");
+                        let why =
+                            found.list().first().map(|finding| finding.expected.clone()).unwrap_or_default();
+                        let help = "the path starts at the folder of this overlay";
+                        self.findings.push(source, problem.expected(why).help(help));
+                    }
+                    None => self.findings.extend(found),
                 }
-                return self.findings.extend(found);
+                return;
             }
         };
         let source = Source::new(&shown, &text);

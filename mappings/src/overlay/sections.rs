@@ -9,12 +9,14 @@ pub struct Section {
     pub key: &'static [&'static str],
     /// Whether the first row that fits wins, so that rows that are added come before those that are there.
     pub first_wins: bool,
+    /// Keys that say the same thing in different ways: where a row of an overlay has some of them, the others of the row that is there go.
+    pub either: &'static [&'static str],
     /// Lists of rows in a row that are laid over row by row as well; any other list is replaced as a whole.
     pub lists: &'static [Section],
 }
 
 const fn section(name: &'static str, key: &'static [&'static str]) -> Section {
-    Section { name, key, first_wins: false, lists: &[] }
+    Section { name, key, first_wins: false, either: &[], lists: &[] }
 }
 
 const fn first(name: &'static str, key: &'static [&'static str]) -> Section {
@@ -23,6 +25,11 @@ const fn first(name: &'static str, key: &'static [&'static str]) -> Section {
 
 const fn nested(name: &'static str, key: &'static [&'static str], lists: &'static [Section]) -> Section {
     Section { lists, ..section(name, key) }
+}
+
+/// What an action sends stands as a whole in the row that says it: by a name, by fields, or by both.
+const fn action(key: &'static [&'static str]) -> Section {
+    Section { either: &["pattern", "send"], ..section("action", key) }
 }
 
 const RANGES: Section = section("ranges", &["from"]);
@@ -101,7 +108,7 @@ const GENERIC_SERCOS: &[Section] = &[
     section("mode", &["mode", "interpolation"]),
     section("mode_slot", &["slot"]),
     section("procedure", &["mode", "interpolation"]),
-    section("action", &["action"]),
+    action(&["action"]),
     first("report", &["pattern", "acknowledges", "procedure"]),
     section("status", &["status", "word", "pattern", "acknowledges"]),
     first("fault", &["word", "pattern"]),
@@ -117,7 +124,7 @@ const GENERIC_CIA402: &[Section] = &[
     section("signal", &["signal", "modes"]),
     first("mode", &["mode", "interpolation", "modes"]),
     section("procedure", &["mode", "interpolation"]),
-    section("action", &["action", "when"]),
+    action(&["action", "when"]),
     first("report", &["state", "pattern", "modes", "follows", "voltage"]),
     section("status", &["status", "object", "state", "pattern", "modes", "follows", "voltage"]),
     first("fault", &["codes"]),

@@ -196,7 +196,7 @@ impl Compiler<'_> {
             CaptureBy::Counter { value, counter } => {
                 let value = self.stored(value, telegram)?;
                 let counter = self.place(counter, &telegram.feedback)?;
-                // Only what comes in every cycle can be told apart.
+                // Only what comes in every cycle can be distinguished.
                 let (_, _) = (value.place.offset?, counter.offset?);
                 program.counters.try_push(Counter { kind, counter, value }).ok()?;
             }

@@ -153,13 +153,13 @@ impl Compiler<'_> {
                     if outcome.saturated {
                         let unlimited = conversion.within(i64::MIN, i64::MAX).convert(*generic).value;
                         return Err(SercosError::Limit {
-                            idn: rule.idn,
+                            idn: rule.at.idn,
                             value: unlimited,
                             limits: (conversion.min, conversion.max),
                         });
                     }
-                    let candidates = vec![encode(rule.idn, outcome.value, entry.width)?];
-                    steps.push(Step::Write { idn: rule.idn, candidates, refused });
+                    let candidates = vec![encode(rule.at.idn, outcome.value, entry.width)?];
+                    steps.push(Step::Write { idn: rule.at.idn, candidates, refused });
                 }
             }
             StepKind::WriteModes => {
@@ -198,7 +198,7 @@ impl Compiler<'_> {
                     let item = Item::from(*idn);
                     telegram.command.contains(&item) || telegram.feedback.contains(&item)
                 };
-                let idns = self.tables.parameters.iter().map(|rule| rule.idn).filter(|idn| !cyclic(idn));
+                let idns = self.tables.parameters.iter().map(|rule| rule.at.idn).filter(|idn| !cyclic(idn));
                 read(steps, idns.collect(), &DESCRIPTION);
             }
             StepKind::ReadCaptures => read(steps, captures::idns(self.tables), &DESCRIPTION),

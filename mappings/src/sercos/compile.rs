@@ -22,6 +22,7 @@ use crate::drive_program::{
     DriveProgram, MAX_MODES, ModeEntry, PROCEDURE_COMMANDS_MAX, PROCEDURES_MAX, ParameterEntry, Procedure,
     ProcedureBy, StatusRow, Telegram, WORD_BYTES,
 };
+use crate::drive_rows::Full;
 use crate::item::Item;
 
 /// Wraps of a position that does not work modulo: the range of its 32 bits.
@@ -36,7 +37,7 @@ pub struct SercosAxis {
     pub modes: ArrayVec<ModeSelection, { MAX_MODES + PROCEDURES_MAX }>,
     /// One of the modes is enough: those that the drive does not have are left out.
     pub any_mode: bool,
-    /// The drive has refused the values of a telegram and does not tell which: those that the axis can do without stay out.
+    /// The drive has refused the values of a telegram and does not report which: those that the axis can do without stay out.
     pub bare: bool,
     /// Whether positions wrap.
     pub modulo: bool,
@@ -46,7 +47,7 @@ pub struct SercosAxis {
     pub parameters: Vec<(Parameter, i64)>,
     /// How the drive's captures are used.
     pub captures: CaptureMode,
-    /// The drive's status word does not tell whether it follows command values and whether it is halted.
+    /// The drive's status word does not report whether it follows command values and whether it is halted.
     pub silent: bool,
 }
 
@@ -195,8 +196,8 @@ pub enum SercosError {
     #[error(transparent)]
     Scaling(#[from] ScalingError),
     /// A table does not fit the program.
-    #[error("{0} does not fit the program of an axis")]
-    Full(&'static str),
+    #[error(transparent)]
+    Full(#[from] Full),
     /// A value beyond the minimum or maximum that the drive gives.
     #[error("{idn}: expected {} to {} by elements 5 and 6 of the drive, got {value}", limits.0, limits.1)]
     Limit {
@@ -420,7 +421,7 @@ fn feed_constant(
 }
 
 impl DriveProgram {
-    /// The program of an axis whose drive has told its scaling.
+    /// The program of an axis whose drive has reported its scaling.
     ///
     /// # Errors
     /// As [`Telegram::compile`], and when the scaling was not read or has no row.
@@ -441,7 +442,7 @@ impl DriveProgram {
         compiler.add_procedures(&mut program)?;
         compiler.add_status(&mut program)?;
         compiler.add_faults(&mut program)?;
-        compiler.add_parameters(&mut program)?;
+        program.add_parameters(&tables.parameters, |rule| compiler.parameter(rule))?;
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
@@ -481,11 +482,11 @@ impl Compiler<'_> {
         program.carriers = Some([carriers(&command), carriers(&actual)]);
         for (signal, idn) in command {
             let field = self.field(signal, idn, self.offset(idn, &program.telegram.command)?)?;
-            program.command.push(field).map_err(|_| SercosError::Full("the master's telegram"))?;
+            program.add_field(field)?;
         }
         for (signal, idn) in actual {
             let field = self.field(signal, idn, self.offset(idn, &program.telegram.feedback)?)?;
-            program.feedback.push(field).map_err(|_| SercosError::Full("the drive's telegram"))?;
+            program.add_field(field)?;
         }
         Ok(())
     }
@@ -497,7 +498,7 @@ impl Compiler<'_> {
         }
         for (action, idn) in &self.tables.commands {
             let command = (*action, Item::from(*idn));
-            program.commands.try_push(command).map_err(|_| SercosError::Full("the table of commands"))?;
+            program.commands.try_push(command).map_err(|_| Full("the table of commands"))?;
         }
         Ok(())
     }
@@ -513,7 +514,7 @@ impl Compiler<'_> {
             let fits = (procedure == Some(true) || program.reports.push(pattern, report))
                 && (procedure == Some(false) || program.led_reports.push(pattern, report));
             if !fits {
-                return Err(SercosError::Full("the table of reports"));
+                return Err(Full("the table of reports").into());
             }
         }
         Ok(())
@@ -522,12 +523,9 @@ impl Compiler<'_> {
     fn add_modes(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
         for (rule, slot) in self.modes()?.chosen {
             let SlotRule { control, status, .. } = *slot;
-            let refuse = |signal: &&Signal| self.tables.signal(**signal).is_some_and(|row| row.refuse);
-            let needs = rule.command.iter().filter(refuse).map(|signal| signal.command_bit()).collect();
-            let fields = || program.command.fields().map(|field| field.signal);
-            let there = |signal: &&Signal| fields().any(|known| known == **signal);
-            let carried = rule.command.iter().filter(there).map(|signal| signal.command_bit()).collect();
-            let entry = ModeEntry {
+            let refuse = |signal| self.tables.signal(signal).is_some_and(|row| row.refuse);
+            let (needs, carried) = program.command_sets(&rule.command, refuse);
+            program.add_mode(ModeEntry {
                 selection: rule.selection,
                 control,
                 status,
@@ -535,8 +533,7 @@ impl Compiler<'_> {
                 handshake: None,
                 needs,
                 carried,
-            };
-            program.modes.try_push(entry).map_err(|_| SercosError::Full("the table of modes"))?;
+            })?;
         }
         Ok(())
     }
@@ -553,13 +550,11 @@ impl Compiler<'_> {
                 continue;
             }
             let commands = rule.commands.iter().copied().map(Item::from).take(PROCEDURE_COMMANDS_MAX);
-            let procedure = Procedure {
+            program.add_procedure(Procedure {
                 selection: rule.selection,
                 led_in: rule.led_in,
                 by: ProcedureBy::Commands(commands.collect()),
-            };
-            let full = |_| SercosError::Full("the table of procedures");
-            program.procedures.try_push(procedure).map_err(full)?;
+            })?;
         }
         Ok(())
     }
@@ -573,35 +568,18 @@ impl Compiler<'_> {
         }
         for rule in self.tables.status.iter().filter(|rule| self.counts(rule.acknowledges)) {
             let word = Some(rule.word).filter(|word| *word != self.tables.status_word).map(Item::from);
-            if word.is_some_and(|word| !program.status_words.iter().any(|place| place.item == word)) {
-                continue;
+            if program.carries_word(word) {
+                program.add_status(StatusRow { word, pattern: rule.pattern, bit: rule.bit })?;
             }
-            let row = StatusRow { word, pattern: rule.pattern, bit: rule.bit };
-            program.status.try_push(row).map_err(|_| SercosError::Full("the table of status bits"))?;
-            program.known_status |= rule.bit;
         }
         Ok(())
     }
 
     /// Faults, and where the drive keeps its diagnostic message.
     fn add_faults(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
-        for row in &self.tables.faults {
-            program.faults.try_push(*row).map_err(|_| SercosError::Full("the table of faults"))?;
-        }
+        program.add_faults(self.tables.faults.iter().copied())?;
         let diagnosis = self.tables.diagnosis.into_iter().flatten();
         program.diagnosis.extend(diagnosis.filter(|idn| !self.facts.is_missing(*idn)).map(Item::from));
-        Ok(())
-    }
-
-    fn add_parameters(&self, program: &mut DriveProgram) -> Result<(), SercosError> {
-        for rule in &self.tables.parameters {
-            match self.parameter(rule)? {
-                Some(entry) => program.parameters.push(entry),
-                None if rule.reject => program.rejected.push(rule.parameter),
-                None => {}
-            }
-        }
-        program.parameters.sort_by_key(|entry| entry.parameter);
         Ok(())
     }
 
@@ -657,18 +635,18 @@ impl Compiler<'_> {
         Ok(half.map(|half| lsb.generic.convert(half, Rounding::Floor).value))
     }
 
-    /// The entry of a parameter; `None` when the drive lacks it or does not tell its unit.
+    /// The entry of a parameter; `None` when the drive lacks it or does not report its unit.
     pub fn parameter(&self, rule: &ParameterRule) -> Result<Option<ParameterEntry>, SercosError> {
-        if self.facts.is_missing(rule.idn) {
+        if self.facts.is_missing(rule.at.idn) {
             return Ok(None);
         }
-        let width = self.facts.width(rule.idn, self.dictionary).filter(|width| !width.is_float());
+        let width = self.facts.width(rule.at.idn, self.dictionary).filter(|width| !width.is_float());
         let Some(width) = width else { return Ok(None) };
-        let unit = if rule.unit_by_drive {
-            let generic = fixed_unit(self.tables, self.facts, rule.idn, rule.quantity, None);
+        let unit = if rule.at.unit_by_drive {
+            let generic = fixed_unit(self.tables, self.facts, rule.at.idn, rule.quantity, None);
             generic.map(|generic| Lsb { quantity: rule.quantity, generic, zero: 0, modulo: None })
         } else {
-            self.unit(rule.idn, rule.quantity)
+            self.unit(rule.at.idn, rule.quantity)
         };
         let lsb = match unit {
             Ok(lsb) => lsb,
@@ -677,14 +655,14 @@ impl Compiler<'_> {
             Err(SercosError::Scaling(_)) => return Ok(None),
             Err(error) => return Err(error),
         };
-        let overflow = || ScalingError::Overflow(rule.idn);
+        let overflow = || ScalingError::Overflow(rule.at.idn);
         let ratio = lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
-        let limits = self.facts.limits(rule.idn, self.dictionary).unwrap_or(width.range());
-        let outward = to_drive(rule.idn, ratio, lsb.zero)?.within(limits.0, limits.1);
-        let inward = from_drive(rule.idn, ratio, lsb.zero)?;
+        let limits = self.facts.limits(rule.at.idn, self.dictionary).unwrap_or(width.range());
+        let outward = to_drive(rule.at.idn, ratio, lsb.zero)?.within(limits.0, limits.1);
+        let inward = from_drive(rule.at.idn, ratio, lsb.zero)?;
         Ok(Some(ParameterEntry {
             parameter: rule.parameter,
-            item: rule.idn.into(),
+            item: rule.at.idn.into(),
             width,
             to_drive: rule.to_drive.then_some(outward),
             from_drive: rule.from_drive.then_some(inward),

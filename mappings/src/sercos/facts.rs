@@ -1,4 +1,4 @@
-//! What a drive has told of itself over its service channel.
+//! What a drive has reported about itself over its service channel.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -202,7 +202,7 @@ impl DriveFacts {
         })
     }
 
-    /// Where what the drive has told of its IDNs is not what the dictionary says, by number. What the dictionary does not
+    /// Where what the drive has reported of its IDNs is not what the dictionary says, by number. What the dictionary does not
     /// know cannot differ.
     pub fn differences(&self, dictionary: &SercosDictionary) -> Vec<Difference> {
         let mut differences = Vec::new();

@@ -118,7 +118,7 @@ impl<'t> Compiler<'t> {
         rule.codes.iter().copied().filter(has).collect()
     }
 
-    /// What a drive that does not list its modes is set to, if nobody has configured them: whoever has knows better.
+    /// What a drive that does not list its modes is set to, unless they are configured.
     fn set_modes(&self) -> Vec<(Idn, u16)> {
         if !self.axis.any_mode || !self.facts.is_told(self.tables.supported_modes) {
             return Vec::new();

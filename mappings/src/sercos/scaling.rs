@@ -70,10 +70,10 @@ pub struct Lsb {
 /// Why a value cannot be scaled.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScalingError {
-    /// No row of the mapping tables tells what the scaling means.
+    /// No row of the mapping tables reports what the scaling means.
     #[error("no [[scaling]] row for `{0}`")]
     Unknown(String),
-    /// The drive has not told a parameter.
+    /// The drive has not reported a parameter.
     #[error("{0} is needed for the scaling and was not read from the drive")]
     NotRead(Idn),
     /// The scaling type is none of those in the tables.

@@ -1,6 +1,7 @@
 //! Programs of the CIP side.
 
 use super::*;
+use crate::device_link::elements;
 
 #[test]
 fn takes_position_as_float_and_as_integer_across_the_wrap() {
@@ -9,7 +10,7 @@ fn takes_position_as_float_and_as_integer_across_the_wrap() {
     let mut command = AxisCommand::default();
     let mut at = |position| {
         let values = CommandValues { position: Some(position), ..CommandValues::default() };
-        let report = program.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+        let report = program.decode(&values, 0, &mut trackers, &mut command);
         (command.position.0, report.is_clean())
     };
     assert_eq!(at(CommandPosition::Integer(i32::MAX)), (2_147_483_647_000, true));
@@ -25,9 +26,8 @@ fn a_value_that_is_not_there_is_absent_and_an_element_without_a_row_is_reported(
     let program = shipped().cip_program(&rotary_counts()).unwrap();
     let mut command = AxisCommand { velocity: Velocity(5), ..AxisCommand::default() };
     let values = CommandValues { torque: Some(-12.5), ..CommandValues::default() };
-    let mut values = CyclicValues::from(&values);
-    values.0[4] = Some(CipValue::Dint(1));
-    let report = program.decode(&values, 0, &mut program.trackers(), &mut command);
+    let values = elements(&values).chain([(4, CipValue::Dint(1))]);
+    let report = program.decode_elements(values, None, 0, &mut program.trackers(), &mut command);
     assert_eq!(
         (command.get(Signal::TorqueCommand), command.get(Signal::VelocityCommand)),
         (Some(-125_000), None)
@@ -41,7 +41,7 @@ fn a_reference_shift_is_taken_off_in_counts() {
     let mut command = AxisCommand::default();
     let position = Some(CommandPosition::Float(1_500.5));
     let values = CommandValues { position, ..CommandValues::default() };
-    program.decode(&CyclicValues::from(&values), 1_000, &mut program.trackers(), &mut command);
+    program.decode(&values, 1_000, &mut program.trackers(), &mut command);
     assert_eq!(command.position, Position(500_500));
 }
 
@@ -54,7 +54,7 @@ fn an_unwind_position_unrolls_commands_and_is_left_to_the_device_for_actual_posi
     for (counts, turns) in [(350_000, 350_000), (10_000, 370_000), (350_000, 350_000)] {
         let position = Some(CommandPosition::Integer(counts));
         let values = CommandValues { position, ..CommandValues::default() };
-        program.decode(&CyclicValues::from(&values), 0, &mut trackers, &mut command);
+        program.decode(&values, 0, &mut trackers, &mut command);
         let expected = turns * 1_000_000_000_i64 / 360_000;
         assert!(command.position.0.abs_diff(expected) <= 1, "{counts}");
     }
@@ -226,7 +226,7 @@ proptest! {
         let position = Some(CommandPosition::Integer(counts));
         let values = CommandValues { position, ..CommandValues::default() };
         let mut command = AxisCommand::default();
-        let report = program.decode(&CyclicValues::from(&values), 0, &mut program.trackers(), &mut command);
+        let report = program.decode(&values, 0, &mut program.trackers(), &mut command);
         prop_assert!(report.is_clean());
         let mut feedback = AxisFeedback::default();
         feedback.set(Signal::PositionActual, command.position.0);

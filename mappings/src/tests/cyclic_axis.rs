@@ -17,7 +17,7 @@ fn command(program: &CipProgram, at: (i64, Option<i64>), reference: i64, tracker
         ..CommandValues::default()
     };
     let mut command = AxisCommand::default();
-    let report = program.decode(&CyclicValues::from(&values), reference, trackers, &mut command);
+    let report = program.decode(&values, reference, trackers, &mut command);
     assert!(report.is_clean() || report.unmapped == 0);
     program.counts(command.position.0).value
 }
@@ -102,7 +102,7 @@ impl Chain {
             ..CommandValues::default()
         };
         let mut command = AxisCommand { mode: OperatingMode::Position, ..AxisCommand::default() };
-        self.north.decode(&CyclicValues::from(&values), 0, &mut self.trackers, &mut command);
+        self.north.decode(&values, 0, &mut self.trackers, &mut command);
         let mut telegram = [0; 12];
         let mut report = ConversionReport::default();
         self.south.encode(&command, Action::Enable, 0, 0, &mut telegram, &mut report);

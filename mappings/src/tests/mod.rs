@@ -7,12 +7,14 @@ mod cip_dictionary;
 mod cip_program;
 mod completeness;
 mod cyclic_axis;
+mod dangerous;
 mod families;
 mod overlays;
 mod sercos_dictionary;
 mod sercos_program;
 mod sercos_scaling;
 mod shipped_tables;
+mod vendor_parameters;
 
 use std::fmt::Write as _;
 use std::sync::LazyLock;

@@ -97,6 +97,7 @@ impl Method {
 
     /// What it does; `None` for a reserved number and for those of the manufacturer.
     #[must_use]
+    // Flat: a table by method.
     pub const fn plan(self) -> Option<Plan> {
         use Direction::{Negative, Positive};
         let (number, index) = match self.0 {

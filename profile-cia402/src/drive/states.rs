@@ -23,7 +23,7 @@ use core::fmt;
 use super::controlword::{Command, Controlword};
 use super::statusword::Statusword;
 
-/// A state.
+/// A state of the power drive system (6041, bits 0 to 6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum State {
     /// Internal checks go on.
@@ -73,7 +73,7 @@ impl State {
         }
     }
 
-    /// The bits of the statusword that tell it; bit 5 tells nothing where operation is not possible.
+    /// The bits of the statusword that tell it; bit 5 reports nothing where operation is not possible.
     #[must_use]
     pub const fn mask(self) -> u16 {
         match self {
@@ -192,6 +192,7 @@ impl fmt::Display for Transition {
 ///
 /// *Enable operation* in *ready to switch on* is transition 3; 4 follows when the same word is asked again.
 #[must_use]
+// Flat: the table of the standard, one arm per transition.
 pub fn transition(state: State, word: Controlword, before: Controlword, holds: bool) -> Option<Transition> {
     use Command as C;
     let rises = |bit| word.contains(bit) && !before.contains(bit);

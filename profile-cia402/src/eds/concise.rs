@@ -13,19 +13,13 @@ use core::fmt;
 use super::description::{DeviceDescription, Object, SubObject};
 use super::drive::Direction;
 use super::value::Value;
+use crate::generated::objects;
 
 /// Bytes in front of the value of an entry.
 const HEAD: usize = 7;
 
 /// Bit 31 of the COB-ID of a PDO: it does not exist.
 const NOT_VALID: u32 = 1 << 31;
-
-/// Store parameters and verify configuration: written when everything else is.
-const STORE: u16 = 0x1010;
-const VERIFY: u16 = 0x1020;
-
-/// Restore default parameters: never part of a configuration.
-const RESTORE: u16 = 0x1011;
 
 /// Bit 0 of `ObjFlags`: not to be written when a configuration is downloaded.
 const NO_DOWNLOAD: u32 = 1;
@@ -172,8 +166,11 @@ impl Configuration {
 
     fn push(&mut self, object: &Object, value: &SubObject, node: u8) {
         let data = value.parameter.as_ref().and_then(|setting| setting.at(node)?.to_bytes(value.data_type));
-        let written = data
-            .filter(|_| value.access.writes() && object.flags & NO_DOWNLOAD == 0 && object.index != RESTORE);
+        let written = data.filter(|_| {
+            value.access.writes()
+                && object.flags & NO_DOWNLOAD == 0
+                && object.index != objects::RESTORE_DEFAULT_PARAMETERS
+        });
         match written {
             Some(data) => self.writes.push(Write { index: object.index, sub: value.sub, data }),
             None => self.left_out.push((object.index, value.sub)),
@@ -192,7 +189,7 @@ impl DeviceDescription {
     pub fn configuration(&self, node: u8) -> Configuration {
         let mut configuration = Configuration::default();
         let set = |object: &Object| object.subs.iter().any(|value| value.parameter.is_some());
-        let late = [STORE, VERIFY];
+        let late = [objects::STORE_PARAMETERS, objects::VERIFY_CONFIGURATION];
         let is_pdo = |index: u16| (0x1400..=0x1BFF).contains(&index);
         let plain =
             self.objects.iter().filter(|object| !is_pdo(object.index) && !late.contains(&object.index));
@@ -212,7 +209,10 @@ impl DeviceDescription {
                 }
             }
         }
-        for object in [VERIFY, STORE].iter().filter_map(|index| self.object(*index)) {
+        for object in [objects::VERIFY_CONFIGURATION, objects::STORE_PARAMETERS]
+            .iter()
+            .filter_map(|index| self.object(*index))
+        {
             for value in object.subs.iter().filter(|value| value.parameter.is_some()) {
                 configuration.push(object, value, node);
             }

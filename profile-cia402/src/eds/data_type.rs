@@ -133,12 +133,6 @@ impl DataType {
             _ => Shape::Other,
         }
     }
-
-    /// Whether its values are whole numbers.
-    #[must_use]
-    pub const fn is_integer(self) -> bool {
-        matches!(self.shape(), Shape::Unsigned | Shape::Signed)
-    }
 }
 
 #[cfg(test)]

@@ -55,9 +55,9 @@ pub struct DeviceInfo {
     pub dynamic_channels: u32,
     /// Whether PDOs can be multiplexed.
     pub group_messaging: bool,
-    /// RPDOs that it has.
+    /// `NrOfRXPDO`; `None` where the file does not say.
     pub rpdos: Option<u16>,
-    /// TPDOs that it has.
+    /// `NrOfTXPDO`; `None` where the file does not say.
     pub tpdos: Option<u16>,
     /// Whether it has LSS.
     pub lss: bool,
@@ -171,16 +171,6 @@ impl ObjectList {
         ("OptionalObjects", Self::Optional),
         ("ManufacturerObjects", Self::Manufacturer),
     ];
-
-    /// The list that an object belongs into by its number.
-    #[must_use]
-    pub const fn of_index(index: u16) -> Self {
-        match index {
-            0x1000 | 0x1001 | 0x1018 => Self::Mandatory,
-            0x2000..=0x5FFF => Self::Manufacturer,
-            _ => Self::Optional,
-        }
-    }
 }
 
 /// What can be done with a value.
@@ -273,7 +263,7 @@ impl SubObject {
     }
 }
 
-/// An object.
+/// An entry of the object dictionary, with its sub-entries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// Its number.

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::description::DeviceDescription;
+use crate::generated::objects;
 pub use crate::wire::pdo::Direction;
 
 /// The number of the drive profile, as the low word of device types has it.
@@ -13,13 +14,6 @@ pub const AXIS_STEP: u16 = 0x800;
 
 /// The most axes of a device.
 pub const AXES_MAX: u16 = 8;
-
-/// Controlword, Statusword, supported drive modes and device type of the first axis.
-const CONTROLWORD: u16 = 0x6040;
-const STATUSWORD: u16 = 0x6041;
-const MODES: u16 = 0x6502;
-const AXIS_TYPE: u16 = 0x67FF;
-const DEVICE_TYPE: u16 = 0x1000;
 
 /// Bit 31 of a COB-ID: the PDO does not exist.
 const NOT_VALID: u32 = 1 << 31;
@@ -102,12 +96,6 @@ impl Pdo {
     pub const fn communication(&self) -> u16 {
         self.direction.first_communication() + self.number
     }
-
-    /// The number of the object with its mapping.
-    #[must_use]
-    pub const fn mapping_index(&self) -> u16 {
-        self.communication() + 0x200
-    }
 }
 
 /// An axis of a drive.
@@ -141,11 +129,11 @@ impl DeviceDescription {
     /// Whether it describes a drive of CiA 402.
     #[must_use]
     pub fn is_drive(&self) -> bool {
-        let profile = self.number(DEVICE_TYPE, 0, 0).map(|device_type| device_type & 0xFFFF);
+        let profile = self.number(objects::DEVICE_TYPE, 0, 0).map(|device_type| device_type & 0xFFFF);
         match profile {
             Some(profile) if profile != 0 => profile == u32::from(PROFILE),
             // A type of 0 or none says nothing.
-            _ => self.object(CONTROLWORD).is_some() && self.object(STATUSWORD).is_some(),
+            _ => self.object(objects::CONTROLWORD).is_some() && self.object(objects::STATUSWORD).is_some(),
         }
     }
 
@@ -154,12 +142,17 @@ impl DeviceDescription {
     pub fn axes(&self) -> Vec<Axis> {
         let there = |number: &u16| {
             let offset = number * AXIS_STEP;
-            self.object(CONTROLWORD + offset).is_some() && self.object(STATUSWORD + offset).is_some()
+            self.object(objects::CONTROLWORD + offset).is_some()
+                && self.object(objects::STATUSWORD + offset).is_some()
         };
         let axis = |number: u16| {
-            let own = self.number(AXIS_TYPE + number * AXIS_STEP, 0, 0);
-            let device_type = own.or_else(|| self.number(DEVICE_TYPE, 0, 0).filter(|_| number == 0));
-            Axis { number, device_type, modes: self.number(MODES + number * AXIS_STEP, 0, 0) }
+            let own = self.number(objects::AXIS_DEVICE_TYPE + number * AXIS_STEP, 0, 0);
+            let device_type = own.or_else(|| self.number(objects::DEVICE_TYPE, 0, 0).filter(|_| number == 0));
+            Axis {
+                number,
+                device_type,
+                modes: self.number(objects::SUPPORTED_MODES + number * AXIS_STEP, 0, 0),
+            }
         };
         (0..AXES_MAX).filter(there).map(axis).collect()
     }

@@ -642,3 +642,51 @@ open_code! {
         CONTROL = 0xF004 => "control",
     }
 }
+
+open_code! {
+    /// State that `switch state global` brings about.
+    pub struct LssMode(u8) {
+        /// Waiting.
+        WAITING = 0 => "waiting",
+        /// Configuration.
+        CONFIGURATION = 1 => "configuration",
+    }
+}
+
+open_code! {
+    /// Error code in answers to 11 (node-id) and 13 (bit timing), and to 17 (store).
+    pub struct LssError(u8) {
+        /// Ok.
+        OK = 0 => "ok",
+        /// Out of range or not supported: node-id out of range, bit rate not supported, or storing not supported.
+        REFUSED = 1 => "out of range or not supported",
+        /// Storage error: the memory cannot be written.
+        STORAGE = 2 => "storage error",
+        /// Manufacturer error: a code of the manufacturer follows.
+        MANUFACTURER = 255 => "manufacturer error",
+    }
+}
+
+open_code! {
+    /// Entry of table 0 of bit rates.
+    pub struct BitTiming(u8) {
+        /// 1000 kbit/s.
+        K1000 = 0 => "1000 kbit/s",
+        /// 800 kbit/s.
+        K800 = 1 => "800 kbit/s",
+        /// 500 kbit/s.
+        K500 = 2 => "500 kbit/s",
+        /// 250 kbit/s.
+        K250 = 3 => "250 kbit/s",
+        /// 125 kbit/s.
+        K125 = 4 => "125 kbit/s",
+        /// 50 kbit/s.
+        K50 = 6 => "50 kbit/s",
+        /// 20 kbit/s.
+        K20 = 7 => "20 kbit/s",
+        /// 10 kbit/s.
+        K10 = 8 => "10 kbit/s",
+        /// Automatic: the device finds it by itself.
+        AUTO = 9 => "automatic",
+    }
+}

@@ -4,3 +4,4 @@
 #[allow(dead_code)]
 pub(crate) mod bits;
 pub(crate) mod codes;
+pub(crate) mod objects;

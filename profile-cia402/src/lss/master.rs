@@ -38,7 +38,7 @@ impl Default for MasterConfig {
 /// Devices by a range of their addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AddressRange {
-    /// Vendor.
+    /// Vendor-ID (1018 sub 1).
     pub vendor: u32,
     /// Product code.
     pub product: u32,
@@ -185,7 +185,7 @@ enum State {
     Await {
         sent: usize,
     },
-    /// Numbers of the address that have been told.
+    /// Numbers of the address that have been reported.
     Inquire {
         known: usize,
     },

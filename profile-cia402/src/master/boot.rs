@@ -97,6 +97,7 @@ impl BootState {
 
     /// The state after `event`; `None` when it means nothing here.
     #[must_use]
+    // Flat: the table above, one arm per row.
     pub const fn next(self, event: BootEvent) -> Option<Self> {
         use BootEvent as E;
         use BootState as S;

@@ -21,7 +21,7 @@ pub const QUEUE_MAX: usize = 16;
 /// Lengths of FD frames beyond eight bytes.
 const FD_LENGTHS: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
 
-/// SYNC.
+/// SYNC: its period, synchronous window and counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SyncConfig {
     /// Time between two SYNCs (1006), nanoseconds; whole microseconds.
@@ -134,7 +134,7 @@ impl Expected {
 /// One value of a device's configuration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Write {
-    /// The object.
+    /// Index and sub-index.
     pub object: Mux,
     /// Its bytes, at least one.
     pub data: SdoData,
@@ -143,7 +143,7 @@ pub struct Write {
 /// The program that a device must have (1F55, 1F58).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProgramConfig {
-    /// What it must tell in 1F56:1, not 0.
+    /// What it must report in 1F56:1, not 0.
     pub identification: u32,
     /// The program for a device that tells something else; `None` permits no download.
     pub image: Option<SdoData>,
@@ -344,9 +344,9 @@ pub enum ConfigError {
         "SYNC: expected a period of at least 100 us in whole microseconds and a window not above it, got {period_ns} ns and {window_ns} ns"
     )]
     SyncTimes {
-        /// The period.
+        /// Communication cycle period (1006), ns.
         period_ns: u32,
-        /// The window.
+        /// Synchronous window length (1007), ns.
         window_ns: u32,
     },
     /// The counter overflow is not possible.
@@ -371,9 +371,9 @@ pub enum ConfigError {
     Guarding {
         /// The device.
         node: NodeId,
-        /// Guard time.
+        /// Guard time (100C), ms.
         guard_time_ms: u16,
-        /// Life time factor.
+        /// Life time factor (100D): guard times until the device counts as lost.
         life_time_factor: u8,
     },
     /// A device is watched in two ways.
@@ -390,7 +390,7 @@ pub enum ConfigError {
     EmptyWrite {
         /// The device.
         node: NodeId,
-        /// The object.
+        /// Index and sub-index.
         object: Mux,
     },
     /// More PDOs than there is room for.
@@ -444,6 +444,7 @@ impl MasterConfig {
     ///
     /// # Errors
     /// The first thing that is not.
+    // Flat: one line per value, each with its error.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.check_sync()?;
         let mut taken = BTreeMap::new();

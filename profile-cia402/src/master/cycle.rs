@@ -69,7 +69,7 @@ impl Master {
         }
     }
 
-    /// Counts a TPDO that did not come, and tells of one too many.
+    /// Counts a TPDO that did not come, and reports one too many.
     pub(super) fn count_missed(&mut self, index: usize, place: usize, missed: bool, lost: bool) {
         self.statistics.pdos_missed += u64::from(missed);
         if lost {

@@ -23,7 +23,7 @@ const DOUBLES_MAX: u8 = 3;
 /// TPDOs that may still come after their period, at most.
 const OWED_MAX: u8 = 100;
 
-/// State of a consumer.
+/// Whether the values of a TPDO count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConsumerState {
     /// Nothing has come since the device went into operation.
@@ -85,7 +85,7 @@ pub(super) struct TpdoEnd {
     owed: u8,
     /// Periods in a row in which more than one came.
     doubles: u8,
-    /// A wrong length has been told.
+    /// A wrong length has been reported.
     pub length_told: bool,
 }
 

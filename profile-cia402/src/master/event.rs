@@ -205,7 +205,7 @@ pub enum Event {
     },
     /// A request of the application has ended.
     Sdo {
-        /// Which.
+        /// The ticket that `sdo_submit` returned.
         ticket: Ticket,
         /// What came out.
         outcome: SdoOutcome,
@@ -213,6 +213,7 @@ pub enum Event {
 }
 
 impl fmt::Display for Event {
+    // Flat: one arm per event.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::AwaitingApplication { node, kept: false } => {

@@ -1,6 +1,6 @@
 //! Another master on the bus: what is heard of it, and what follows.
 //!
-//! A device acts at any SYNC, obeys any NMT and takes any RPDO, whoever has sent it. So a master listens before its first frame, and after each
+//! A device acts at any SYNC, obeys any NMT and takes any RPDO, regardless of the sender. So a master listens before its first frame, and after each
 //! return of the bus, and is silent as long as it hears somebody:
 //!
 //! ```text
@@ -14,7 +14,7 @@
 //!
 //! What counts are SYNC (of a network with SYNC), NMT, RPDOs of the devices in the list, and a heartbeat with the master's own
 //! node-id. In operation each of these is told once per kind ([`Event::SecondMaster`]). A tool sends one now and then, and a device that
-//! obeys it leaves operation, which stops its axes; but whoever sends SYNC twice within [`LISTEN`] is a master: the application stops its
+//! obeys it leaves operation, which stops its axes; but a station that sends SYNC twice within [`LISTEN`] is a master: the application stops its
 //! axes and calls [`Master::give_way`].
 
 use core::fmt;

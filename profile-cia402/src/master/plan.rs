@@ -12,6 +12,7 @@ use super::config::{
 use super::program::ProgramStep;
 use super::report::RowOutcome;
 use super::station::Station;
+use crate::generated::objects;
 use crate::sdo::request::{SdoFailure, SdoOutcome, SdoRequest};
 use crate::wire::pdo::{
     MAPPING_MAX, MappingEntry, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT, SUB_SYNC_START, SUB_TYPE,
@@ -105,6 +106,7 @@ pub(super) fn steps_max(node: &NodeConfig) -> usize {
 }
 
 /// Fills in the steps of a state.
+// Flat: the steps of a state, one arm per state.
 pub(super) fn fill(
     steps: &mut Vec<Step>,
     state: BootState,
@@ -218,6 +220,7 @@ fn cob_id(direction: Direction, pdo: &PdoConfig, node: &NodeConfig, station: &St
 }
 
 /// The request of a step. The bytes of a configured value go with it, and come back with the outcome.
+// Flat: one arm per step.
 pub(super) fn request(
     step: Step,
     sync: Option<SyncConfig>,
@@ -228,7 +231,7 @@ pub(super) fn request(
     let stamp = node.stamp;
     match step {
         Step::DeviceType => SdoRequest::upload(Mux::DEVICE_TYPE),
-        Step::Identity(sub) => SdoRequest::upload(Mux::new(0x1018, sub)),
+        Step::Identity(sub) => SdoRequest::upload(Mux::new(objects::IDENTITY, sub)),
         Step::Program(step) => step.request(node),
         Step::Date => SdoRequest::upload(Mux::CONFIGURATION_DATE),
         Step::Time => SdoRequest::upload(Mux::CONFIGURATION_TIME),
@@ -306,6 +309,7 @@ fn pdo_request(
 }
 
 /// What a step's outcome means.
+// Flat: one arm per step.
 pub(super) fn judge(
     step: Step,
     outcome: &SdoOutcome,
@@ -421,6 +425,7 @@ impl PdoJudge<'_> {
         Step::Pdo(self.direction, self.place, step)
     }
 
+    // Flat: one arm per step.
     fn judge(
         &self,
         step: PdoStep,

@@ -79,6 +79,7 @@ impl ProgramStep {
     }
 
     /// What its outcome means.
+    // Flat: one arm per step.
     pub fn judge(
         self,
         value: Option<u32>,

@@ -123,7 +123,7 @@ impl Master {
         Refusal::SecondMaster
     }
 
-    /// The place of a device; one that is not in the list is told once.
+    /// The place of a device; one that is not in the list is reported once.
     fn listed(&mut self, node: NodeId) -> Result<usize, Refusal> {
         if let Some(place) = self.place(node) {
             return Ok(place);

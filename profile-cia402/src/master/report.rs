@@ -37,7 +37,7 @@ pub enum RowOutcome {
 pub struct ReportRow {
     /// Where the device was.
     pub state: BootState,
-    /// The object.
+    /// Index and sub-index.
     pub object: Mux,
     /// Which way.
     pub operation: SdoOperation,

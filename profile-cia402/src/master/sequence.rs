@@ -32,7 +32,19 @@ impl Master {
         if event == BootEvent::BootUp || next.is_out() {
             (station.guard_at, station.guard_toggle) = (None, None);
         }
-        match next {
+        self.enter(now, index, last, event);
+        self.check_complete();
+        true
+    }
+
+    /// A device enters its present state by `event`; `last` is the one before.
+    // Flat: one arm per state.
+    fn enter(&mut self, now: MonotonicTime, index: usize, last: BootState, event: BootEvent) {
+        let config = &self.config;
+        let node = &config.nodes[index];
+        let station = &mut self.stations[index];
+        let kept = station.kept;
+        match station.state {
             BootState::Off => {
                 (station.give_up, station.kept) = (None, false);
                 station.relapse.forget();
@@ -43,7 +55,7 @@ impl Master {
                 (station.status, station.kept, station.heartbeat) = (None, false, None);
                 station.signs.clear();
                 (station.strays, station.last_answer) = (0, None);
-                // One that may stay in operation tells its state when it is asked, and has to be asked from then on.
+                // One that may stay in operation reports its state when it is asked, and has to be asked from then on.
                 station.guard_at = node.guarding.filter(|_| keep).map(|_| now);
                 station.deadline = Some(now + config.boot_up_time);
                 station.give_up = (config.boot_time > DurationNs::ZERO)
@@ -108,8 +120,6 @@ impl Master {
             }
             BootState::Program | BootState::Control | BootState::Failed => {}
         }
-        self.check_complete();
-        true
     }
 
     /// A device fails to come up.
@@ -400,7 +410,7 @@ impl Master {
                 .all(|(node, station)| !node.mandatory || ready(station))
     }
 
-    /// Whether a device that was started is in operation. One that tells nothing is believed to be once the command is out.
+    /// Whether a device that was started is in operation. One that reports nothing is believed to be once the command is out.
     fn has_started(&self, index: usize) -> bool {
         let station = &self.stations[index];
         let told = station.heartbeat == Some(NmtState::OPERATIONAL);

@@ -200,7 +200,7 @@ impl Station {
         }
     }
 
-    /// The transmission type of a PDO; by the configuration until the device has told another one.
+    /// The transmission type of a PDO; by the configuration until the device has reported another one.
     pub fn transmission(&self, direction: Direction, place: usize) -> Option<TransmissionType> {
         match direction {
             Direction::Receive => self.rpdos.get(place).map(RpdoEnd::transmission),

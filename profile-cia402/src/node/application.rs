@@ -11,7 +11,7 @@ use crate::wire::{AbortCode, Mux};
 pub enum Event {
     /// The device starts anew; objects have their values after power-on.
     Reset,
-    /// The master is gone, or takes the device out of *operational*: the abort connection option code 6007h tells what
+    /// The master is gone, or takes the device out of *operational*: the abort connection option code 6007h reports what
     /// to do.
     ConnectionLost,
     /// The SYNC messages that 1006h promises stay away.

@@ -4,45 +4,14 @@ use profile_generic::can::Id;
 
 use super::Config;
 use super::dictionary::{DataType, Definition, Dictionary, Group, Mapping, Object, Shape};
-use super::errors::{HISTORY, HISTORY_LEN, INHIBIT, REGISTER};
+use super::errors::HISTORY_LEN;
+use crate::generated::objects;
 use crate::wire::cob_id::CobId;
 use crate::wire::sync::COUNTER_MAX;
 use crate::wire::{AbortCode, Mux};
 
-/// COB-ID SYNC.
-pub const SYNC_ID: u16 = 0x1005;
-/// Communication cycle period, microseconds.
-pub const CYCLE_PERIOD: u16 = 0x1006;
-/// Synchronous window length, microseconds.
-pub const SYNC_WINDOW: u16 = 0x1007;
-/// Guard time, ms.
-pub const GUARD_TIME: u16 = 0x100C;
-/// Life time factor.
-pub const LIFE_TIME_FACTOR: u16 = 0x100D;
-/// Store parameters.
-pub const STORE: u16 = 0x1010;
-/// Restore default parameters.
-pub const RESTORE: u16 = 0x1011;
-/// COB-ID TIME.
-pub const TIME_ID: u16 = 0x1012;
-/// COB-ID EMCY.
-pub const EMCY_ID: u16 = 0x1014;
-/// Consumer heartbeat time.
-pub const CONSUMER_HEARTBEAT: u16 = 0x1016;
 /// Entries of 1016h.
 pub const CONSUMERS: u8 = 4;
-/// Producer heartbeat time, ms.
-pub const PRODUCER_HEARTBEAT: u16 = 0x1017;
-/// Identity.
-pub const IDENTITY: u16 = 0x1018;
-/// Synchronous counter overflow value.
-pub const SYNC_OVERFLOW: u16 = 0x1019;
-/// Verify configuration.
-pub const VERIFY: u16 = 0x1020;
-/// Store EDS.
-pub const EDS: u16 = 0x1021;
-/// Error behaviour.
-pub const ERROR_BEHAVIOUR: u16 = 0x1029;
 
 /// "save", what 1010h wants to be written.
 pub const SAVE: i64 = 0x6576_6173;
@@ -55,21 +24,39 @@ pub(super) fn define(dictionary: &mut Dictionary, config: &Config) {
     let new = Definition::new;
     let identity = &config.identity;
     let number = |name, value: u32| Some(new(name, U32, i64::from(value)).constant());
-    dictionary.variable(0x1000, new("Device type", U32, i64::from(identity.device_type)).constant());
-    dictionary.variable(REGISTER, new("Error register", U8, 0).read_only().mappable(Mapping::Tpdo));
-    dictionary.add_object(Object { index: HISTORY, name: "Pre-defined error field", shape: Shape::Array });
-    dictionary.add(Mux::new(HISTORY, 0), new("Number of errors", U8, 0).volatile());
+    dictionary
+        .variable(objects::DEVICE_TYPE, new("Device type", U32, i64::from(identity.device_type)).constant());
+    dictionary
+        .variable(objects::ERROR_REGISTER, new("Error register", U8, 0).read_only().mappable(Mapping::Tpdo));
+    dictionary.add_object(Object {
+        index: objects::PRE_DEFINED_ERROR_FIELD,
+        name: "Pre-defined error field",
+        shape: Shape::Array,
+    });
+    dictionary.add(Mux::new(objects::PRE_DEFINED_ERROR_FIELD, 0), new("Number of errors", U8, 0).volatile());
     for sub in 1..=HISTORY_LEN {
-        dictionary.add(Mux::new(HISTORY, sub), new("Standard error field", U32, 0).read_only());
+        dictionary.add(
+            Mux::new(objects::PRE_DEFINED_ERROR_FIELD, sub),
+            new("Standard error field", U32, 0).read_only(),
+        );
     }
-    dictionary.variable(SYNC_ID, new("COB-ID SYNC", U32, 0x80));
-    dictionary.variable(CYCLE_PERIOD, new("Communication cycle period", U32, 0));
-    dictionary.variable(SYNC_WINDOW, new("Synchronous window length", U32, 0));
-    dictionary.variable(0x1008, Definition::text("Manufacturer device name", identity.name));
-    dictionary.variable(0x1009, Definition::text("Manufacturer hardware version", identity.hardware));
-    dictionary.variable(0x100A, Definition::text("Manufacturer software version", identity.software));
-    dictionary.variable(GUARD_TIME, new("Guard time", U16, 0));
-    dictionary.variable(LIFE_TIME_FACTOR, new("Life time factor", U8, 0));
+    dictionary.variable(objects::COB_ID_SYNC, new("COB-ID SYNC", U32, 0x80));
+    dictionary.variable(objects::COMMUNICATION_CYCLE_PERIOD, new("Communication cycle period", U32, 0));
+    dictionary.variable(objects::SYNCHRONOUS_WINDOW_LENGTH, new("Synchronous window length", U32, 0));
+    dictionary.variable(
+        objects::MANUFACTURER_DEVICE_NAME,
+        Definition::text("Manufacturer device name", identity.name),
+    );
+    dictionary.variable(
+        objects::MANUFACTURER_HARDWARE_VERSION,
+        Definition::text("Manufacturer hardware version", identity.hardware),
+    );
+    dictionary.variable(
+        objects::MANUFACTURER_SOFTWARE_VERSION,
+        Definition::text("Manufacturer software version", identity.software),
+    );
+    dictionary.variable(objects::GUARD_TIME, new("Guard time", U16, 0));
+    dictionary.variable(objects::LIFE_TIME_FACTOR, new("Life time factor", U8, 0));
     let groups = [
         "Save all parameters",
         "Save communication parameters",
@@ -77,7 +64,7 @@ pub(super) fn define(dictionary: &mut Dictionary, config: &Config) {
         "Save manufacturer parameters",
     ];
     dictionary.record(
-        STORE,
+        objects::STORE_PARAMETERS,
         "Store parameters",
         Shape::Array,
         &groups.map(|name| Some(new(name, U32, 1).volatile())),
@@ -89,43 +76,43 @@ pub(super) fn define(dictionary: &mut Dictionary, config: &Config) {
         "Restore manufacturer default parameters",
     ];
     dictionary.record(
-        RESTORE,
+        objects::RESTORE_DEFAULT_PARAMETERS,
         "Restore default parameters",
         Shape::Array,
         &groups.map(|name| Some(new(name, U32, 1).volatile())),
     );
-    dictionary.variable(TIME_ID, new("COB-ID TIME", U32, 0x8000_0100));
-    dictionary.variable(EMCY_ID, new("COB-ID EMCY", U32, 0x80).plus_node());
-    dictionary.variable(INHIBIT, new("Inhibit time EMCY", U16, 0));
+    dictionary.variable(objects::COB_ID_TIME, new("COB-ID TIME", U32, 0x8000_0100));
+    dictionary.variable(objects::COB_ID_EMCY, new("COB-ID EMCY", U32, 0x80).plus_node());
+    dictionary.variable(objects::INHIBIT_TIME_EMCY, new("Inhibit time EMCY", U16, 0));
     let consumer = new("Consumer heartbeat time", U32, 0);
     dictionary.record(
-        CONSUMER_HEARTBEAT,
+        objects::CONSUMER_HEARTBEAT_TIME,
         "Consumer heartbeat time",
         Shape::Array,
         &[Some(consumer); CONSUMERS as usize],
     );
-    dictionary.variable(PRODUCER_HEARTBEAT, new("Producer heartbeat time", U16, 0));
+    dictionary.variable(objects::PRODUCER_HEARTBEAT_TIME, new("Producer heartbeat time", U16, 0));
     let parts = [
         number("Vendor-ID", identity.vendor),
         number("Product code", identity.product),
         number("Revision number", identity.revision),
         number("Serial number", identity.serial),
     ];
-    dictionary.record(IDENTITY, "Identity object", Shape::Record, &parts);
+    dictionary.record(objects::IDENTITY, "Identity object", Shape::Record, &parts);
     let overflow = new("Synchronous counter overflow value", U8, 0).range(0, i64::from(COUNTER_MAX));
-    dictionary.variable(SYNC_OVERFLOW, overflow);
+    dictionary.variable(objects::SYNC_OVERFLOW, overflow);
     let verify = [Some(new("Configuration date", U32, 0)), Some(new("Configuration time", U32, 0))];
-    dictionary.record(VERIFY, "Verify configuration", Shape::Array, &verify);
+    dictionary.record(objects::VERIFY_CONFIGURATION, "Verify configuration", Shape::Array, &verify);
     let eds = Definition { is_volatile: true, ..Definition::domain("Store EDS", 0) };
-    dictionary.variable(EDS, eds.constant());
+    dictionary.variable(objects::STORE_EDS, eds.constant());
     dictionary.variable(0x1022, new("Store format", U8, 0).constant());
     let behaviour = [Some(new("Communication error", U8, 0).range(0, 2))];
-    dictionary.record(ERROR_BEHAVIOUR, "Error behaviour", Shape::Array, &behaviour);
+    dictionary.record(objects::ERROR_BEHAVIOR, "Error behaviour", Shape::Array, &behaviour);
     let server = [
         Some(new("COB-ID client to server", U32, 0x600).constant().plus_node()),
         Some(new("COB-ID server to client", U32, 0x580).constant().plus_node()),
     ];
-    dictionary.record(0x1200, "SDO server parameter", Shape::Record, &server);
+    dictionary.record(objects::SDO_SERVER_PARAMETER, "SDO server parameter", Shape::Record, &server);
 }
 
 /// Whether an identifier may be used for a PDO, SYNC, TIME or EMCY: not one of NMT, SDO, error control or LSS.
@@ -153,17 +140,19 @@ pub(super) fn check(mux: Mux, number: i64, dictionary: &Dictionary) -> Result<()
     let old = || word(dictionary.number(mux.index, mux.sub));
     match (mux.index, mux.sub) {
         // The device produces neither SYNC nor TIME. SYNC and TIME have no bit that makes them invalid.
-        (SYNC_ID | TIME_ID, 0) => {
+        (objects::COB_ID_SYNC | objects::COB_ID_TIME, 0) => {
             let new = word(number);
             if new.bit_30() || !is_free(new.id()) { Err(AbortCode::VALUE) } else { Ok(()) }
         }
-        (EMCY_ID, 0) => check_cob_id(word(number), old()),
-        (HISTORY, 0) if number != 0 => Err(AbortCode::VALUE),
-        (STORE, 1..=4) if number != SAVE => Err(AbortCode::STORE),
-        (RESTORE, 1..=4) if number != LOAD => Err(AbortCode::STORE),
-        (SYNC_OVERFLOW, 0) if dictionary.number(CYCLE_PERIOD, 0) != 0 => Err(AbortCode::DEVICE_STATE),
-        (SYNC_OVERFLOW, 0) if number == 1 => Err(AbortCode::VALUE),
-        (CONSUMER_HEARTBEAT, 1..=CONSUMERS) => check_consumer(mux.sub, number, dictionary),
+        (objects::COB_ID_EMCY, 0) => check_cob_id(word(number), old()),
+        (objects::PRE_DEFINED_ERROR_FIELD, 0) if number != 0 => Err(AbortCode::VALUE),
+        (objects::STORE_PARAMETERS, 1..=4) if number != SAVE => Err(AbortCode::STORE),
+        (objects::RESTORE_DEFAULT_PARAMETERS, 1..=4) if number != LOAD => Err(AbortCode::STORE),
+        (objects::SYNC_OVERFLOW, 0) if dictionary.number(objects::COMMUNICATION_CYCLE_PERIOD, 0) != 0 => {
+            Err(AbortCode::DEVICE_STATE)
+        }
+        (objects::SYNC_OVERFLOW, 0) if number == 1 => Err(AbortCode::VALUE),
+        (objects::CONSUMER_HEARTBEAT_TIME, 1..=CONSUMERS) => check_consumer(mux.sub, number, dictionary),
         _ => Ok(()),
     }
 }
@@ -175,7 +164,7 @@ fn check_consumer(sub: u8, number: i64, dictionary: &Dictionary) -> Result<(), A
         return Err(AbortCode::VALUE);
     }
     let others = (1..=CONSUMERS).filter(|other| *other != sub);
-    let mut others = others.map(|other| consumer(dictionary.number(CONSUMER_HEARTBEAT, other)));
+    let mut others = others.map(|other| consumer(dictionary.number(objects::CONSUMER_HEARTBEAT_TIME, other)));
     let twice = others.any(|(other, watched)| other == node && watched != 0);
     if twice && time != 0 && node != 0 { Err(AbortCode::PARAMETER) } else { Ok(()) }
 }
@@ -188,14 +177,14 @@ pub(super) fn consumer(number: i64) -> (i64, i64) {
 /// What has to be done once an object of this file is written.
 pub(super) fn written(mux: Mux, dictionary: &mut Dictionary) {
     match (mux.index, Group::of(mux.sub)) {
-        (HISTORY, _) => super::errors::forget(dictionary),
-        (STORE, Some(group)) => {
+        (objects::PRE_DEFINED_ERROR_FIELD, _) => super::errors::forget(dictionary),
+        (objects::STORE_PARAMETERS, Some(group)) => {
             // Reading 1 says: it is stored when asked for.
-            dictionary.set(STORE, mux.sub, 1);
+            dictionary.set(objects::STORE_PARAMETERS, mux.sub, 1);
             dictionary.store(group);
         }
-        (RESTORE, Some(group)) => {
-            dictionary.set(RESTORE, mux.sub, 1);
+        (objects::RESTORE_DEFAULT_PARAMETERS, Some(group)) => {
+            dictionary.set(objects::RESTORE_DEFAULT_PARAMETERS, mux.sub, 1);
             dictionary.restore(group);
         }
         _ => {}

@@ -2,8 +2,9 @@
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::communication::{self, CONSUMER_HEARTBEAT, CONSUMERS};
+use super::communication::{self, CONSUMERS};
 use super::dictionary::Dictionary;
+use crate::generated::objects;
 
 /// One node under watch.
 #[derive(Debug, Clone, Copy, Default)]
@@ -36,7 +37,8 @@ impl Consumers {
     /// Takes 1016h over; an entry that did not change goes on.
     pub fn refresh(&mut self, dictionary: &Dictionary) {
         for (sub, watched) in (1..=CONSUMERS).zip(&mut self.watched) {
-            let (node, time) = communication::consumer(dictionary.number(CONSUMER_HEARTBEAT, sub));
+            let (node, time) =
+                communication::consumer(dictionary.number(objects::CONSUMER_HEARTBEAT_TIME, sub));
             let (node, time) = (u8::try_from(node).unwrap_or(0), DurationNs::from_millis(time));
             if (watched.node, watched.time) != (node, time) {
                 *watched = Watched { node, time, due: None, lost: false };

@@ -303,7 +303,7 @@ impl Group {
     }
 }
 
-/// The dictionary.
+/// The objects of a node and their values, in the order of their indices.
 #[derive(Debug, Clone)]
 pub struct Dictionary {
     /// Added to identifiers; `None` adds nothing.

@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use super::Identity;
 use super::dictionary::{Access, DataType, Dictionary, Entry, Mapping, Object, Shape};
+use crate::generated::objects;
 use crate::wire::Mux;
 
 /// Objects that every device has.
-const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
+const MANDATORY: [u16; 3] = [objects::DEVICE_TYPE, objects::ERROR_REGISTER, objects::IDENTITY];
 
 /// The data sheet.
 #[must_use]

@@ -5,16 +5,11 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::dictionary::Dictionary;
 use crate::drive::ErrorCode;
+use crate::generated::objects;
 use crate::wire::emcy::{Emcy, ErrorRegister};
 
-/// Error register.
-pub const REGISTER: u16 = 0x1001;
-/// Error history.
-pub const HISTORY: u16 = 0x1003;
 /// Entries of the history.
 pub const HISTORY_LEN: u8 = 8;
-/// Inhibit time of EMCY, 100 microseconds.
-pub const INHIBIT: u16 = 0x1015;
 
 /// Errors that can be present at once; further ones are told, but not remembered as present.
 const ACTIVE_MAX: usize = 32;
@@ -54,7 +49,7 @@ impl Errors {
     pub fn restart(&mut self, dictionary: &mut Dictionary) {
         self.active.retain(|(code, _)| !code.is_communication());
         self.waiting.clear();
-        dictionary.set(REGISTER, 0, i64::from(self.register()));
+        dictionary.set(objects::ERROR_REGISTER, 0, i64::from(self.register()));
     }
 
     fn register(&self) -> u8 {
@@ -63,7 +58,7 @@ impl Errors {
 
     fn tell(&mut self, code: ErrorCode, source: u8, dictionary: &mut Dictionary) {
         let register = self.register();
-        dictionary.set(REGISTER, 0, i64::from(register));
+        dictionary.set(objects::ERROR_REGISTER, 0, i64::from(register));
         if self.waiting.is_full() {
             self.waiting.remove(0);
         }
@@ -76,7 +71,7 @@ impl Errors {
         if self.waiting.is_empty() || now < self.inhibited_until {
             return None;
         }
-        let inhibit = dictionary.number(INHIBIT, 0);
+        let inhibit = dictionary.number(objects::INHIBIT_TIME_EMCY, 0);
         self.inhibited_until = now + DurationNs::from_micros(100 * inhibit);
         Some(self.waiting.remove(0))
     }
@@ -85,17 +80,21 @@ impl Errors {
 /// Puts an error first in the history.
 fn remember(code: ErrorCode, source: u8, dictionary: &mut Dictionary) {
     for sub in (2..=HISTORY_LEN).rev() {
-        let older = dictionary.number(HISTORY, sub - 1);
-        dictionary.set(HISTORY, sub, older);
+        let older = dictionary.number(objects::PRE_DEFINED_ERROR_FIELD, sub - 1);
+        dictionary.set(objects::PRE_DEFINED_ERROR_FIELD, sub, older);
     }
-    dictionary.set(HISTORY, 1, i64::from(u32::from(source) << 16 | u32::from(code.0)));
-    let count = dictionary.number(HISTORY, 0);
-    dictionary.set(HISTORY, 0, (count + 1).min(i64::from(HISTORY_LEN)));
+    dictionary.set(
+        objects::PRE_DEFINED_ERROR_FIELD,
+        1,
+        i64::from(u32::from(source) << 16 | u32::from(code.0)),
+    );
+    let count = dictionary.number(objects::PRE_DEFINED_ERROR_FIELD, 0);
+    dictionary.set(objects::PRE_DEFINED_ERROR_FIELD, 0, (count + 1).min(i64::from(HISTORY_LEN)));
 }
 
 /// Empties the history.
 pub(super) fn forget(dictionary: &mut Dictionary) {
     for sub in 0..=HISTORY_LEN {
-        dictionary.set(HISTORY, sub, 0);
+        dictionary.set(objects::PRE_DEFINED_ERROR_FIELD, sub, 0);
     }
 }

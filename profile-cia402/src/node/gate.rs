@@ -3,9 +3,9 @@
 use super::application::Application;
 use super::communication;
 use super::consumer::Consumers;
-use super::dictionary::{Access, DataType, Dictionary};
-use super::errors::HISTORY;
+use super::dictionary::{Access, DataType, Definition, Dictionary};
 use super::pdo::{self, Pdo};
+use crate::generated::objects;
 use crate::sdo::server::ObjectAccess;
 use crate::wire::{AbortCode, Mux};
 
@@ -21,7 +21,9 @@ pub(super) struct Gate<'a, A> {
 impl<A: Application> ObjectAccess for Gate<'_, A> {
     fn read(&mut self, object: Mux, into: &mut [u8]) -> Result<usize, AbortCode> {
         let entry = self.dictionary.entry(self.dictionary.look_up(object)?);
-        if object.index == HISTORY && i64::from(object.sub) > self.dictionary.number(HISTORY, 0) {
+        if object.index == objects::PRE_DEFINED_ERROR_FIELD
+            && i64::from(object.sub) > self.dictionary.number(objects::PRE_DEFINED_ERROR_FIELD, 0)
+        {
             return Err(AbortCode::NO_DATA);
         }
         let number = entry.number().to_le_bytes();
@@ -63,28 +65,28 @@ impl<A: Application> ObjectAccess for Gate<'_, A> {
             self.dictionary.set_bytes(handle, data);
             return Ok(());
         }
-        let size = definition.data_type.size();
-        let wrong = if data.len() > size { AbortCode::TOO_LONG } else { AbortCode::TOO_SHORT };
-        let number = definition.data_type.number(data).ok_or(wrong)?;
-        if number > definition.high {
-            return Err(AbortCode::TOO_HIGH);
-        }
-        if number < definition.low {
-            return Err(AbortCode::TOO_LOW);
-        }
         let is_parameter = !definition.is_volatile;
+        let number = number_of(definition, data)?;
         communication::check(object, number, self.dictionary)?;
         pdo::check(object, number, self.dictionary)?;
         self.application.check(object, number, self.dictionary)?;
         let before = self.dictionary.entry(handle).number();
         self.dictionary.set_number(handle, number);
-        if is_parameter && number != before && object.index != communication::VERIFY {
+        if is_parameter && number != before && object.index != objects::VERIFY_CONFIGURATION {
             // What 1020h says was configured is no longer so.
-            self.dictionary.set(communication::VERIFY, 1, 0);
-            self.dictionary.set(communication::VERIFY, 2, 0);
+            self.dictionary.set(objects::VERIFY_CONFIGURATION, 1, 0);
+            self.dictionary.set(objects::VERIFY_CONFIGURATION, 2, 0);
         }
+        self.written(object);
+        Ok(())
+    }
+}
+
+impl<A: Application> Gate<'_, A> {
+    /// What follows from a number that was written.
+    fn written(&mut self, object: Mux) {
         communication::written(object, self.dictionary);
-        if object.index == communication::CONSUMER_HEARTBEAT {
+        if object.index == objects::CONSUMER_HEARTBEAT_TIME {
             self.consumers.refresh(self.dictionary);
         }
         let changed = pdo::communication_index(object.index);
@@ -94,6 +96,19 @@ impl<A: Application> ObjectAccess for Gate<'_, A> {
             }
         }
         self.application.commanded(self.dictionary);
-        Ok(())
     }
+}
+
+/// The number that bytes are, within the limits of its object.
+fn number_of(definition: &Definition, data: &[u8]) -> Result<i64, AbortCode> {
+    let size = definition.data_type.size();
+    let wrong = if data.len() > size { AbortCode::TOO_LONG } else { AbortCode::TOO_SHORT };
+    let number = definition.data_type.number(data).ok_or(wrong)?;
+    if number > definition.high {
+        return Err(AbortCode::TOO_HIGH);
+    }
+    if number < definition.low {
+        return Err(AbortCode::TOO_LOW);
+    }
+    Ok(number)
 }

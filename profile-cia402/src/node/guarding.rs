@@ -7,8 +7,8 @@
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::communication::{GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT};
 use super::dictionary::Dictionary;
+use crate::generated::objects::{GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
 use crate::wire::error_control::Heartbeat;
 use crate::wire::nmt::NmtState;
 
@@ -29,7 +29,7 @@ impl Guarding {
         state: NmtState,
         dictionary: &Dictionary,
     ) -> Option<(Heartbeat, bool)> {
-        if dictionary.number(PRODUCER_HEARTBEAT, 0) != 0 {
+        if dictionary.number(PRODUCER_HEARTBEAT_TIME, 0) != 0 {
             return None;
         }
         let answer = Heartbeat { state, toggle: self.toggle };
@@ -41,7 +41,7 @@ impl Guarding {
     /// Whether the requests stay away, told once.
     pub fn misses(&mut self, now: MonotonicTime, dictionary: &Dictionary) -> bool {
         let life_time = dictionary.number(GUARD_TIME, 0) * dictionary.number(LIFE_TIME_FACTOR, 0);
-        let heartbeat = dictionary.number(PRODUCER_HEARTBEAT, 0) != 0;
+        let heartbeat = dictionary.number(PRODUCER_HEARTBEAT_TIME, 0) != 0;
         let Some(asked) = self.asked.filter(|_| life_time > 0 && !heartbeat) else { return false };
         if now.since(asked) < DurationNs::from_millis(life_time) {
             return false;

@@ -27,7 +27,6 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use self::application::{Application, Event, Report};
 
-use self::communication as object;
 use self::consumer::{Change, Consumers};
 use self::dictionary::{Dictionary, Group};
 use self::errors::Errors;
@@ -36,6 +35,7 @@ use self::guarding::Guarding;
 use self::nmt::Effect;
 use self::pdo::Pdo;
 use crate::drive::ErrorCode;
+use crate::generated::objects;
 use crate::lss::slave::{self as lss, SlaveEvent};
 use crate::sdo::server::{Server, ServerConfig};
 use crate::wire::cob_id::{self, CobId, Function};
@@ -157,7 +157,7 @@ impl<A: Application> Node<A> {
             });
         }
         let eds = eds::write(&dictionary, &config.identity);
-        dictionary.fill(wire::Mux::new(object::EDS, 0), eds.as_bytes());
+        dictionary.fill(wire::Mux::new(objects::STORE_EDS, 0), eds.as_bytes());
         let capacity =
             dictionary.entries().iter().map(|entry| entry.bytes().len().max(entry.definition().bytes.1));
         let server = Server::new(ServerConfig {
@@ -215,7 +215,7 @@ impl<A: Application> Node<A> {
         &mut self.dictionary
     }
 
-    /// The application.
+    /// What runs on the node.
     pub fn application(&self) -> &A {
         &self.application
     }
@@ -242,7 +242,7 @@ impl<A: Application> Node<A> {
 
     /// Its electronic data sheet.
     pub fn eds(&self) -> &[u8] {
-        let handle = self.dictionary.find(wire::Mux::new(object::EDS, 0));
+        let handle = self.dictionary.find(wire::Mux::new(objects::STORE_EDS, 0));
         handle.map_or(&[], |handle| self.dictionary.entry(handle).bytes())
     }
 
@@ -295,6 +295,7 @@ impl<A: Application> Node<A> {
     }
 
     /// Takes a frame of the bus that another station has sent. Those that are none of this node's business are left alone.
+    // Flat: one arm per kind of frame.
     pub fn handle_frame(&mut self, now: MonotonicTime, frame: &Frame) {
         self.handle_time(now);
         let Id::Standard(_) = frame.id() else { return };
@@ -315,30 +316,11 @@ impl<A: Application> Node<A> {
         let word = |index| CobId(u32::try_from(self.dictionary.number(index, 0)).unwrap_or(u32::MAX));
         match Function::of(frame.id()) {
             Some(Function::Nmt) => self.handle_nmt(now, data),
-            Some(Function::SdoRequest(node)) if node == own && self.state.has_sdo() => {
-                let mut gate = Gate {
-                    dictionary: &mut self.dictionary,
-                    application: &mut self.application,
-                    rpdos: &mut self.rpdos,
-                    tpdos: &mut self.tpdos,
-                    consumers: &mut self.consumers,
-                };
-                if self.server.handle(now, data, &mut gate).is_err() {
-                    self.statistics.malformed += 1;
-                }
-            }
-            Some(Function::SdoRequest(node)) if node == own => {}
-            Some(Function::ErrorControl(node)) if node != own => match Heartbeat::parse(data) {
-                Ok(_) => {
-                    if let Change::Back(node) = self.consumers.heard(node.get(), now) {
-                        self.errors.clear(ErrorCode::HEARTBEAT, node, &mut self.dictionary);
-                    }
-                }
-                Err(_) => self.statistics.malformed += 1,
-            },
+            Some(Function::SdoRequest(node)) if node == own => self.handle_sdo(now, data),
+            Some(Function::ErrorControl(node)) if node != own => self.handle_heartbeat(now, node, data),
             _ if !self.state.has_sdo() => {}
-            _ if frame.id() == word(object::SYNC_ID).id() => self.handle_sync(now, data),
-            _ if frame.id() == word(object::TIME_ID).id() && !word(object::TIME_ID).is_valid() => {
+            _ if frame.id() == word(objects::COB_ID_SYNC).id() => self.handle_sync(now, data),
+            _ if frame.id() == word(objects::COB_ID_TIME).id() && !word(objects::COB_ID_TIME).is_valid() => {
                 match TimeOfDay::parse(data) {
                     Ok(time) => self.time = time,
                     Err(_) => self.statistics.malformed += 1,
@@ -353,6 +335,30 @@ impl<A: Application> Node<A> {
         self.tell(now);
     }
 
+    fn handle_sdo(&mut self, now: MonotonicTime, data: &[u8]) {
+        if !self.state.has_sdo() {
+            return;
+        }
+        let mut gate = Gate {
+            dictionary: &mut self.dictionary,
+            application: &mut self.application,
+            rpdos: &mut self.rpdos,
+            tpdos: &mut self.tpdos,
+            consumers: &mut self.consumers,
+        };
+        if self.server.handle(now, data, &mut gate).is_err() {
+            self.statistics.malformed += 1;
+        }
+    }
+
+    fn handle_heartbeat(&mut self, now: MonotonicTime, node: NodeId, data: &[u8]) {
+        if Heartbeat::parse(data).is_err() {
+            self.statistics.malformed += 1;
+        } else if let Change::Back(node) = self.consumers.heard(node.get(), now) {
+            self.errors.clear(ErrorCode::HEARTBEAT, node, &mut self.dictionary);
+        }
+    }
+
     /// The next frame to send.
     pub fn poll(&mut self, now: MonotonicTime) -> Option<Frame> {
         if let Some(frame) = self.waiting.pop_front() {
@@ -362,7 +368,7 @@ impl<A: Application> Node<A> {
             return Some(wire::frame(cob_id::LSS_RESPONSE, &answer));
         }
         let node = self.node.filter(|_| self.state.has_sdo())?;
-        let emcy = CobId(u32::try_from(self.dictionary.number(object::EMCY_ID, 0)).unwrap_or(u32::MAX));
+        let emcy = CobId(u32::try_from(self.dictionary.number(objects::COB_ID_EMCY, 0)).unwrap_or(u32::MAX));
         if let Some(message) = self.errors.poll(now, &self.dictionary)
             && emcy.is_valid()
         {
@@ -383,7 +389,7 @@ impl<A: Application> Node<A> {
     /// Whether only this node may send frames with this identifier.
     fn is_mine(&self, id: Id) -> bool {
         let Some(own) = self.node else { return false };
-        let emcy = CobId(u32::try_from(self.dictionary.number(object::EMCY_ID, 0)).unwrap_or(u32::MAX));
+        let emcy = CobId(u32::try_from(self.dictionary.number(objects::COB_ID_EMCY, 0)).unwrap_or(u32::MAX));
         id == cob_id::error_control(own)
             || id == cob_id::sdo_response(own)
             || emcy.is_valid() && id == emcy.id()
@@ -491,7 +497,7 @@ impl<A: Application> Node<A> {
     /// A communication error: the application is told, and 1029h:1 says what else.
     fn fail(&mut self, now: MonotonicTime) {
         self.lose_connection();
-        let behaviour = self.dictionary.number(object::ERROR_BEHAVIOUR, 1);
+        let behaviour = self.dictionary.number(objects::ERROR_BEHAVIOR, 1);
         let (state, effect) = nmt::fail(self.state, behaviour);
         if state != self.state {
             self.apply(now, state, effect);
@@ -517,7 +523,7 @@ impl<A: Application> Node<A> {
                 self.fail(now);
             }
         }
-        let period = DurationNs::from_micros(self.dictionary.number(object::CYCLE_PERIOD, 0));
+        let period = DurationNs::from_micros(self.dictionary.number(objects::COMMUNICATION_CYCLE_PERIOD, 0));
         let silence = self.last_sync.map_or(DurationNs::ZERO, |last| now.since(last));
         if period > DurationNs::ZERO && silence.0 > i64::from(self.sync_cycles) * period.0 && !self.sync_lost
         {
@@ -536,7 +542,7 @@ impl<A: Application> Node<A> {
             }
         }
         let Some(node) = self.node.filter(|_| self.state != NmtState::BOOT_UP) else { return };
-        let period = DurationNs::from_millis(self.dictionary.number(object::PRODUCER_HEARTBEAT, 0));
+        let period = DurationNs::from_millis(self.dictionary.number(objects::PRODUCER_HEARTBEAT_TIME, 0));
         if period > DurationNs::ZERO && now.since(self.heartbeat_at) >= period {
             // On the grid of its period, unless it was not called for longer.
             let next = self.heartbeat_at + period;
@@ -565,7 +571,7 @@ impl<A: Application> Node<A> {
     }
 
     fn handle_sync(&mut self, now: MonotonicTime, data: &[u8]) {
-        let counts = self.dictionary.number(object::SYNC_OVERFLOW, 0) != 0;
+        let counts = self.dictionary.number(objects::SYNC_OVERFLOW, 0) != 0;
         let sync = match Sync::parse(data) {
             Ok(sync) if sync.counter.is_some() == counts => sync,
             _ => {
@@ -608,7 +614,7 @@ impl<A: Application> Node<A> {
         } else {
             self.errors.clear(ErrorCode::PDO_TOO_LONG, source, &mut self.dictionary);
         }
-        let window = DurationNs::from_micros(self.dictionary.number(object::SYNC_WINDOW, 0));
+        let window = DurationNs::from_micros(self.dictionary.number(objects::SYNCHRONOUS_WINDOW_LENGTH, 0));
         let since = self.last_sync.map_or(DurationNs::ZERO, |last| now.since(last));
         if pdo.transmission.is_synchronous() && window > DurationNs::ZERO && since > window {
             self.statistics.late_rpdos += 1;

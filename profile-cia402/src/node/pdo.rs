@@ -151,25 +151,24 @@ pub(super) fn check(mux: Mux, number: i64, dictionary: &Dictionary) -> Result<()
             _ => mapped(direction, entry_of(number), dictionary).map(|_| ()),
         };
     }
-    match mux.sub {
-        SUB_COB_ID => {
-            let (new, old) = (word(number), word(dictionary.number(index, SUB_COB_ID)));
-            let moves = valid && new.is_valid() && !new.names_same(old);
-            let unusable = new.is_valid() && !is_free(new.id()) || matches!(new.id(), Id::Extended(_));
-            if moves || unusable { Err(AbortCode::VALUE) } else { Ok(()) }
-        }
+    let good = match mux.sub {
+        SUB_COB_ID => is_usable(word(number), word(dictionary.number(index, SUB_COB_ID))),
         SUB_TYPE => {
             let transmission = TransmissionType(u8::try_from(number).unwrap_or(u8::MAX));
             // No device here answers remote frames.
-            if transmission.is_reserved() || transmission.is_remote() {
-                Err(AbortCode::VALUE)
-            } else {
-                Ok(())
-            }
+            !transmission.is_reserved() && !transmission.is_remote()
         }
-        SUB_INHIBIT | SUB_SYNC_START if valid => Err(AbortCode::VALUE),
-        _ => Ok(()),
-    }
+        SUB_INHIBIT | SUB_SYNC_START => !valid,
+        _ => true,
+    };
+    if good { Ok(()) } else { Err(AbortCode::VALUE) }
+}
+
+/// Whether a PDO can have this COB-ID instead of the old one: one that is sent or received does not move.
+fn is_usable(new: CobId, old: CobId) -> bool {
+    let moves = old.is_valid() && new.is_valid() && !new.names_same(old);
+    let taken = new.is_valid() && !is_free(new.id());
+    !moves && !taken && !matches!(new.id(), Id::Extended(_))
 }
 
 fn check_count(

@@ -220,18 +220,18 @@ impl Client {
     /// Takes a frame from the server. `Ok(false)` when nobody has asked for it.
     ///
     /// # Errors
-    /// [`Error::Length`] when it has not eight bytes: it is ignored, and the transfer goes on.
+    /// [`Error::length`] when it has not eight bytes: it is ignored, and the transfer goes on.
     pub fn handle(&mut self, now: MonotonicTime, data: &[u8]) -> Result<bool, Error> {
         let segments = self.state == ClientState::BlockUploadSegments;
         let step = if segments && Abort::parse(data).is_none() {
             match BlockSegment::parse(data) {
                 Ok(segment) => self.take_block_segment(segment),
-                Err(error @ Error::Length { .. }) => return Err(error),
+                Err(error) if error.is_length() => return Err(error),
                 Err(_) => Err(protocol(AbortCode::SEQUENCE)),
             }
         } else {
             let response = match SdoResponse::parse(data) {
-                Err(error @ Error::Length { .. }) => return Err(error),
+                Err(error) if error.is_length() => return Err(error),
                 response => response.ok(),
             };
             if self.is_stray(response) {
@@ -331,6 +331,7 @@ impl Client {
         Ok(None)
     }
 
+    // Flat: one arm per state and response.
     fn take(&mut self, now: MonotonicTime, response: SdoResponse) -> Step {
         use ClientState as S;
         use SdoResponse as R;

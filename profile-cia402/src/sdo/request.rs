@@ -106,7 +106,7 @@ pub enum Method {
 /// One request to a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SdoRequest {
-    /// The object.
+    /// Index and sub-index.
     pub object: Mux,
     /// What to do with it.
     pub operation: SdoOperation,
@@ -211,7 +211,7 @@ impl SdoFailure {
 /// A finished request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SdoOutcome {
-    /// The object.
+    /// Index and sub-index.
     pub object: Mux,
     /// What was asked.
     pub operation: SdoOperation,

@@ -180,7 +180,7 @@ impl Server {
     /// Takes a frame from the client.
     ///
     /// # Errors
-    /// [`Error::Length`] when it has not eight bytes: it is ignored, and the transfer goes on.
+    /// [`Error::length`] when it has not eight bytes: it is ignored, and the transfer goes on.
     pub fn handle(
         &mut self,
         now: MonotonicTime,
@@ -190,13 +190,13 @@ impl Server {
         let handled = if self.state == ServerState::BlockDownload && Abort::parse(data).is_none() {
             match BlockSegment::parse(data) {
                 Ok(segment) => self.take_block_segment(segment).transpose(),
-                Err(error @ Error::Length { .. }) => return Err(error),
+                Err(error) if error.is_length() => return Err(error),
                 Err(_) => Some(Err(AbortCode::SEQUENCE)),
             }
         } else {
             match SdoRequest::parse(data) {
                 Ok(request) => self.take(request, objects),
-                Err(error @ Error::Length { .. }) => return Err(error),
+                Err(error) if error.is_length() => return Err(error),
                 Err(_) => Some(Err(AbortCode::COMMAND)),
             }
         };

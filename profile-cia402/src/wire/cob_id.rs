@@ -39,7 +39,7 @@ impl NodeId {
     pub const fn new(number: u8) -> Result<Self, Error> {
         match number {
             1..=127 => Ok(Self(number)),
-            _ => Err(Error::Value { what: "node-id", expected: "1 to 127", found: number as u32 }),
+            _ => Err(Error::value("node-id", "1 to 127", number as u32)),
         }
     }
 
@@ -174,6 +174,7 @@ pub enum Function {
 impl Function {
     /// What an identifier means; `None` when the default connection set does not use it.
     #[must_use]
+    // Flat: a table of ranges of identifiers.
     pub fn of(id: Id) -> Option<Self> {
         let Id::Standard(id) = id else { return None };
         let node = NodeId::new(u8::try_from(id & 0x7F).unwrap_or_default());

@@ -8,7 +8,7 @@ use bitflags::bitflags;
 use crate::drive::ErrorCode;
 
 use super::bytes::Bytes;
-use super::display_bits;
+use profile_generic::wire::display_bits;
 use profile_generic::wire::{Error, exact, u16_at};
 
 /// Bytes of EMCY.
@@ -47,7 +47,7 @@ impl fmt::Display for ErrorRegister {
     }
 }
 
-/// EMCY.
+/// An emergency message: error code, error register and five bytes of the maker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Emcy {
     /// Error code.
@@ -62,7 +62,7 @@ impl Emcy {
     /// Reads one.
     ///
     /// # Errors
-    /// [`Error::Length`] unless there are eight bytes.
+    /// [`Error::length`] unless there are eight bytes.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let bytes = exact::<EMCY_LEN>("EMCY", bytes)?;
         let [_, _, register, vendor @ ..] = bytes;
@@ -94,6 +94,7 @@ impl fmt::Display for Emcy {
 
 #[cfg(test)]
 mod tests {
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     use super::*;
@@ -125,12 +126,8 @@ mod tests {
             ),
         ];
         for (source, bytes, value, text) in vectors {
-            assert_eq!(Emcy::parse(&bytes), Ok(value), "{source}");
-            assert_eq!((value.emit(), value.to_string()), (bytes, text.to_string()), "{source}");
-        }
-        for len in (0..16).filter(|&len| len != EMCY_LEN) {
-            let error = Error::Length { what: "EMCY", expected: 8, found: len };
-            assert_eq!(Emcy::parse(&[0; 16][..len]), Err(error));
+            check_vectors!(&[(source, bytes, value)], Emcy, whole);
+            assert_eq!(value.to_string(), text, "{source}");
         }
     }
 

@@ -33,7 +33,7 @@ impl Heartbeat {
     /// Reads one.
     ///
     /// # Errors
-    /// [`Error::Length`] unless there is one byte.
+    /// [`Error::length`] unless there is one byte.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let [byte] = exact::<HEARTBEAT_LEN>("heartbeat", bytes)?;
         Ok(Self { state: NmtState(byte & 0x7F), toggle: byte & 0x80 != 0 })
@@ -57,6 +57,7 @@ impl fmt::Display for Heartbeat {
 
 #[cfg(test)]
 mod tests {
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     use super::*;
@@ -73,12 +74,8 @@ mod tests {
             (0x85, Heartbeat { state: NmtState::OPERATIONAL, toggle: true }, "heartbeat operational toggle"),
         ];
         for (byte, value, text) in vectors {
-            assert_eq!(Heartbeat::parse(&[byte]), Ok(value));
-            assert_eq!((value.emit(), value.to_string()), ([byte], text.to_string()));
-        }
-        for bytes in [&[][..], &[5, 0]] {
-            let error = Error::Length { what: "heartbeat", expected: 1, found: bytes.len() };
-            assert_eq!(Heartbeat::parse(bytes), Err(error));
+            check_vectors!(&[(text, [byte], value)], Heartbeat, whole);
+            assert_eq!(value.to_string(), text);
         }
     }
 

@@ -4,9 +4,9 @@
 
 use core::fmt;
 
-use profile_generic::open_code;
-
 use profile_generic::wire::{Error, exact, u16_at, u32_at};
+
+pub use crate::generated::codes::{BitTiming, LssError, LssMode};
 
 /// Bytes of a request and of an answer.
 pub const LSS_LEN: usize = 8;
@@ -16,54 +16,6 @@ pub const UNCONFIGURED: u8 = 0xFF;
 
 /// Bit check of the fastscan that asks whether any slave without a node-id is there, and starts it.
 pub const FASTSCAN_CONFIRM: u8 = 0x80;
-
-open_code! {
-    /// State that `switch state global` brings about.
-    pub struct LssMode(u8) {
-        /// Waiting.
-        WAITING = 0 => "waiting",
-        /// Configuration.
-        CONFIGURATION = 1 => "configuration",
-    }
-}
-
-open_code! {
-    /// Error code in answers to 11 (node-id) and 13 (bit timing), and to 17 (store).
-    pub struct LssError(u8) {
-        /// Done.
-        OK = 0 => "ok",
-        /// Node-id out of range, bit rate not supported, or storing not supported.
-        REFUSED = 1 => "out of range or not supported",
-        /// Store: the memory cannot be written.
-        STORAGE = 2 => "storage error",
-        /// A code of the manufacturer follows.
-        MANUFACTURER = 0xFF => "manufacturer error",
-    }
-}
-
-open_code! {
-    /// Entry of table 0 of bit rates.
-    pub struct BitTiming(u8) {
-        /// 1000 kbit/s.
-        K1000 = 0 => "1000 kbit/s",
-        /// 800 kbit/s.
-        K800 = 1 => "800 kbit/s",
-        /// 500 kbit/s.
-        K500 = 2 => "500 kbit/s",
-        /// 250 kbit/s.
-        K250 = 3 => "250 kbit/s",
-        /// 125 kbit/s.
-        K125 = 4 => "125 kbit/s",
-        /// 50 kbit/s.
-        K50 = 6 => "50 kbit/s",
-        /// 20 kbit/s.
-        K20 = 7 => "20 kbit/s",
-        /// 10 kbit/s.
-        K10 = 8 => "10 kbit/s",
-        /// The device finds it by itself.
-        AUTO = 9 => "automatic",
-    }
-}
 
 impl BitTiming {
     /// Bits per second; `None` for automatic and unknown entries.
@@ -223,6 +175,7 @@ impl LssRequest {
     ///
     /// # Errors
     /// [`Error`] unless there are eight bytes with a known command specifier.
+    // Flat: one arm per command specifier.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let bytes = exact::<LSS_LEN>("LSS request", bytes)?;
         let number = u32_at(&bytes, 1);
@@ -393,7 +346,7 @@ impl fmt::Display for LssResponse {
 }
 
 const fn unknown(found: u8) -> Error {
-    Error::Value { what: "LSS", expected: "a known command specifier", found: found as u32 }
+    Error::value("LSS", "a known command specifier", found as u32)
 }
 
 const fn short(command: u8, first: u8, second: u8) -> [u8; LSS_LEN] {
@@ -407,6 +360,7 @@ fn long(command: u8, number: u32) -> [u8; LSS_LEN] {
 
 #[cfg(test)]
 mod tests {
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     use super::*;
@@ -467,8 +421,8 @@ mod tests {
             ([0x5E, 0, 0, 0, 0, 0, 0, 0], R::InquireNodeId, "LSS inquire node-id"),
         ];
         for (bytes, value, text) in vectors {
-            assert_eq!(R::parse(&bytes), Ok(value));
-            assert_eq!((value.emit(), value.to_string()), (bytes, text.to_string()));
+            check_vectors!(&[(text, bytes, value)], R, whole);
+            assert_eq!(value.to_string(), text);
         }
     }
 
@@ -502,8 +456,8 @@ mod tests {
             ([0x5E, 0xFF, 0, 0, 0, 0, 0, 0], R::InquiredNodeId(UNCONFIGURED), "LSS node-id 255"),
         ];
         for (bytes, value, text) in vectors {
-            assert_eq!(R::parse(&bytes), Ok(value));
-            assert_eq!((value.emit(), value.to_string()), (bytes, text.to_string()));
+            check_vectors!(&[(text, bytes, value)], R, whole);
+            assert_eq!(value.to_string(), text);
         }
     }
 
@@ -525,7 +479,7 @@ mod tests {
     fn wrong_lengths_are_named() {
         for len in (0..16).filter(|&len| len != LSS_LEN) {
             let bytes = &[0x17; 16][..len];
-            let error = |what| Error::Length { what, expected: 8, found: len };
+            let error = |what| Error::length(what, 8, len);
             assert_eq!(LssRequest::parse(bytes), Err(error("LSS request")));
             assert_eq!(LssResponse::parse(bytes), Err(error("LSS response")));
         }

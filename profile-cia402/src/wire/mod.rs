@@ -36,16 +36,3 @@ use profile_generic::can::{Frame, Id};
 pub fn frame(id: Id, data: &[u8]) -> Frame {
     Frame::new(id, data).expect("an identifier in its range and at most eight bytes")
 }
-
-/// Writes names in brackets, separated by commas; nothing if there are none.
-pub(crate) fn display_bits(
-    f: &mut core::fmt::Formatter<'_>,
-    names: impl Iterator<Item = &'static str>,
-) -> core::fmt::Result {
-    let mut open = false;
-    for name in names {
-        write!(f, "{}{name}", if open { ", " } else { " (" })?;
-        open = true;
-    }
-    if open { f.write_str(")") } else { Ok(()) }
-}

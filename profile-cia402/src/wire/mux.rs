@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::generated::objects;
+
 /// Index and sub-index of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Mux {
@@ -13,39 +15,33 @@ pub struct Mux {
 
 impl Mux {
     /// Device type.
-    pub const DEVICE_TYPE: Self = Self::new(0x1000, 0);
-    /// Error register.
-    pub const ERROR_REGISTER: Self = Self::new(0x1001, 0);
-    /// COB-ID of SYNC; bit 30 when the device produces it.
-    pub const SYNC_COB_ID: Self = Self::new(0x1005, 0);
+    pub const DEVICE_TYPE: Self = Self::new(objects::DEVICE_TYPE, 0);
     /// Communication cycle period, microseconds.
-    pub const CYCLE_PERIOD: Self = Self::new(0x1006, 0);
+    pub const CYCLE_PERIOD: Self = Self::new(objects::COMMUNICATION_CYCLE_PERIOD, 0);
     /// Synchronous window length, microseconds; 0 for the whole cycle.
-    pub const SYNC_WINDOW: Self = Self::new(0x1007, 0);
+    pub const SYNC_WINDOW: Self = Self::new(objects::SYNCHRONOUS_WINDOW_LENGTH, 0);
     /// Node guarding: time between two requests, ms; 0 for none.
-    pub const GUARD_TIME: Self = Self::new(0x100C, 0);
+    pub const GUARD_TIME: Self = Self::new(objects::GUARD_TIME, 0);
     /// Node guarding: guard times without a request after which the master is lost; 0 for never.
-    pub const LIFE_TIME_FACTOR: Self = Self::new(0x100D, 0);
+    pub const LIFE_TIME_FACTOR: Self = Self::new(objects::LIFE_TIME_FACTOR, 0);
     /// Store parameters: all of them.
-    pub const STORE: Self = Self::new(0x1010, 1);
-    /// COB-ID of EMCY; bit 31 when there is none.
-    pub const EMCY_COB_ID: Self = Self::new(0x1014, 0);
+    pub const STORE: Self = Self::new(objects::STORE_PARAMETERS, 1);
     /// Time between two heartbeats, ms; 0 for none.
-    pub const PRODUCER_HEARTBEAT: Self = Self::new(0x1017, 0);
+    pub const PRODUCER_HEARTBEAT: Self = Self::new(objects::PRODUCER_HEARTBEAT_TIME, 0);
     /// Identity: vendor.
-    pub const VENDOR: Self = Self::new(0x1018, 1);
+    pub const VENDOR: Self = Self::new(objects::IDENTITY, 1);
     /// Identity: product code.
-    pub const PRODUCT: Self = Self::new(0x1018, 2);
+    pub const PRODUCT: Self = Self::new(objects::IDENTITY, 2);
     /// Identity: revision.
-    pub const REVISION: Self = Self::new(0x1018, 3);
+    pub const REVISION: Self = Self::new(objects::IDENTITY, 3);
     /// Identity: serial number.
-    pub const SERIAL: Self = Self::new(0x1018, 4);
+    pub const SERIAL: Self = Self::new(objects::IDENTITY, 4);
     /// Counter overflow of SYNC: 0 for no counter, else 2 to 240.
-    pub const SYNC_OVERFLOW: Self = Self::new(0x1019, 0);
+    pub const SYNC_OVERFLOW: Self = Self::new(objects::SYNC_OVERFLOW, 0);
     /// Configuration date, days since 1984-01-01.
-    pub const CONFIGURATION_DATE: Self = Self::new(0x1020, 1);
+    pub const CONFIGURATION_DATE: Self = Self::new(objects::VERIFY_CONFIGURATION, 1);
     /// Configuration time, ms after midnight.
-    pub const CONFIGURATION_TIME: Self = Self::new(0x1020, 2);
+    pub const CONFIGURATION_TIME: Self = Self::new(objects::VERIFY_CONFIGURATION, 2);
 
     /// This part of this object.
     #[must_use]
@@ -56,7 +52,7 @@ impl Mux {
     /// Time out of a heartbeat that the device consumes, by entry from 1: node-id in bits 23..16, ms in 15..0.
     #[must_use]
     pub const fn consumer_heartbeat(entry: u8) -> Self {
-        Self::new(0x1016, entry)
+        Self::new(objects::CONSUMER_HEARTBEAT_TIME, entry)
     }
 
     /// The bytes in a frame: index, low byte first, and sub-index.

@@ -11,14 +11,9 @@ pub const PDO_LEN_MAX: usize = 8;
 /// Most entries of a mapping: one per bit of the PDO.
 pub const MAPPING_MAX: usize = 64;
 
-/// Communication parameters of RPDO 1; those of RPDO n follow at n - 1.
-pub const RPDO_COMMUNICATION: u16 = 0x1400;
-/// Mapping of RPDO 1.
-pub const RPDO_MAPPING: u16 = 0x1600;
-/// Communication parameters of TPDO 1.
-pub const TPDO_COMMUNICATION: u16 = 0x1800;
-/// Mapping of TPDO 1.
-pub const TPDO_MAPPING: u16 = 0x1A00;
+/// Of PDO 1; those of PDO n follow at n - 1.
+pub use crate::generated::objects::{RPDO_COMMUNICATION, RPDO_MAPPING, TPDO_COMMUNICATION, TPDO_MAPPING};
+
 /// Highest number of a PDO, counted from 1.
 pub const PDO_NUMBER_MAX: u16 = 512;
 

@@ -7,7 +7,7 @@ use profile_generic::wire::Error;
 /// The largest value of the counter (1019).
 pub const COUNTER_MAX: u8 = 240;
 
-/// SYNC.
+/// SYNC, with or without its counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Sync {
     /// Counts from 1 to the value of 1019 and begins again; `None` where 1019 is 0.
@@ -23,10 +23,8 @@ impl Sync {
         match *bytes {
             [] => Ok(Self { counter: None }),
             [counter @ 1..=COUNTER_MAX] => Ok(Self { counter: Some(counter) }),
-            [counter] => {
-                Err(Error::Value { what: "SYNC counter", expected: "1 to 240", found: u32::from(counter) })
-            }
-            _ => Err(Error::Length { what: "SYNC", expected: 1, found: bytes.len() }),
+            [counter] => Err(Error::value("SYNC counter", "1 to 240", u32::from(counter))),
+            _ => Err(Error::length("SYNC", 1, bytes.len())),
         }
     }
 
@@ -69,7 +67,7 @@ mod tests {
             assert_eq!(&value.emit()[..value.buffer_len()], bytes);
             assert_eq!(value.to_string(), text);
         }
-        assert_eq!(Sync::parse(&[1, 2]), Err(Error::Length { what: "SYNC", expected: 1, found: 2 }));
+        assert_eq!(Sync::parse(&[1, 2]), Err(Error::length("SYNC", 1, 2)));
         assert_eq!(Sync::parse(&[0]).unwrap_err().to_string(), "SYNC counter: expected 1 to 240, got 0x0");
         assert!(Sync::parse(&[241]).is_err());
     }

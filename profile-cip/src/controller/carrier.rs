@@ -36,7 +36,7 @@ impl Controller {
         }
     }
 
-    /// Takes the answer to a message, whoever it is for.
+    /// Takes the answer to a message, regardless of which request it belongs to.
     pub(super) fn take_answer(&mut self, now: MonotonicTime, asker: Asker, answer: Result<Answer, Failure>) {
         match asker {
             Asker::Program => self.answer = Some(answer),

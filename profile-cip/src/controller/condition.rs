@@ -145,7 +145,7 @@ pub enum Condition {
     Velocity {
         /// Instance number.
         axis: u8,
-        /// Actual velocity in units/s: as the device tells it, or from the actual positions if it does not.
+        /// Actual velocity in units/s: as the device reports it, or from the actual positions if it does not.
         velocity: f64,
         /// Units/s on either side.
         tolerance: f64,
@@ -254,6 +254,7 @@ impl Condition {
 }
 
 impl fmt::Display for Condition {
+    // Flat: one arm per condition.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(axis) = self.axis() {
             write!(f, "{}: ", Instance(axis))?;

@@ -242,7 +242,7 @@ pub struct ControllerConfig {
     pub time_data: TimeDataSet,
     /// Attributes of the class (instance 0), written first.
     pub class_attributes: Vec<AttributeSet>,
-    /// The axes.
+    /// The axes of the device; the first is instance 1.
     pub axes: Vec<AxisSetup>,
     /// Axes whose drives may come later: the program begins while they are still in Initializing.
     pub late: AxisSet,
@@ -318,6 +318,7 @@ impl ControllerConfig {
     ///
     /// # Errors
     /// The first value out of its range.
+    // Flat: one line per value, each with its error.
     pub fn check(&self) -> Result<(), ConfigError> {
         let bad = |what, value: f64, wanted| Err(ConfigError::Value { what, value, wanted });
         if self.axes.is_empty() || self.axes.len() > MAX_AXES {

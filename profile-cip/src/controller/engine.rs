@@ -141,12 +141,6 @@ impl Controller {
         self.phase == Phase::Closed
     }
 
-    /// Whether the steps of the program are being carried out.
-    #[must_use]
-    pub fn is_running_program(&self) -> bool {
-        self.phase == Phase::Program
-    }
-
     /// Where the C-to-D datagrams go if the device said so; otherwise UDP port 2222 of the device.
     #[must_use]
     pub fn datagram_destination(&self) -> Option<SocketAddrV4> {
@@ -464,12 +458,6 @@ impl Controller {
     ) -> bool {
         let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
         axis.map(|axis| axis.events.arm(checking, parameters)).is_some()
-    }
-
-    /// Disarms events of an axis. `false` if there is no such axis.
-    pub fn disarm_events(&mut self, axis: u8, checking: EventChecking) -> bool {
-        let axis = self.axes.iter_mut().find(|known| known.instance() == axis);
-        axis.map(|axis| axis.events.disarm(checking)).is_some()
     }
 
     /// Event Checking Status of the newest update; `None` if there is no such axis.

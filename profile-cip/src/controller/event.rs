@@ -18,17 +18,17 @@ pub struct DeviceIdentity {
     pub vendor: u16,
     /// Device type; 0x25 for a CIP Motion drive.
     pub device_type: u16,
-    /// Product code.
+    /// Identity object, attribute 3.
     pub product_code: u16,
-    /// Major revision.
+    /// Identity object, attribute 4, first byte.
     pub major_revision: u8,
-    /// Minor revision.
+    /// Identity object, attribute 4, second byte.
     pub minor_revision: u8,
     /// Status word.
     pub status: u16,
-    /// Serial number.
+    /// Identity object, attribute 6.
     pub serial_number: u32,
-    /// Product name.
+    /// Identity object, attribute 7.
     pub product_name: String,
 }
 
@@ -233,6 +233,7 @@ impl fmt::Display for Instance {
 }
 
 impl fmt::Display for Event {
+    // Flat: one arm per event.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Identified(identity) => write!(f, "device {identity}"),

@@ -27,7 +27,7 @@ pub(super) struct EventChecks {
     next: EventChecking,
     sending: Option<Sending>,
     status: EventChecking,
-    /// Notifications of the newest update; they have been told.
+    /// Notifications of the newest update; they have been reported.
     seen: ArrayVec<u8, MAX_EVENTS>,
 }
 
@@ -213,7 +213,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is lost on the way, every event that the device took is told once and in order.
+        /// Whatever is lost on the way, every event that the device took is reported once and in order.
         #[test]
         fn no_event_is_lost_or_doubled(
             losses in prop::collection::vec((any::<bool>(), any::<bool>(), 0..4_usize), 1..600),

@@ -205,7 +205,7 @@ pub enum Failure {
     RequestRefused {
         /// Instance number.
         axis: u8,
-        /// The request.
+        /// What Axis Control asked for.
         request: AxisControl,
         /// Response Status.
         status: u8,
@@ -216,7 +216,7 @@ pub enum Failure {
     RequestTimeOut {
         /// Instance number.
         axis: u8,
-        /// The request.
+        /// What Axis Control asked for.
         request: AxisControl,
         /// Axis Response that came instead.
         response: AxisControl,
@@ -338,7 +338,7 @@ pub enum Failure {
     NotRefused {
         /// Instance number.
         axis: u8,
-        /// The request.
+        /// What Axis Control asked for.
         request: AxisControl,
         /// Response Status expected, if it mattered.
         expected: Option<u8>,
@@ -398,6 +398,7 @@ pub enum Failure {
 }
 
 impl fmt::Display for Failure {
+    // Flat: one arm per failure.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let status = status::Named;
         match *self {

@@ -26,7 +26,7 @@ const RECORD: [(u16, u8); 5] = [
     (AXIS_FAULT_TIME_STAMP, 8),
 ];
 
-/// Updates after which the record of an axis that stands for a fault is read again: a device may tell at first only that its
+/// Updates after which the record of an axis that stands for a fault is read again: a device may report at first only that its
 /// drive has one, and a moment later which.
 const READ_AGAIN: u16 = 16;
 
@@ -84,7 +84,7 @@ pub(super) struct FaultReader {
     state: AxisStateCode,
     /// Updates since the axis' record was read.
     updates: u16,
-    /// The axis' record that was told last in this trouble; what is read after it need not be new.
+    /// The axis' record that was reported last in this trouble; what is read after it need not be new.
     told: Option<FaultRecord>,
 }
 

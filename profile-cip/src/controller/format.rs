@@ -4,7 +4,7 @@
 //! |---|---|
 //! | time stamps, time data | asynchronous operation |
 //! | Control Status, Command Control | attributes 89 and 92, set by a service |
-//! | node fault, fault record of the axis | read by a service when Node Status or Axis State tells of one |
+//! | node fault, fault record of the axis | read by a service when Node Status or Axis State reports one |
 //! | node alarm, alarm record, Axis Status, Axis I/O Status | attributes, read by steps |
 //! | Lost and Late Updates | class attributes, read by steps |
 //! | service channel | the same services as explicit messages |

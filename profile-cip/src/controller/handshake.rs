@@ -27,7 +27,7 @@ enum Exchange {
 /// An acknowledged request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Acknowledge {
-    /// The request.
+    /// What Axis Control asks for.
     pub request: AxisControl,
     /// Response Status; 0 is success.
     pub status: u8,

@@ -271,7 +271,7 @@ impl Link {
         if datagram.data.len() > room {
             let clip = |length| u32::try_from(length).unwrap_or(u32::MAX);
             let (value, max) = (clip(datagram.data.len()), clip(room));
-            return Err(Error::OutOfRange { what: "connection data", value, max });
+            return Err(Error::too_large("connection data", max, value));
         }
         let update = match self.format {
             Format::Variable => Update::Variable(ActualFrame::parse(datagram.data)?),

@@ -63,14 +63,14 @@ pub enum Misbehaviour {
     },
     /// Leave out the command value that the Control Mode needs.
     OmitSetPoint {
-        /// Of which axes.
+        /// The axes that it applies to.
         axes: AxisSet,
         /// How many updates.
         updates: u32,
     },
     /// Ask in the next updates for a Control Mode that the axis does not have to know.
     WrongMode {
-        /// The axes.
+        /// The axes that it applies to.
         axes: AxisSet,
         /// The code.
         mode: u8,

@@ -19,7 +19,7 @@ pub(super) struct NodeSeen {
     late: Counter,
 }
 
-/// The device counts from zero since the connection was opened, and tells only what has changed.
+/// The device counts from zero since the connection was opened, and reports only what has changed.
 #[derive(Debug, Default)]
 struct Counter {
     last: u8,

@@ -29,6 +29,7 @@ use super::event::Event;
 use super::executor::{Context, report_refused};
 use super::failure::Failure;
 use super::services::{Outcome, Ticket};
+use crate::device::attribute::id;
 use crate::wire::motion::Format;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{
@@ -44,8 +45,6 @@ const SKEW_PERIODS: i64 = 4;
 const MOTION_SCALING_CONFIGURATION: u16 = 45;
 const MOTION_RESOLUTION: u16 = 78;
 const DRIVE_SCALING: u8 = 1;
-/// Attributes that a service sets where the updates do not carry them (footnote of Table 5-2.16).
-const CONTROL_STATUS: u16 = 89;
 
 /// Where a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +68,7 @@ pub(super) enum Phase {
 
 impl Controller {
     /// Goes through the phases as far as possible.
+    // Flat: one arm per phase.
     pub(super) fn advance(&mut self, now: MonotonicTime) -> Result<(), Failure> {
         if self.node.fault != NodeFault::NONE
             && !matches!(self.phase, Phase::Program | Phase::Stopping { .. } | Phase::Closing | Phase::Closed)
@@ -326,7 +326,7 @@ impl Controller {
 /// What ends the configuration in the fixed format, in this order.
 fn completion(target: CommandTarget) -> [AttributeSet; 2] {
     let complete = ControlStatus::CONFIGURATION_COMPLETE.bits();
-    [command_control(target), AttributeSet::usint(CONTROL_STATUS, complete).optional()]
+    [command_control(target), AttributeSet::usint(id::CONTROL_STATUS, complete).optional()]
 }
 
 /// States from which an axis has to be disabled before the connection may be closed.

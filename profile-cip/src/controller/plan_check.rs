@@ -15,6 +15,7 @@ impl Step {
     ///
     /// # Errors
     /// The failure that the step would end with.
+    // Flat: one arm per step.
     pub fn check(&self, config: &ControllerConfig) -> Result<(), Failure> {
         let count = u8::try_from(config.axes.len()).unwrap_or(u8::MAX);
         if let Some(axis) = self.unknown_axis(count) {

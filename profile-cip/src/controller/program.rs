@@ -88,16 +88,16 @@ pub enum Step {
     Cancel(AxisSet),
     /// Make an Axis Control request and go on without waiting for its acknowledge.
     Ask {
-        /// The axes.
+        /// The axes that it applies to.
         axes: AxisSet,
-        /// The request.
+        /// What Axis Control asks for.
         request: AxisControl,
     },
     /// Make an Axis Control request that the device has to refuse.
     Refused {
-        /// The axes.
+        /// The axes that it applies to.
         axes: AxisSet,
-        /// The request.
+        /// What Axis Control asks for.
         request: AxisControl,
         /// The Response Status, if it matters.
         status: Option<u8>,
@@ -393,6 +393,7 @@ impl Step {
 }
 
 impl fmt::Display for Step {
+    // Flat: one arm per step.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |f: &mut fmt::Formatter<'_>, name: &str, steps: &[Step]| {
             write!(f, "{name}")?;

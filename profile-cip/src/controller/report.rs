@@ -41,7 +41,7 @@ impl<T> Entries<T> {
     }
 }
 
-/// One axis.
+/// The figures of one axis in a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AxisReport {
     /// Instance number.

@@ -292,6 +292,7 @@ impl Services {
 }
 
 impl Job {
+    // Flat: one arm per kind of service.
     fn take_response(&mut self, body: &Body, response: &ServiceResponse<'_>) -> Result<(), Failure> {
         let (instance, service) = (self.instance, self.service);
         let malformed = |error| Failure::ServiceMalformed { instance, service, error };
@@ -333,12 +334,7 @@ impl Job {
                 }
                 let Some(code) = response.data.first() else {
                     let (needed, available) = (1, 0);
-                    return Err(malformed(Error::Truncated {
-                        what: "sync status",
-                        offset: 0,
-                        needed,
-                        available,
-                    }));
+                    return Err(malformed(Error::truncated("sync status", 0, needed, available)));
                 };
                 *sync = SyncStatus(*code);
             }
@@ -361,7 +357,7 @@ fn same_count(asked: u16, answered: u16) -> Result<(), Error> {
         return Ok(());
     }
     let (found, expected) = (u32::from(answered), u32::from(asked));
-    Err(Error::Invalid { what: "number of attributes", offset: 0, found, expected })
+    Err(Error::invalid("number of attributes", 0, expected, found))
 }
 
 /// What an attribute takes in a request and in its response.

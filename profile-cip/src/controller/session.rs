@@ -321,7 +321,7 @@ impl Session {
             let length = HEADER_LEN + usize::from(header.length);
             if length > PACKET_MAX {
                 let (value, max) = (u32::from(header.length), 4096 - 24);
-                let error = Error::OutOfRange { what: "encapsulation length", value, max };
+                let error = Error::too_large("encapsulation length", max, value);
                 self.received.clear();
                 self.fail(Failure::StreamMalformed(error));
                 return;
@@ -370,7 +370,7 @@ impl Session {
     }
 
     fn unexpected(&mut self, what: &'static str, offset: usize, found: u32, expected: u32) {
-        self.outputs.push_back(Output::Malformed(Error::Invalid { what, offset, found, expected }));
+        self.outputs.push_back(Output::Malformed(Error::invalid(what, offset, expected, found)));
     }
 
     fn take_identity_list(&mut self, now: MonotonicTime, data: &[u8]) -> Result<(), Error> {
@@ -406,12 +406,12 @@ impl Session {
 
     fn take_reply(&mut self, now: MonotonicTime, exchange: Exchange, data: &[u8]) -> Result<(), Error> {
         let packet = EncapsulatedPacket::parse(data)?.packet;
-        let missing = Error::Truncated { what: "unconnected data item", offset: 0, needed: 4, available: 0 };
+        let missing = Error::truncated("unconnected data item", 0, 4, 0);
         let reply = Reply::parse(packet.find(ItemType::UNCONNECTED_DATA).ok_or(missing)?)?;
         let service = service_of(exchange);
         if reply.service != service {
             let (found, expected) = (u32::from(reply.service.0), u32::from(service.0));
-            return Err(Error::Invalid { what: "reply service", offset: 0, found, expected });
+            return Err(Error::invalid("reply service", 0, expected, found));
         }
         if let Exchange::Message(service) = exchange {
             self.state = State::Open;
@@ -455,7 +455,7 @@ impl Session {
         if open.triad != self.triad {
             let found = u32::from(open.triad.connection_serial);
             let expected = u32::from(self.triad.connection_serial);
-            return Err(Error::Invalid { what: "connection triad", offset: 8, found, expected });
+            return Err(Error::invalid("connection triad", 8, expected, found));
         }
         let destination = packet.find(ItemType::SOCKADDR_O_TO_T).map(SockaddrInfo::parse).transpose()?;
         // From here on the connection is there and has to be closed, whatever is wrong with it.

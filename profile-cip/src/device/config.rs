@@ -205,7 +205,7 @@ impl Default for QosConfig {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MotionConfig {
     /// Format of the connection data that the device accepts. The connection point is the same for both (it is the
-    /// Format Revision), so in the Forward_Open the size type tells them apart: fixed size for the fixed format,
+    /// Format Revision), so in the Forward_Open the size type distinguishes them: fixed size for the fixed format,
     /// variable size for the variable one.
     pub format: Format,
     /// Shortest packet interval in microseconds.

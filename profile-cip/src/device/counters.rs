@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 
-/// Different reasons of refused Forward_Opens that are told apart; those beyond are counted in the last one.
+/// Different reasons of refused Forward_Opens that are distinguished; those beyond are counted in the last one.
 pub const REFUSALS_MAX: usize = 48;
 
 /// Everything that was refused or given up, by reason. Counters only rise.

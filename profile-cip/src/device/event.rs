@@ -20,7 +20,7 @@ pub enum ResetKind {
 pub enum Event {
     /// The motion connection is open.
     MotionOpened {
-        /// Which one.
+        /// The connection, by the numbers of its Forward_Open.
         triad: ConnectionTriad,
         /// Whose.
         originator: SocketAddrV4,
@@ -29,12 +29,12 @@ pub enum Event {
     },
     /// The motion connection was closed by its originator.
     MotionClosed {
-        /// Which one.
+        /// The connection, by the numbers of its Forward_Open.
         triad: ConnectionTriad,
     },
     /// The motion connection timed out: no controller-to-device datagram for too long.
     MotionLost {
-        /// Which one.
+        /// The connection, by the numbers of its Forward_Open.
         triad: ConnectionTriad,
         /// Whose.
         originator: SocketAddrV4,
@@ -60,7 +60,7 @@ pub enum Event {
     },
     /// An explicit connection timed out: no request for too long.
     ExplicitLost {
-        /// Which one.
+        /// The connection, by the numbers of its Forward_Open.
         triad: ConnectionTriad,
         /// Whose.
         originator: SocketAddrV4,
@@ -104,6 +104,7 @@ pub enum Event {
 }
 
 impl fmt::Display for Event {
+    // Flat: one arm per event.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::MotionOpened { triad, originator, rpi_us } => {

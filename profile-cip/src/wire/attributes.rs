@@ -19,7 +19,7 @@ impl<'a> AttributeIds<'a> {
     /// Reads the request data.
     ///
     /// # Errors
-    /// [`Error::Truncated`] if the count says more than there is, [`Error::Trailing`].
+    /// [`Error::truncated`] if the count says more than there is, [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let count = r.u16("attribute count")?;
@@ -46,7 +46,7 @@ impl<'a> AttributeIds<'a> {
     /// Writes request data with these numbers and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] for more than 65535 numbers.
+    /// [`Error::truncated`]; [`Error::OutOfRange`] for more than 65535 numbers.
     pub fn emit(ids: &[u16], buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("attribute count", length_u16("attribute count", ids.len())?)?;
@@ -66,14 +66,11 @@ pub struct AttributeStatus {
     pub status: u16,
 }
 
-/// Length of [`AttributeStatus`] in bytes.
-pub const ATTRIBUTE_STATUS_LEN: usize = 4;
-
 impl AttributeStatus {
     /// Reads a row where `r` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn read(r: &mut Reader<'_>) -> Result<Self, Error> {
         Ok(Self { attribute: r.u16("attribute")?, status: r.u16("attribute status")? })
     }
@@ -81,7 +78,7 @@ impl AttributeStatus {
     /// Writes a row where `w` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn write(&self, w: &mut Writer<'_>) -> Result<(), Error> {
         w.u16("attribute", self.attribute)?;
         w.u16("attribute status", self.status)
@@ -117,7 +114,7 @@ mod tests {
     fn a_huge_count_is_refused_before_any_number_is_read() {
         assert_eq!(
             AttributeIds::parse(&[0xFF, 0xFF, 1, 0]),
-            Err(Error::Truncated { what: "attribute list", offset: 2, needed: 131_070, available: 2 })
+            Err(Error::truncated("attribute list", 2, 131_070, 2))
         );
     }
 

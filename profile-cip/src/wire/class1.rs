@@ -26,7 +26,7 @@ pub const CONNECTION_ID_OFFSET: usize = 6;
 /// Bytes of the sequence count, which the connection size includes.
 pub const SEQUENCE_COUNT_LEN: usize = 2;
 
-/// One datagram.
+/// A datagram of a class 1 connection: sequenced address item and connected data item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Class1Datagram<'a> {
     /// Connection ID of this direction.
@@ -43,7 +43,7 @@ impl<'a> Class1Datagram<'a> {
     /// Reads exactly one datagram.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`], [`Error::Invalid`] for other items or counts.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for other items or counts.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         expect(&mut r, "item count", 2)?;
@@ -67,7 +67,7 @@ impl<'a> Class1Datagram<'a> {
     /// Writes the datagram and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] for more than 65533 bytes of data.
+    /// [`Error::truncated`]; [`Error::OutOfRange`] for more than 65533 bytes of data.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         Self::emit_header(
             self.connection_id,
@@ -115,7 +115,7 @@ fn expect(r: &mut Reader<'_>, what: &'static str, expected: u16) -> Result<(), E
     if found == expected {
         return Ok(());
     }
-    Err(Error::Invalid { what, offset, found: u32::from(found), expected: u32::from(expected) })
+    Err(Error::invalid(what, offset, u32::from(expected), u32::from(found)))
 }
 
 impl fmt::Display for Class1Datagram<'_> {
@@ -134,7 +134,7 @@ impl fmt::Display for Class1Datagram<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     const INITIAL: Class1Datagram<'static> = Class1Datagram {
@@ -168,7 +168,7 @@ mod tests {
             let mut bytes = INITIAL_BYTES.to_vec();
             bytes[offset] ^= 0x40;
             let found = expected ^ 0x40;
-            assert_eq!(Class1Datagram::parse(&bytes), Err(Error::Invalid { what, offset, found, expected }));
+            assert_eq!(Class1Datagram::parse(&bytes), Err(Error::invalid(what, offset, expected, found)));
         }
     }
 
@@ -176,10 +176,7 @@ mod tests {
     fn a_data_item_too_short_for_the_sequence_count_is_refused() {
         let mut bytes = INITIAL_BYTES[..19].to_vec();
         bytes[16] = 1;
-        assert_eq!(
-            Class1Datagram::parse(&bytes),
-            Err(Error::Truncated { what: "sequence count", offset: 0, needed: 2, available: 1 })
-        );
+        assert_eq!(Class1Datagram::parse(&bytes), Err(Error::truncated("sequence count", 0, 2, 1)));
     }
 
     proptest! {

@@ -45,7 +45,7 @@ open_code! {
     }
 }
 
-/// One item.
+/// An item of the Common Packet Format: type and data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Item<'a> {
     /// What the data is.
@@ -77,7 +77,7 @@ impl<'a> CommonPacket<'a> {
     /// Reads exactly one list.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for more than [`ITEMS_MAX`] items, [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::OutOfRange`] for more than [`ITEMS_MAX`] items, [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let packet = Self::read(&mut r)?;
@@ -88,7 +88,7 @@ impl<'a> CommonPacket<'a> {
     fn read(r: &mut Reader<'a>) -> Result<Self, Error> {
         let count = r.u16("item count")?;
         if usize::from(count) > ITEMS_MAX {
-            return Err(Error::OutOfRange { what: "item count", value: u32::from(count), max: 8 });
+            return Err(Error::too_large("item count", 8, u32::from(count)));
         }
         let mut items = ArrayVec::new();
         for _ in 0..count {
@@ -107,7 +107,7 @@ impl<'a> CommonPacket<'a> {
     /// Writes the list and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] for an item of more than 65535 bytes.
+    /// [`Error::truncated`]; [`Error::OutOfRange`] for an item of more than 65535 bytes.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("item count", length_u16("item count", self.items.len())?)?;
@@ -183,7 +183,7 @@ impl<'a> EncapsulatedPacket<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
@@ -224,7 +224,7 @@ mod tests {
     fn an_item_count_of_0xe801_is_refused_before_any_item_is_read() {
         assert_eq!(
             CommonPacket::parse(&[0x01, 0xE8, 0, 0, 0, 0]),
-            Err(Error::OutOfRange { what: "item count", value: 0xE801, max: 8 })
+            Err(Error::too_large("item count", 8, 0xE801))
         );
     }
 
@@ -232,7 +232,7 @@ mod tests {
     fn an_item_longer_than_its_packet_is_refused() {
         assert_eq!(
             CommonPacket::parse(&[1, 0, 0xB2, 0, 0xFF, 0xFF, 1, 2]),
-            Err(Error::Truncated { what: "item data", offset: 6, needed: 65535, available: 2 })
+            Err(Error::truncated("item data", 6, 65535, 2))
         );
     }
 

@@ -91,7 +91,7 @@ impl Header {
     /// Reads the header at the start of `bytes`; more may follow.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         Ok(Self {
@@ -112,7 +112,7 @@ impl Header {
     /// Writes the header and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("encapsulation command", self.command.0)?;
@@ -146,7 +146,7 @@ impl<'a> Packet<'a> {
     /// Reads exactly one packet: a datagram, or a slice cut out of a stream by [`Header::length`].
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::Trailing`] if the length field leaves bytes over.
+    /// [`Error::truncated`]; [`Error::trailing`] if the length field leaves bytes over.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let header = Header::parse(bytes)?;
         let mut r = Reader::new(bytes);
@@ -171,7 +171,7 @@ impl<'a> Packet<'a> {
     /// Writes the packet and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] if the data is longer than the length field can say.
+    /// [`Error::truncated`]; [`Error::OutOfRange`] if the data is longer than the length field can say.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let header = Header {
             command: self.command,
@@ -206,11 +206,8 @@ impl fmt::Display for Packet<'_> {
 /// # Errors
 /// [`Error::OutOfRange`] naming `what` above 65535.
 pub(crate) fn length_u16(what: &'static str, length: usize) -> Result<u16, Error> {
-    u16::try_from(length).map_err(|_| Error::OutOfRange {
-        what,
-        value: u32::try_from(length).unwrap_or(u32::MAX),
-        max: u32::from(u16::MAX),
-    })
+    u16::try_from(length)
+        .map_err(|_| Error::too_large(what, u32::from(u16::MAX), u32::try_from(length).unwrap_or(u32::MAX)))
 }
 
 /// A length in bytes as the 8-bit count of 16-bit words that carries it.
@@ -220,15 +217,15 @@ pub(crate) fn length_u16(what: &'static str, length: usize) -> Result<u16, Error
 pub(crate) fn words_u8(what: &'static str, length: usize) -> Result<u8, Error> {
     let value = u32::try_from(length).unwrap_or(u32::MAX);
     if !length.is_multiple_of(2) {
-        return Err(Error::Invalid { what, offset: 0, found: value, expected: value.saturating_add(1) });
+        return Err(Error::invalid(what, 0, value.saturating_add(1), value));
     }
-    u8::try_from(length / 2).map_err(|_| Error::OutOfRange { what, value, max: 510 })
+    u8::try_from(length / 2).map_err(|_| Error::too_large(what, 510, value))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     // Layout: encapsulation header table above; RegisterSession with protocol version 1.
@@ -268,10 +265,7 @@ mod tests {
     fn a_length_field_that_leaves_bytes_over_is_refused() {
         let mut bytes = [0; 30];
         bytes[2] = 4;
-        assert_eq!(
-            Packet::parse(&bytes),
-            Err(Error::Trailing { what: "encapsulation packet", offset: 28, excess: 2 })
-        );
+        assert_eq!(Packet::parse(&bytes), Err(Error::trailing("encapsulation packet", 28, 2)));
     }
 
     #[test]
@@ -279,10 +273,7 @@ mod tests {
         let data = vec![0; 65536];
         let packet = Packet { data: &data, ..VECTORS[0].2 };
         let mut buffer = vec![0; packet.buffer_len()];
-        assert_eq!(
-            packet.emit(&mut buffer),
-            Err(Error::OutOfRange { what: "encapsulation data", value: 65536, max: 65535 })
-        );
+        assert_eq!(packet.emit(&mut buffer), Err(Error::too_large("encapsulation data", 65535, 65536)));
     }
 
     proptest! {

@@ -166,8 +166,9 @@ impl<'a> Segment<'a> {
     /// Reads one segment where `r` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::Invalid`] naming the field for segments that are reserved or not
+    /// [`Error::truncated`]; [`Error::Invalid`] naming the field for segments that are reserved or not
     /// supported.
+    // Flat: one arm per kind of segment.
     pub fn read(r: &mut Reader<'a>, encoding: Encoding) -> Result<Self, Error> {
         let start = r.offset();
         let first = r.u8("segment")?;
@@ -247,7 +248,7 @@ impl<'a> Segment<'a> {
         let format = r.u8("electronic key format")?;
         if format != KEY_FORMAT_4 {
             let (found, expected) = (u32::from(format), u32::from(KEY_FORMAT_4));
-            return Err(Error::Invalid { what: "electronic key format", offset, found, expected });
+            return Err(Error::invalid("electronic key format", offset, expected, found));
         }
         let vendor = r.u16("key vendor ID")?;
         let device_type = r.u16("key device type")?;
@@ -292,8 +293,9 @@ impl<'a> Segment<'a> {
     /// Writes the segment where `w` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a value its segment cannot
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a value its segment cannot
     /// carry.
+    // Flat: one arm per kind of segment.
     pub fn write(&self, w: &mut Writer<'_>, encoding: Encoding) -> Result<(), Error> {
         let start = w.written();
         match *self {
@@ -315,12 +317,7 @@ impl<'a> Segment<'a> {
                     w.u8("network segment length", words_u8("network segment", data.len())?)?;
                 } else if data.len() != 1 {
                     let found = u32::try_from(data.len()).unwrap_or(u32::MAX);
-                    return Err(Error::Invalid {
-                        what: "network segment",
-                        offset: start,
-                        found,
-                        expected: 1,
-                    });
+                    return Err(Error::invalid("network segment", start, 1, found));
                 }
                 w.slice("network segment", data)?;
             }
@@ -393,22 +390,18 @@ impl<'a> Segment<'a> {
 }
 
 fn unsupported(what: &'static str, offset: usize, found: u8) -> Error {
-    Error::Invalid { what, offset, found: u32::from(found), expected: 0x20 }
+    Error::invalid(what, offset, 0x20, u32::from(found))
 }
 
 fn at_most(what: &'static str, value: u8, max: u8) -> Result<u8, Error> {
     if value <= max {
         return Ok(value);
     }
-    Err(Error::OutOfRange { what, value: u32::from(value), max: u32::from(max) })
+    Err(Error::too_large(what, u32::from(max), u32::from(value)))
 }
 
 fn length_u8(what: &'static str, length: usize) -> Result<u8, Error> {
-    u8::try_from(length).map_err(|_| Error::OutOfRange {
-        what,
-        value: u32::try_from(length).unwrap_or(u32::MAX),
-        max: 255,
-    })
+    u8::try_from(length).map_err(|_| Error::too_large(what, 255, u32::try_from(length).unwrap_or(u32::MAX)))
 }
 
 fn pad_read(r: &mut Reader<'_>, start: usize, encoding: Encoding) -> Result<(), Error> {

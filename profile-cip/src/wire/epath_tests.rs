@@ -1,5 +1,6 @@
 use super::Encoding::{Packed, Padded};
 use super::*;
+use profile_generic::wire::Expected;
 use proptest::prelude::*;
 
 fn read_all(bytes: &[u8], encoding: Encoding) -> Result<Vec<Segment<'_>>, Error> {
@@ -122,7 +123,7 @@ fn every_single_segment_is_refused_when_cut() {
         assert_eq!(read_all(bytes, Padded).map(|path| path.len()), Ok(1));
         for cut in 1..bytes.len() {
             assert!(
-                matches!(read_all(&bytes[..cut], Padded), Err(Error::Truncated { .. })),
+                matches!(read_all(&bytes[..cut], Padded), Err(Error { expected: Expected::Bytes(_), .. })),
                 "{bytes:02x?} cut at {cut}"
             );
         }
@@ -133,7 +134,7 @@ fn every_single_segment_is_refused_when_cut() {
 fn a_data_segment_longer_than_its_path_says_how_long() {
     assert_eq!(
         read_all(&[0x20, 6, 0x80, 0xFF, 0, 0], Padded),
-        Err(Error::Truncated { what: "data segment", offset: 4, needed: 510, available: 2 })
+        Err(Error::truncated("data segment", 4, 510, 2))
     );
 }
 
@@ -153,7 +154,7 @@ fn reserved_and_unsupported_segments_are_refused_where_they_stand() {
         (&[0x20, 1, 0x0F, 0, 0, 8], "extended port"),
     ] {
         let found = u32::from(bytes[2]);
-        let error = Error::Invalid { what, offset: 2, found, expected: 0x20 };
+        let error = Error::invalid(what, 2, 0x20, found);
         let mut walk = segments(bytes, Padded);
         assert_eq!(walk.next(), Some(Ok(Segment::class(1))));
         assert_eq!(walk.next(), Some(Err(error)));
@@ -161,7 +162,7 @@ fn reserved_and_unsupported_segments_are_refused_where_they_stand() {
     }
     assert_eq!(
         read_all(&[0x34, 5, 0, 0, 0, 0, 0, 0, 0, 0], Padded),
-        Err(Error::Invalid { what: "electronic key format", offset: 1, found: 5, expected: 4 })
+        Err(Error::invalid("electronic key format", 1, 4, 5))
     );
 }
 

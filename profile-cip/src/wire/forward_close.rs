@@ -33,7 +33,7 @@ impl<'a> ForwardClose<'a> {
     /// Reads the request data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let priority_tick = r.u8("priority and time tick")?;
@@ -54,7 +54,7 @@ impl<'a> ForwardClose<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
     /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -87,7 +87,7 @@ impl<'a> ForwardCloseReply<'a> {
     /// Reads the reply data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let triad = ConnectionTriad::read(&mut r)?;
@@ -106,7 +106,7 @@ impl<'a> ForwardCloseReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
     /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -121,7 +121,7 @@ impl<'a> ForwardCloseReply<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     const TRIAD: ConnectionTriad =

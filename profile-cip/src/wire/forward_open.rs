@@ -99,7 +99,8 @@ impl<'a> ForwardOpen<'a> {
     /// Reads the data of a Forward_Open, or with `large` of a Large_Forward_Open.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
+    // Flat: one line per field, each with its error.
     pub fn parse(bytes: &'a [u8], large: bool) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let priority_tick = r.u8("priority and time tick")?;
@@ -142,8 +143,9 @@ impl<'a> ForwardOpen<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] for a size above 511 in the small form or a path above 510
+    /// [`Error::truncated`]; [`Error::OutOfRange`] for a size above 511 in the small form or a path above 510
     /// bytes; [`Error::Invalid`] for a path of odd length.
+    // Flat: one line per field, each with its error.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u8("priority and time tick", self.priority_tick)?;
@@ -234,7 +236,7 @@ impl<'a> ForwardOpenReply<'a> {
     /// Reads the reply data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let o_to_t_id = r.u32("O->T connection ID")?;
@@ -257,7 +259,7 @@ impl<'a> ForwardOpenReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
     /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -289,7 +291,7 @@ impl ConnectionFailure {
     /// Reads the reply data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let triad = ConnectionTriad::read(&mut r)?;
@@ -307,7 +309,7 @@ impl ConnectionFailure {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         self.triad.write(&mut w)?;
@@ -320,7 +322,7 @@ impl ConnectionFailure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     const TRIAD: ConnectionTriad = ConnectionTriad {
@@ -389,7 +391,7 @@ mod tests {
             let longer = [bytes, &[0][..]].concat();
             assert_eq!(
                 ForwardOpen::parse(&longer, large),
-                Err(Error::Trailing { what: "Forward_Open", offset: bytes.len(), excess: 1 })
+                Err(Error::trailing("Forward_Open", bytes.len(), 1))
             );
         }
         assert_eq!(

@@ -31,13 +31,13 @@ pub struct IdentityItem<'a> {
     pub vendor: u16,
     /// Device type (profile); 0x25 for CIP Motion drives.
     pub device_type: u16,
-    /// Product code.
+    /// Identity object, attribute 3.
     pub product_code: u16,
     /// Revision, major and minor.
     pub revision: (u8, u8),
     /// Status word of the Identity object.
     pub status: u16,
-    /// Serial number.
+    /// Identity object, attribute 6.
     pub serial_number: u32,
     /// Product name, ASCII, at most [`PRODUCT_NAME_MAX`] bytes where this crate writes it.
     pub product_name: &'a [u8],
@@ -49,7 +49,7 @@ impl<'a> IdentityItem<'a> {
     /// Reads the item's data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`], [`Error::Invalid`] for an address family other than IPv4.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for an address family other than IPv4.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let protocol_version = r.u16("protocol version")?;
@@ -86,7 +86,7 @@ impl<'a> IdentityItem<'a> {
     /// Writes the item's data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] for a name above 255 bytes.
+    /// [`Error::truncated`]; [`Error::OutOfRange`] for a name above 255 bytes.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("protocol version", self.protocol_version)?;
@@ -97,10 +97,12 @@ impl<'a> IdentityItem<'a> {
         w.slice("revision", &[self.revision.0, self.revision.1])?;
         w.u16("status", self.status)?;
         w.u32("serial number", self.serial_number)?;
-        let length = u8::try_from(self.product_name.len()).map_err(|_| Error::OutOfRange {
-            what: "product name length",
-            value: u32::try_from(self.product_name.len()).unwrap_or(u32::MAX),
-            max: 255,
+        let length = u8::try_from(self.product_name.len()).map_err(|_| {
+            Error::too_large(
+                "product name length",
+                255,
+                u32::try_from(self.product_name.len()).unwrap_or(u32::MAX),
+            )
         })?;
         w.u8("product name length", length)?;
         w.slice("product name", self.product_name)?;
@@ -129,8 +131,8 @@ impl fmt::Display for IdentityItem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
     use core::net::{Ipv4Addr, SocketAddrV4};
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     const VALUE: IdentityItem<'static> = IdentityItem {

@@ -36,7 +36,7 @@ impl ServicesItem {
     /// Reads the item's data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let value = Self {
@@ -56,7 +56,7 @@ impl ServicesItem {
     /// Writes the item's data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("protocol version", self.protocol_version)?;
@@ -76,7 +76,7 @@ impl fmt::Display for ServicesItem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]

@@ -17,7 +17,7 @@ use core::fmt;
 /// Most words of extended status kept: the longest one defined here has five.
 pub const EXTENDED_STATUS_MAX: usize = 8;
 
-/// A request.
+/// A Message Router request: service, path and data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request<'a> {
     /// Service code, bit 7 clear.
@@ -32,13 +32,13 @@ impl<'a> Request<'a> {
     /// Reads a request; everything behind the path is data.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::Invalid`] if the service has the reply bit.
+    /// [`Error::truncated`]; [`Error::Invalid`] if the service has the reply bit.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let service = r.u8("service")?;
         if service & REPLY_BIT != 0 {
             let (found, expected) = (u32::from(service), u32::from(service & !REPLY_BIT));
-            return Err(Error::Invalid { what: "service", offset: 0, found, expected });
+            return Err(Error::invalid("service", 0, expected, found));
         }
         let words = r.u8("path length")?;
         let path = r.take("path", 2 * usize::from(words))?;
@@ -53,7 +53,7 @@ impl<'a> Request<'a> {
     /// Writes the request and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
     /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -71,7 +71,7 @@ impl fmt::Display for Request<'_> {
     }
 }
 
-/// A reply.
+/// A Message Router reply: service, general and extended status, data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply<'a> {
     /// Service code of the request, bit 7 clear.
@@ -93,21 +93,21 @@ impl<'a> Reply<'a> {
     /// Reads a reply; everything behind the extended status is data.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::Invalid`] without the reply bit; [`Error::OutOfRange`] for more than
+    /// [`Error::truncated`]; [`Error::Invalid`] without the reply bit; [`Error::OutOfRange`] for more than
     /// [`EXTENDED_STATUS_MAX`] words of extended status.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let service = r.u8("service")?;
         if service & REPLY_BIT == 0 {
             let (found, expected) = (u32::from(service), u32::from(service | REPLY_BIT));
-            return Err(Error::Invalid { what: "reply service", offset: 0, found, expected });
+            return Err(Error::invalid("reply service", 0, expected, found));
         }
         r.u8("reserved")?;
         let status = GeneralStatus(r.u8("general status")?);
         let words = r.u8("extended status length")?;
         if usize::from(words) > EXTENDED_STATUS_MAX {
             let max = 8;
-            return Err(Error::OutOfRange { what: "extended status length", value: u32::from(words), max });
+            return Err(Error::too_large("extended status length", max, u32::from(words)));
         }
         let mut extended = ArrayVec::new();
         for _ in 0..words {
@@ -124,7 +124,7 @@ impl<'a> Reply<'a> {
     /// Writes the reply and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u8("service", self.service.0 | REPLY_BIT)?;
@@ -152,7 +152,8 @@ impl fmt::Display for Reply<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::{check_vector, check_vectors};
+    use profile_generic::wire::Expected;
+    use profile_generic::wire::check::{check_vector, check_vectors};
     use proptest::prelude::*;
 
     #[test]
@@ -186,29 +187,33 @@ mod tests {
             ("value", &[0x8E, 0, 0, 0, 0x34, 0x12][..], vendor),
             ("ownership conflict", &[0xD4, 0, 1, 1, 0x06, 0x01], refused),
         ] {
-            check_vector!(name, bytes, value, Reply);
+            check_vector!(name, bytes, &value, Reply);
+            assert_eq!(value.buffer_len(), bytes.len(), "{name}");
             for cut in 0..4 {
                 assert!(Reply::parse(&bytes[..cut]).is_err(), "{name} cut at {cut}");
             }
         }
         assert_eq!(
             Reply::parse(&[0xD4, 0, 1, 2, 6, 1, 0]),
-            Err(Error::Truncated { what: "extended status", offset: 6, needed: 2, available: 1 })
+            Err(Error::truncated("extended status", 6, 2, 1))
         );
     }
 
     #[test]
     fn a_padded_path_past_the_buffer_is_refused() {
-        assert_eq!(
-            Request::parse(&[0x0E, 200, 0x20, 1]),
-            Err(Error::Truncated { what: "path", offset: 2, needed: 400, available: 2 })
-        );
+        assert_eq!(Request::parse(&[0x0E, 200, 0x20, 1]), Err(Error::truncated("path", 2, 400, 2)));
     }
 
     #[test]
     fn requests_and_replies_are_not_taken_for_each_other() {
-        assert!(matches!(Request::parse(&[0x8E, 0]), Err(Error::Invalid { what: "service", .. })));
-        assert!(matches!(Reply::parse(&[0x0E, 0, 0, 0]), Err(Error::Invalid { what: "reply service", .. })));
+        assert!(matches!(
+            Request::parse(&[0x8E, 0]),
+            Err(Error { what: "service", expected: Expected::Value(_), .. })
+        ));
+        assert!(matches!(
+            Reply::parse(&[0x0E, 0, 0, 0]),
+            Err(Error { what: "reply service", expected: Expected::Value(_), .. })
+        ));
     }
 
     proptest! {

@@ -4,8 +4,6 @@
 //! and parsing never panics and never allocates, whatever the bytes are.
 
 pub mod attributes;
-#[cfg(test)]
-pub(crate) mod check;
 pub mod class1;
 pub mod cpf;
 pub mod encapsulation;

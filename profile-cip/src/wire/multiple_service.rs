@@ -23,7 +23,7 @@ impl<'a> MultipleService<'a> {
     /// Checks count and offsets.
     ///
     /// # Errors
-    /// [`Error::Truncated`] if the list does not fit the data; [`Error::Invalid`] for an offset into the
+    /// [`Error::truncated`] if the list does not fit the data; [`Error::Invalid`] for an offset into the
     /// list, before its predecessor, or past the end.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
@@ -34,7 +34,7 @@ impl<'a> MultipleService<'a> {
             let found = offsets.u16("service offset")?;
             if found < lowest || usize::from(found) > bytes.len() {
                 let (offset, found, expected) = (2 + 2 * n, u32::from(found), u32::from(lowest));
-                return Err(Error::Invalid { what: "service offset", offset, found, expected });
+                return Err(Error::invalid("service offset", offset, expected, found));
             }
             lowest = found;
         }
@@ -82,7 +82,7 @@ pub fn buffer_len(messages: &[&[u8]]) -> usize {
 /// Writes a packet with these messages and returns its length.
 ///
 /// # Errors
-/// [`Error::Truncated`]; [`Error::OutOfRange`] if an offset exceeds 65535.
+/// [`Error::truncated`]; [`Error::OutOfRange`] if an offset exceeds 65535.
 pub fn emit(messages: &[&[u8]], buffer: &mut [u8]) -> Result<usize, Error> {
     let mut w = Writer::new(buffer);
     w.u16("service count", length_u16("service count", messages.len())?)?;
@@ -137,12 +137,12 @@ mod tests {
             let found = u32::from(to);
             assert_eq!(
                 MultipleService::parse(&bytes),
-                Err(Error::Invalid { what: "service offset", offset: at, found, expected })
+                Err(Error::invalid("service offset", at, expected, found))
             );
         }
         assert_eq!(
             MultipleService::parse(&[0xFF, 0xFF, 0, 0]),
-            Err(Error::Truncated { what: "service offsets", offset: 2, needed: 131_070, available: 2 })
+            Err(Error::truncated("service offsets", 2, 131_070, 2))
         );
     }
 

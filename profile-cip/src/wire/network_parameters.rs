@@ -95,7 +95,7 @@ impl NetworkParameters {
     pub fn to_u16(&self) -> Result<u16, Error> {
         if self.size > SMALL_SIZE_MAX {
             let (value, max) = (u32::from(self.size), u32::from(SMALL_SIZE_MAX));
-            return Err(Error::OutOfRange { what: "connection size", value, max });
+            return Err(Error::too_large("connection size", max, value));
         }
         Ok(u16::from(self.high()) << 8 | self.size)
     }
@@ -144,7 +144,7 @@ mod tests {
         };
         assert_eq!(NetworkParameters::from_u32(0xA000_0FA2), owner);
         assert_eq!(owner.to_u32(), 0xA000_0FA2);
-        assert_eq!(owner.to_u16(), Err(Error::OutOfRange { what: "connection size", value: 4002, max: 511 }));
+        assert_eq!(owner.to_u16(), Err(Error::too_large("connection size", 511, 4002)));
         assert_eq!(MOTION.to_string(), "point to point, urgent priority, up to 220 bytes");
     }
 

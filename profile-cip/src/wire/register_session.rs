@@ -24,7 +24,7 @@ impl RegisterSession {
     /// Reads exactly this block.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let value = Self { protocol_version: r.u16("protocol version")?, options: r.u16("session options")? };
@@ -40,7 +40,7 @@ impl RegisterSession {
     /// Writes the block and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("protocol version", self.protocol_version)?;
@@ -58,7 +58,7 @@ impl fmt::Display for RegisterSession {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
@@ -68,10 +68,7 @@ mod tests {
             ("byte order", &[1, 2, 3, 4], RegisterSession { protocol_version: 0x0201, options: 0x0403 }),
         ];
         check_vectors!(vectors, RegisterSession);
-        assert_eq!(
-            RegisterSession::parse(&[1, 0, 0, 0, 0]),
-            Err(Error::Trailing { what: "RegisterSession", offset: 4, excess: 1 })
-        );
+        assert_eq!(RegisterSession::parse(&[1, 0, 0, 0, 0]), Err(Error::trailing("RegisterSession", 4, 1)));
     }
 
     proptest! {

@@ -27,7 +27,7 @@ impl SockaddrInfo {
     /// Reads exactly this block. The last eight bytes are ignored, as some senders leave them unset.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`], [`Error::Invalid`] for another address family.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for another address family.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let value = Self::read(&mut r)?;
@@ -38,13 +38,13 @@ impl SockaddrInfo {
     /// Reads the block where `r` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Invalid`] for another address family.
+    /// [`Error::truncated`], [`Error::Invalid`] for another address family.
     pub fn read(r: &mut Reader<'_>) -> Result<Self, Error> {
         let offset = r.offset();
         let family = u16::from_be_bytes(r.array("sockaddr family")?);
         if family != FAMILY_IPV4 {
             let (found, expected) = (u32::from(family), u32::from(FAMILY_IPV4));
-            return Err(Error::Invalid { what: "sockaddr family", offset, found, expected });
+            return Err(Error::invalid("sockaddr family", offset, expected, found));
         }
         let port = u16::from_be_bytes(r.array("sockaddr port")?);
         let address = Ipv4Addr::from(r.array::<4>("sockaddr address")?);
@@ -60,7 +60,7 @@ impl SockaddrInfo {
     /// Writes the block and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         self.write(&mut w)?;
@@ -70,7 +70,7 @@ impl SockaddrInfo {
     /// Writes the block where `w` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn write(&self, w: &mut Writer<'_>) -> Result<(), Error> {
         w.slice("sockaddr family", &FAMILY_IPV4.to_be_bytes())?;
         w.slice("sockaddr port", &self.address.port().to_be_bytes())?;
@@ -82,7 +82,7 @@ impl SockaddrInfo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
@@ -99,10 +99,7 @@ mod tests {
     fn another_family_is_refused() {
         let mut bytes = [0; 16];
         bytes[0] = 2;
-        assert_eq!(
-            SockaddrInfo::parse(&bytes),
-            Err(Error::Invalid { what: "sockaddr family", offset: 0, found: 0x200, expected: 2 })
-        );
+        assert_eq!(SockaddrInfo::parse(&bytes), Err(Error::invalid("sockaddr family", 0, 2, 0x200)));
     }
 
     proptest! {

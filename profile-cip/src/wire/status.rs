@@ -193,6 +193,15 @@ open_code! {
 /// Bit 7 of the service code, which marks a reply.
 pub const REPLY_BIT: u8 = 0x80;
 
+/// General status for data with a wrong number of bytes; `None` where the bytes say something wrong.
+pub(crate) fn length_status(error: &super::Error) -> Option<GeneralStatus> {
+    match error {
+        error if error.is_too_short() => Some(GeneralStatus::NOT_ENOUGH_DATA),
+        error if error.is_too_long() => Some(GeneralStatus::TOO_MUCH_DATA),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -29,7 +29,7 @@ impl ConnectionTriad {
     /// Reads the triad where `reader` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn read(reader: &mut Reader<'_>) -> Result<Self, Error> {
         Ok(Self {
             connection_serial: reader.u16("connection serial number")?,
@@ -41,7 +41,7 @@ impl ConnectionTriad {
     /// Writes the triad where `writer` stands.
     ///
     /// # Errors
-    /// [`Error::Truncated`].
+    /// [`Error::truncated`].
     pub fn write(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         writer.u16("connection serial number", self.connection_serial)?;
         writer.u16("originator vendor ID", self.originator_vendor)?;

@@ -32,7 +32,7 @@ impl<'a> UnconnectedSend<'a> {
     /// Reads the request data.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::Trailing`].
+    /// [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let priority_tick = r.u8("priority and time tick")?;
@@ -57,7 +57,7 @@ impl<'a> UnconnectedSend<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a message or route too long, or
+    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a message or route too long, or
     /// a route of odd length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -87,7 +87,7 @@ impl fmt::Display for UnconnectedSend<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
@@ -121,7 +121,7 @@ mod tests {
     fn a_message_length_past_the_end_is_refused() {
         assert_eq!(
             UnconnectedSend::parse(&[5, 0x9D, 0xFF, 0xFF, 1, 2]),
-            Err(Error::Truncated { what: "embedded message", offset: 4, needed: 65535, available: 2 })
+            Err(Error::truncated("embedded message", 4, 65535, 2))
         );
     }
 

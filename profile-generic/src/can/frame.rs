@@ -57,7 +57,7 @@ pub enum FrameError {
     Length(usize),
 }
 
-/// A frame.
+/// A data or remote frame, classic or FD.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frame {
     id: Id,

@@ -10,7 +10,7 @@
 //! the arithmetic is below one nanounit as long as the axis moves less than 2000 units in a period.
 
 use crate::code::named_enum;
-use crate::image::{AxisCommand, CommandSet};
+use crate::image::{AxisCommand, Signal};
 use crate::mode::OperatingMode;
 use crate::quantity::{Acceleration, Position, Torque, Velocity};
 use crate::time::{DurationNs, MonotonicTime};
@@ -73,46 +73,6 @@ pub const MAX_GAP: i64 = 16;
 /// ten periods; its updates are for two periods later, and one segment is in use.
 const MAX_SEGMENTS: usize = 16;
 
-/// Set-points at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SetPoints {
-    /// Position, if it is commanded.
-    pub position: Option<Position>,
-    /// Velocity, if it is commanded; as a result also the derivative of a commanded position.
-    pub velocity: Option<Velocity>,
-    /// Acceleration, if it is commanded.
-    pub acceleration: Option<Acceleration>,
-    /// Torque, if it is commanded.
-    pub torque: Option<Torque>,
-}
-
-impl From<&AxisCommand> for SetPoints {
-    fn from(command: &AxisCommand) -> Self {
-        let has = |bit| command.present.contains(bit);
-        Self {
-            position: has(CommandSet::POSITION).then_some(command.position),
-            velocity: has(CommandSet::VELOCITY).then_some(command.velocity),
-            acceleration: has(CommandSet::ACCELERATION).then_some(command.acceleration),
-            torque: has(CommandSet::TORQUE).then_some(command.torque),
-        }
-    }
-}
-
-impl SetPoints {
-    /// Puts these set-points into a command: those that are there are set, those that are not are marked
-    /// absent.
-    pub fn write_to(&self, command: &mut AxisCommand) {
-        command.position = self.position.unwrap_or(command.position);
-        command.velocity = self.velocity.unwrap_or(command.velocity);
-        command.acceleration = self.acceleration.unwrap_or(command.acceleration);
-        command.torque = self.torque.unwrap_or(command.torque);
-        command.present.set(CommandSet::POSITION, self.position.is_some());
-        command.present.set(CommandSet::VELOCITY, self.velocity.is_some());
-        command.present.set(CommandSet::ACCELERATION, self.acceleration.is_some());
-        command.present.set(CommandSet::TORQUE, self.torque.is_some());
-    }
-}
-
 /// How good a fine set-point is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
@@ -162,15 +122,6 @@ impl Motion {
 
 fn saturate(value: i128) -> i64 {
     i64::try_from(value).unwrap_or(if value > 0 { i64::MAX } else { i64::MIN })
-}
-
-/// A fine set-point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FineCommand {
-    /// The set-points for the instant asked for.
-    pub set_points: SetPoints,
-    /// How good they are.
-    pub quality: Quality,
 }
 
 /// An update was not taken.
@@ -243,7 +194,7 @@ pub struct FineInterpolator {
     acceleration: Channel<1>,
     torque: Channel<1>,
     /// What is given while there is nothing to follow: before the first update and after a loss.
-    held: SetPoints,
+    held: AxisCommand,
     lost: bool,
     /// The motion that the next update goes on from, and when it was so.
     carried: Option<(MonotonicTime, Motion)>,
@@ -263,7 +214,7 @@ impl FineInterpolator {
             velocity: Channel::default(),
             acceleration: Channel::default(),
             torque: Channel::default(),
-            held: SetPoints::default(),
+            held: AxisCommand::default(),
             lost: false,
             carried: None,
         })
@@ -283,7 +234,10 @@ impl FineInterpolator {
         self.velocity = Channel::default();
         self.acceleration = Channel::default();
         self.torque = Channel::default();
-        self.held = SetPoints { position, ..SetPoints::default() };
+        self.held = AxisCommand::default();
+        if let Some(position) = position {
+            self.held.set(Signal::PositionCommand, position.get());
+        }
         self.lost = false;
         self.carried = None;
     }
@@ -293,7 +247,7 @@ impl FineInterpolator {
     /// and that update's curve begins in it: neither position nor velocity steps.
     ///
     /// `modes` are the operating mode of before and that from now on. Of the curves of before only those count that led the
-    /// axis: a velocity of zero beside a commanded torque was a feed-forward value, not the motion. What they do not tell is
+    /// axis: a velocity of zero beside a commanded torque was a feed-forward value, not the motion. What they do not report is
     /// taken from `actual`; the torque is always one that was commanded. Before the first update and after a loss there is no motion to go on with: then only the way changes.
     pub fn change(
         &mut self,
@@ -353,11 +307,11 @@ impl FineInterpolator {
         self.carried = Some((now, motion));
     }
 
-    /// Takes an update for the instant `target`, which may be past already.
+    /// Takes the set-points of an update for the instant `target`, which may be past already.
     ///
     /// # Errors
     /// See [`UpdateError`]; the update is then left out of account.
-    pub fn update(&mut self, target: MonotonicTime, set_points: &SetPoints) -> Result<(), UpdateError> {
+    pub fn update(&mut self, target: MonotonicTime, update: &AxisCommand) -> Result<(), UpdateError> {
         if self.lost {
             return Err(UpdateError::Lost);
         }
@@ -394,10 +348,10 @@ impl FineInterpolator {
             start: target - length,
             length,
             follow: length + self.config.period * i64::from(self.config.target_update.usual_overrun()),
-            position: channels.0.push(set_points.position.map(Position::get), immediate)?,
-            velocity: channels.1.push(set_points.velocity.map(Velocity::get), immediate)?,
-            acceleration: channels.2.push(set_points.acceleration.map(Acceleration::get), immediate)?,
-            torque: channels.3.push(set_points.torque.map(Torque::get), immediate)?,
+            position: channels.0.push(update.get(Signal::PositionCommand), immediate)?,
+            velocity: channels.1.push(update.get(Signal::VelocityCommand), immediate)?,
+            acceleration: channels.2.push(update.get(Signal::AccelerationCommand), immediate)?,
+            torque: channels.3.push(update.get(Signal::TorqueCommand), immediate)?,
         };
         (self.position, self.velocity, self.acceleration, self.torque) = channels;
         if immediate {
@@ -416,25 +370,30 @@ impl FineInterpolator {
         }
     }
 
-    /// The fine set-points for the instant `now`.
-    pub fn at(&mut self, now: MonotonicTime) -> FineCommand {
+    /// Puts the fine set-points for the instant `now` into a command; those that are not commanded become absent.
+    pub fn write(&mut self, now: MonotonicTime, command: &mut AxisCommand) -> Quality {
         self.pass(now);
         let (Some(segment), Some(last_target)) = (self.segments.first(), self.last_target) else {
-            let quality = if self.lost { Quality::Lost } else { Quality::Waiting };
-            return FineCommand { set_points: self.held, quality };
+            command.take_set_points(&self.held);
+            return if self.lost { Quality::Lost } else { Quality::Waiting };
         };
         let overdue = self.overdue(last_target, now);
         if overdue > self.config.extrapolate_periods {
-            self.held = segment.at_rest(self.limit_time(segment, now));
+            segment.write(self.limit_time(segment, now), &mut self.held);
+            // The position, and nothing that would move the axis on from there.
+            self.held.velocity = Velocity::ZERO;
+            self.held.acceleration = Acceleration::ZERO;
+            self.held.torque = Torque::ZERO;
             self.segments.clear();
             self.lost = true;
-            return FineCommand { set_points: self.held, quality: Quality::Lost };
+            command.take_set_points(&self.held);
+            return Quality::Lost;
         }
-        let quality = match overdue {
+        segment.write(now, command);
+        match overdue {
             0 => Quality::Fresh,
             periods => Quality::Extrapolated { periods },
-        };
-        FineCommand { set_points: segment.at(now), quality }
+        }
     }
 
     /// Whether updates were lost, so that a new start is needed.
@@ -472,52 +431,37 @@ impl FineInterpolator {
 }
 
 impl Segment {
-    fn at(&self, now: MonotonicTime) -> SetPoints {
+    fn write(&self, now: MonotonicTime, command: &mut AxisCommand) {
         let beyond = now.since(self.start) > self.follow;
         let place = self.place(now);
         let motion = self.position.map(|curve| self.motion(&curve, &place, now));
         let velocity = match (self.velocity, motion) {
             // Beyond its curve a position goes its own way, and its velocity with it.
-            (Some(curve), None) => Some(Velocity(curve.value(&place))),
-            (Some(curve), Some(_)) if !beyond => Some(Velocity(curve.value(&place))),
-            (_, Some((_, velocity))) => Some(Velocity(velocity)),
+            (Some(curve), None) => Some(curve.value(&place)),
+            (Some(curve), Some(_)) if !beyond => Some(curve.value(&place)),
+            (_, Some((_, velocity))) => Some(velocity),
             (None, None) => None,
         };
-        SetPoints {
-            position: motion.map(|(position, _)| Position(position)),
+        command.put_set_points([
+            motion.map(|(position, _)| position),
             velocity,
-            acceleration: self.acceleration.map(|curve| Acceleration(curve.value(&place))),
-            torque: self.torque.map(|curve| Torque(curve.value(&place))),
-        }
+            self.acceleration.map(|curve| curve.value(&place)),
+            self.torque.map(|curve| curve.value(&place)),
+        ]);
     }
 
     /// The motion at `now`; what no curve tells is taken from `actual`.
     fn motion_at(&self, now: MonotonicTime, actual: &Motion) -> Motion {
-        let points = self.at(now);
+        let Motion { position, velocity, acceleration, torque } = *actual;
+        let mut points = AxisCommand { position, velocity, acceleration, torque, ..AxisCommand::default() };
+        self.write(now, &mut points);
         let place = self.place(now);
-        let acceleration = match (points.acceleration, self.position, self.velocity) {
-            (Some(acceleration), ..) => acceleration.get(),
-            (None, Some(curve), _) => curve.bend_per_second(&place),
-            (None, None, Some(curve)) => curve.slope_per_second(&place),
-            (None, None, None) => actual.acceleration.get(),
+        let acceleration = match (self.acceleration, self.position, self.velocity) {
+            (None, Some(curve), _) => Acceleration(curve.bend_per_second(&place)),
+            (None, None, Some(curve)) => Acceleration(curve.slope_per_second(&place)),
+            _ => points.acceleration,
         };
-        Motion {
-            position: points.position.unwrap_or(actual.position),
-            velocity: points.velocity.unwrap_or(actual.velocity),
-            acceleration: Acceleration(acceleration),
-            torque: points.torque.unwrap_or(actual.torque),
-        }
-    }
-
-    /// The position at `now` and nothing that would move the axis on from there.
-    fn at_rest(&self, now: MonotonicTime) -> SetPoints {
-        let moving = self.at(now);
-        SetPoints {
-            position: moving.position,
-            velocity: moving.velocity.map(|_| Velocity::ZERO),
-            acceleration: moving.acceleration.map(|_| Acceleration::ZERO),
-            torque: moving.torque.map(|_| Torque::ZERO),
-        }
+        Motion { position: points.position, velocity: points.velocity, acceleration, torque: points.torque }
     }
 
     /// How far along its curve the segment is at `at`. A curve is followed to its end and through the overrun that the

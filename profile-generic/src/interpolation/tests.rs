@@ -1,5 +1,6 @@
 use super::*;
 use crate::cast;
+use crate::image::Signal::{AccelerationCommand, PositionCommand, TorqueCommand, VelocityCommand};
 use proptest::prelude::*;
 
 const PERIOD: DurationNs = DurationNs::from_millis(2);
@@ -15,12 +16,35 @@ fn time(periods: i64, part: i64) -> MonotonicTime {
     EPOCH + PERIOD * periods + DurationNs(PERIOD.0 / 1000 * part)
 }
 
-fn position(value: i64) -> SetPoints {
-    SetPoints { position: Some(Position(value)), ..SetPoints::default() }
+/// A command with these set-points and nothing else.
+fn commanded<const N: usize>(values: [(Signal, i64); N]) -> AxisCommand {
+    let mut command = AxisCommand::default();
+    for (signal, value) in values {
+        assert!(command.set(signal, value));
+    }
+    command
+}
+
+fn position(value: i64) -> AxisCommand {
+    commanded([(PositionCommand, value)])
+}
+
+fn fine(interpolator: &mut FineInterpolator, now: MonotonicTime) -> (AxisCommand, Quality) {
+    let mut command = AxisCommand::default();
+    let quality = interpolator.write(now, &mut command);
+    (command, quality)
+}
+
+fn quality_at(interpolator: &mut FineInterpolator, now: MonotonicTime) -> Quality {
+    fine(interpolator, now).1
 }
 
 fn position_at(interpolator: &mut FineInterpolator, now: MonotonicTime) -> i64 {
-    interpolator.at(now).set_points.position.unwrap().0
+    fine(interpolator, now).0.get(PositionCommand).unwrap()
+}
+
+fn velocity_at(interpolator: &mut FineInterpolator, now: MonotonicTime) -> Option<i64> {
+    fine(interpolator, now).0.get(VelocityCommand)
 }
 
 /// An interpolator that took `values` for targets 1, 2, 3... and was started at 0.
@@ -62,8 +86,7 @@ fn the_cubic_has_the_coefficients_of_the_standard() {
     assert_eq!(position_at(&mut interpolator, time(2, 500)), 394);
     assert_eq!(position_at(&mut interpolator, time(3, 0)), 600);
     // Slope at the end: (260 + 2*90 + 3*10) in 2 ms.
-    let fine = interpolator.at(time(3, 0));
-    assert_eq!(fine.set_points.velocity, Some(Velocity(470 * 500)));
+    assert_eq!(velocity_at(&mut interpolator, time(3, 0)), Some(470 * 500));
 }
 
 /// For V-2..V0 = 0, 100, 400: dV = 300, dA = 200; 100 + (300 - 100)/2 + 100/4 = 225.
@@ -72,28 +95,21 @@ fn velocity_is_quadratic_and_torque_linear() {
     let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
     interpolator.start(None);
     for (target, velocity, torque) in [(1, 0, 0), (2, 100, 50), (3, 400, 60)] {
-        let set_points = SetPoints {
-            velocity: Some(Velocity(velocity)),
-            torque: Some(Torque(torque)),
-            acceleration: Some(Acceleration(-torque)),
-            ..SetPoints::default()
-        };
+        let set_points =
+            commanded([(VelocityCommand, velocity), (TorqueCommand, torque), (AccelerationCommand, -torque)]);
         interpolator.update(time(target, 0), &set_points).unwrap();
     }
-    let fine = interpolator.at(time(2, 500)).set_points;
-    assert_eq!(fine.velocity, Some(Velocity(225)));
-    assert_eq!(fine.torque, Some(Torque(55)));
-    assert_eq!(fine.acceleration, Some(Acceleration(-55)));
-    assert_eq!(fine.position, None);
+    let (fine, _) = fine(&mut interpolator, time(2, 500));
+    assert_eq!(fine, commanded([(VelocityCommand, 225), (TorqueCommand, 55), (AccelerationCommand, -55)]));
 }
 
 #[test]
 fn a_commanded_velocity_is_preferred_to_the_derivative() {
     let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
     interpolator.start(Some(Position(0)));
-    let set_points = SetPoints { velocity: Some(Velocity(7)), ..position(1_000_000) };
+    let set_points = commanded([(PositionCommand, 1_000_000), (VelocityCommand, 7)]);
     interpolator.update(time(1, 0), &set_points).unwrap();
-    assert_eq!(interpolator.at(time(0, 500)).set_points.velocity, Some(Velocity(7)));
+    assert_eq!(velocity_at(&mut interpolator, time(0, 500)), Some(7));
     assert_eq!(position_at(&mut interpolator, time(0, 500)), 500_000);
 }
 
@@ -118,8 +134,7 @@ fn a_segment_begins_at_its_own_time_and_not_when_it_arrives() {
 fn before_the_first_update_the_start_is_held() {
     let mut interpolator = interpolator(TargetUpdate::Interpolate, 1);
     interpolator.start(Some(Position(42)));
-    let fine = interpolator.at(time(1_000, 0));
-    assert_eq!((fine.set_points, fine.quality), (position(42), Quality::Waiting));
+    assert_eq!(fine(&mut interpolator, time(1_000, 0)), (position(42), Quality::Waiting));
 }
 
 #[test]
@@ -128,14 +143,13 @@ fn immediate_takes_updates_as_they_come() {
     interpolator.start(Some(Position(0)));
     interpolator.update(time(0, 0), &position(500)).unwrap();
     for part in [0, 500, 1_000, 2_000] {
-        let fine = interpolator.at(time(0, part));
-        assert_eq!((fine.set_points.position, fine.quality), (Some(Position(500)), Quality::Fresh), "{part}");
-        assert_eq!(fine.set_points.velocity, Some(Velocity(0)));
+        let expected = commanded([(PositionCommand, 500), (VelocityCommand, 0)]);
+        assert_eq!(fine(&mut interpolator, time(0, part)), (expected, Quality::Fresh), "{part}");
     }
     interpolator.update(time(1, 0), &position(-500)).unwrap();
     assert_eq!(position_at(&mut interpolator, time(1, 0)), -500);
-    assert_eq!(interpolator.at(time(3, 1)).quality, Quality::Extrapolated { periods: 1 });
-    assert_eq!(interpolator.at(time(4, 1)).quality, Quality::Lost);
+    assert_eq!(quality_at(&mut interpolator, time(3, 1)), Quality::Extrapolated { periods: 1 });
+    assert_eq!(quality_at(&mut interpolator, time(4, 1)), Quality::Lost);
 }
 
 /// Updates stop: the polynomial goes on for the stated periods, then everything stands and says so.
@@ -152,7 +166,7 @@ fn a_loss_is_ridden_through_and_then_held() {
             let mut highest = 0;
             for step in 0..20_000 {
                 let now = time(4, step);
-                let fine = interpolator.at(now);
+                let (command, shown) = fine(&mut interpolator, now);
                 let beyond = now.since(time(5 + usual, 0)).0.max(0);
                 let overdue = u32::try_from((beyond + PERIOD.0 - 1) / PERIOD.0).unwrap();
                 let quality = match overdue {
@@ -160,19 +174,15 @@ fn a_loss_is_ridden_through_and_then_held() {
                     periods if periods <= allowed => Quality::Extrapolated { periods },
                     _ => Quality::Lost,
                 };
-                assert_eq!(fine.quality, quality, "{update} {allowed} {step}");
-                let moved = fine.set_points.position.unwrap().0;
+                assert_eq!(shown, quality, "{update} {allowed} {step}");
+                let moved = command.get(PositionCommand).unwrap();
                 assert!(moved >= highest && moved <= last * 1_000, "{update} {allowed} {step}: {moved}");
                 highest = moved;
                 let speed = if quality == Quality::Lost { 0 } else { 500_000 };
-                assert_eq!(fine.set_points.velocity, Some(Velocity(speed)), "{update} {allowed} {step}");
+                assert_eq!(command.get(VelocityCommand), Some(speed), "{update} {allowed} {step}");
             }
             assert_eq!(highest, last * 1_000, "goes on to the limit and not beyond");
-            assert_eq!(
-                interpolator.at(time(4, 0)).set_points.position,
-                Some(Position(highest)),
-                "time stepped back"
-            );
+            assert_eq!(position_at(&mut interpolator, time(4, 0)), highest, "time stepped back");
             assert_eq!(interpolator.update(time(30, 0), &position(0)), Err(UpdateError::Lost));
             interpolator.start(Some(Position(9)));
             assert_eq!(interpolator.update(time(30, 0), &position(9)), Ok(()));
@@ -193,32 +203,29 @@ fn without_updates_an_axis_never_gets_faster_and_goes_on_slowing_down() {
     let rest = position_at(&mut falling, time(6, 800));
     assert!((15_000..=15_200).contains(&rest), "{rest}");
     assert_eq!(position_at(&mut falling, time(7, 0)), rest);
-    let standing = falling.at(time(7, 0));
-    assert_eq!(standing.set_points.velocity, Some(Velocity(0)));
+    assert_eq!(velocity_at(&mut falling, time(7, 0)), Some(0));
 }
 
 #[test]
 fn velocity_and_torque_go_to_zero_after_a_loss() {
     let mut interpolator = interpolator(TargetUpdate::Interpolate, 0);
     interpolator.start(None);
-    let set_points =
-        SetPoints { velocity: Some(Velocity(9)), torque: Some(Torque(8)), ..SetPoints::default() };
+    let set_points = commanded([(VelocityCommand, 9), (TorqueCommand, 8)]);
     interpolator.update(time(1, 0), &set_points).unwrap();
-    assert_eq!(interpolator.at(time(1, 0)).set_points, set_points);
-    let expected = SetPoints { velocity: Some(Velocity(0)), torque: Some(Torque(0)), ..SetPoints::default() };
-    assert_eq!(interpolator.at(time(1, 1)).set_points, expected);
+    assert_eq!(fine(&mut interpolator, time(1, 0)).0, set_points);
+    let expected = commanded([(VelocityCommand, 0), (TorqueCommand, 0)]);
+    assert_eq!(fine(&mut interpolator, time(1, 1)).0, expected);
 }
 
 #[test]
 fn a_lost_update_is_bridged() {
     let mut interpolator = fed(&[1_000, 2_000, 3_000]);
     // Target 4 never comes; 5 does, while the polynomial is still being followed.
-    assert_eq!(interpolator.at(time(3, 500)).quality, Quality::Extrapolated { periods: 1 });
+    assert_eq!(quality_at(&mut interpolator, time(3, 500)), Quality::Extrapolated { periods: 1 });
     interpolator.update(time(5, 0), &position(5_000)).unwrap();
     for (periods, part, expected) in [(3, 500, 3_500), (4, 0, 4_000), (4, 500, 4_500), (5, 0, 5_000)] {
-        let fine = interpolator.at(time(periods, part));
-        assert_eq!(fine.set_points.position, Some(Position(expected)), "{periods}.{part}");
-        assert_eq!(fine.quality, Quality::Fresh);
+        assert_eq!(position_at(&mut interpolator, time(periods, part)), expected, "{periods}.{part}");
+        assert_eq!(quality_at(&mut interpolator, time(periods, part)), Quality::Fresh);
     }
 }
 
@@ -317,15 +324,17 @@ fn an_update_for_which_there_is_no_room_is_refused_and_the_curve_in_use_goes_on(
 }
 
 #[test]
-fn commands_carry_set_points_both_ways() {
-    let mut command =
-        AxisCommand { position: Position(5), present: CommandSet::POSITION, ..AxisCommand::default() };
-    assert_eq!(SetPoints::from(&command), position(5));
-    SetPoints { velocity: Some(Velocity(6)), ..SetPoints::default() }.write_to(&mut command);
-    assert_eq!(
-        (command.position, command.velocity, command.present),
-        (Position(5), Velocity(6), CommandSet::VELOCITY)
-    );
+fn set_points_that_are_not_commanded_become_absent_and_nothing_else_changes() {
+    let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
+    interpolator.start(None);
+    let mut command = commanded([(PositionCommand, 5), (TorqueCommand, 6), (Signal::TorqueOffset, 7)]);
+    let offset = commanded([(Signal::TorqueOffset, 7)]);
+    interpolator.write(time(0, 0), &mut command);
+    assert_eq!((command.present, command.torque_offset), (offset.present, Torque(7)), "none is held");
+    interpolator.update(time(1, 0), &commanded([(VelocityCommand, 8)])).unwrap();
+    interpolator.write(time(1, 0), &mut command);
+    assert_eq!((command.velocity, command.torque_offset), (Velocity(8), Torque(7)));
+    assert_eq!(command.present, offset.present | VelocityCommand.command_bit());
 }
 
 proptest! {
@@ -372,16 +381,13 @@ proptest! {
         interpolator.start(Some(Position(0)));
         for (time, place, speed) in updates {
             let time = MonotonicTime(time >> spread);
-            let set_points = SetPoints {
-                position: Some(Position(place >> (spread / 2))),
-                velocity: Some(Velocity(speed >> (spread / 2))),
-                ..SetPoints::default()
-            };
+            let (place, speed) = (place >> (spread / 2), speed >> (spread / 2));
+            let set_points = commanded([(PositionCommand, place), (VelocityCommand, speed)]);
             if interpolator.update(time, &set_points) == Err(UpdateError::Lost) {
                 interpolator.start(None);
             }
-            interpolator.at(time);
-            interpolator.at(MonotonicTime(time.0.wrapping_mul(3)));
+            fine(&mut interpolator, time);
+            fine(&mut interpolator, MonotonicTime(time.0.wrapping_mul(3)));
         }
     }
 }
@@ -427,16 +433,15 @@ proptest! {
                 }
                 let target = update.target(stamp, PERIOD);
                 let aim = swing(target);
-                let points = SetPoints {
-                    position: (!velocity).then_some(aim.position),
-                    velocity: velocity.then_some(aim.velocity),
-                    ..SetPoints::default()
+                let points = if velocity {
+                    commanded([(VelocityCommand, aim.velocity.get())])
+                } else {
+                    position(aim.position.get())
                 };
                 prop_assert!(!matches!(interpolator.update(target, &points), Err(UpdateError::Jump | UpdateError::Lost)));
                 let mut now = arrives;
                 while now < time(period + 1, 100) {
-                    let fine = interpolator.at(now);
-                    let speed = fine.set_points.velocity.unwrap().get();
+                    let speed = velocity_at(&mut interpolator, now).unwrap();
                     if let Some(last) = last {
                         // 50 units/s2 for 0.25 ms, four times.
                         prop_assert!((speed - last).abs() < 4 * 50_000_000_000 / 4_000, "{speed} after {last}");
@@ -465,18 +470,14 @@ fn a_motion_goes_on_until_the_first_update_after_a_change() {
     // Then by velocity, from the velocity that there is.
     let modes = (OperatingMode::Position, OperatingMode::Velocity);
     interpolator.change(time(1, 500), TargetUpdate::Extrapolate, modes, &Motion::default());
-    assert_eq!(interpolator.at(time(1, 500)).set_points.velocity, Some(Velocity(500_000)));
-    let points = SetPoints { velocity: Some(Velocity(500_000)), ..SetPoints::default() };
+    assert_eq!(velocity_at(&mut interpolator, time(1, 500)), Some(500_000));
+    let points = commanded([(VelocityCommand, 500_000)]);
     interpolator.update(time(2, 0), &points).unwrap();
-    let fine = interpolator.at(time(1, 750));
-    assert_eq!((fine.set_points.velocity, fine.set_points.position), (Some(Velocity(500_000)), None));
+    assert_eq!(fine(&mut interpolator, time(1, 750)).0, points);
     // Before the first update there is nothing to carry on.
     interpolator.start(Some(Position(7)));
     interpolator.change(time(3, 0), TargetUpdate::Interpolate, modes, &moving);
-    assert_eq!(
-        interpolator.at(time(3, 0)),
-        FineCommand { set_points: position(7), quality: Quality::Waiting }
-    );
+    assert_eq!(fine(&mut interpolator, time(3, 0)), (position(7), Quality::Waiting));
 }
 
 /// On the move from one mode to another: what led the axis counts, and feed-forward values beside it do not.
@@ -494,17 +495,18 @@ fn a_change_of_mode_begins_in_the_motion_that_there_is() {
         let mut interpolator = interpolator(TargetUpdate::Interpolate, 2);
         interpolator.start(Some(Position(1_000)));
         for period in 0..4_i64 {
-            let points = SetPoints {
-                position: Some(Position(1_000 * (period + 1))),
-                velocity: Some(Velocity(if from == ByVelocity { 500_000 } else { 0 })),
-                acceleration: Some(Acceleration::ZERO),
-                torque: Some(Torque(if from == ByTorque { 100_000 } else { 20_000 })),
-            };
+            let points = commanded([
+                (PositionCommand, 1_000 * (period + 1)),
+                (VelocityCommand, if from == ByVelocity { 500_000 } else { 0 }),
+                (AccelerationCommand, 0),
+                (TorqueCommand, if from == ByTorque { 100_000 } else { 20_000 }),
+            ]);
             interpolator.update(time(period, 0), &points).unwrap();
         }
         interpolator.change(time(3, 0), TargetUpdate::Interpolate, (from, to), &actual);
-        let points = interpolator.at(time(3, 0)).set_points;
-        (points.position.unwrap().0, points.velocity.unwrap().0, points.torque.unwrap().0)
+        let (points, _) = fine(&mut interpolator, time(3, 0));
+        let get = |signal| points.get(signal).unwrap();
+        (get(PositionCommand), get(VelocityCommand), get(TorqueCommand))
     };
     assert_eq!(begin(ByPosition, ByVelocity), (4_000, 500_000, 20_000));
     assert_eq!(begin(ByPosition, ByTorque), (4_000, 500_000, 20_000));

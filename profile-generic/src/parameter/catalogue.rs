@@ -23,6 +23,14 @@ pub struct ParameterRow {
 }
 
 impl Parameter {
+    /// The lowest number of a parameter that an overlay defines; the catalogue keeps below it.
+    pub const FIRST_OF_VENDOR: u16 = 0x8000;
+
+    /// Whether an overlay defines the parameter, and the catalogue does not.
+    pub const fn is_of_vendor(self) -> bool {
+        self.0 >= Self::FIRST_OF_VENDOR
+    }
+
     /// The row of the catalogue for this parameter.
     pub fn row(self) -> Option<&'static ParameterRow> {
         let index = CATALOGUE.binary_search_by_key(&self, |row| row.parameter).ok()?;

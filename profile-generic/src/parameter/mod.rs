@@ -54,7 +54,7 @@ named_enum! {
     }
 }
 
-/// The value of a parameter.
+/// A value in the type of its parameter, in generic units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ParameterValue {
     /// A whole number in the unit of the parameter's quantity.
@@ -229,12 +229,14 @@ mod tests {
                 name.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_')
             );
             assert_eq!(Parameter::from_name(name), Some(row.parameter), "{name}");
+            assert!(!row.parameter.is_of_vendor(), "{name}");
             assert_eq!(row.parameter.row(), Some(row), "{name}");
             assert!(row.description.ends_with('.') && row.description.len() > 10, "{name}");
             let measured = row.quantity != Quantity::None;
             assert!(!measured || row.kind == ParameterType::Integer, "{name}: a quantity is an integer");
         }
         assert_eq!(Parameter(0xFFFF).row(), None);
+        assert!(Parameter(0x8000).is_of_vendor());
         assert_eq!(Parameter::from_name("no_such_parameter"), None);
     }
 

@@ -67,14 +67,14 @@ impl Conversion {
         self.ratio.quotient_f64(value, self.rounding).map(|quotient| self.finish(quotient))
     }
 
-    /// Converts to a double without rounding to an integer first; the second value tells whether it was
+    /// Converts to a double without rounding to an integer first; the second value is whether it was
     /// clamped.
     pub fn convert_to_f64(&self, value: i64) -> (FloatOutcome<f64>, bool) {
         let (num, saturated) = self.numerator(value);
         (ratio::f64_quotient(num, self.ratio.den()), saturated)
     }
 
-    /// Converts to a single without rounding to an integer first; the second value tells whether it was
+    /// Converts to a single without rounding to an integer first; the second value is whether it was
     /// clamped.
     pub fn convert_to_f32(&self, value: i64) -> (FloatOutcome<f32>, bool) {
         let (num, saturated) = self.numerator(value);

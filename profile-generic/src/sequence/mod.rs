@@ -155,7 +155,7 @@ pub struct Sequencer {
 }
 
 impl Sequencer {
-    /// The step.
+    /// Where the start or the stop is.
     pub const fn step(&self) -> SequenceStep {
         self.step
     }
@@ -247,6 +247,7 @@ impl Sequencer {
     }
 
     /// Goes on with the time. At most one order comes of it; further ones in the next cycles.
+    // Flat: one arm per step.
     pub fn poll(&mut self, now: MonotonicTime, sensed: &Sensed, times: &SequenceTimes) -> Option<Order> {
         let rest = self.rests(now, sensed, times);
         match self.step {

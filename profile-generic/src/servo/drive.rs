@@ -112,7 +112,7 @@ impl Servo {
         })
     }
 
-    /// The parameters.
+    /// Mechanics, loops and limits as they are now.
     pub const fn parameters(&self) -> &ServoParameters {
         &self.parameters
     }
@@ -279,8 +279,14 @@ impl Servo {
                 (Some(goal), Some(from)) => units(goal.0.saturating_sub(from.0)) / seconds(DurationNs(whole)),
                 _ => 0.0,
             };
+            let before = self.plant;
             self.sub_step(DurationNs(until - done), command, set_point.map(|place| (place, speed)));
             done = until;
+            // Without torque, a plant that does not change in one sub-step does not change in the others.
+            if self.stage == Stage::Off && self.plant == before {
+                self.pass(DurationNs(whole - done), before.position());
+                break;
+            }
         }
         let actual = self.actual(command);
         self.last = if self.frozen { stale(actual, &self.last) } else { actual };
@@ -294,20 +300,12 @@ impl Servo {
     }
 
     /// Takes the control word.
+    // Flat: one arm per control value, once faults are seen to.
     fn obey(&mut self, command: &ServoCommand) {
         let reset = command.reset_fault && !self.reset_before;
         self.reset_before = command.reset_fault;
         if reset && self.latched.is_some() && self.active.is_empty() {
-            match self.stage {
-                Stage::Off => self.latched = None,
-                // An enable that still stands must not move the axis when the fault goes, so the hold ends in
-                // a stop.
-                Stage::Holding(_) => {
-                    self.latched = None;
-                    self.begin_stop(Afterwards::Off);
-                }
-                _ => {}
-            }
+            self.reset_fault();
         }
         if !command.power && self.has_torque() {
             self.latch(FaultCause::POWER_LOSS, Reaction::CoastAndDisable);
@@ -328,19 +326,31 @@ impl Servo {
                 self.switch_off();
                 self.armed = self.is_ready();
             }
-            ServoControl::Disable => match self.stage {
-                Stage::Off => self.armed = self.is_ready(),
-                Stage::Starting(_) => self.switch_off(),
-                Stage::Stopping { ramp, .. } => {
-                    self.stage = Stage::Stopping { ramp, then: Afterwards::Off };
-                }
-                Stage::Following | Stage::Holding(_) => self.begin_stop(Afterwards::Off),
-            },
-            ServoControl::Halt => match self.stage {
-                Stage::Following => self.begin_stop(Afterwards::Hold),
-                Stage::Stopping { .. } | Stage::Off | Stage::Starting(_) | Stage::Holding(_) => {}
-            },
+            ServoControl::Disable => self.disable(),
+            ServoControl::Halt if matches!(self.stage, Stage::Following) => self.begin_stop(Afterwards::Hold),
+            ServoControl::Halt => {}
             ServoControl::Enable => self.enable(command),
+        }
+    }
+
+    fn reset_fault(&mut self) {
+        match self.stage {
+            Stage::Off => self.latched = None,
+            // An enable that still stands must not move the axis when the fault goes, so the hold ends in a stop.
+            Stage::Holding(_) => {
+                self.latched = None;
+                self.begin_stop(Afterwards::Off);
+            }
+            _ => {}
+        }
+    }
+
+    fn disable(&mut self) {
+        match self.stage {
+            Stage::Off => self.armed = self.is_ready(),
+            Stage::Starting(_) => self.switch_off(),
+            Stage::Stopping { ramp, .. } => self.stage = Stage::Stopping { ramp, then: Afterwards::Off },
+            Stage::Following | Stage::Holding(_) => self.begin_stop(Afterwards::Off),
         }
     }
 
@@ -440,6 +450,12 @@ impl Servo {
         let from = self.plant.position();
         let torque = target.map(|target| self.control.torque(target, offsets, seen, &self.plant, time_s));
         self.plant.step(time_s, torque, command.power);
+        self.pass(time, from);
+        self.supervise(command);
+    }
+
+    /// Time has passed in which the axis has moved from `from` to where it is.
+    fn pass(&mut self, time: DurationNs, from: Position) {
         self.charged_for = if self.plant.is_charged() {
             (self.charged_for + time).min(self.parameters.power_up_time)
         } else {
@@ -448,7 +464,6 @@ impl Servo {
         let stretch = Stretch { from, to: self.plant.position(), begin: self.now, length: time };
         self.captures.on_motion(&stretch);
         self.now = self.now + time;
-        self.supervise(command);
     }
 
     fn advance_stage(&mut self, time: DurationNs, time_s: f64) {

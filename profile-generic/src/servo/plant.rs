@@ -40,7 +40,7 @@ pub(super) fn ppm(parts: f64) -> i64 {
 }
 
 /// The state of motor and load. Torques are parts of the rated torque, velocities in axis units per second.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plant {
     /// Acceleration per rated torque.
     pub(super) gain: f64,

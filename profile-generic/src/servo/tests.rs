@@ -648,3 +648,22 @@ fn the_drive_takes_its_time_to_be_ready_to_have_torque_and_to_move_its_brake() {
     let negative = ServoParameters { power_up_time: DurationNs(-1), ..slow };
     assert_eq!(servo.set_parameters(negative), Err(ServoError::OutOfRange("power_up_time")));
 }
+
+/// An axis that rests passes a long step at once. It must show what it shows when it takes every sub-step.
+#[test]
+fn resting_axis_shows_the_same_in_long_and_short_steps() {
+    for power in [true, false] {
+        let mut long = Servo::new(ServoParameters::default()).unwrap();
+        let command = ServoCommand { power, ..ServoCommand::default() };
+        let mut short = long.clone();
+        for _ in 0..2_500 {
+            let at_once = long.step(2_000_000, &command);
+            let mut in_parts = ServoActual::default();
+            for _ in 0..64 {
+                in_parts = short.step(31_250, &command);
+            }
+            assert_eq!(at_once, in_parts);
+        }
+        assert_eq!(long.step(1, &command).report, if power { Report::Ready } else { Report::AwaitingPower });
+    }
+}

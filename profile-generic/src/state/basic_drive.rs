@@ -26,7 +26,7 @@ impl BasicDrive {
         Self::default()
     }
 
-    /// The state.
+    /// The state after the last event.
     pub const fn state(&self) -> DriveState {
         self.state
     }

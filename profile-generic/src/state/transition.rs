@@ -126,6 +126,7 @@ impl DriveState {
         }
     }
 
+    // Flat: the table of the module, one arm per row.
     const fn on_request(self, request: Request, conditions: &Conditions) -> Transition {
         match request {
             Request::Enable | Request::Test => self.on_enable(request, conditions),

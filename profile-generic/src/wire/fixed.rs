@@ -5,17 +5,17 @@ use super::Error;
 /// Fails unless `available` bytes are at least `needed`.
 ///
 /// # Errors
-/// [`Error::Truncated`] at offset 0.
+/// [`Error::truncated`] at offset 0.
 pub const fn need(what: &'static str, needed: usize, available: usize) -> Result<(), Error> {
-    if available < needed { Err(Error::Truncated { what, offset: 0, needed, available }) } else { Ok(()) }
+    if available < needed { Err(Error::truncated(what, 0, needed, available)) } else { Ok(()) }
 }
 
 /// The bytes as an array of exactly `N`.
 ///
 /// # Errors
-/// [`Error::Length`] for any other number of bytes.
+/// [`Error::length`] for any other number of bytes.
 pub fn exact<const N: usize>(what: &'static str, bytes: &[u8]) -> Result<[u8; N], Error> {
-    bytes.try_into().map_err(|_| Error::Length { what, expected: N, found: bytes.len() })
+    bytes.try_into().map_err(|_| Error::length(what, N, bytes.len()))
 }
 
 /// `u16` at `offset`; panics unless the caller has checked the length.
@@ -60,7 +60,7 @@ mod tests {
         assert_eq!(short.to_string(), "part at byte 0: expected 4 bytes, found 3");
         assert_eq!(exact::<2>("part", &[1, 2]), Ok([1, 2]));
         for bytes in [&[1][..], &[1, 2, 3]] {
-            let error = Error::Length { what: "part", expected: 2, found: bytes.len() };
+            let error = Error::length("part", 2, bytes.len());
             assert_eq!(exact::<2>("part", bytes), Err(error));
         }
     }

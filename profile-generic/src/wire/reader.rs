@@ -2,7 +2,7 @@
 
 use super::Error;
 
-/// Reads values one after the other; running over the end is an [`Error::Truncated`], never a panic.
+/// Reads values one after the other; running over the end is an [`Error::truncated`], never a panic.
 #[derive(Debug, Clone)]
 pub struct Reader<'a> {
     rest: &'a [u8],
@@ -37,16 +37,11 @@ impl<'a> Reader<'a> {
     /// The next `count` bytes.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what` if fewer are left; nothing is consumed then.
+    /// [`Error::truncated`] naming `what` if fewer are left; nothing is consumed then.
     #[inline]
     pub fn take(&mut self, what: &'static str, count: usize) -> Result<&'a [u8], Error> {
         let Some((part, rest)) = self.rest.split_at_checked(count) else {
-            return Err(Error::Truncated {
-                what,
-                offset: self.at,
-                needed: count,
-                available: self.rest.len(),
-            });
+            return Err(Error::truncated(what, self.at, count, self.rest.len()));
         };
         self.rest = rest;
         self.at += count;
@@ -63,7 +58,7 @@ impl<'a> Reader<'a> {
     /// The next `N` bytes as an array.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn array<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], Error> {
         let mut out = [0; N];
@@ -74,7 +69,7 @@ impl<'a> Reader<'a> {
     /// One byte.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u8(&mut self, what: &'static str) -> Result<u8, Error> {
         Ok(self.array::<1>(what)?[0])
@@ -83,7 +78,7 @@ impl<'a> Reader<'a> {
     /// A little-endian 16-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u16(&mut self, what: &'static str) -> Result<u16, Error> {
         Ok(u16::from_le_bytes(self.array(what)?))
@@ -92,7 +87,7 @@ impl<'a> Reader<'a> {
     /// A little-endian 32-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u32(&mut self, what: &'static str) -> Result<u32, Error> {
         Ok(u32::from_le_bytes(self.array(what)?))
@@ -101,7 +96,7 @@ impl<'a> Reader<'a> {
     /// A little-endian 64-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u64(&mut self, what: &'static str) -> Result<u64, Error> {
         Ok(u64::from_le_bytes(self.array(what)?))
@@ -116,12 +111,12 @@ impl<'a> Reader<'a> {
     /// Succeeds only if nothing is left behind the part named `what`.
     ///
     /// # Errors
-    /// [`Error::Trailing`] with the count of bytes too many.
+    /// [`Error::trailing`] with the count of bytes too many.
     #[inline]
     pub fn finish(&self, what: &'static str) -> Result<(), Error> {
         match self.remaining() {
             0 => Ok(()),
-            excess => Err(Error::Trailing { what, offset: self.at, excess }),
+            excess => Err(Error::trailing(what, self.at, excess)),
         }
     }
 }
@@ -139,7 +134,7 @@ mod tests {
         assert_eq!(r.u32("c"), Ok(0x0706_0504));
         assert_eq!(r.u64("d"), Ok(0x0F0E_0D0C_0B0A_0908));
         assert_eq!(r.peek(), Some(0xAA));
-        assert_eq!(r.finish("all"), Err(Error::Trailing { what: "all", offset: 15, excess: 1 }));
+        assert_eq!(r.finish("all"), Err(Error::trailing("all", 15, 1)));
         assert_eq!(r.rest(), [0xAA]);
         assert_eq!(r.finish("all"), Ok(()));
         assert_eq!(r.peek(), None);
@@ -149,11 +144,11 @@ mod tests {
     fn a_short_read_consumes_nothing_and_says_where() {
         let mut r = Reader::new(&[1, 2, 3]);
         assert_eq!(r.u8("first"), Ok(1));
-        let expected = Error::Truncated { what: "word", offset: 1, needed: 4, available: 2 };
+        let expected = Error::truncated("word", 1, 4, 2);
         assert_eq!(r.u32("word"), Err(expected));
         assert_eq!(expected.to_string(), "word at byte 1: expected 4 bytes, found 2");
         assert_eq!(r.u16("half"), Ok(0x0302));
         let huge = r.take("huge", usize::MAX);
-        assert_eq!(huge, Err(Error::Truncated { what: "huge", offset: 3, needed: usize::MAX, available: 0 }));
+        assert_eq!(huge, Err(Error::truncated("huge", 3, usize::MAX, 0)));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Error;
 
-/// Writes values one after the other; running over the end is an [`Error::Truncated`], never a panic.
+/// Writes values one after the other; running over the end is an [`Error::truncated`], never a panic.
 #[derive(Debug)]
 pub struct Writer<'a> {
     bytes: &'a mut [u8],
@@ -31,12 +31,12 @@ impl<'a> Writer<'a> {
     /// The next `count` bytes for the caller to fill.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what` if fewer are left; nothing is written then.
+    /// [`Error::truncated`] naming `what` if fewer are left; nothing is written then.
     #[inline]
     pub fn reserve(&mut self, what: &'static str, count: usize) -> Result<&mut [u8], Error> {
         let available = self.remaining();
         if count > available {
-            return Err(Error::Truncated { what, offset: self.at, needed: count, available });
+            return Err(Error::truncated(what, self.at, count, available));
         }
         let start = self.at;
         self.at += count;
@@ -46,7 +46,7 @@ impl<'a> Writer<'a> {
     /// Copies `part`.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn slice(&mut self, what: &'static str, part: &[u8]) -> Result<(), Error> {
         self.reserve(what, part.len())?.copy_from_slice(part);
@@ -56,7 +56,7 @@ impl<'a> Writer<'a> {
     /// `count` zero bytes: reserved fields and padding.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn zeros(&mut self, what: &'static str, count: usize) -> Result<(), Error> {
         self.reserve(what, count)?.fill(0);
@@ -66,7 +66,7 @@ impl<'a> Writer<'a> {
     /// One byte.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u8(&mut self, what: &'static str, value: u8) -> Result<(), Error> {
         self.slice(what, &[value])
@@ -75,7 +75,7 @@ impl<'a> Writer<'a> {
     /// A little-endian 16-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u16(&mut self, what: &'static str, value: u16) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
@@ -84,7 +84,7 @@ impl<'a> Writer<'a> {
     /// A little-endian 32-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u32(&mut self, what: &'static str, value: u32) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
@@ -93,7 +93,7 @@ impl<'a> Writer<'a> {
     /// A little-endian 64-bit value.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what`.
+    /// [`Error::truncated`] naming `what`.
     #[inline]
     pub fn u64(&mut self, what: &'static str, value: u64) -> Result<(), Error> {
         self.slice(what, &value.to_le_bytes())
@@ -102,12 +102,12 @@ impl<'a> Writer<'a> {
     /// Overwrites a 16-bit value written earlier at `offset`: lengths that are known only afterwards.
     ///
     /// # Errors
-    /// [`Error::Truncated`] naming `what` if those two bytes have not been written yet.
+    /// [`Error::truncated`] naming `what` if those two bytes have not been written yet.
     #[inline]
     pub fn patch_u16(&mut self, what: &'static str, offset: usize, value: u16) -> Result<(), Error> {
         let available = self.at.saturating_sub(offset);
         if available < 2 {
-            return Err(Error::Truncated { what, offset, needed: 2, available });
+            return Err(Error::truncated(what, offset, 2, available));
         }
         self.bytes[offset..offset + 2].copy_from_slice(&value.to_le_bytes());
         Ok(())
@@ -129,9 +129,9 @@ mod tests {
         assert_eq!(w.zeros("e", 2), Ok(()));
         assert_eq!(w.patch_u16("b", 1, 0xBEEF), Ok(()));
         assert_eq!(w.written(), 17);
-        let short = Error::Truncated { what: "f", offset: 17, needed: 4, available: 2 };
+        let short = Error::truncated("f", 17, 4, 2);
         assert_eq!(w.u32("f", 1), Err(short));
-        let unwritten = Error::Truncated { what: "g", offset: 16, needed: 2, available: 1 };
+        let unwritten = Error::truncated("g", 16, 2, 1);
         assert_eq!(w.patch_u16("g", 16, 1), Err(unwritten));
         assert_eq!(buffer, [1, 0xEF, 0xBE, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 0, 0, 0xA5, 0xA5],);
     }

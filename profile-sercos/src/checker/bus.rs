@@ -66,7 +66,7 @@ pub type Cable = Box<dyn FnMut(&mut Vec<u8>) -> bool>;
 pub struct VirtualBus<S> {
     /// The virtual time.
     pub now: MonotonicTime,
-    /// The master.
+    /// The master under test.
     pub master: Master,
     /// The slaves.
     pub line: S,

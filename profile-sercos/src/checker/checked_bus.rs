@@ -23,7 +23,7 @@ struct Purpose {
 
 /// A checker, and what of its findings is meant to be.
 pub struct CheckedBus {
-    /// The checker.
+    /// Judges everything that is sent and passed.
     pub checker: Checker,
     purposes: Vec<Purpose>,
     judged: usize,

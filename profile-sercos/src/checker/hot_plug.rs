@@ -67,6 +67,20 @@ impl HotPlugs {
     }
 }
 
+/// Whether a field with hot plug on says something that there is.
+fn is_allowed(field: HotPlug) -> bool {
+    let switch = field.word & HotPlug::SWITCH_TO_SVC != 0;
+    let good = match field.code() {
+        HotPlugCode::NONE => field.info == 0 && field.address() == 0,
+        HotPlugCode::SVC_OFFSET_MDT | HotPlugCode::SVC_OFFSET_AT => {
+            (1..=511).contains(&field.address()) && !switch
+        }
+        HotPlugCode(1..=5 | 0x10..=0x13 | 0x20..=0x23) => field.address() == BROADCAST_ADDRESS && !switch,
+        _ => false,
+    };
+    good && field.word & HotPlug::SUPPORTED != 0 && field.word & !CONTROL_BITS == 0
+}
+
 impl Checker {
     /// The field of MDT0.
     pub(super) fn hot_plug_field(&mut self, at: MonotonicTime, channel: Channel, data: &[u8]) {
@@ -89,22 +103,12 @@ impl Checker {
         }
         let code = field.code();
         line.asked.insert(code.0);
-        let switch = field.word & HotPlug::SWITCH_TO_SVC != 0;
-        let broadcast = field.address() == BROADCAST_ADDRESS;
-        let good = match code {
-            HotPlugCode::NONE => field.info == 0 && field.address() == 0,
-            HotPlugCode::SVC_OFFSET_MDT | HotPlugCode::SVC_OFFSET_AT => {
-                (1..=511).contains(&field.address()) && !switch
-            }
-            HotPlugCode(1..=5 | 0x10..=0x13 | 0x20..=0x23) => broadcast && !switch,
-            _ => false,
-        };
-        if !good || field.word & HotPlug::SUPPORTED == 0 || field.word & !CONTROL_BITS != 0 {
+        if !is_allowed(field) {
             self.violation(at, Offender::Master, Rule::HotPlugField { field });
             return;
         }
         match code {
-            HotPlugCode::NONE if switch => self.switch_to_svc(channel),
+            HotPlugCode::NONE if field.word & HotPlug::SWITCH_TO_SVC != 0 => self.switch_to_svc(channel),
             HotPlugCode::NONE => {}
             HotPlugCode::SVC_OFFSET_MDT => self.offset(at, channel, field, Kind::Mdt),
             HotPlugCode::SVC_OFFSET_AT => self.offset(at, channel, field, Kind::At),
@@ -191,10 +195,11 @@ impl Checker {
         before: &[u8],
         after: &[u8],
     ) {
-        if before[..HOT_PLUG_LEN] == after[..HOT_PLUG_LEN] {
+        // A frame too short for the field holds no answer; nothing of it can have changed as one.
+        let Ok(answer) = HotPlug::parse(after) else { return };
+        if before.get(..HOT_PLUG_LEN) == after.get(..HOT_PLUG_LEN) {
             return;
         }
-        let Ok(answer) = HotPlug::parse(after) else { return };
         let asked = &self.hot_plugs.lines[channel.index()].asked;
         let [code, _] = answer.word.to_le_bytes();
         let error = answer.word & HotPlug::ERROR != 0;

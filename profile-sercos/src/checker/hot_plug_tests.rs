@@ -10,9 +10,10 @@ use crate::master::event::{Event, Port};
 use crate::master::layout::{ConnectionNeed, SlaveNeed};
 use crate::master::phase::State;
 use crate::slave::{self, Network, STRANGER, Slave};
-use crate::wire::header::{HEADER_LEN, Phase};
-use crate::wire::hot_plug::HotPlug;
+use crate::wire::header::{Channel, HEADER_LEN, Header, Kind, Phase, PhaseField, TelegramType};
+use crate::wire::hot_plug::{HOT_PLUG_LEN, HotPlug};
 use crate::wire::scp::{ScpClass, ScpEntry};
+use profile_generic::time::MonotonicTime;
 
 const CLASSES: &[ScpEntry] = &[
     ScpEntry { class: ScpClass::VAR_CFG, version: 1 },
@@ -104,6 +105,27 @@ fn a_slave_comes_in_by_the_rules_and_is_watched_from_then_on() {
     bus.breaking(|_| true, |bus| bus.cycles(1));
     let violation = bus.checked.checker.violations()[0].to_string();
     assert!(violation.contains(&format!("changed byte {} of AT0 P", at - 1)), "{violation}");
+}
+
+/// An AT0 may end anywhere inside of the field; noise on the line makes such frames.
+#[test]
+fn an_at0_too_short_for_the_field_holds_no_answer() {
+    let mut bus = bus(false);
+    bus.state(State::Cp4);
+    plug(&mut bus);
+    let enabled = |bus: &Bus| bus.checked.checker.hot_plugs.is_enabled(Channel::Primary);
+    bus.run_until("hot plug is on", enabled);
+    let count = bus.checked.checker.violations().len();
+    for len in 0..HOT_PLUG_LEN {
+        let mut before = vec![0; HEADER_LEN + len];
+        let telegram = TelegramType::new(Channel::Primary, Kind::At, 0);
+        let header = Header { source: [2; 6], telegram, phase: PhaseField::new(false, 0, Phase::CP4) };
+        header.emit(&mut before).unwrap();
+        let mut after = before.clone();
+        after[HEADER_LEN..].fill(0x55);
+        bus.checked.checker.passed(MonotonicTime::ZERO, STRANGER + 2, true, &before, &after);
+        assert_eq!(bus.checked.checker.violations().len(), count, "{len} bytes");
+    }
 }
 
 #[test]

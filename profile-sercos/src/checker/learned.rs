@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::generated::idns::connection;
 use crate::wire::data_status::{CommandState, DataStatus};
 use crate::wire::idn::Idn;
 use crate::wire::procedure::ProcedureControl;
@@ -75,7 +76,9 @@ impl Learned {
     /// The numbers of the connections that were set up (element 1) or given a place (element 3).
     pub fn connections(&self) -> BTreeSet<u8> {
         let told = self.values.keys().filter(|idn| {
-            idn.block() == Idn::CONNECTION_BLOCK && !idn.is_product() && matches!(idn.element(), 1 | 3)
+            idn.block() == Idn::CONNECTION_BLOCK
+                && !idn.is_product()
+                && matches!(idn.element(), connection::SETUP | connection::ASSIGNMENT)
         });
         told.map(|idn| idn.instance()).collect()
     }

@@ -83,7 +83,7 @@ pub enum Rule {
     },
     /// All telegrams of a cycle have the phase byte of its MST.
     PhaseMixed {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
         /// Its phase byte.
         found: PhaseField,
@@ -99,7 +99,7 @@ pub enum Rule {
     },
     /// The phase has no such telegram.
     Unexpected {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
         /// The phase whose layout is in force.
         phase: Phase,
@@ -113,12 +113,12 @@ pub enum Rule {
     },
     /// Every telegram of the phase is sent in every cycle.
     Missing {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
     },
     /// The data field has the length of the phase, or of S-0-1010 and S-0-1012.
     Length {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
         /// Bytes found.
         found: usize,
@@ -148,7 +148,7 @@ pub enum Rule {
     },
     /// SERCOS telegrams end before the unified communication channel begins, or else before the cycle ends.
     TelegramTooLate {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
         /// Its end in the cycle.
         end: DurationNs,
@@ -193,7 +193,7 @@ pub enum Rule {
     },
     /// Before CP3 each slave is told what it needs.
     NotConfigured {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
         /// The parameter that is missing or impossible.
         idn: Idn,
@@ -230,24 +230,24 @@ pub enum Rule {
     },
     /// SERCOS addresses are 1..=511 and unique from CP3 on.
     Address {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
         /// Its address.
         address: u16,
     },
     /// The master starts a step only when the slave is through with the one before.
     StepTooEarly {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
     },
     /// Control word and info stay as they are until the next step; unused bits are 0.
     StepChanged {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
     },
     /// C-DEV commands another topology together with its handshake bit only, and never store and forward.
     TopologyCommand {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
         /// The commanded topology and the handshake bit.
         found: DeviceControl,
@@ -255,7 +255,7 @@ pub enum Rule {
     /// The MDTs of the two channels command a slave alike, unless those of one channel ask it to turn that channel's telegrams
     /// round: told anything else, it would turn its back on the only telegrams that it may get.
     TopologyApart {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
         /// What the P telegrams command.
         primary: DeviceControl,
@@ -264,19 +264,19 @@ pub enum Rule {
     },
     /// In CP1 the service channel only takes over the handshake bit.
     StepInCp1 {
-        /// The slave.
+        /// Number of the slave in the line.
         slave: u16,
     },
     /// A slave changes nothing but its own slots in an AT; this byte of the frame is another's.
     OutsideSlots {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
         /// Offset in the data field; `None` for the header.
         offset: Option<usize>,
     },
     /// A slave changes a telegram on its way to the end of the line only.
     ReturnPath {
-        /// The telegram.
+        /// Kind and number of the telegram.
         telegram: TelegramType,
     },
     /// A slave adds one to the sequence counter at each pass and writes its address at its own place.
@@ -333,6 +333,7 @@ pub enum Rule {
 }
 
 impl fmt::Display for Rule {
+    // Flat: one arm per rule.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let us = |duration: &DurationNs| format!("{} us", duration.0 / 1000);
         match self {

@@ -4,16 +4,18 @@ use core::ops::Range;
 
 use profile_generic::time::SystemTime;
 
-use super::Master;
 use super::event::SlaveId;
+use super::isolation::Isolation;
 use super::layout::CyclicLayout;
-use super::scan;
+use super::network::Network;
+use super::scan::{self, Scan};
 use super::station::{End, Presence, Station};
 use crate::wire::cp0::{self, AtRepr, MdtRepr, SequenceCounter};
 use crate::wire::cp12;
 use crate::wire::device_control::DeviceControl;
 use crate::wire::extended::{EXTENDED_LEN, EXTENDED_OFFSET, Extended};
 use crate::wire::header::{Channel, Kind, Phase, PhaseField, TELEGRAMS_MAX};
+use crate::wire::hot_plug::HotPlug;
 use crate::wire::layout::DEVICE_WORD_LEN;
 use crate::wire::svc::SVC_LEN;
 use profile_generic::wire::put_u16;
@@ -40,42 +42,36 @@ pub(super) fn slot(phase: Phase, layout: &CyclicLayout, index: usize, kind: Kind
     Some(Slot { svc: pair(svc), device: pair(device) })
 }
 
-impl Master {
-    /// Builds the telegrams of the next cycle.
-    pub(super) fn build(&mut self) {
-        if self.state.serves() {
-            for station in self.stations[..self.found].iter_mut().filter(|station| station.is_served()) {
-                station.channel.kick();
-            }
-        }
-        let switching = self.state.announces();
-        let phase = switching.unwrap_or(self.layout_phase);
-        self.frames.begin(PhaseField::new(switching.is_some(), self.cycle_count, phase));
-        match self.layout_phase {
-            Phase::CP0 => self.build_scan(),
+impl Network {
+    /// Builds the telegrams of the next cycle; `switching` is the phase announced with CPS, `hot_plug` the fields of CP4.
+    pub(super) fn build(
+        &mut self,
+        switching: Option<Phase>,
+        scan: &Scan,
+        hot_plug: Option<[HotPlug; 2]>,
+        search: &Isolation,
+    ) {
+        let phase = self.stations.phase;
+        let header = PhaseField::new(switching.is_some(), self.cycle_count, switching.unwrap_or(phase));
+        self.frames.begin(header);
+        match phase {
+            Phase::CP0 => self.build_scan(scan.start_two()),
             Phase::CP1 | Phase::CP2 => {
-                let telegrams = self.config.setup_telegrams();
-                let lengths =
-                    core::array::from_fn(
-                        |number| {
-                            if number < usize::from(telegrams) { cp12::LEN } else { 0 }
-                        },
-                    );
-                self.build_telegrams(lengths, lengths, None);
+                let telegrams = usize::from(self.config.setup_telegrams());
+                let lengths = core::array::from_fn(|number| if number < telegrams { cp12::LEN } else { 0 });
+                self.build_telegrams([lengths; 2], None, None, search);
             }
             _ => {
-                let extended = self.extended().filter(|_| switching.is_none());
-                let lengths = |lengths: [u16; TELEGRAMS_MAX]| lengths.map(usize::from);
-                self.build_telegrams(lengths(self.layout.mdt_len), lengths(self.layout.at_len), extended);
+                let extended = self.time.field(self.cycle_count).filter(|_| switching.is_none());
+                let lengths = [self.layout.mdt_len, self.layout.at_len].map(|len| len.map(usize::from));
+                self.build_telegrams(lengths, extended, hot_plug, search);
             }
         }
         self.cycle_count = (self.cycle_count + 1) & 7;
-        self.cycles = self.cycles.saturating_add(1);
-        self.evaluated = false;
-        self.statistics.cycles += 1;
+        self.journal.statistics.cycles += 1;
     }
 
-    fn build_scan(&mut self) {
+    fn build_scan(&mut self, start_two: u16) {
         let mdt = MdtRepr { version: self.config.communication_version(), ..MdtRepr::default() };
         let emit = |data: &mut [u8]| {
             // The length is the one of the telegram.
@@ -85,19 +81,20 @@ impl Master {
         let empty = |data: &mut [u8]| {
             let _ = AtRepr::empty(SequenceCounter::START_PRIMARY).emit(data);
         };
-        let counter = scan::secondary_counter(self.scan.start_two());
+        let counter = scan::secondary_counter(start_two);
         self.frames.add(Kind::At, 0, cp0::AT_LEN, empty, |data| put_u16(data, 0, counter.0));
     }
 
+    /// Builds MDTs and ATs of these lengths.
     fn build_telegrams(
         &mut self,
-        mdt: [usize; TELEGRAMS_MAX],
-        at: [usize; TELEGRAMS_MAX],
+        [mdt, at]: [[usize; TELEGRAMS_MAX]; 2],
         extended: Option<Extended>,
+        hot_plug: Option<[HotPlug; 2]>,
+        search: &Isolation,
     ) {
-        let (stations, layout, phase) = (&self.stations[..self.found], &self.layout, self.layout_phase);
+        let (stations, layout, phase) = (&self.stations, &self.layout, self.stations.phase);
         let ring = self.redundancy.is_closed();
-        let fields = self.admission.fields(&self.config, layout);
         let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
         for (number, len) in used(mdt) {
             self.frames.add(Kind::Mdt, number, len, |_| {}, |_| {});
@@ -116,18 +113,17 @@ impl Master {
                 fill_connections(&mut mdts, layout, index, station);
             }
         }
-        let fields = fields.filter(|_| phase == Phase::CP4);
-        if let (Some([primary, _]), Some(data)) = (fields, &mut mdts[0]) {
+        if let (Some([primary, _]), Some(data)) = (hot_plug, &mut mdts[0]) {
             // MDT0 of CP4 begins with the field.
             let _ = primary.emit(data);
         }
         self.frames.copy_mdts();
-        if let Some([_, secondary]) = fields {
+        if let Some([_, secondary]) = hot_plug {
             self.frames.edit_mdt(Channel::Secondary, 0, |data| {
                 let _ = secondary.emit(data);
             });
         }
-        self.build_questions();
+        search.build_questions(self);
         for (number, len) in used(at) {
             self.frames.add(Kind::At, number, len, |_| {}, |_| {});
         }
@@ -135,27 +131,38 @@ impl Master {
 
     /// Gives a slave another C-DEV in the MDTs of one channel.
     pub(super) fn write_control(&mut self, channel: Channel, index: usize, control: DeviceControl) {
-        let Some(slot) = slot(self.layout_phase, &self.layout, index, Kind::Mdt) else { return };
+        let Some(slot) = slot(self.stations.phase, &self.layout, index, Kind::Mdt) else { return };
         self.frames.edit_mdt(channel, slot.device.0, |data| {
             if data.len() >= slot.device.1 + DEVICE_WORD_LEN {
                 put_u16(data, slot.device.1, control.bits());
             }
         });
     }
+}
 
+/// The system time as it is sent in the extended field.
+#[derive(Debug, Default)]
+pub(super) struct TimeField {
+    /// At the start of the next cycle; `None` sends none.
+    pub now: Option<SystemTime>,
+    /// The time sent, latched for eight cycles, and its toggle.
+    latched: Option<(SystemTime, bool)>,
+}
+
+impl TimeField {
     /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
     /// in four halves, each sent in two cycles, latched for all eight.
-    fn extended(&mut self) -> Option<Extended> {
-        if self.cycle_count == 0 {
-            let toggle = self.latched_time.is_some_and(|(_, toggle)| toggle);
-            self.latched_time = self.system_time.map(|time| (time, !toggle));
+    fn field(&mut self, cycle_count: u8) -> Option<Extended> {
+        if cycle_count == 0 {
+            let toggle = self.latched.is_some_and(|(_, toggle)| toggle);
+            self.latched = self.now.map(|time| (time, !toggle));
         }
-        let (SystemTime(nanos), toggle) = self.latched_time?;
+        let (SystemTime(nanos), toggle) = self.latched?;
         let seconds = u32::try_from(nanos / 1_000_000_000 % (1 << 32)).unwrap_or(u32::MAX);
         let nanos = u32::try_from(nanos % 1_000_000_000).unwrap_or(0);
-        let word = if self.cycle_count < 4 { seconds } else { nanos };
+        let word = if cycle_count < 4 { seconds } else { nanos };
         let [a, b, c, d] = word.to_le_bytes();
-        let half = if self.cycle_count & 2 == 0 { [c, d] } else { [a, b] };
+        let half = if cycle_count & 2 == 0 { [c, d] } else { [a, b] };
         let toggle = if toggle { Extended::TIME_TOGGLE } else { 0 };
         Some(Extended { word: Extended::TIME_VALID | toggle, time_fragment: u16::from_le_bytes(half) })
     }
@@ -168,7 +175,7 @@ fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool, 
         let _ = station.channel.outgoing().emit(bytes);
     }
     if let Some(bytes) = part(mdts, slot.device.0, slot.device.1..slot.device.1 + DEVICE_WORD_LEN) {
-        let mut control = station.command;
+        let mut control = station.link.command;
         control.set(DeviceControl::MASTER_VALID, addressed);
         control.set(DeviceControl::RING_CLOSED, ring && addressed);
         put_u16(bytes, 0, control.bits());
@@ -194,4 +201,30 @@ type Mdts<'a> = [Option<&'a mut [u8]>; TELEGRAMS_MAX];
 /// A part of an MDT.
 fn part<'a>(mdts: &'a mut Mdts<'_>, telegram: u8, range: Range<usize>) -> Option<&'a mut [u8]> {
     mdts.get_mut(usize::from(telegram))?.as_mut()?.get_mut(range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn system_time_is_latched_for_eight_cycles() {
+        let mut time =
+            TimeField { now: Some(SystemTime(0x1234_5678 * 1_000_000_000 + 0x0ABC_DEF0)), latched: None };
+        let mut fields = Vec::new();
+        for cycle in 0..8 {
+            fields.push(time.field(cycle).unwrap());
+            time.now = Some(SystemTime(0));
+        }
+        let halves: Vec<_> = fields.iter().map(|field| field.time_fragment).collect();
+        assert_eq!(halves, [0x1234, 0x1234, 0x5678, 0x5678, 0x0ABC, 0x0ABC, 0xDEF0, 0xDEF0]);
+        let first = Extended::TIME_VALID | Extended::TIME_TOGGLE;
+        assert!(fields.iter().all(|field| field.word == first));
+        assert_eq!(time.field(0), Some(Extended { word: Extended::TIME_VALID, time_fragment: 0 }));
+        time.now = None;
+        assert_eq!(
+            (time.field(1).map(|field| field.word), time.field(0)),
+            (Some(Extended::TIME_VALID), None)
+        );
+    }
 }

@@ -255,6 +255,10 @@ impl MasterConfig {
         if self.mst_jitter_ns >= self.cycle_ns {
             return Err(ConfigError::Jitter { nanoseconds: self.mst_jitter_ns, cycle_ns: self.cycle_ns });
         }
+        self.check_slaves()
+    }
+
+    fn check_slaves(&self) -> Result<(), ConfigError> {
         for (index, slave) in self.slaves.iter().enumerate() {
             if slave.address == 0 || usize::from(slave.address) > cp0::SLAVES_MAX {
                 return Err(ConfigError::Address(slave.address));
@@ -266,6 +270,11 @@ impl MasterConfig {
             check_room(slave)?;
         }
         Ok(())
+    }
+
+    /// The slave that is to have this address.
+    pub(super) fn slave(&self, address: u16) -> Option<&SlaveConfig> {
+        self.slaves.iter().find(|slave| slave.address == address)
     }
 
     /// The communication version of CP0.

@@ -23,7 +23,7 @@ use profile_generic::wire::put_u16;
 /// Bytes of a connection's values.
 const DATA_MAX: usize = CONNECTION_LEN_MAX - CONNECTION_CONTROL_LEN;
 
-/// State of a consumer.
+/// State of a consumer, from the toggle and counter of its C-CON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConsumerState {
     /// The producer is not ready.

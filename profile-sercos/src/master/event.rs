@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::connection::ConsumerState;
 use super::foreign::OtherMaster;
-pub use super::hot_plug::HotPlugRefusal;
+pub use super::hot_plug::refusal::HotPlugRefusal;
 use super::layout::LayoutError;
 use super::svc::request::{SvcFailure, SvcOutcome};
 use super::topology::Topology;
@@ -49,7 +49,7 @@ pub enum End {
     Master(Port),
     /// A slave.
     Slave {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
@@ -68,7 +68,7 @@ impl fmt::Display for End {
 /// Names one submitted service channel request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ticket {
-    /// The slave.
+    /// Place of the slave in the line.
     pub slave: SlaveId,
     /// Place in the slave's queue.
     pub(crate) place: usize,
@@ -153,14 +153,14 @@ pub enum Event {
     },
     /// A slave was found which is not configured. It takes part without connections.
     Unknown {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address, 0 when none is set.
         address: u16,
     },
     /// Two slaves have the same SERCOS address. CP2 is possible, CP3 is not.
     DoubleAddress {
-        /// The address.
+        /// SERCOS address that both have.
         address: u16,
         /// The slave nearer to the master.
         first: SlaveId,
@@ -169,12 +169,12 @@ pub enum Event {
     },
     /// The slave has no SERCOS address, or shares it. CP3 was refused.
     AddressConflict {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
     },
     /// The slave was given another SERCOS address by S-0-1040. It takes part without connections.
     AddressAssigned {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// The address before, 0 for none.
         old: u16,
@@ -188,7 +188,7 @@ pub enum Event {
     },
     /// A step of the phase-up failed at a slave.
     StepFailed {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// The parameter.
         idn: Idn,
@@ -198,12 +198,12 @@ pub enum Event {
     /// The slave's SCP classes leave open how its connections are configured: it needs exactly one of SCP_FixCFG
     /// and SCP_VarCFG.
     ClassMismatch {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
     },
     /// The slave does not have this connection: S-0-1051, or its fixed configuration.
     NoConnection {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// The configured connection.
         instance: u8,
@@ -212,7 +212,7 @@ pub enum Event {
     },
     /// S-0-0127 or S-0-0128 failed.
     CheckFailed {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// The phase that cannot be left: CP2 or CP3.
         phase: Phase,
@@ -222,7 +222,7 @@ pub enum Event {
     /// The slave has been checked for CP3 and takes no part any more. It would write where it was told to, over what
     /// others have there in a new layout: the master goes back to CP0.
     Stale {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
     },
     /// The telegrams of CP3 and CP4 cannot be laid out.
@@ -240,7 +240,7 @@ pub enum Event {
     },
     /// What a slave says about errors and warnings in S-DEV has changed: bits 15, 9, 7, 6 and 4.
     DeviceStatus {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Those bits, the others 0.
         status: DeviceStatus,
@@ -258,7 +258,7 @@ pub enum Event {
     /// Nothing came back any more though no slave had lost a link. The slaves were asked one after the other to turn the telegrams
     /// round, and this one does not answer: it passes nothing on. What is in front of it goes on.
     Isolated {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
@@ -271,7 +271,7 @@ pub enum Event {
     RingClosed,
     /// A slave did not do what closes the ring. It is open as before, and tried again after a while.
     RingNotClosed {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
@@ -279,7 +279,7 @@ pub enum Event {
     /// A slave is not valid any more. It takes no part until it is valid again in CP4, comes in by hot plug, or is found by
     /// the next scan.
     SlaveLost {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
@@ -288,7 +288,7 @@ pub enum Event {
     },
     /// A lost slave is valid again in CP4 and takes part: it had never left.
     SlaveReturned {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
     },
     /// A configured slave was not found, and the telegrams keep its place: it can be plugged in later.
@@ -299,7 +299,7 @@ pub enum Event {
     /// A slave is on its way in by hot plug and can be set up: the application may work as in this phase, and then call
     /// `proceed_hot_plug`, or `exclude`.
     HotPlugAwaits {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
@@ -308,14 +308,14 @@ pub enum Event {
     },
     /// A slave has come in by hot plug and takes part from now on.
     HotPlugged {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// Its SERCOS address.
         address: u16,
     },
     /// A slave does not come in by hot plug. The others go on.
     HotPlugRefused {
-        /// The SERCOS address which the slave has told, or which is known from before.
+        /// The SERCOS address which the slave has reported, or which is known from before.
         address: Option<u16>,
         /// Why.
         reason: HotPlugRefusal,
@@ -327,7 +327,7 @@ pub enum Event {
     },
     /// A slave has not measured its delays once more; it goes on with the old ones.
     MeasureFailed {
-        /// The slave.
+        /// Place of the slave in the line.
         slave: SlaveId,
         /// S-0-1015 or S-0-1024.
         idn: Idn,
@@ -355,6 +355,7 @@ pub enum Event {
 }
 
 impl fmt::Display for Event {
+    // Flat: one arm per event.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Event::Phase(phase) => write!(f, "{phase}"),

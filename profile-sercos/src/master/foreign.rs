@@ -1,9 +1,9 @@
 //! Another master on the wire: what is heard of it, and what follows.
 //!
-//! Slaves do as any MST says, whoever has sent it: two masters wreck each other's bus. So a master [listens](State::Listen) before its
+//! Slaves obey any MST, regardless of the sender: two masters wreck each other's bus. So a master [listens](super::phase::State::Listen) before its
 //! first telegram, and is silent as long as it hears somebody. Who comes later is heard as well: below CP4 the master gives way at
-//! once, because no axis has torque there. In CP4 the application is told ([`Event::OtherMaster`]), stops its axes while they are still led,
-//! and then calls [`Master::give_way`].
+//! once, because no axis has torque there. In CP4 the application is told ([`Event::OtherMaster`](super::event::Event::OtherMaster)), stops its axes while they are still led,
+//! and then calls [`Master::give_way`](super::Master::give_way).
 //!
 //! A single MST of somebody else in operation is counted and nothing more; the second one within [`LISTEN`] is of a master. One that has
 //! this master's own hardware address is known in CP4 by a phase that was not sent for that long.
@@ -12,13 +12,11 @@ use core::fmt;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::Master;
-use super::event::{Event, Port, Refusal};
-use super::phase::{PhaseEvent, State};
-use super::svc::request::SvcFailure;
+use super::event::{Port, Refusal};
+use super::phase::State;
 use crate::wire::header::{Header, MacAddress, Phase, TelegramType};
 
-/// How long the wire has to be silent before the first telegram. Whoever is in a phase sends in every cycle of at most 65 ms; whoever
+/// How long the wire has to be silent before the first telegram. A master in a phase sends in every cycle of at most 65 ms; whoever
 /// is between two phases is silent for 120 ms. The rest is for hosts that are late.
 pub const LISTEN: DurationNs = DurationNs::from_millis(200);
 
@@ -64,12 +62,23 @@ pub(super) struct Foreign {
     first: Option<(Port, TelegramType, MonotonicTime)>,
     last: MonotonicTime,
     count: u32,
-    told: bool,
+    /// Who sends them.
+    heard: Option<OtherMaster>,
+    reported: bool,
     /// How often the wire was found occupied since it was used.
     tries: u32,
 }
 
 impl Foreign {
+    /// Takes a frame of another master.
+    pub fn hear(&mut self, now: MonotonicTime, port: Port, header: &Header) {
+        if header.telegram.is_mst() {
+            self.count(now, port, header.telegram);
+        }
+        let (source, phase) = (header.source, header.phase.phase());
+        self.heard = Some(OtherMaster { source, phase, port, cycle: self.cycle() });
+    }
+
     /// Counts an MST; copies on other ways are not counted again.
     fn count(&mut self, now: MonotonicTime, port: Port, telegram: TelegramType) {
         if now.since(self.last) > LISTEN {
@@ -87,113 +96,101 @@ impl Foreign {
         let span = self.last.since(first).as_nanos();
         (self.count > 1 && span > 0).then(|| DurationNs(span / i64::from(self.count - 1)))
     }
-}
 
-impl Master {
-    /// Takes a frame that is not one of those that were sent in this cycle. Returns why it is refused.
-    pub(super) fn hear(&mut self, now: MonotonicTime, port: Port, frame: &[u8], reason: Refusal) -> Refusal {
-        let Ok(header) = Header::parse(frame) else { return reason };
-        let listens = self.state.listens();
-        let alien = match reason {
-            Refusal::Foreign => true,
-            // Nothing was sent: it is not its own.
-            Refusal::Silence => listens,
-            Refusal::Phase => {
-                header.telegram.is_mst()
-                    && self.state == State::Cp4
-                    && header.phase.phase() != Phase::CP4
-                    && now.since(self.since) > LISTEN
-            }
-            _ => false,
-        };
-        if !alien || self.state == State::Nrt {
-            return reason;
-        }
-        if header.telegram.is_mst() {
-            self.foreign.count(now, port, header.telegram);
-        }
-        let other = OtherMaster {
-            source: header.source,
-            phase: header.phase.phase(),
-            port,
-            cycle: self.foreign.cycle(),
-        };
-        self.heard = Some(other);
-        let confirmed = self.foreign.count > 1;
-        if listens {
-            self.advance(now, PhaseEvent::Foreign);
-            self.next_cycle = now + self.patience();
-            if self.foreign.count >= ESTIMATE_COUNT {
-                self.tell_other();
-            }
-        } else if confirmed {
-            self.tell_other();
-            if self.state != State::Cp4 {
-                self.advance(now, PhaseEvent::Foreign);
-            }
-        }
-        Refusal::Foreign
+    /// A master, not just a stray MST.
+    pub fn is_confirmed(&self) -> bool {
+        self.count > 1
     }
 
-    /// Says once what was heard.
-    fn tell_other(&mut self) {
-        if let Some(other) = self.heard.filter(|_| !core::mem::replace(&mut self.foreign.told, true)) {
-            self.emit(Event::OtherMaster(other));
-        }
+    /// Its cycle time is known well enough.
+    pub fn is_estimated(&self) -> bool {
+        self.count >= ESTIMATE_COUNT
     }
 
-    /// Another master that sends while this one does, or for which this one waits. `None` when nobody is heard.
-    #[must_use]
-    pub fn other_master(&self) -> Option<OtherMaster> {
-        self.heard.filter(|_| self.foreign.told || self.state == State::Occupied)
+    /// What was heard, once.
+    pub fn report(&mut self) -> Option<OtherMaster> {
+        self.heard.filter(|_| !core::mem::replace(&mut self.reported, true))
     }
 
-    /// Leaves the wire to another master: no telegrams any more, not even those towards CP0, until he has been silent for a
-    /// while. Nothing when nobody was heard.
-    pub fn give_way(&mut self, now: MonotonicTime) {
-        if self.other_master().is_some() {
-            self.advance(now, PhaseEvent::Foreign);
-        }
+    /// Another master that sends while this one does, or for which this one waits.
+    pub fn other(&self, state: State) -> Option<OtherMaster> {
+        self.heard.filter(|_| self.reported || state == State::Occupied)
+    }
+
+    /// The wire is left to the other master once more.
+    pub fn retry(&mut self) {
+        self.tries = self.tries.wrapping_add(1);
+    }
+
+    /// The other master has been silent for long enough.
+    pub fn forget(&mut self) {
+        *self = Foreign { tries: self.tries, ..Foreign::default() };
     }
 
     /// How long another master has to be silent.
-    fn patience(&self) -> DurationNs {
-        let draw = crc32fast::hash(&self.config.mac) >> (4 * (self.foreign.tries % 8)) & 0xF;
+    pub fn patience(&self, mac: &MacAddress) -> DurationNs {
+        let draw = crc32fast::hash(mac) >> (4 * (self.tries % 8)) & 0xF;
         LISTEN + SPREAD * i64::from(draw)
     }
+}
 
-    pub(super) fn decide_listen(&mut self, now: MonotonicTime) -> Option<PhaseEvent> {
-        if now < self.next_cycle {
-            return None;
+/// Whether a frame that was refused for `reason` is another master's. `age` is the time in this state.
+pub(super) fn is_alien(header: &Header, reason: Refusal, state: State, age: DurationNs) -> bool {
+    match reason {
+        _ if state == State::Nrt => false,
+        Refusal::Foreign => true,
+        // Nothing was sent: it is not its own.
+        Refusal::Silence => state.listens(),
+        Refusal::Phase => {
+            let other_phase = header.phase.phase() != Phase::CP4;
+            header.telegram.is_mst() && state == State::Cp4 && other_phase && age > LISTEN
         }
-        if self.state == State::Occupied {
-            // One that has said so little that it was not told of yet.
-            self.tell_other();
-        }
-        self.heard = None;
-        self.foreign = Foreign { tries: self.foreign.tries, ..Foreign::default() };
-        Some(PhaseEvent::Elapsed)
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::header::{Channel, Kind, PhaseField};
+
+    fn mst(channel: Channel) -> Header {
+        let telegram = TelegramType::new(channel, Kind::Mdt, 0);
+        Header { source: [2, 0, 0, 0, 0, 9], telegram, phase: PhaseField::new(false, 0, Phase::CP2) }
     }
 
-    pub(super) fn enter_listen(&mut self, now: MonotonicTime) {
-        self.frames.silence();
-        self.evaluated = true;
-        (self.foreign, self.heard) = (Foreign::default(), None);
-        self.next_cycle = now + LISTEN;
+    #[test]
+    fn cycle_of_the_other_master_is_counted_on_one_way() {
+        let mut foreign = Foreign::default();
+        for cycle in 0..3u64 {
+            let at = MonotonicTime(1_000_000 * (300 + cycle));
+            foreign.hear(at, Port::One, &mst(Channel::Primary));
+            foreign.hear(at, Port::Two, &mst(Channel::Secondary));
+        }
+        assert!(foreign.is_confirmed() && !foreign.is_estimated());
+        let other = foreign.report().unwrap();
+        assert_eq!((other.phase, other.cycle), (Phase::CP2, Some(DurationNs(1_000_000))));
+        assert_eq!(foreign.report(), None);
+        assert_eq!(foreign.other(State::Cp4), Some(other));
+        // After a silence a single one is a stray again.
+        foreign.hear(MonotonicTime(900_000_000), Port::Two, &mst(Channel::Secondary));
+        assert!(!foreign.is_confirmed());
     }
 
-    pub(super) fn enter_occupied(&mut self, now: MonotonicTime, last: State) {
-        self.frames.silence();
-        self.evaluated = true;
-        self.foreign.tries = self.foreign.tries.wrapping_add(1);
-        self.next_cycle = now + self.patience();
-        if last == State::Listen {
-            return;
-        }
-        for station in &mut self.stations[..self.found] {
-            station.channel.abort(SvcFailure::PhaseLeft);
-        }
-        self.open_channels(false);
-        self.emit(Event::GaveWay);
+    #[test]
+    fn another_try_waits_for_another_time() {
+        let (mut foreign, mac) = (Foreign::default(), [2, 0, 0, 0, 0, 1]);
+        let waits: Vec<_> = (0..8)
+            .map(|_| {
+                let wait = foreign.patience(&mac);
+                foreign.retry();
+                (wait - LISTEN).as_nanos() / SPREAD.as_nanos()
+            })
+            .collect();
+        let draw = i64::from(crc32fast::hash(&mac));
+        let wanted: Vec<_> = (0..8).map(|nibble| draw >> (4 * nibble) & 0xF).collect();
+        assert_eq!(waits, wanted);
+        foreign.forget();
+        assert_eq!(foreign.patience(&mac), LISTEN + SPREAD * (draw & 0xF));
     }
 }

@@ -177,6 +177,7 @@ impl Frames {
 
     /// Takes a frame that came back on `port`. It comes back once on a port at which the topology `admits` it;
     /// everything about it but the slaves' data is as it was sent.
+    // Flat: one line per reason to refuse, in the order in which they count.
     pub fn receive(
         &mut self,
         port: Port,

@@ -63,7 +63,7 @@ pub struct SlaveNeed {
     pub feedback_ns: u32,
     /// Minimum of S-0-1006, earliest start of AT0, ns.
     pub at_start_min_ns: u32,
-    /// S-0-1037, jitter of its forwarding, ns; 0 where it does not tell.
+    /// S-0-1037, jitter of its forwarding, ns; 0 where it does not report.
     pub jitter_ns: u32,
     /// S-0-1047, time until command values are active in it (t11), ns.
     pub consumer_ns: u32,

@@ -1,8 +1,8 @@
 //! Measuring the delays once more in CP4, where the telegrams take another way than when it was done last: a network
 //! that came up with an open ring and is closed, or in which slaves have come in.
 
-use super::Master;
 use super::event::Event;
+use super::network::Network;
 use super::plan;
 use super::station::{Station, Work};
 use crate::wire::header::Phase;
@@ -39,24 +39,24 @@ fn measures(station: &Station) -> bool {
     station.is_active() && station.facts.version(ScpClass::SYNC).is_some()
 }
 
-impl Master {
+impl Measuring {
     /// One cycle of measuring, if there is something to measure. All slaves at the same time.
-    pub(super) fn measure_again(&mut self) {
-        if core::mem::take(&mut self.measuring.wanted) {
-            self.measuring.running = true;
-            for index in 0..self.found {
-                if measures(&self.stations[index]) {
-                    self.begin_steps(index);
+    pub fn step(&mut self, net: &mut Network) {
+        if core::mem::take(&mut self.wanted) {
+            self.running = true;
+            for index in 0..net.stations.len() {
+                if measures(&net.stations[index]) {
+                    net.begin_steps(index);
                 }
             }
         }
-        if !self.measuring.running {
+        if !self.running {
             return;
         }
         let (mut pending, mut done) = (false, 0);
-        for index in 0..self.found {
-            if measures(&self.stations[index]) {
-                match self.work_on(index, plan::MEASURE_AGAIN, Phase::CP4) {
+        for index in 0..net.stations.len() {
+            if measures(&net.stations[index]) {
+                match net.work_on(index, plan::MEASURE_AGAIN, Phase::CP4) {
                     Work::Free | Work::Asked(..) => pending = true,
                     Work::Done => done += 1,
                     Work::Failed => {}
@@ -64,8 +64,8 @@ impl Master {
             }
         }
         if !pending {
-            self.measuring.running = false;
-            self.emit(Event::Measured { slaves: done });
+            self.running = false;
+            net.emit(Event::Measured { slaves: done });
         }
     }
 }

@@ -148,6 +148,7 @@ impl State {
 
     /// The state after `event`; `None` when the event means nothing here.
     #[must_use]
+    // Flat: the table above, one arm per row.
     pub const fn next(self, event: PhaseEvent) -> Option<State> {
         use PhaseEvent as E;
         use State as S;

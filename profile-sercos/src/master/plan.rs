@@ -7,6 +7,7 @@ use super::config::{ConnectionConfig, MasterConfig};
 use super::layout::{CyclicLayout, SlavePlaces};
 use super::station::Station;
 use super::svc::request::{Shape, SvcData, SvcOperation, SvcRequest};
+use crate::generated::idns::connection;
 use crate::wire::connection::{ConfigurationType, ConnectionSetup};
 use crate::wire::header::Kind;
 use crate::wire::idn::Idn;
@@ -222,8 +223,8 @@ impl Step {
             Step::CounterMax => sync >= 3,
             Step::Gap => facts.gap,
             Step::UcTimes | Step::MtuRequested | Step::MtuEffective => facts.version(ScpClass::NRT).is_some(),
-            Step::Address => station.assign.is_some(),
-            Step::CheckInvalid => station.check_failed,
+            Step::Address => station.setup.assign.is_some(),
+            Step::CheckInvalid => station.setup.check_failed,
             _ => true,
         }
     }
@@ -235,7 +236,7 @@ impl Step {
             // A connection that is not wanted is switched off. Slaves with a fixed configuration may lack the setup.
             (Step::Setup, None) => facts.has_setup() && u16::from(instance) < facts.connections,
             (Step::Setup, Some(_)) => facts.has_setup(),
-            (Step::FixedSetup, _) => instance < 32 && station.fixed_setups >> instance & 1 != 0,
+            (Step::FixedSetup, _) => instance < 32 && station.setup.fixed_setups >> instance & 1 != 0,
             (_, None) => false,
             (Step::ConfigurationList, Some(connection)) => {
                 variable && connection.configuration == ConfigurationType::IdnList
@@ -249,6 +250,7 @@ impl Step {
         }
     }
 
+    // Flat: a table from step to IDN.
     fn idn(self, instance: u8, check: (Idn, Idn)) -> Idn {
         match self {
             Step::Address => Idn::ADDRESS,
@@ -257,13 +259,13 @@ impl Step {
             Step::ActivateClasses => Idn::SCP_ACTIVE,
             Step::GapPresence | Step::Gap => Idn::INTER_FRAME_GAP,
             Step::ConnectionImage => Idn::CONNECTION_IMAGE,
-            Step::Setup | Step::FixedSetup => Idn::connection(instance, 1),
-            Step::Number => Idn::connection(instance, 2),
-            Step::Assignment => Idn::connection(instance, 3),
-            Step::Length => Idn::connection(instance, 5),
-            Step::ConfigurationList | Step::FixedList => Idn::connection(instance, 6),
-            Step::ProducerCycle => Idn::connection(instance, 10),
-            Step::AllowedLosses => Idn::connection(instance, 11),
+            Step::Setup | Step::FixedSetup => Idn::connection(instance, connection::SETUP),
+            Step::Number => Idn::connection(instance, connection::NUMBER),
+            Step::Assignment => Idn::connection(instance, connection::ASSIGNMENT),
+            Step::Length => Idn::connection(instance, connection::LENGTH),
+            Step::ConfigurationList | Step::FixedList => Idn::connection(instance, connection::LIST),
+            Step::ProducerCycle => Idn::connection(instance, connection::CYCLE),
+            Step::AllowedLosses => Idn::connection(instance, connection::LOSSES_MAX),
             Step::FeedbackTime => Idn::FEEDBACK_TIME,
             Step::AtStartMinimum | Step::AtStart => Idn::AT_START,
             Step::SlaveJitter => Idn::SLAVE_JITTER,
@@ -292,6 +294,7 @@ impl Step {
     }
 
     /// The request of this step. `list` is the slave's buffer for lists to read; it is taken only by those.
+    // Flat: one arm per step.
     pub fn request(self, instance: u8, station: &mut Station, values: &Values<'_>) -> SvcRequest {
         let idn = self.idn(instance, values.check);
         let times = &values.layout.times;
@@ -307,14 +310,14 @@ impl Step {
             word(idn, values.config.cycle_ns.saturating_mul(cycles))
         };
         match self {
-            Step::Address => half(idn, station.assign.unwrap_or(0)),
+            Step::Address => half(idn, station.setup.assign.unwrap_or(0)),
             Step::FspType => SvcRequest::read(idn),
-            Step::ScpClasses => {
-                SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))
-            }
-            Step::CheckInvalid | Step::FixedList => {
-                SvcRequest::read(idn).with_shape(Shape::List).with_buffer(core::mem::take(&mut station.list))
-            }
+            Step::ScpClasses => SvcRequest::read(idn)
+                .with_shape(Shape::List)
+                .with_buffer(core::mem::take(&mut station.setup.list)),
+            Step::CheckInvalid | Step::FixedList => SvcRequest::read(idn)
+                .with_shape(Shape::List)
+                .with_buffer(core::mem::take(&mut station.setup.list)),
             Step::ActivateClasses => list(idn, station.facts.active_classes()),
             Step::GapPresence | Step::SlaveJitter | Step::MtuEffective | Step::Length | Step::FixedSetup => {
                 SvcRequest::read(idn).with_shape(Shape::Fixed(2))

@@ -8,14 +8,15 @@
 
 use arrayvec::ArrayVec;
 
-use super::Master;
-use super::config::Ports;
+use super::config::{MasterConfig, Ports};
 use super::event::{End, Event, Port, SlaveId};
-use super::phase::State;
+use super::journal::Journal;
+use super::scan::Survey;
+use super::stations::Stations;
 use super::topology::{Closing, ClosingEvent, Route, Seen, Topology, Watch};
-use crate::wire::device_control::{DeviceControl, Topology as Loop};
+use crate::wire::device_control::Topology as Loop;
 use crate::wire::device_status::InactivePort;
-use crate::wire::header::{Channel, Kind, Phase};
+use crate::wire::header::Channel;
 
 /// Cycles in which a slave has to follow a topology command.
 pub(super) const COMMAND_CYCLES: u16 = 12;
@@ -188,135 +189,78 @@ impl Redundancy {
         }
         moved
     }
-}
 
-impl Master {
+    /// Takes a cycle's routes; gives the topology when it is another one.
+    pub fn see(&mut self, seen: Seen) -> Option<Topology> {
+        self.watch.update(seen)
+    }
+
     /// Takes the topology over from the scan.
-    pub(super) fn take_topology(&mut self) {
-        let Some(survey) = self.scan.survey() else { return };
+    pub fn take_over(&mut self, survey: &Survey, stations: &Stations, journal: &mut Journal) {
         let (topology, from_one) = (survey.topology, usize::from(survey.from_one));
-        let redundancy = &mut self.redundancy;
-        redundancy.order.clear();
-        let numbered = (0..from_one).chain((from_one..self.scanned).rev());
-        redundancy.order.extend(numbered.map(|index| SlaveId::from_index(index).0));
-        redundancy.open.clear();
-        redundancy.open.resize(self.scanned + 1, false);
+        self.order.clear();
+        let numbered = (0..from_one).chain((from_one..stations.scanned).rev());
+        self.order.extend(numbered.map(|index| SlaveId::from_index(index).0));
+        self.open.clear();
+        self.open.resize(stations.scanned + 1, false);
         let gap = match topology {
-            Topology::LineOne => Some(self.scanned),
+            Topology::LineOne => Some(stations.scanned),
             Topology::LineTwo => Some(0),
             Topology::BrokenRing => Some(from_one),
             _ => None,
         };
-        if let Some(open) = gap.and_then(|gap| redundancy.open.get_mut(gap)) {
+        if let Some(open) = gap.and_then(|gap| self.open.get_mut(gap)) {
             *open = true;
         }
-        redundancy.closing = Closing::Idle;
-        if redundancy.is_fixed() {
+        self.closing = Closing::Idle;
+        if self.is_fixed() {
             return;
         }
-        redundancy.watch = Watch::new(topology);
-        self.emit(Event::Topology(topology));
+        self.watch = Watch::new(topology);
+        journal.emit(Event::Topology(topology));
         if let Some(gap) = gap.filter(|_| topology == Topology::BrokenRing) {
-            let (low, high) = self.cable(gap);
-            self.emit(Event::CableOpen { low, high });
-        }
-    }
-
-    /// The handshake bits start anew with each phase.
-    pub(super) fn reset_topology_commands(&mut self) {
-        self.redundancy.closing = Closing::Idle;
-        self.reset_isolation();
-        self.admission.reset();
-        for station in &mut self.stations[..self.found] {
-            station.command = DeviceControl::empty();
+            let (low, high) = self.cable(gap, stations);
+            journal.emit(Event::CableOpen { low, high });
         }
     }
 
     /// The ends of a cable by its position.
-    pub(super) fn cable(&self, cable: usize) -> (End, End) {
+    pub fn cable(&self, cable: usize, stations: &Stations) -> (End, End) {
         let slave = |position: usize| {
-            let index = usize::from(*self.redundancy.order.get(position)?);
-            let address = self.stations.get(index)?.address;
+            let index = usize::from(*self.order.get(position)?);
+            let address = stations.get(index)?.address;
             Some(End::Slave { slave: SlaveId::from_index(index), address })
         };
         let low = cable.checked_sub(1).and_then(slave).unwrap_or(End::Master(Port::One));
         (low, slave(cable).unwrap_or(End::Master(Port::Two)))
     }
 
-    /// The cycle is over: what did not come back is lost, and the ways of the telegrams are looked at.
-    pub(super) fn end_cycle(&mut self) {
-        let routes = match self.scan.survey() {
-            Some(survey) if self.layout_phase == Phase::CP0 && !self.redundancy.is_fixed() => {
-                survey.topology.routes()
-            }
-            _ => self.redundancy.topology().routes(),
-        };
-        let mut mdt_missing = false;
-        for &route in routes {
-            for kind in [Kind::Mdt, Kind::At] {
-                let missing = self.frames.missing(kind, route);
-                self.statistics.count_lost(route.port, kind, missing);
-                mdt_missing |= kind == Kind::Mdt && missing > 0;
-            }
-        }
-        self.statistics.mdt_missing += u64::from(mdt_missing);
-        if self.layout_phase == Phase::CP0 {
-            return;
-        }
-        if !self.redundancy.is_fixed() {
-            let frames = &self.frames;
-            let seen = Seen::of(|route| frames.came(route));
-            if let Some(topology) = self.redundancy.watch.update(seen) {
-                self.emit(Event::Topology(topology));
-            }
-        }
-        let switching = self.state.announces().is_some();
-        if !switching && !self.admission.is_busy() && self.redundancy.is_at_ease() {
-            self.isolate();
-        }
-        let isolating = self.isolation.is_busy();
-        if !isolating {
-            // Else they turn the telegrams round because they were asked to.
-            self.find_open_cables();
-        }
-        if !self.redundancy.is_fixed() && !switching && !self.admission.is_busy() && !isolating {
-            self.close_ring();
-        }
-        if self.state == State::Cp4 {
-            if !isolating {
-                self.admit();
-            }
-            self.measure_again();
-        }
-    }
-
     /// A slave that has turned the telegrams round has no link on its other side.
-    fn find_open_cables(&mut self) {
-        for place in 0..self.turning.len() {
-            let index = usize::from(self.turning[place]);
-            let position = self.redundancy.position(index);
-            let Some((position, status)) = position.zip(self.valid_status(index)) else { continue };
+    pub fn find_open_cables(&mut self, stations: &Stations, journal: &mut Journal) {
+        for place in 0..stations.turning.len() {
+            let index = usize::from(stations.turning[place]);
+            let position = self.position(index);
+            let Some((position, status)) = position.zip(stations.valid_status(index)) else { continue };
             let cable = match status.topology() {
                 Loop::LoopbackForwardPrimary => position + 1,
                 Loop::LoopbackForwardSecondary => position,
                 Loop::FastForward | Loop::StoreAndForward => continue,
             };
-            let newly =
-                self.redundancy.open.get_mut(cable).is_some_and(|open| !core::mem::replace(open, true));
+            let newly = self.open.get_mut(cable).is_some_and(|open| !core::mem::replace(open, true));
             if newly {
-                let (low, high) = self.cable(cable);
-                self.emit(Event::CableOpen { low, high });
+                let (low, high) = self.cable(cable, stations);
+                journal.emit(Event::CableOpen { low, high });
             }
         }
     }
 
     /// The slaves that turn telegrams round, if closing the ring is a matter of commanding them.
-    fn closable_ends(&self) -> Option<ArrayVec<usize, ENDS_MAX>> {
+    fn closable_ends(&self, stations: &Stations) -> Option<ArrayVec<usize, ENDS_MAX>> {
         let (mut low, mut high) = (None, None);
-        for &index in &self.turning {
-            let station = &self.stations[usize::from(index)];
-            let position = self.redundancy.position(usize::from(index));
-            let Some((position, status)) = position.zip(self.valid_status(usize::from(index))) else {
+        for &index in &stations.turning {
+            let station = &stations[usize::from(index)];
+            let position = self.position(usize::from(index));
+            let Some((position, status)) = position.zip(stations.valid_status(usize::from(index))) else {
                 continue;
             };
             let (end, wanted) = match status.topology() {
@@ -329,8 +273,8 @@ impl Master {
                 return None;
             }
         }
-        let last = self.redundancy.order.len().checked_sub(1);
-        let joined = match (self.redundancy.topology(), low, high) {
+        let last = self.order.len().checked_sub(1);
+        let joined = match (self.topology(), low, high) {
             (Topology::BrokenRing, Some(low), Some(high)) => low + 1 == high,
             (Topology::LineOne, Some(low), None) => Some(low) == last,
             (Topology::LineTwo, None, Some(high)) => high == 0,
@@ -339,85 +283,75 @@ impl Master {
             }
             _ => false,
         };
-        let station = |position: usize| self.redundancy.order.get(position).copied().map(usize::from);
+        let station = |position: usize| self.order.get(position).copied().map(usize::from);
         joined.then(|| [low, high].into_iter().flatten().filter_map(station).collect())
     }
 
-    /// One cycle of closing the ring.
-    fn close_ring(&mut self) {
-        self.redundancy.cycles = self.redundancy.cycles.saturating_add(1);
-        let cycles = self.redundancy.cycles;
-        let event = match self.redundancy.closing {
-            Closing::Idle | Closing::Settling | Closing::Refused => match self.closable_ends() {
-                None => ClosingEvent::Open,
-                Some(ends) => {
-                    self.redundancy.ends = ends;
-                    let wait = match self.redundancy.closing {
-                        Closing::Settling => self.config.close_cycles,
-                        Closing::Refused => REFUSED_CYCLES,
-                        _ => u16::MAX,
-                    };
-                    if cycles >= wait { ClosingEvent::Elapsed } else { ClosingEvent::Closable }
-                }
-            },
-            Closing::Commanded => {
-                let done = self.follow() && self.redundancy.topology() == Topology::Ring;
-                if done { ClosingEvent::Done } else { self.judge_command() }
-            }
-            Closing::Restoring => {
-                let late = cycles >= COMMAND_CYCLES;
-                if self.follow() {
-                    ClosingEvent::Done
-                } else if late {
-                    ClosingEvent::Failed
-                } else {
-                    return;
-                }
-            }
-        };
-        let before = self.redundancy.closing;
-        let culprit = self.redundancy.ends.iter().copied().find(|&end| !self.stations[end].follows_command());
-        if !self.redundancy.move_on(event) {
-            return;
+    /// One cycle of closing the ring; `true` in the one in which it is closed.
+    pub fn close_ring(
+        &mut self,
+        stations: &mut Stations,
+        config: &MasterConfig,
+        journal: &mut Journal,
+    ) -> bool {
+        self.cycles = self.cycles.saturating_add(1);
+        let Some(event) = self.judge_closing(stations, config) else { return false };
+        let before = self.closing;
+        let culprit = self.ends.iter().copied().find(|&end| !stations[end].follows_command());
+        if !self.move_on(event) {
+            return false;
         }
-        match (before, self.redundancy.closing) {
+        match (before, self.closing) {
             (Closing::Settling, Closing::Commanded) => {
-                for end in self.redundancy.ends.clone() {
-                    self.stations[end].command_topology(Loop::FastForward);
+                for &end in &self.ends {
+                    stations[end].command_topology(Loop::FastForward);
                 }
             }
             (Closing::Commanded, Closing::Idle) => {
-                self.redundancy.open.fill(false);
-                self.emit(Event::RingClosed);
-                self.measuring.ring_closed();
+                self.open.fill(false);
+                journal.emit(Event::RingClosed);
+                return true;
             }
             (Closing::Commanded, Closing::Restoring) => {
-                let last = self.redundancy.ends.last().copied();
-                if let Some(index) = culprit.or(last) {
-                    let (slave, address) = (SlaveId::from_index(index), self.stations[index].address);
-                    self.emit(Event::RingNotClosed { slave, address });
+                if let Some(index) = culprit.or(self.ends.last().copied()) {
+                    let (slave, address) = (SlaveId::from_index(index), stations[index].address);
+                    journal.emit(Event::RingNotClosed { slave, address });
                 }
-                self.restore_loopback();
+                self.restore_loopback(stations);
             }
             _ => {}
         }
+        false
     }
 
-    fn follow(&self) -> bool {
-        self.redundancy.ends.iter().all(|&end| self.stations[end].follows_command())
+    /// What this cycle means to the closing.
+    fn judge_closing(&mut self, stations: &Stations, config: &MasterConfig) -> Option<ClosingEvent> {
+        let wait = match self.closing {
+            Closing::Commanded => {
+                let done = self.follow(stations) && self.topology() == Topology::Ring;
+                return Some(if done { ClosingEvent::Done } else { self.judge_command(stations, config) });
+            }
+            Closing::Restoring if self.follow(stations) => return Some(ClosingEvent::Done),
+            Closing::Restoring => return (self.cycles >= COMMAND_CYCLES).then_some(ClosingEvent::Failed),
+            Closing::Settling => config.close_cycles,
+            Closing::Refused => REFUSED_CYCLES,
+            Closing::Idle => u16::MAX,
+        };
+        let Some(ends) = self.closable_ends(stations) else { return Some(ClosingEvent::Open) };
+        self.ends = ends;
+        Some(if self.cycles >= wait { ClosingEvent::Elapsed } else { ClosingEvent::Closable })
+    }
+
+    fn follow(&self, stations: &Stations) -> bool {
+        self.ends.iter().all(|&end| stations[end].follows_command())
     }
 
     /// While one end has followed and the other has not, the slaves of a line are not seen. That must not last until
     /// they count as lost.
-    fn judge_command(&mut self) -> ClosingEvent {
-        let unseen = (0..self.found).any(|index| {
-            let station = &self.stations[index];
-            station.is_active() && !self.is_valid(station)
-        });
-        let redundancy = &mut self.redundancy;
-        redundancy.blind = if unseen { redundancy.blind + 1 } else { 0 };
-        let limit = self.config.slave_valid_misses.max(1);
-        if redundancy.blind >= limit || redundancy.cycles >= COMMAND_CYCLES {
+    fn judge_command(&mut self, stations: &Stations, config: &MasterConfig) -> ClosingEvent {
+        let unseen = stations.any_unseen();
+        self.blind = if unseen { self.blind + 1 } else { 0 };
+        if self.blind >= config.slave_valid_misses.max(1) || self.cycles >= COMMAND_CYCLES {
             ClosingEvent::Failed
         } else {
             ClosingEvent::Closable
@@ -425,14 +359,14 @@ impl Master {
     }
 
     /// Commands the ends back to what they were before.
-    fn restore_loopback(&mut self) {
-        for end in self.redundancy.ends.clone() {
-            let position = self.redundancy.position(end);
-            let cable_above = position
-                .is_some_and(|position| self.redundancy.open.get(position + 1).copied().unwrap_or(false));
+    fn restore_loopback(&self, stations: &mut Stations) {
+        for &end in &self.ends {
+            let position = self.position(end);
+            let cable_above =
+                position.is_some_and(|position| self.open.get(position + 1).copied().unwrap_or(false));
             let topology =
                 if cable_above { Loop::LoopbackForwardPrimary } else { Loop::LoopbackForwardSecondary };
-            self.stations[end].command_topology(topology);
+            stations[end].command_topology(topology);
         }
     }
 }

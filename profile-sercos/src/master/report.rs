@@ -66,6 +66,7 @@ impl ReportRow {
 }
 
 impl fmt::Display for ReportRow {
+    // Flat: one arm per operation, then one per outcome.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let access = match self.operation {
             SvcOperation::Status => "status",

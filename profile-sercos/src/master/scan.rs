@@ -26,7 +26,7 @@ pub(super) enum ScanResult {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Survey {
     pub topology: Topology,
-    /// Slaves.
+    /// Slaves that were counted.
     pub slaves: u16,
     /// Those of them that are numbered from port 1 on; the others are numbered from port 2 on.
     pub from_one: u16,
@@ -39,6 +39,7 @@ pub(super) struct Survey {
 impl Survey {
     /// Evaluates the ATs by route. `start_two` is the count with which the S telegram was sent. `None` when they do not
     /// come from a network with at least one slave.
+    // Flat: one arm per topology.
     pub fn of(ats: &[Option<AtRepr>; 4], start_two: u16) -> Option<Survey> {
         let Verdict::Now(topology) = Topology::Absent.judge(Seen::of(|route| ats[route.index()].is_some()))
         else {
@@ -87,16 +88,10 @@ impl Survey {
                 // they are says the copy that was turned round; without it they cannot be numbered.
                 let slaves = ring(Route::SECONDARY_ONE, start_two)?;
                 let one = line(Route::SECONDARY_TWO, start_two).and_then(|upper| slaves.checked_sub(upper));
-                let from_one = one.unwrap_or(0);
                 let written = copy(Route::SECONDARY_ONE, start_two, slaves);
-                let (len, first) = (usize::from(slaves), usize::from(from_one));
-                if let Some(moved) = list.get_mut(first..first + len).filter(|_| written) {
-                    // S order: from_one + 1 to the last one, then the others backwards.
-                    moved[len - first..].reverse();
-                    let fields: arrayvec::ArrayVec<u16, SLAVES_MAX> = moved.iter().copied().collect();
-                    list.fill(NO_SLAVE);
-                    list[first..len].copy_from_slice(&fields[..len - first]);
-                    list[..first].copy_from_slice(&fields[len - first..]);
+                let from_one = one.unwrap_or(0);
+                if written {
+                    reorder(&mut list, usize::from(slaves), usize::from(from_one));
                 }
                 (slaves, from_one, written && one.is_some() && start_two == from_one + 1)
             }
@@ -144,6 +139,16 @@ fn copy_fields(list: &mut [u16; SLAVES_MAX], at: &AtRepr, from: usize, slaves: u
     at.topology.iter().enumerate().all(written)
 }
 
+/// Puts fields in S order, `from_one` + 1 to the last one and then the others backwards, in the order of their numbers.
+fn reorder(list: &mut [u16; SLAVES_MAX], slaves: usize, from_one: usize) {
+    let Some(moved) = list.get_mut(from_one..from_one + slaves) else { return };
+    moved[slaves - from_one..].reverse();
+    let fields: arrayvec::ArrayVec<u16, SLAVES_MAX> = moved.iter().copied().collect();
+    list.fill(NO_SLAVE);
+    list[from_one..slaves].copy_from_slice(&fields[..slaves - from_one]);
+    list[..from_one].copy_from_slice(&fields[slaves - from_one..]);
+}
+
 /// Whether no slave has written: the condition to leave CP0.
 pub(super) fn is_untouched(at: &AtRepr) -> bool {
     at.topology.iter().all(|&word| word == NO_SLAVE)
@@ -166,6 +171,8 @@ pub(super) struct Scan {
     /// Consecutive cycles that do not fit the result of the scan.
     changed: u8,
     start_two: u16,
+    /// Slaves in a stable scan that has not been taken over yet.
+    pub ready: Option<u16>,
 }
 
 impl Scan {
@@ -179,6 +186,7 @@ impl Scan {
             spent: 0,
             changed: 0,
             start_two: 1,
+            ready: None,
         }
     }
 
@@ -194,6 +202,11 @@ impl Scan {
     /// What the network is, as far as known.
     pub fn survey(&self) -> Option<&Survey> {
         self.survey.as_ref()
+    }
+
+    /// The routes on which every telegram comes back, as far as known.
+    pub fn routes(&self) -> &'static [Route] {
+        self.survey.as_ref().map_or(&[], |survey| survey.topology.routes())
     }
 
     /// Takes what one cycle says, `None` when no slaves answered.

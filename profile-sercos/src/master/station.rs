@@ -45,7 +45,7 @@ pub struct Facts {
     pub classes: ArrayVec<ScpEntry, CLASSES_MAX>,
     /// Whether it has S-0-1036, inter frame gap.
     pub gap: bool,
-    /// Connections which it has: by S-0-1051, or [`CONNECTIONS_FIXED`] without SCP_VarCFG; 0 when it does not tell.
+    /// Connections which it has: by S-0-1051, or [`CONNECTIONS_FIXED`] without SCP_VarCFG; 0 when it does not report.
     pub connections: u16,
 }
 
@@ -97,37 +97,31 @@ pub(super) enum Work {
     Failed,
 }
 
-/// One slave. What every cycle touches stands together at the beginning, in as few cache lines as it fits into.
-#[derive(Debug)]
-#[repr(C)]
-pub(super) struct Station {
-    pub channel: ServiceChannel,
+/// What the telegrams of the last cycle said about a slave, and what those of the next one tell it.
+#[derive(Debug, Default)]
+pub(super) struct Link {
     /// S-SVC of the last cycle; `None` when its AT did not come.
     pub svc: Option<AtSvc>,
     /// S-DEV of the last cycle; `None` when its AT did not come.
     pub status: Option<DeviceStatus>,
     /// Errors and warnings of S-DEV that the application knows of.
-    pub told: DeviceStatus,
+    pub reported: DeviceStatus,
     /// Commanded topology and handshake bit of C-DEV.
     pub command: DeviceControl,
     pub misses: u16,
-    pub presence: Presence,
     /// Routes on which the last cycle brought valid data, one bit each by [`super::topology::Route::index`].
     pub valid_routes: u8,
     /// Cycles in a row in which it was valid again since it was lost.
     pub valid_cycles: u16,
-    pub ends: ArrayVec<End, CONNECTIONS_MAX>,
-    pub connections: Connections,
-    pub address: u16,
-    pub configured: bool,
-    /// The configuration lets it come later.
-    pub hot_plug: bool,
-    /// The SERCOS address that it is to be given in CP2.
-    pub assign: Option<u16>,
-    pub facts: Facts,
-    pub need: SlaveNeed,
+}
+
+/// How far a slave is set up, and what came of it.
+#[derive(Debug)]
+pub(super) struct Setup {
     pub work: Work,
     pub cursor: Cursor,
+    /// The SERCOS address that it is to be given in CP2.
+    pub assign: Option<u16>,
     pub check_failed: bool,
     /// Connections, by their instance, whose setup the slave does not let anybody write.
     pub fixed_setups: u32,
@@ -143,6 +137,55 @@ pub(super) struct Station {
     pub invalid: Invalid,
 }
 
+impl Setup {
+    /// Nothing is done yet. The buffers are kept, because nothing is allocated once the master runs.
+    fn new(report: Vec<ReportRow>, list: Vec<u8>) -> Setup {
+        Setup {
+            work: Work::Done,
+            cursor: Cursor::default(),
+            assign: None,
+            check_failed: false,
+            fixed_setups: 0,
+            checked: false,
+            read_rows: 0,
+            report,
+            list,
+            invalid: Invalid::default(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.report.clear();
+        *self = Setup::new(core::mem::take(&mut self.report), core::mem::take(&mut self.list));
+    }
+
+    /// Keeps a row of the report.
+    pub fn note(&mut self, row: ReportRow) {
+        // The report is for people: rows that do not fit are left out.
+        if self.report.len() < REPORT_MAX {
+            self.report.push(row);
+        }
+    }
+}
+
+/// One slave. What every cycle touches stands together at the beginning, in as few cache lines as it fits into.
+#[derive(Debug)]
+#[repr(C)]
+pub(super) struct Station {
+    pub channel: ServiceChannel,
+    pub link: Link,
+    pub presence: Presence,
+    pub ends: ArrayVec<End, CONNECTIONS_MAX>,
+    pub connections: Connections,
+    pub address: u16,
+    pub configured: bool,
+    /// The configuration lets it come later.
+    pub hot_plug: bool,
+    pub facts: Facts,
+    pub need: SlaveNeed,
+    pub setup: Setup,
+}
+
 impl Station {
     /// Storage for one slave.
     pub fn new(config: &MasterConfig) -> Station {
@@ -151,28 +194,13 @@ impl Station {
             presence: Presence::Active,
             configured: false,
             hot_plug: false,
-            assign: None,
             connections: Connections::new(),
             facts: Facts::default(),
             need: SlaveNeed::default(),
             ends: ArrayVec::new(),
             channel: ServiceChannel::new(config.svc),
-            status: None,
-            valid_routes: 0,
-            command: DeviceControl::empty(),
-            svc: None,
-            told: DeviceStatus::empty(),
-            misses: 0,
-            valid_cycles: 0,
-            work: Work::Done,
-            cursor: Cursor::default(),
-            check_failed: false,
-            fixed_setups: 0,
-            checked: false,
-            read_rows: 0,
-            report: Vec::with_capacity(REPORT_MAX),
-            list: Vec::with_capacity(config.list_capacity),
-            invalid: Invalid::default(),
+            link: Link::default(),
+            setup: Setup::new(Vec::with_capacity(REPORT_MAX), Vec::with_capacity(config.list_capacity)),
         }
     }
 
@@ -182,7 +210,6 @@ impl Station {
         self.presence = Presence::Active;
         self.configured = config.is_some();
         self.hot_plug = config.is_some_and(|config| config.hot_plug.is_some());
-        self.assign = None;
         self.connections.clear();
         if let Some(config) = config {
             self.connections.extend(config.connections.iter().cloned());
@@ -191,20 +218,8 @@ impl Station {
         self.need = SlaveNeed::default();
         self.ends.clear();
         self.channel.rest(false);
-        self.status = None;
-        self.valid_routes = 0;
-        self.command = DeviceControl::empty();
-        self.svc = None;
-        self.told = DeviceStatus::empty();
-        self.misses = 0;
-        self.valid_cycles = 0;
-        self.work = Work::Done;
-        self.check_failed = false;
-        self.fixed_setups = 0;
-        self.checked = false;
-        self.read_rows = 0;
-        self.report.clear();
-        self.invalid = Invalid::default();
+        self.link = Link::default();
+        self.setup.clear();
     }
 
     pub fn is_active(&self) -> bool {
@@ -233,16 +248,16 @@ impl Station {
 
     /// Commands a topology: the bits change and the handshake bit toggles.
     pub fn command_topology(&mut self, topology: Topology) {
-        self.command = self.command.with_topology(topology);
-        self.command.toggle(DeviceControl::TOPOLOGY_CHANGE);
+        self.link.command = self.link.command.with_topology(topology);
+        self.link.command.toggle(DeviceControl::TOPOLOGY_CHANGE);
     }
 
     /// Whether S-DEV shows what was commanded.
     pub fn follows_command(&self) -> bool {
-        self.status.is_some_and(|status| {
+        self.link.status.is_some_and(|status| {
             status.contains(DeviceStatus::TOPOLOGY_CHANGE)
-                == self.command.contains(DeviceControl::TOPOLOGY_CHANGE)
-                && status.topology() == self.command.topology()
+                == self.link.command.contains(DeviceControl::TOPOLOGY_CHANGE)
+                && status.topology() == self.link.command.topology()
         })
     }
 
@@ -254,13 +269,6 @@ impl Station {
     pub fn end(&mut self, instance: u8) -> Option<&mut End> {
         let index = self.connections.iter().position(|connection| connection.instance == instance)?;
         self.ends.get_mut(index)
-    }
-
-    pub fn note(&mut self, row: ReportRow) {
-        // The report is for people: rows that do not fit are left out.
-        if self.report.len() < REPORT_MAX {
-            self.report.push(row);
-        }
     }
 }
 

@@ -159,6 +159,7 @@ impl Topology {
     }
 
     /// What a cycle says in which ATs came back as in `seen`.
+    // Flat: the table above, one arm per row.
     pub(super) fn judge(self, seen: Seen) -> Verdict {
         use Topology as T;
         let defect = |defective| T::DefectRing { defective };

@@ -36,7 +36,7 @@ pub enum Progress {
 /// One communication cycle, or one master synchronisation telegram before there are cycles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cycle {
-    /// Now.
+    /// The instant of this cycle, on the local clock.
     pub now: MonotonicTime,
     /// Time since the last call.
     pub elapsed: DurationNs,

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::parameter::{Definition, IDN_LIST_READ_ONLY, Store};
+use crate::generated::idns::connection;
 use crate::wire::connection::ConnectionSetup;
 use crate::wire::header::{DATA_LEN_MAX, DATA_LEN_MIN, Phase};
 use crate::wire::idn::Idn;
@@ -30,62 +31,6 @@ pub const CLASSES_WITH_HOT_PLUG: &[ScpEntry] = &[
     ScpEntry { class: ScpClass::NRT, version: 1 },
     ScpEntry { class: ScpClass::HOT_PLUG, version: 1 },
 ];
-
-/// IDNs that [`Idn`] does not name.
-pub mod idn {
-    use crate::wire::idn::Idn;
-
-    /// Interface status: communication errors.
-    pub const INTERFACE_STATUS: Idn = Idn::standard(14);
-    /// IDNs of all parameters.
-    pub const ALL: Idn = Idn::standard(17);
-    /// IDNs of all procedure commands.
-    pub const COMMANDS: Idn = Idn::standard(25);
-    /// IDNs of what a backup keeps.
-    pub const BACKUP: Idn = Idn::standard(192);
-    /// SERCOS addresses of the device.
-    pub const ADDRESSES: Idn = Idn::standard(1046);
-    /// Diagnosis as text.
-    pub const DIAGNOSIS_TEXT: Idn = Idn::standard(95);
-    /// Diagnosis as number.
-    pub const DIAGNOSIS_NUMBER: Idn = Idn::standard(390);
-    /// Class 1 diagnostics: errors.
-    pub const ERRORS: Idn = Idn::standard(11);
-    /// Class 2 diagnostics: warnings.
-    pub const WARNINGS: Idn = Idn::standard(12);
-    /// IDNs that can be in a producing connection.
-    pub const PRODUCIBLE: Idn = Idn::standard(187);
-    /// IDNs that can be in a consuming connection.
-    pub const CONSUMABLE: Idn = Idn::standard(188);
-    /// MST error counter.
-    pub const MST_ERRORS: Idn = Idn::standard(1028);
-    /// Error counters of both ports.
-    pub const PORT_ERRORS: Idn = Idn::standard(1035);
-}
-
-/// Elements of S-0-1050.x.
-pub mod connection {
-    /// Setup.
-    pub const SETUP: u8 = 1;
-    /// Connection number.
-    pub const NUMBER: u8 = 2;
-    /// Telegram assignment.
-    pub const ASSIGNMENT: u8 = 3;
-    /// Longest possible data.
-    pub const LENGTH_MAX: u8 = 4;
-    /// Length of data with C-CON.
-    pub const LENGTH: u8 = 5;
-    /// Configuration list.
-    pub const LIST: u8 = 6;
-    /// C-CON.
-    pub const CONTROL: u8 = 8;
-    /// Producer cycle time, ns.
-    pub const CYCLE: u8 = 10;
-    /// Permitted losses in a row.
-    pub const LOSSES_MAX: u8 = 11;
-    /// Losses counted.
-    pub const LOSSES: u8 = 12;
-}
 
 /// What a slave says about itself: S-0-1300.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,18 +109,18 @@ pub fn define(store: &mut Store, config: &super::Config) {
     let cycle_max = i64::from(CYCLE_NS_MAX);
     let time = |idn, attribute, name, value| number(idn, attribute, name, value).unit("ns");
     let definitions = [
-        number(idn::ERRORS, a::BITS, "Class 1 diagnostics", 0),
-        number(idn::WARNINGS, a::BITS, "Class 2 diagnostics", 0),
-        number(idn::INTERFACE_STATUS, a::BITS, "Interface status", 0),
+        number(Idn::CLASS_1_DIAGNOSTIC, a::BITS, "Class 1 diagnostics", 0),
+        number(Idn::CLASS_2_DIAGNOSTIC, a::BITS, "Class 2 diagnostics", 0),
+        number(Idn::INTERFACE_STATUS, a::BITS, "Interface status", 0),
         Definition::list(Idn::INVALID_CP2, IDN_LIST_READ_ONLY, "IDNs invalid in CP2", &[], 256),
         Definition::list(Idn::INVALID_CP3, IDN_LIST_READ_ONLY, "IDNs invalid in CP3", &[], 256),
-        Definition::text(idn::DIAGNOSIS_TEXT, "Diagnostic message", "", 80),
+        Definition::text(Idn::DIAGNOSTIC_MESSAGE, "Diagnostic message", "", 80),
         Definition::command(Idn::RESET_C1D, a::COMMAND_ANY, "Reset class 1 diagnostics"),
         Definition::command(Idn::CP3_CHECK, a::COMMAND_CP2, "CP3 transition check"),
         Definition::command(Idn::CP4_CHECK, a::COMMAND_CP3, "CP4 transition check"),
         Definition::text(s(140), "Controller type", identity.device_name, 40),
         Definition::list(s(142), a::TEXT_ANY, "Application type", &[], 40),
-        number(idn::DIAGNOSIS_NUMBER, a::HEX32, "Diagnostic number", 0),
+        number(Idn::DIAGNOSTIC_NUMBER, a::HEX32, "Diagnostic number", 0),
         Definition::list(Idn::SCP_CLASSES, a::U16_LIST, "SCP classes and versions", &classes, 64),
         Definition::list(Idn::SCP_ACTIVE, a::U16_LIST_CP2, "Active SCP classes and versions", &classes, 64),
         time(Idn::CYCLE_TIME, a::TIME_CP2, "Communication cycle time", 1_000_000).range(31_250, cycle_max),
@@ -200,15 +145,21 @@ pub fn define(store: &mut Store, config: &super::Config) {
         Definition::text(s(1026), "Communication hardware version", "Axisbridge sans-IO", 40),
         number(Idn::MTU_REQUESTED, a::U16_CP2, "Requested MTU", 1500).range(46, 1500),
         number(Idn::MTU_EFFECTIVE, a::U16, "Effective MTU", 1500),
-        number(idn::MST_ERRORS, a::U16, "MST error counter", 0),
+        number(Idn::MST_ERROR_COUNTER, a::U16, "MST error counter", 0),
         number(Idn::COMMUNICATION_CONTROL, a::BITS32_CP2, "Communication control", 0),
-        Definition::list(idn::PORT_ERRORS, a::U16_LIST_ANY, "Error counters of ports 1 and 2", &[0; 4], 4),
+        Definition::list(
+            Idn::ERROR_COUNTER_PORT_1_AND_PORT_2,
+            a::U16_LIST_ANY,
+            "Error counters of ports 1 and 2",
+            &[0; 4],
+            4,
+        ),
         number(Idn::INTER_FRAME_GAP, a::U16_CP2, "Inter-frame gap", 37).unit("bytes").range(12, 0xFFFF),
         time(Idn::SLAVE_JITTER, 0x7011_0001, "Slave jitter", 80),
         number(Idn::ADDRESS, a::U16_CP2, "SERCOS address", i64::from(address)).range(0, 511),
         number(Idn::DEVICE_CONTROL, a::BITS, "Device control", 0),
         Definition::list(
-            idn::ADDRESSES,
+            Idn::LIST_OF_SERCOS_ADDRESSES_IN_DEVICE,
             a::U16_LIST,
             "SERCOS addresses of the device",
             &address.to_le_bytes(),
@@ -290,7 +241,13 @@ pub fn define_lists(store: &mut Store) {
         idns.sort_unstable();
         idns.iter().flat_map(|idn| idn.0.to_le_bytes()).collect()
     };
-    let lists = [idn::ALL, idn::COMMANDS, idn::PRODUCIBLE, idn::CONSUMABLE, idn::BACKUP];
+    let lists = [
+        Idn::IDN_LIST_OF_ALL_OPERATION_DATA,
+        Idn::IDN_LIST_OF_ALL_PROCEDURE_COMMANDS,
+        Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_AT,
+        Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_MDT,
+        Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA,
+    ];
     let all = list(&|_| true, &lists);
     let producible = list(&|p| matches!(p.cyclic(), Cyclic::Feedback | Cyclic::Both), &[]);
     let consumable = list(&|p| matches!(p.cyclic(), Cyclic::Command | Cyclic::Both), &[]);
@@ -302,11 +259,19 @@ pub fn define_lists(store: &mut Store) {
     };
     let backup = list(&kept, &[]);
     for (idn, name, data) in [
-        (idn::ALL, "IDN list of all operation data", all),
-        (idn::COMMANDS, "IDN list of all procedure commands", commands),
-        (idn::BACKUP, "IDN list of all backup operation data", backup),
-        (idn::PRODUCIBLE, "IDN list of configurable data in the producer", producible),
-        (idn::CONSUMABLE, "IDN list of configurable data in the consumer", consumable),
+        (Idn::IDN_LIST_OF_ALL_OPERATION_DATA, "IDN list of all operation data", all),
+        (Idn::IDN_LIST_OF_ALL_PROCEDURE_COMMANDS, "IDN list of all procedure commands", commands),
+        (Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA, "IDN list of all backup operation data", backup),
+        (
+            Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_AT,
+            "IDN list of configurable data in the producer",
+            producible,
+        ),
+        (
+            Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_MDT,
+            "IDN list of configurable data in the consumer",
+            consumable,
+        ),
     ] {
         store.define(Definition::list(idn, IDN_LIST_READ_ONLY, name, &data, data.len()));
     }
@@ -332,7 +297,7 @@ pub fn check(store: &Store, idn: Idn, data: &[u8]) -> Result<(), SvcError> {
                 && words().all(|len| len == 0 || (DATA_LEN_MIN..=DATA_LEN_MAX).contains(&usize::from(len)))
         }
         Idn::UC_TIMES => data.len() == 8,
-        idn::PORT_ERRORS => data.len() == 4 && words().all(|count| count == 0),
+        Idn::ERROR_COUNTER_PORT_1_AND_PORT_2 => data.len() == 4 && words().all(|count| count == 0),
         _ if idn.block() == Idn::CONNECTION_BLOCK && !idn.is_product() => {
             idn.element() != connection::LIST || doubles().all(|word| value_len(store, Idn(word)).is_some())
         }
@@ -369,7 +334,7 @@ pub fn written(store: &mut Store, idn: Idn) {
             }
             Idn::ADDRESS => {
                 let [low, high, ..] = store.number_of(idn).to_le_bytes();
-                store.set_data_of(idn::ADDRESSES, &[low, high]);
+                store.set_data_of(Idn::LIST_OF_SERCOS_ADDRESSES_IN_DEVICE, &[low, high]);
             }
             _ => {}
         }
@@ -442,20 +407,31 @@ mod tests {
     #[test]
     fn lists_of_idns_are_sorted_and_complete() {
         let store = store();
-        let all: Vec<Idn> = store.idns(idn::ALL).collect();
+        let all: Vec<Idn> = store.idns(Idn::IDN_LIST_OF_ALL_OPERATION_DATA).collect();
         assert_eq!(all.len(), store.iter().count());
         assert!(all.is_sorted());
-        assert_eq!(store.idns(idn::PRODUCIBLE).collect::<Vec<_>>(), [Idn::standard(135)]);
-        assert_eq!(store.idns(idn::CONSUMABLE).collect::<Vec<_>>(), [Idn::standard(36)]);
+        assert_eq!(
+            store.idns(Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_AT).collect::<Vec<_>>(),
+            [Idn::standard(135)]
+        );
+        assert_eq!(
+            store.idns(Idn::LIST_OF_CONFIGURABLE_DATA_IN_THE_MDT).collect::<Vec<_>>(),
+            [Idn::standard(36)]
+        );
         let commands = [99, 127, 128, 1024].map(Idn::standard);
-        assert_eq!(store.idns(idn::COMMANDS).collect::<Vec<_>>(), commands);
-        assert_eq!(store.idns(idn::BACKUP).collect::<Vec<_>>(), [Idn::standard(142)]);
+        assert_eq!(store.idns(Idn::IDN_LIST_OF_ALL_PROCEDURE_COMMANDS).collect::<Vec<_>>(), commands);
+        assert_eq!(
+            store.idns(Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA).collect::<Vec<_>>(),
+            [Idn::standard(142)]
+        );
     }
 
     #[test]
     fn the_list_of_addresses_follows_the_address() {
         let mut store = store();
-        let addresses = |store: &Store| store.get(store.find(idn::ADDRESSES).unwrap()).data().to_vec();
+        let addresses = |store: &Store| {
+            store.get(store.find(Idn::LIST_OF_SERCOS_ADDRESSES_IN_DEVICE).unwrap()).data().to_vec()
+        };
         assert_eq!(addresses(&store), [5, 0]);
         store.set_number_of(Idn::ADDRESS, 0x0102);
         written(&mut store, Idn::ADDRESS);
@@ -476,6 +452,6 @@ mod tests {
         assert_eq!(check(&store, Idn::MDT_LENGTHS, &words(&[39, 0, 0, 0])), refused);
         assert_eq!(check(&store, Idn::AT_LENGTHS, &words(&[1495, 0, 0, 0])), refused);
         assert_eq!(check(&store, Idn::AT_LENGTHS, &words(&[48])), refused);
-        assert_eq!(check(&store, idn::PORT_ERRORS, &words(&[0, 1])), refused);
+        assert_eq!(check(&store, Idn::ERROR_COUNTER_PORT_1_AND_PORT_2, &words(&[0, 1])), refused);
     }
 }

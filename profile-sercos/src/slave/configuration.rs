@@ -4,9 +4,10 @@ use core::ops::Range;
 
 use arrayvec::ArrayVec;
 
-use super::communication::{CONNECTIONS_MAX, VALUES_MAX, connection};
+use super::communication::{CONNECTIONS_MAX, VALUES_MAX};
 use super::connection::Consumer;
 use super::parameter::{Cyclic, Handle, Store};
+use crate::generated::idns::connection;
 use crate::wire::connection::{
     CONNECTION_CONTROL_LEN, ConfigurationType, ConnectionControl, ConnectionSetup,
 };
@@ -175,6 +176,36 @@ pub fn resolve(store: &Store, invalid: &mut Invalid) -> Option<Configuration> {
     invalid.idns().is_empty().then_some(configuration)
 }
 
+/// Resolves the list of a connection's values.
+fn resolve_values<const N: usize>(
+    store: &Store,
+    list: Idn,
+    producer: bool,
+    invalid: &mut Invalid,
+) -> ArrayVec<(Handle, usize), N> {
+    let fits = |cyclic| match cyclic {
+        Cyclic::No => false,
+        Cyclic::Both => true,
+        Cyclic::Command => !producer,
+        Cyclic::Feedback => producer,
+    };
+    let mut values = ArrayVec::new();
+    for idn in store.idns(list) {
+        let found = store.find(idn).map(|handle| (handle, store.get(handle)));
+        let found =
+            found.filter(|(_, parameter)| fits(parameter.cyclic()) && !parameter.attribute().is_list());
+        let kept =
+            found.is_some_and(|(handle, parameter)| values.try_push((handle, parameter.capacity())).is_ok());
+        if !kept {
+            invalid.push(list);
+        }
+    }
+    if values.is_empty() {
+        invalid.push(list);
+    }
+    values
+}
+
 /// Resolves connection `index`; `None` if it is not there or not active.
 fn resolve_link(
     store: &Store,
@@ -197,27 +228,7 @@ fn resolve_link(
         invalid.push(x(connection::SETUP));
     }
     let producer = setup.contains(ConnectionSetup::PRODUCER);
-    let mut values = ArrayVec::new();
-    for idn in store.idns(x(connection::LIST)) {
-        let found = store.find(idn).map(|handle| (handle, store.get(handle)));
-        let fits = |cyclic| match cyclic {
-            Cyclic::No => false,
-            Cyclic::Both => true,
-            Cyclic::Command => !producer,
-            Cyclic::Feedback => producer,
-        };
-        match found {
-            Some((handle, parameter)) if fits(parameter.cyclic()) && !parameter.attribute().is_list() => {
-                if values.try_push((handle, parameter.capacity())).is_err() {
-                    invalid.push(x(connection::LIST));
-                }
-            }
-            _ => invalid.push(x(connection::LIST)),
-        }
-    }
-    if values.is_empty() {
-        invalid.push(x(connection::LIST));
-    }
+    let values = resolve_values(store, x(connection::LIST), producer, invalid);
     let producer_cycle = u32::try_from(store.number_of(x(connection::CYCLE))).unwrap_or(0);
     if producer_cycle != 0 && cycle_ns != 0 && producer_cycle % cycle_ns != 0 {
         invalid.push(x(connection::CYCLE));

@@ -14,7 +14,7 @@ use core::fmt;
 
 use crate::wire::connection::ConnectionControl;
 
-/// State of a consumer.
+/// State of a consumer, from the toggle and counter of its C-CON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConsumerState {
     /// The producer is not ready.

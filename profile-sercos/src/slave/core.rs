@@ -161,7 +161,7 @@ impl Core {
                 // The cause of a communication fault is gone once the slave communicates.
                 if self.state != State::Nrt {
                     self.fault = None;
-                    self.store.set_number_of(communication::idn::INTERFACE_STATUS, 0);
+                    self.store.set_number_of(Idn::INTERFACE_STATUS, 0);
                 }
                 self.connection_failed = false;
                 for link in self.configuration.iter_mut().flat_map(|configuration| &mut configuration.links) {
@@ -187,22 +187,7 @@ impl Core {
         let state = parameter.status().command_state();
         let word = i64::from(control.bits());
         match (control, state) {
-            (ProcedureControl::CANCEL, _) => {
-                match state {
-                    CommandState::InProcess | CommandState::Interrupted => {
-                        app.order(idn, Order::Cancel, &mut self.store)?;
-                    }
-                    CommandState::Idle | CommandState::Set => {}
-                    // It has ended; what it has left behind ends too.
-                    _ if !is_communication(idn) => {
-                        let _ = app.order(idn, Order::Cancel, &mut self.store);
-                    }
-                    _ => {}
-                }
-                self.running.retain(|running| *running != handle);
-                self.ended.retain(|ended| *ended != handle);
-                self.store.set_status(handle, DataStatus::empty());
-            }
+            (ProcedureControl::CANCEL, _) => self.cancel(handle, idn, state, app)?,
             (ProcedureControl::INTERRUPT, CommandState::InProcess) => {
                 app.order(idn, Order::Interrupt, &mut self.store)?;
                 self.store.set_status(handle, DataStatus::SET | DataStatus::BUSY);
@@ -232,6 +217,30 @@ impl Core {
             _ => return Err(SvcError::INVALID_DATA),
         }
         self.store.set_number(handle, word);
+        Ok(())
+    }
+
+    fn cancel(
+        &mut self,
+        handle: Handle,
+        idn: Idn,
+        state: CommandState,
+        app: &mut impl Application,
+    ) -> Result<(), SvcError> {
+        match state {
+            CommandState::InProcess | CommandState::Interrupted => {
+                app.order(idn, Order::Cancel, &mut self.store)?;
+            }
+            CommandState::Idle | CommandState::Set => {}
+            // It has ended; what it has left behind ends too.
+            _ if !is_communication(idn) => {
+                let _ = app.order(idn, Order::Cancel, &mut self.store);
+            }
+            _ => {}
+        }
+        self.running.retain(|running| *running != handle);
+        self.ended.retain(|ended| *ended != handle);
+        self.store.set_status(handle, DataStatus::empty());
         Ok(())
     }
 }

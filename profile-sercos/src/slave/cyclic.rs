@@ -1,11 +1,11 @@
 //! CP3 and CP4: the slave's parts of the configured telegrams.
 
-use super::communication::connection;
 use super::configuration::{Configuration, Link};
 use super::connection::ConsumerState;
 use super::parameter::Store;
 use super::phase::State;
 use super::{Application, Slave};
+use crate::generated::idns::connection;
 use crate::wire::connection::{CONNECTION_CONTROL_LEN, ConnectionControl};
 use crate::wire::header::{Kind, Phase};
 use crate::wire::idn::Idn;

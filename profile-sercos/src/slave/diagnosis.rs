@@ -4,7 +4,6 @@
 //! code. The codes of states, of S-0-0127 and of the MST loss warning are public; those of communication errors
 //! are not known and are here the error's bit in S-0-0014, or 1 for a lost connection.
 
-use super::communication::idn;
 use super::phase::{Stage, State};
 use super::{Application, Diagnosis, Slave};
 use crate::wire::header::Phase;
@@ -27,14 +26,14 @@ impl<A: Application> Slave<A> {
         let own = self.app.diagnosis();
         let communication = if self.communication_error() { COMMUNICATION_ERROR } else { 0 };
         let store = &mut self.core.store;
-        store.set_number_of(idn::ERRORS, i64::from(own.errors | communication));
-        store.set_number_of(idn::WARNINGS, i64::from(own.warnings));
+        store.set_number_of(Idn::CLASS_1_DIAGNOSTIC, i64::from(own.errors | communication));
+        store.set_number_of(Idn::CLASS_2_DIAGNOSTIC, i64::from(own.warnings));
         let (number, text) = self.diagnosis_shown(&own);
         if number != self.shown {
             self.shown = number;
             let store = &mut self.core.store;
-            store.set_number_of(idn::DIAGNOSIS_NUMBER, i64::from(number));
-            store.set_data_of(idn::DIAGNOSIS_TEXT, text.as_bytes());
+            store.set_number_of(Idn::DIAGNOSTIC_NUMBER, i64::from(number));
+            store.set_data_of(Idn::DIAGNOSTIC_MESSAGE, text.as_bytes());
         }
     }
 

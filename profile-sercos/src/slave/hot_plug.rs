@@ -202,7 +202,7 @@ impl<A: Application> Slave<A> {
             }
             return;
         }
-        let (place, idn) = match field.code() {
+        let taken = match field.code() {
             HotPlugCode::NONE if field.address() == 0 => {
                 self.joining.answer = match (field.slave_index(), own) {
                     (0, 0) => answer(0, HotPlug::ERROR | HotPlug::ERROR_NO_ADDRESS, 0),
@@ -211,21 +211,26 @@ impl<A: Application> Slave<A> {
                 };
                 return;
             }
-            HotPlugCode::SVC_OFFSET_MDT if mine => (0, Idn::SVC_MDT_OFFSET),
-            HotPlugCode::SVC_OFFSET_AT if mine => (1, Idn::SVC_AT_OFFSET),
+            HotPlugCode::SVC_OFFSET_MDT if mine => self.take_offset(0, Idn::SVC_MDT_OFFSET, field.info),
+            HotPlugCode::SVC_OFFSET_AT if mine => self.take_offset(1, Idn::SVC_AT_OFFSET, field.info),
             _ => return,
         };
-        let word = u16::try_from(field.info).unwrap_or(u16::MAX);
+        let error = if taken { 0 } else { HotPlug::ERROR };
+        self.joining.answer = answer(own, error | u16::from(field.code().0), field.info);
+    }
+
+    /// Takes the place of the service channel in the MDTs (0) or ATs (1), if there is such a place.
+    fn take_offset(&mut self, place: u8, idn: Idn, info: u32) -> bool {
+        let word = u16::try_from(info).unwrap_or(u16::MAX);
         let at = Offset::from_parameter(word);
-        let len = self.joining.len(1 + 4 * place, at.telegram & 3);
+        let len = self.joining.len(1 + 4 * usize::from(place), at.telegram & 3);
         let free = at.telegram > 0 || usize::from(at.offset) >= crate::wire::hot_plug::HOT_PLUG_LEN;
-        if at.telegram < 4 && free && at.range(SVC_LEN).end <= len {
+        let fits = at.telegram < 4 && free && at.range(SVC_LEN).end <= len;
+        if fits {
             self.core.store.set_number_of(idn, i64::from(word));
             self.joining.offsets |= 1 << place;
-            self.joining.answer = answer(own, u16::from(field.code().0), field.info);
-        } else {
-            self.joining.answer = answer(own, HotPlug::ERROR | u16::from(field.code().0), field.info);
         }
+        fits
     }
 
     fn give_up_joining(&mut self) {

@@ -30,7 +30,7 @@ pub use self::core::Core;
 pub use self::network::{Network, STRANGER};
 pub use crate::port::Port;
 
-use self::communication::{FixedConnection, Identity, idn};
+use self::communication::{FixedConnection, Identity};
 use self::core::Access;
 use self::hot_plug::Joining;
 use self::parameter::Store;
@@ -171,7 +171,7 @@ impl<A: Application> Slave<A> {
         self.app.written(idn, &mut self.core.store);
     }
 
-    /// The application.
+    /// What runs on the slave.
     pub fn application(&self) -> &A {
         &self.app
     }
@@ -305,7 +305,7 @@ impl<A: Application> Slave<A> {
     }
 
     fn count_port_error(&mut self, port: Port) {
-        if let Some(handle) = self.core.store.find(idn::PORT_ERRORS) {
+        if let Some(handle) = self.core.store.find(Idn::ERROR_COUNTER_PORT_1_AND_PORT_2) {
             let data = self.core.store.get(handle).data();
             let mut counts = [0; 4];
             counts.copy_from_slice(&data[..4]);
@@ -376,8 +376,8 @@ impl<A: Application> Slave<A> {
         if cyclic {
             let cycle = self.cycle_time().0.max(1);
             self.losses = u32::try_from((silence.0 - cycle / 2) / cycle).unwrap_or(0);
-            let total = self.core.store.number_of(idn::MST_ERRORS) + i64::from(self.losses);
-            self.core.store.set_number_of(idn::MST_ERRORS, total);
+            let total = self.core.store.number_of(Idn::MST_ERROR_COUNTER) + i64::from(self.losses);
+            self.core.store.set_number_of(Idn::MST_ERROR_COUNTER, total);
         }
         self.core.last_mst = now;
         self.round = Round { phase: header.phase.0, mdts: 0, acted: false };
@@ -408,7 +408,7 @@ impl<A: Application> Slave<A> {
             let phase = i64::from(before.phase().map_or(0, |phase| phase.0));
             let status = phase | i64::from(fault.interface_status().0);
             self.core.fault = Some(fault);
-            self.core.store.set_number_of(idn::INTERFACE_STATUS, status);
+            self.core.store.set_number_of(Idn::INTERFACE_STATUS, status);
         }
         match (before, transition.next) {
             (before, after) if before == after => {}

@@ -53,6 +53,14 @@ struct Cable {
 impl Cable {
     const WHOLE: Cable = Cable { up: true, down: true, blocked: false };
     const CUT: Cable = Cable { up: false, down: false, blocked: false };
+
+    const fn carries(self, way: Way) -> bool {
+        !self.blocked
+            && match way {
+                Way::Up => self.up,
+                Way::Down => self.down,
+            }
+    }
 }
 
 /// How a slave is plugged in.
@@ -331,17 +339,15 @@ impl<A: Application> Network<A> {
         let mut before = [0; FRAME_MAX];
         // A frame passes each slave twice at most; more would be a loop.
         for _ in 0..=2 * self.slaves.len() {
-            let wires = self.cables[cable];
-            if wires.blocked || !(if way == Way::Up { wires.up } else { wires.down }) {
+            if !self.cables[cable].carries(way) {
                 return;
             }
-            let index = match way {
+            let (index, next) = match way {
                 Way::Up if cable == self.slaves.len() => return arrived(Port::Two, frame),
-                Way::Up => cable,
+                Way::Up => (cable, cable + 1),
                 Way::Down if cable == 0 => return arrived(Port::One, frame),
-                Way::Down => cable - 1,
+                Way::Down => (cable - 1, cable - 1),
             };
-            let next = if way == Way::Up { cable + 1 } else { cable - 1 };
             let place = self.places[index];
             if !place.works() {
                 return;
@@ -365,15 +371,20 @@ impl<A: Application> Network<A> {
                 Forward::Through => cable = next,
                 Forward::Back => way = way.turned(),
                 Forward::BackAndThrough => {
-                    if let Some(copy) = self.copies.get_mut(self.waiting) {
-                        copy.bytes[..frame.len()].copy_from_slice(frame);
-                        (copy.cable, copy.way) = (next, way);
-                        self.waiting += 1;
-                    }
+                    self.keep_copy(next, way, frame);
                     way = way.turned();
                 }
                 Forward::Nowhere => return,
             }
+        }
+    }
+
+    /// Keeps a copy of a frame that goes on from here, to be moved later.
+    fn keep_copy(&mut self, cable: usize, way: Way, frame: &[u8]) {
+        if let Some(copy) = self.copies.get_mut(self.waiting) {
+            copy.bytes[..frame.len()].copy_from_slice(frame);
+            (copy.cable, copy.way) = (cable, way);
+            self.waiting += 1;
         }
     }
 }

@@ -136,7 +136,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// The IDN.
+    /// The identification number that it stands under.
     pub fn idn(&self) -> Idn {
         self.definition.idn
     }

@@ -111,6 +111,7 @@ impl State {
 
     /// The state after `event`.
     #[must_use]
+    // Flat: the table above, one arm per row.
     pub fn next(self, event: Event, conditions: Conditions) -> Transition {
         let to = |next| Transition { next, fault: None };
         let fail = |fault| Transition { next: State::Nrt, fault: Some(fault) };

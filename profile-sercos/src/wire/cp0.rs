@@ -75,7 +75,10 @@ impl fmt::Display for CommunicationVersion {
             (Self::FAST_PHASE_SWITCH, "fast phase switch"),
             (Self::NO_FORWARD_AT_END, "no forward at the end"),
         ];
-        super::display_bits(f, names.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name))
+        profile_generic::wire::display_bits(
+            f,
+            names.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name),
+        )
     }
 }
 

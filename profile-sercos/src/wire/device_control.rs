@@ -106,7 +106,7 @@ impl fmt::Display for DeviceControl {
             (Self::RING_CLOSED, "ring closed"),
             (Self::MASTER_VALID, "master valid"),
         ];
-        super::display_bits(
+        profile_generic::wire::display_bits(
             f,
             names.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name),
         )?;

@@ -90,7 +90,7 @@ impl DeviceStatus {
     const TOPOLOGY: DeviceStatus = DeviceStatus::TOPOLOGY_1.union(DeviceStatus::TOPOLOGY_0);
     const INACTIVE_PORT: DeviceStatus = DeviceStatus::INACTIVE_PORT_1.union(DeviceStatus::INACTIVE_PORT_0);
 
-    /// The bits that tell of errors, warnings and the parameterization level.
+    /// The bits that report errors, warnings and the parameterization level.
     pub const CONDITIONS: DeviceStatus = DeviceStatus::COMMUNICATION_WARNING
         .union(DeviceStatus::CONNECTION_ERROR)
         .union(DeviceStatus::DEVICE_ERROR)
@@ -145,7 +145,7 @@ impl DeviceStatus {
 impl fmt::Display for DeviceStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:#06x}", self.bits())?;
-        super::display_bits(
+        profile_generic::wire::display_bits(
             f,
             Self::NAMES.into_iter().filter(|&(bit, _)| self.contains(bit)).map(|(_, name)| name),
         )?;

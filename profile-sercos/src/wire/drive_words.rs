@@ -59,10 +59,11 @@ impl DriveControl {
 }
 
 /// Ready state of a drive, bits 15..14 of S-0-0135. All four values have a meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum ReadyState {
     /// 00: internal checks are not finished.
+    #[default]
     NotReady = 0,
     /// 01: logic ready, main power may be switched on.
     ReadyForPower = 1,

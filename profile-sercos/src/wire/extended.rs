@@ -68,20 +68,15 @@ impl fmt::Display for Extended {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
     fn layout() {
         let field = Extended { word: Extended::TIME_VALID | 0x123, time_fragment: 0xABCD };
-        let mut bytes = [0xA5; EXTENDED_LEN];
-        field.emit(&mut bytes).unwrap();
-        assert_eq!(bytes, [0x23, 0x41, 0xCD, 0xAB]);
+        check_vectors!(&[("time valid", [0x23, 0x41, 0xCD, 0xAB], field)], Extended, fixed);
         assert_eq!(field.tsref(), 0x123);
         assert_eq!(field.to_string(), "TSref 291, SERCOS time valid, fragment 0xabcd");
-        for len in 0..EXTENDED_LEN {
-            assert!(Extended::parse(&bytes[..len]).is_err());
-            assert!(field.emit(&mut bytes[..len]).is_err());
-        }
     }
 
     proptest! {

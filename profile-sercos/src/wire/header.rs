@@ -136,11 +136,6 @@ impl TelegramType {
         self.0 & Self::NUMBER
     }
 
-    /// Whether the cycle count of the phase field counts.
-    pub const fn cycle_count_valid(self) -> bool {
-        self.0 & Self::CYCLE_COUNT_VALID != 0
-    }
-
     /// Whether the header of this telegram is the MST.
     pub const fn is_mst(self) -> bool {
         self.0 & (Self::AT | Self::NUMBER) == 0
@@ -251,7 +246,7 @@ impl fmt::Display for PhaseField {
 pub struct Header {
     /// Hardware address of the master.
     pub source: MacAddress,
-    /// Which telegram this is.
+    /// Kind, number and channel of the telegram.
     pub telegram: TelegramType,
     /// Phase, cycle count and phase switching.
     pub phase: PhaseField,
@@ -265,7 +260,7 @@ impl Header {
         let header = Header::parse_unchecked(frame)?;
         let (found, expected) = (crc_found(frame), crc_expected(frame));
         if found != expected {
-            return Err(Error::Invalid { what: "header CRC", offset: field::CRC.start, found, expected });
+            return Err(Error::invalid("header CRC", field::CRC.start, expected, found));
         }
         Ok(header)
     }
@@ -276,16 +271,16 @@ impl Header {
         let ethertype =
             u16::from_be_bytes([frame[field::ETHERTYPE.start], frame[field::ETHERTYPE.start + 1]]);
         if ethertype != ETHERTYPE {
-            return Err(Error::Invalid {
-                what: "EtherType",
-                offset: field::ETHERTYPE.start,
-                found: u32::from(ethertype),
-                expected: u32::from(ETHERTYPE),
-            });
+            return Err(Error::invalid(
+                "EtherType",
+                field::ETHERTYPE.start,
+                u32::from(ETHERTYPE),
+                u32::from(ethertype),
+            ));
         }
         if let Some(offset) = field::DESTINATION.into_iter().find(|&at| frame[at] != 0xFF) {
             let found = u32::from(frame[offset]);
-            return Err(Error::Invalid { what: "destination address", offset, found, expected: 0xFF });
+            return Err(Error::invalid("destination address", offset, 0xFF, found));
         }
         let mut source = [0; 6];
         source.copy_from_slice(&frame[field::SOURCE]);
@@ -385,7 +380,7 @@ mod tests {
         let mut bytes = [0; HEADER_LEN];
         header(0x20, 0).emit(&mut bytes).unwrap();
         for len in 0..HEADER_LEN {
-            let expected = Error::Truncated { what: "SERCOS header", offset: 0, needed: 20, available: len };
+            let expected = Error::truncated("SERCOS header", 0, 20, len);
             assert_eq!(Header::parse(&bytes[..len]), Err(expected));
             assert_eq!(header(0x20, 0).emit(&mut [0; HEADER_LEN][..len]), Err(expected));
         }

@@ -147,6 +147,7 @@ impl fmt::Display for HotPlug {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use profile_generic::wire::check::check_vectors;
 
     /// Recording sercos3_startup_line2: frame, bytes, value.
     const VECTORS: &[(u32, [u8; 8], HotPlug)] = &[
@@ -160,16 +161,7 @@ mod tests {
 
     #[test]
     fn vectors_both_ways_and_truncation() {
-        for (frame, bytes, field) in VECTORS {
-            assert_eq!(HotPlug::parse(bytes), Ok(*field), "frame {frame}");
-            let mut again = [0xA5; HOT_PLUG_LEN];
-            field.emit(&mut again).unwrap();
-            assert_eq!(&again, bytes, "frame {frame}");
-            for len in 0..HOT_PLUG_LEN {
-                assert!(HotPlug::parse(&bytes[..len]).is_err());
-                assert!(field.emit(&mut again[..len]).is_err());
-            }
-        }
+        check_vectors!(VECTORS, HotPlug, fixed);
         assert_eq!(VECTORS[0].2.to_string(), "to all, word 0x8002 (t6), info 62200");
         assert_eq!(VECTORS[1].2.to_string(), "address 0 index 0, word 0x8000 (none), info 0");
         assert_eq!(HotPlugCode(0x12).to_string(), "length of MDT2");

@@ -11,6 +11,7 @@
 //! Printed as `S-0-1050.1.3` (kind, set, data block, SI, SE); `.SI.SE` is left out when both are 0.
 //! SERCOS I and II and SoE know the low half only.
 
+pub use crate::generated::idns::connection;
 use core::fmt;
 use core::str::FromStr;
 
@@ -28,81 +29,6 @@ mod field {
 pub struct Idn(pub u32);
 
 impl Idn {
-    /// S-0-0021: list of the parameters that the CP3 transition check found invalid.
-    pub const INVALID_CP2: Idn = Idn::standard(21);
-    /// S-0-0022: list of the parameters that the CP4 transition check found invalid.
-    pub const INVALID_CP3: Idn = Idn::standard(22);
-    /// S-0-0099: procedure command "reset class 1 diagnostics".
-    pub const RESET_C1D: Idn = Idn::standard(99);
-    /// S-0-0127: procedure command "CP3 transition check".
-    pub const CP3_CHECK: Idn = Idn::standard(127);
-    /// S-0-0128: procedure command "CP4 transition check".
-    pub const CP4_CHECK: Idn = Idn::standard(128);
-    /// S-0-0134: drive control word.
-    pub const DRIVE_CONTROL: Idn = Idn::standard(134);
-    /// S-0-0135: drive status word.
-    pub const DRIVE_STATUS: Idn = Idn::standard(135);
-    /// S-0-1000: list of the SCP classes and versions which the slave has.
-    pub const SCP_CLASSES: Idn = Idn::standard(1000);
-    /// S-0-1000.0.1: list of the active SCP classes and versions.
-    pub const SCP_ACTIVE: Idn = Idn::structured(1000, 0, 1);
-    /// S-0-1002: communication cycle time (tScyc), nanoseconds.
-    pub const CYCLE_TIME: Idn = Idn::standard(1002);
-    /// S-0-1003: allowed number of consecutive MST losses in CP3 and CP4.
-    pub const MST_LOSSES: Idn = Idn::standard(1003);
-    /// S-0-1005: minimum feedback processing time (t5), nanoseconds.
-    pub const FEEDBACK_TIME: Idn = Idn::standard(1005);
-    /// S-0-1006: AT0 transmission starting time (t1), nanoseconds.
-    pub const AT_START: Idn = Idn::standard(1006);
-    /// S-0-1007: feedback acquisition / synchronization time (tSync), nanoseconds.
-    pub const SYNC_TIME: Idn = Idn::standard(1007);
-    /// S-0-1008: command value valid time (t3), nanoseconds.
-    pub const COMMAND_VALID: Idn = Idn::standard(1008);
-    /// S-0-1009: offset of the device control field in the MDT.
-    pub const CONTROL_OFFSET: Idn = Idn::standard(1009);
-    /// S-0-1010: lengths of the four MDTs.
-    pub const MDT_LENGTHS: Idn = Idn::standard(1010);
-    /// S-0-1011: offset of the device status field in the AT.
-    pub const STATUS_OFFSET: Idn = Idn::standard(1011);
-    /// S-0-1012: lengths of the four ATs.
-    pub const AT_LENGTHS: Idn = Idn::standard(1012);
-    /// S-0-1013: offset of the service channel in the MDT.
-    pub const SVC_MDT_OFFSET: Idn = Idn::standard(1013);
-    /// S-0-1014: offset of the service channel in the AT.
-    pub const SVC_AT_OFFSET: Idn = Idn::standard(1014);
-    /// S-0-1015: ring delay, nanoseconds.
-    pub const RING_DELAY: Idn = Idn::standard(1015);
-    /// S-0-1017: begin and end of the unified communication channel (t6, t7), nanoseconds.
-    pub const UC_TIMES: Idn = Idn::standard(1017);
-    /// S-0-1023: synchronization jitter, nanoseconds.
-    pub const SYNC_JITTER: Idn = Idn::standard(1023);
-    /// S-0-1024: procedure command "synchronization delay measuring".
-    pub const DELAY_MEASURING: Idn = Idn::standard(1024);
-    /// S-0-1027.0.1: requested MTU of the unified communication channel, bytes.
-    pub const MTU_REQUESTED: Idn = Idn::structured(1027, 0, 1);
-    /// S-0-1027.0.2: effective MTU of the unified communication channel, bytes.
-    pub const MTU_EFFECTIVE: Idn = Idn::structured(1027, 0, 2);
-    /// S-0-1032: communication control word.
-    pub const COMMUNICATION_CONTROL: Idn = Idn::standard(1032);
-    /// S-0-1036: inter frame gap, bytes.
-    pub const INTER_FRAME_GAP: Idn = Idn::standard(1036);
-    /// S-0-1037: slave jitter, nanoseconds.
-    pub const SLAVE_JITTER: Idn = Idn::standard(1037);
-    /// S-0-1040: SERCOS address.
-    pub const ADDRESS: Idn = Idn::standard(1040);
-    /// S-0-1044: device control (C-DEV).
-    pub const DEVICE_CONTROL: Idn = Idn::standard(1044);
-    /// S-0-1045: device status (S-DEV).
-    pub const DEVICE_STATUS: Idn = Idn::standard(1045);
-    /// S-0-1047: maximum consumer activation time (t11), nanoseconds.
-    pub const CONSUMER_TIME: Idn = Idn::standard(1047);
-    /// S-0-1051: image of the connection setups, one word per connection which the slave has.
-    pub const CONNECTION_IMAGE: Idn = Idn::standard(1051);
-    /// Largest count of the TSref counter.
-    pub const TSREF_MAX: Idn = Idn::standard(1061);
-    /// S-0-1302.0.1: function specific profile type.
-    pub const FSP_TYPE: Idn = Idn::structured(1302, 0, 1);
-
     /// Data block of the connection parameters, S-0-1050.x.y.
     pub const CONNECTION_BLOCK: u16 = 1050;
 

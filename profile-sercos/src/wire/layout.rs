@@ -184,21 +184,16 @@ fn close_gaps(
     let mut at = 0;
     for (range, region) in regions {
         if range.end > len {
-            return Err(Error::Truncated {
-                what: "telegram layout",
-                offset: 0,
-                needed: range.end,
-                available: len,
-            });
+            return Err(Error::truncated("telegram layout", 0, range.end, len));
         }
         if range.start < at {
             let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-            return Err(Error::Invalid {
-                what: "telegram layout: overlapping part",
-                offset: range.start,
-                found: number(range.start),
-                expected: number(at),
-            });
+            return Err(Error::invalid(
+                "telegram layout: overlapping part",
+                range.start,
+                number(at),
+                number(range.start),
+            ));
         }
         if at < range.start {
             whole.push((at..range.start, Region::Gap));
@@ -215,6 +210,7 @@ fn close_gaps(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use profile_generic::wire::Expected;
 
     /// The layout of recording sercos3_startup_line2, from the CP2 writes (frames 3209 to 3825).
     pub(crate) fn recording() -> Layout {
@@ -289,13 +285,13 @@ pub(crate) mod tests {
     fn bad_layouts_are_refused() {
         assert_eq!(
             recording().regions(Kind::Mdt, 0, 45),
-            Err(Error::Truncated { what: "telegram layout", offset: 0, needed: 46, available: 45 })
+            Err(Error::truncated("telegram layout", 0, 46, 45))
         );
         let mut overlap = recording();
         overlap.devices[1].device_control = Some(Offset { telegram: 0, offset: 27 });
         assert!(matches!(
             overlap.regions(Kind::Mdt, 0, 46),
-            Err(Error::Invalid { offset: 27, found: 27, expected: 28, .. })
+            Err(Error { offset: Some(27), expected: Expected::Value(28), found: 27, .. })
         ));
         overlap.devices[1].device_control = None;
         overlap.extended = true;

@@ -26,16 +26,3 @@ pub mod svc_error;
 pub mod telegram;
 
 pub use profile_generic::wire::Error;
-
-/// Writes names in brackets, separated by commas; nothing if there are none.
-pub(crate) fn display_bits(
-    f: &mut core::fmt::Formatter<'_>,
-    names: impl Iterator<Item = &'static str>,
-) -> core::fmt::Result {
-    let mut open = false;
-    for name in names {
-        write!(f, "{}{name}", if open { ", " } else { " (" })?;
-        open = true;
-    }
-    if open { f.write_str(")") } else { Ok(()) }
-}

@@ -51,6 +51,7 @@ impl fmt::Display for SvcSlot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use profile_generic::wire::check::check_vectors;
 
     /// Recording sercos3_startup_line2: frame, bytes, slot.
     const VECTORS: &[(u32, [u8; 6], SvcSlot)] = &[
@@ -60,16 +61,7 @@ mod tests {
 
     #[test]
     fn vectors_both_ways_and_truncation() {
-        for (frame, bytes, slot) in VECTORS {
-            assert_eq!(SvcSlot::parse(bytes), Ok(*slot), "frame {frame}");
-            let mut again = [0xA5; SLOT_LEN];
-            slot.emit(&mut again).unwrap();
-            assert_eq!(&again, bytes, "frame {frame}");
-            for len in 0..SLOT_LEN {
-                assert!(SvcSlot::parse(&bytes[..len]).is_err());
-                assert!(slot.emit(&mut again[..len]).is_err());
-            }
-        }
+        check_vectors!(VECTORS, SvcSlot, fixed);
         assert_eq!(VECTORS[0].2.to_string(), "0x000e INFO 0x00010516");
     }
 }

@@ -313,63 +313,53 @@ impl fmt::Display for ListHead {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use profile_generic::wire::check::check_vectors;
     use proptest::prelude::*;
 
     #[test]
     fn control_vectors() {
-        // (bytes, frame of the startup recording, value)
-        let vectors: &[([u8; 6], u32, MdtSvc)] = &[
+        // Frame of the startup recording, bytes, value.
+        let vectors: &[(u32, [u8; 6], MdtSvc)] = &[
             (
-                [0x0E, 0x00, 0x16, 0x05, 0x01, 0x00],
                 1401,
+                [0x0E, 0x00, 0x16, 0x05, 0x01, 0x00],
                 MdtSvc { control: SvcControl::new(false, Element::Idn, true, true), info: 0x0001_0516 },
             ),
             (
-                [0x1D, 0x00, 0x16, 0x05, 0x01, 0x00],
                 1425,
+                [0x1D, 0x00, 0x16, 0x05, 0x01, 0x00],
                 MdtSvc { control: SvcControl::new(true, Element::Attribute, false, true), info: 0x0001_0516 },
             ),
             (
-                [0x3A, 0x00, 0x08, 0x00, 0x40, 0x00],
                 2777,
+                [0x3A, 0x00, 0x08, 0x00, 0x40, 0x00],
                 MdtSvc { control: SvcControl::new(false, Element::Data, true, false), info: 0x0040_0008 },
             ),
             (
-                [0x07, 0x00, 0xE8, 0x03, 0x00, 0x00],
                 2257,
+                [0x07, 0x00, 0xE8, 0x03, 0x00, 0x00],
                 MdtSvc { control: SvcControl::new(true, Element::Close, true, true), info: 0x3E8 },
             ),
             (
-                [0x2D, 0x00, 0xEE, 0x03, 0x00, 0x00],
                 3137,
+                [0x2D, 0x00, 0xEE, 0x03, 0x00, 0x00],
                 MdtSvc { control: SvcControl::new(true, Element::Minimum, false, true), info: 0x3EE },
             ),
         ];
-        for (bytes, frame, value) in vectors {
-            assert_eq!(MdtSvc::parse(bytes), Ok(*value), "frame {frame}");
-            let mut out = [0xA5; SVC_LEN + 1];
-            value.emit(&mut out).unwrap();
-            assert_eq!(out[..SVC_LEN], *bytes, "frame {frame}");
-            assert_eq!(out[SVC_LEN], 0xA5);
-        }
+        check_vectors!(vectors, MdtSvc, fixed);
     }
 
     #[test]
     fn status_vectors() {
-        let vectors: &[([u8; 6], u32, AtSvc)] = &[
+        let vectors: &[(u32, [u8; 6], AtSvc)] = &[
             (
-                [0x09, 0x00, 0x01, 0x00, 0x01, 0x00],
                 1431,
+                [0x09, 0x00, 0x01, 0x00, 0x01, 0x00],
                 AtSvc { status: SvcStatus::VALID | SvcStatus::AHS, info: 0x0001_0001 },
             ),
-            ([0x08, 0x00, 0x03, 0x00, 0x00, 0x00], 1639, AtSvc { status: SvcStatus::VALID, info: 3 }),
+            (1639, [0x08, 0x00, 0x03, 0x00, 0x00, 0x00], AtSvc { status: SvcStatus::VALID, info: 3 }),
         ];
-        for (bytes, frame, value) in vectors {
-            assert_eq!(AtSvc::parse(bytes), Ok(*value), "frame {frame}");
-            let mut out = [0xA5; SVC_LEN];
-            value.emit(&mut out).unwrap();
-            assert_eq!(out, *bytes, "frame {frame}");
-        }
+        check_vectors!(vectors, AtSvc, fixed);
         // Bits by the S-SVC layout: AHS, busy, error, valid.
         let all = AtSvc::parse(&[0x0F, 0, 0x07, 0x70, 0, 0]).unwrap();
         assert_eq!(all.status, SvcStatus::AHS | SvcStatus::BUSY | SvcStatus::ERROR | SvcStatus::VALID,);
@@ -382,17 +372,6 @@ mod tests {
         // Startup recording, frame 2239: six of 64 bytes.
         assert_eq!(ListHead::from_info(0x0040_0006), ListHead { current: 6, max: 64 });
         assert_eq!(ListHead { current: 6, max: 64 }.to_info(), 0x0040_0006);
-    }
-
-    #[test]
-    fn truncation() {
-        for len in 0..SVC_LEN {
-            let error = |what| Error::Truncated { what, offset: 0, needed: SVC_LEN, available: len };
-            assert_eq!(MdtSvc::parse(&[0; SVC_LEN][..len]), Err(error("MDT service channel")));
-            assert_eq!(AtSvc::parse(&[0; SVC_LEN][..len]), Err(error("AT service channel")));
-            assert_eq!(MdtSvc::default().emit(&mut [0; SVC_LEN][..len]), Err(error("MDT service channel")));
-            assert_eq!(AtSvc::default().emit(&mut [0; SVC_LEN][..len]), Err(error("AT service channel")));
-        }
     }
 
     proptest! {

@@ -68,6 +68,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Reads the data field of a frame whose header is known already.
+    // Flat: one arm per phase and kind.
     pub fn parse_body(
         header: Header,
         frame: &'a [u8],
@@ -97,7 +98,7 @@ impl<'a> Frame<'a> {
             }
             (Phase(found), _) => {
                 let (found, expected) = (u32::from(found), u32::from(Phase::CP4.0));
-                return Err(Error::Invalid { what: "communication phase", offset: 15, found, expected });
+                return Err(Error::invalid("communication phase", 15, expected, found));
             }
         };
         let trailer = &data[body.buffer_len().min(data.len())..];
@@ -142,7 +143,7 @@ impl Body<'_> {
 }
 
 fn not_in_phase(number: u8, max: u32) -> Error {
-    Error::Invalid { what: "telegram number", offset: 14, found: u32::from(number), expected: max }
+    Error::invalid("telegram number", 14, max, u32::from(number))
 }
 
 impl fmt::Display for Frame<'_> {
@@ -155,6 +156,7 @@ impl fmt::Display for Frame<'_> {
 mod tests {
     use super::super::header::{Channel, PhaseField, TelegramType};
     use super::*;
+    use profile_generic::wire::Expected;
     use proptest::prelude::*;
 
     fn frame(kind: Kind, number: u8, phase: u8, len: usize) -> Vec<u8> {
@@ -184,9 +186,12 @@ mod tests {
         assert_eq!(parse(&frame(Kind::At, 4, 2, 1280), 2), Some(not_in_phase(4, 3)));
         assert!(matches!(
             parse(&frame(Kind::At, 0, 5, 1280), 5),
-            Some(Error::Invalid { what: "communication phase", found: 5, .. })
+            Some(Error { what: "communication phase", expected: Expected::Value(_), found: 5, .. })
         ));
-        assert!(matches!(parse(&frame(Kind::At, 0, 2, 1279), 2), Some(Error::Truncated { .. })));
+        assert!(matches!(
+            parse(&frame(Kind::At, 0, 2, 1279), 2),
+            Some(Error { expected: Expected::Bytes(_), .. })
+        ));
         assert_eq!(parse(&frame(Kind::At, 3, 2, 1280), 2), None);
     }
 

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use axisbridge::engine::axis::{AxisChannel, Limits};
-use axisbridge::engine::bus::{Cycle, Received};
+use axisbridge::engine::cyclic::{Cycle, Received};
 use axisbridge::engine::device::CipAxis;
-use axisbridge::mapping::{CipProgram, CipTrackers, CyclicValues, DriveProgram, Mapping};
+use axisbridge::mapping::{CipProgram, CipTrackers, DriveProgram, Mapping};
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
 use criterion::Criterion;
@@ -148,8 +148,8 @@ impl Axis {
 
     /// The values of an update become the generic command.
     pub fn decode(&mut self) {
-        let values = CyclicValues::from(black_box(&self.swing[self.next]));
-        let report = self.north.decode(&values, 0, &mut self.trackers, &mut self.command);
+        let values = black_box(&self.swing[self.next]);
+        let report = self.north.decode(values, 0, &mut self.trackers, &mut self.command);
         assert!(report.is_clean());
     }
 

@@ -154,7 +154,7 @@ impl Device {
         self.drive();
         let (now, system) = (self.now, self.system());
         if self.adapter.wake_at().is_some_and(|at| at <= now) {
-            self.adapter.handle_timeout(now);
+            self.adapter.handle_time(now);
         }
         const HEAD: usize = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
         let mut buffer = [0xA5; HEAD + UPDATE_MAX];

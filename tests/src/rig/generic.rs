@@ -3,7 +3,7 @@
 //! What leads it is [`GenericRig::command`], as a north side of another profile would; see `AxisChannel::from_north`.
 
 use axisbridge::config::Config;
-use axisbridge::engine::axis::{AxisChannel, Limits};
+use axisbridge::engine::axis::{AxisChannel, Limits, Reactions};
 use axisbridge::engine::build::can::{Network, network};
 use axisbridge::engine::build::sercos::master_config;
 use axisbridge::engine::bus::can::CanBus;
@@ -19,7 +19,7 @@ use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::status::BoxStatus;
 use profile_cia402::node::drive::Axis;
-use profile_generic::fault::Reaction;
+use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet};
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{ModeSelection, OperatingMode};
@@ -316,7 +316,13 @@ impl<S: South> OneAxis<S> {
             notice_queue,
             _status: status,
         };
-        rig.engine.axes_mut()[0].keep_update_period(UPDATE_PERIOD, TargetUpdate::Interpolate);
+        let system = rig.system();
+        let axis = &mut rig.engine.axes_mut()[0];
+        axis.keep_update_period(UPDATE_PERIOD, TargetUpdate::Interpolate);
+        // A homing that fails is no reason to stop an axis that stands: it may be led again.
+        let mut reactions = Reactions::default();
+        reactions.set(FaultCause::HOMING, Reaction::Alarm);
+        axis.set_reactions(START, system, &reactions);
         rig.run_until(20_000, "the drive to be ready", |rig| rig.state() == DriveState::Ready);
         rig
     }

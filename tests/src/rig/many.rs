@@ -452,7 +452,7 @@ impl Seat {
             self.adapter.complete(now, &reply);
         }
         if self.adapter.wake_at().is_some_and(|at| at <= now) {
-            self.adapter.handle_timeout(now);
+            self.adapter.handle_time(now);
         }
         let (Some(controller), Some(slot)) = (self.controller.as_mut(), self.slot) else { return };
         let mut buffer = [0; 4096];

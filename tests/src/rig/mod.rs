@@ -35,8 +35,9 @@ use axisbridge::engine::bus::sercos::SercosBus;
 use axisbridge::engine::notice::Notice;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{BUSES_MAX, Engine};
+use axisbridge::finding::Findings;
 use axisbridge::latest::Reader;
-use axisbridge::mapping::Mapping;
+use axisbridge::mapping::{Mapping, Overlay, TableTexts};
 use axisbridge::north::AdapterEnd;
 use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::devicenet_drive::DevicenetNode;
@@ -99,7 +100,17 @@ const STEP_MAX: DurationNs = DurationNs::from_millis(1);
 
 /// The two tables that everybody needs are compiled once in a process.
 fn mapping() -> Mapping {
-    Mapping::embedded().expect("the shipped tables are sound")
+    mapping_with(&[])
+}
+
+/// The shipped tables with overlays.
+fn mapping_with(overlays: &[&str]) -> Mapping {
+    let mut texts = TableTexts::embedded();
+    texts.overlays = overlays.iter().map(|text| Overlay::new("own.toml", text)).collect();
+    let mut findings = Findings::default();
+    let mapping = Mapping::resolve(&texts, &mut findings);
+    assert!(!findings.has_errors(), "{findings}");
+    mapping.expect("the tables are sound")
 }
 
 /// How a rig is set up.
@@ -109,6 +120,8 @@ pub struct Settings {
     pub configuration: String,
     /// Address and kind of each drive on the line, nearest to the master first.
     pub drives: Vec<(u16, UnitKind)>,
+    /// Texts of overlays over the shipped tables.
+    pub overlays: Vec<&'static str>,
     /// The network between controller and box.
     pub knobs: Knobs,
     /// What the network's dice start from.
@@ -128,6 +141,7 @@ impl Default for Settings {
         Self {
             configuration: BOX.to_owned(),
             drives: vec![(1, UnitKind::Rotary), (2, UnitKind::Linear)],
+            overlays: Vec::new(),
             knobs: Knobs::GOOD,
             seed: 1,
         }
@@ -199,6 +213,7 @@ pub struct Rig {
     /// Whether the box accepts another stream of the controller.
     pub accepts_streams: bool,
     mapping: Mapping,
+    overlays: Vec<&'static str>,
     config: Config,
     seed: u64,
     now: MonotonicTime,
@@ -233,7 +248,8 @@ impl Rig {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let config = Config::parse(&settings.configuration, "box.toml").expect("the configuration is sound");
-        let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&config);
+        let (engine, adapter, link, notice_queue, status, commissioners) =
+            assemble(&config, &settings.overlays);
         let line = drives(settings.drives.iter().copied(), false);
         let can = config.can.iter().map(|bus| CanWire::new(InProcessCan::of(bus, None))).collect();
         let devicenet =
@@ -264,7 +280,8 @@ impl Rig {
             stream_works: true,
             command_port: IO_PORT,
             accepts_streams: true,
-            mapping: mapping(),
+            mapping: mapping_with(&settings.overlays),
+            overlays: settings.overlays,
             config,
             seed: settings.seed,
             now: START,
@@ -530,7 +547,8 @@ impl Rig {
     /// as they are.
     pub fn restart_box(&mut self) {
         self.drop_stream();
-        let (engine, adapter, link, notice_queue, status, commissioners) = assemble(&self.config);
+        let (engine, adapter, link, notice_queue, status, commissioners) =
+            assemble(&self.config, &self.overlays);
         (self.engine, self.adapter, self.link, self.commissioners) = (engine, adapter, link, commissioners);
         (self.notice_queue, self.status) = (notice_queue, status);
         self.north = NorthQueue::default();
@@ -831,7 +849,7 @@ impl Rig {
             self.adapter.complete(now, &reply);
         }
         if self.adapter.wake_at().is_some_and(|at| at <= now) {
-            self.adapter.handle_timeout(now);
+            self.adapter.handle_time(now);
         }
         let mut buffer = [0; 4096];
         loop {
@@ -936,9 +954,9 @@ fn ports_of<'a>(
 
 type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<BoxStatus>, Commissioners);
 
-fn assemble(config: &Config) -> Assembled {
+fn assemble(config: &Config, overlays: &[&str]) -> Assembled {
     let Built { mut engine, adapters, notices, status, commissioners } =
-        build(config, mapping(), HOST).expect("the configuration makes a box");
+        build(config, mapping_with(overlays), HOST).expect("the configuration makes a box");
     engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });
     let (config, link) = adapters.into_iter().next().expect("one device");
     let adapter = Adapter::new(config).expect("the adapter's configuration is sound");

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A page in `docs/` and how many tests it names at least: fewer are a page that is not read rightly.
-const PAGES: [(&str, &str, usize); 3] = [
+const PAGES: [(&str, &str, usize); 4] = [
     ("compliance-cip-motion.md", include_str!("../../../docs/compliance-cip-motion.md"), 150),
     ("sercos.md", include_str!("../../../docs/sercos.md"), 150),
     ("canopen.md", include_str!("../../../docs/canopen.md"), 60),
+    ("architecture.md", include_str!("../../../docs/architecture.md"), 50),
 ];
 
 /// What stands between backquotes and looks like `file.rs::function`.

@@ -4,4 +4,6 @@ mod broken;
 mod compliance;
 mod data_sheet;
 mod device_descriptions;
+mod mistakes;
+mod schema_values;
 mod schemas;

@@ -52,7 +52,7 @@ fn ask(python: &PathBuf, script: &str, address: &str) -> Value {
 }
 
 /// Vendor 1, device type 37, product 1001, revision 1.1, status (owned or not), serial number, name.
-const IDENTITY: &str = "01002500e9030101";
+const IDENTITY: &str = "ffff2500e9030101";
 const SERIAL: &str = "40e20100";
 const NAME: &str = "13417869736272696467652074776f2061786573";
 
@@ -106,7 +106,7 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
     let unknown = got["axis_missing_instance"]["error"].as_str().expect("refused");
     assert!(unknown.starts_with("Destination unknown"), "{unknown}");
     // Status 0x0A with the good items beside the bad one.
-    assert_eq!(got["identity_list"]["value"], "0300010000000100630014000600000040e20100");
+    assert_eq!(got["identity_list"]["value"], "030001000000ffff630014000600000040e20100");
     for what in ["packed", "connected_packed"] {
         assert_eq!(got[what]["value"], PACKED, "{what}");
     }
@@ -206,7 +206,7 @@ fn ethernetip_opens_runs_and_closes_the_motion_connection() {
 
     assert_eq!(
         got["list_identity"],
-        json!({ "vendor": 1, "device_type": 37, "product_code": 1001, "product_name": "Axisbridge two axes" })
+        json!({ "vendor": 65535, "device_type": 37, "product_code": 1001, "product_name": "Axisbridge two axes" })
     );
     // CIP over TCP, and class 0 and 1 over UDP.
     assert_eq!(got["list_services"], json!({ "capability": 0x120, "name": "Communications" }));
@@ -263,7 +263,7 @@ fn nmap_identifies_the_box_over_tcp_and_udp() {
         let text = String::from_utf8_lossy(&output.stdout);
         for line in [
             "type: CIP Motion Drive (37)",
-            "(1)\n",
+            "(65535)\n",
             "productName: Axisbridge two axes",
             "serialNumber: 0x0001e240",
             "productCode: 1001",

@@ -274,9 +274,14 @@ fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
         std::fs::write(&config, &found).expect("the scratch folder can be written");
         let starter = found;
 
+        // Where the axis ends no bus knows: its limits are asked for, each line to be edited is named, and nothing else.
+        let marks =
+            starter.lines().filter(|line| !line.starts_with('#') && line.contains("# CHANGE")).count();
         let (status, found, said) = output(&["check", "--config", path]);
-        assert_eq!(status, Some(0), "{found}{said}");
-        assert!(found.starts_with("0 errors, 0 warnings"), "{found}");
+        assert_eq!(status, Some(1), "{found}{said}");
+        assert!(found.contains("warning[AX0082]: the linear axis `axis-8`"), "{found}");
+        assert_eq!(found.matches("warning[AX0090]").count(), marks, "{found}");
+        assert!(found.contains(&format!("\n0 errors, {} warnings", marks + 1)), "{found}");
         let (status, found, said) = output(&["scan", "--config", path]);
         assert_eq!(status, Some(0), "{found}{said}");
         assert!(!found.contains("# !"), "the bus is the one of the configuration: {found}");

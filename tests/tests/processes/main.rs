@@ -3,6 +3,7 @@
 mod demo;
 mod doctor;
 mod ending;
+mod local;
 mod reload;
 mod scripts;
 mod two_clocks;

@@ -11,7 +11,7 @@ use profile_cip::device::exception::ExceptionAction;
 use profile_cip::device::fault_log::LogKind;
 use profile_cip::wire::motion::attribute_list::{AttributeSelector, Range};
 use profile_cip::wire::motion::codes::{AlarmType, AxisStateCode, ClearingEvent, FaultType};
-use profile_generic::fault::FaultCause;
+use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::quantity::Torque;
 use profile_generic::state::{DriveState, Report};
@@ -217,6 +217,53 @@ fn a_warning_of_the_drive_is_an_alarm_while_it_lasts_and_stops_nothing() {
     assert_eq!((words.exceptions, words.alarms), ([0, 0], [0; 4]));
     let report = rig.run(millis(30_000));
     assert_eq!(report.failure, None, "{}", rig.log());
+}
+
+#[test]
+fn a_warning_that_shall_be_a_major_fault_stops_the_axis_by_its_own_cause() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        action_of(1, 6, ExceptionAction::MAJOR_FAULT),
+        Step::Enable(TURNTABLE_ONLY),
+        Step::MoveAbsolute { axis: 1, position: 40.0, limits: TURNTABLE },
+    ]);
+    rig.run_until(millis(20_000), "full speed", |rig| rig.velocity(0) > 49 * NANO / 10);
+    rig.drive_mut(0).set_warnings(1 << 2);
+    rig.run_until(millis(100), "the fault", |rig| rig.engine.axes()[0].fault().is_some());
+    let fault = rig.engine.axes()[0].fault().map(|fault| (fault.cause, fault.reaction));
+    let cause = FaultCause::MOTOR_OVER_TEMPERATURE_USER_LIMIT;
+    assert_eq!(fault, Some((cause, Reaction::DecelerateAndDisable)));
+    let report = rig.run(millis(20_000));
+    assert!(matches!(report.failure, Some(Failure::AxisNotRunning { axis: 1, .. })), "{report}");
+    assert_eq!(codes(&rig, 0), [(FaultType::AXIS, 6)]);
+    rig.run_until(millis(3_000), "rest", at_rest);
+    assert!(rig.torque_free());
+}
+
+#[test]
+fn an_action_that_changes_counts_for_a_warning_that_stands() {
+    let mut rig = Rig::ready(Settings::default());
+    rig.connect(vec![
+        Step::Enable(TURNTABLE_ONLY),
+        Step::Disable(TURNTABLE_ONLY),
+        Step::Dwell { seconds: 0.5 },
+        action_of(1, 6, ExceptionAction::MAJOR_FAULT),
+        Step::Dwell { seconds: 0.5 },
+        Step::FaultReset(TURNTABLE_ONLY),
+        Step::Enable(TURNTABLE_ONLY),
+        Step::Disable(TURNTABLE_ONLY),
+    ]);
+    rig.run_until(millis(20_000), "the disable", |rig| rig.report().steps_finished == 2);
+    rig.drive_mut(0).set_warnings(1 << 2);
+    rig.run_until(millis(20_000), "the action", |rig| rig.report().steps_finished == 4);
+    rig.run_for(millis(100));
+    assert_eq!(alarms(&rig, 0), [(AlarmType::AXIS, 6, 1), (AlarmType::AXIS, 6, 0)], "no alarm any more");
+    assert_eq!(rig.report().axes[0].state, Some(AxisStateCode::MAJOR_FAULTED));
+    let axis = &rig.engine.axes()[0];
+    assert_eq!((axis.state(), axis.fault()), (DriveState::Ready, None), "there is no torque to take away");
+    rig.drive_mut(0).set_warnings(0);
+    let report = rig.run(millis(20_000));
+    assert_eq!((report.failure, codes(&rig, 0)), (None, vec![(FaultType::AXIS, 6)]), "{}", rig.log());
 }
 
 /// Diagnostic messages of the drive that were logged, in order.

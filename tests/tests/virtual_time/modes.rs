@@ -10,7 +10,6 @@ use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::state::{DriveState, Request};
 use profile_generic::time::DurationNs;
-use profile_sercos::slave::drive::homing::idn as homing;
 use profile_sercos::wire::idn::Idn;
 
 const NANO: i64 = 1_000_000_000;
@@ -34,11 +33,11 @@ fn ready() -> GenericRig {
     let window = CaptureWindow { from: Position(1_300_000_000), to: Position(1_600_000_000) };
     rig.drive_mut().servo_mut().set_home_switch(Some(window));
     // The reference point is 0.05 turns behind the marker, and its position 10 turns, in 0.0001 degree.
-    rig.set_number(homing::REFERENCE, 36_000_000);
-    rig.set_number(homing::OFFSET, 180_000);
+    rig.set_number(Idn::REFERENCE_DISTANCE_1, 36_000_000);
+    rig.set_number(Idn::REFERENCE_OFFSET_1, 180_000);
     // 60 revolutions a minute, and 5 turns per second squared in 0.001 rad/s2.
-    rig.set_number(homing::VELOCITY, 600_000);
-    rig.set_number(homing::ACCELERATION, 31_416);
+    rig.set_number(Idn::HOMING_VELOCITY, 600_000);
+    rig.set_number(Idn::HOMING_ACCELERATION, 31_416);
     rig
 }
 
@@ -196,8 +195,8 @@ fn a_drive_without_acknowledgement_homes_as_well() {
         GenericRig::ready([POSITION, BY_DRIVE], with_velocity_limit(), |needs, _| needs.silent = true);
     rig.drive_mut().set_silent(true);
     // Without a switch: the first marker.
-    rig.set_number(homing::PARAMETER, 0b0010_0000);
-    rig.set_number(homing::REFERENCE, -36_000_000);
+    rig.set_number(Idn::HOMING_PARAMETER, 0b0010_0000);
+    rig.set_number(Idn::REFERENCE_DISTANCE_1, -36_000_000);
     rig.enable();
     rig.run_for(50);
     rig.want(|command| command.select(BY_DRIVE));
@@ -226,7 +225,7 @@ fn homing_that_is_no_longer_wanted_is_cancelled() {
     rig.run_for(300);
     assert!(!status(&rig, StatusBits::HOMED) && !status(&rig, StatusBits::HOMING_FAILED));
     assert_eq!((rig.feedback().selection(), rig.state()), (POSITION, DriveState::Operating));
-    let set = |rig: &GenericRig| rig.number(homing::BY_DRIVE);
+    let set = |rig: &GenericRig| rig.number(Idn::DRIVE_CONTROLLED_HOMING);
     assert_eq!(set(&rig), 0, "the command was taken back");
     // It can be asked for again.
     rig.velocity = None;
@@ -238,7 +237,7 @@ fn homing_that_is_no_longer_wanted_is_cancelled() {
 fn homing_that_the_drive_refuses_has_failed_and_the_axis_stands() {
     let mut rig = ready();
     // Neither switch nor marker.
-    rig.set_number(homing::PARAMETER, 0b0110_0000);
+    rig.set_number(Idn::HOMING_PARAMETER, 0b0110_0000);
     rig.enable();
     rig.want(|command| command.select(BY_DRIVE));
     rig.run_until(500, "the refusal", |rig| status(rig, StatusBits::HOMING_FAILED));
@@ -247,7 +246,7 @@ fn homing_that_the_drive_refuses_has_failed_and_the_axis_stands() {
     assert_eq!(rig.state(), DriveState::Operating);
     assert!(rig.position().abs() < NANO / 1_000);
     // Not tried again before it is asked for anew.
-    rig.set_number(homing::PARAMETER, 0);
+    rig.set_number(Idn::HOMING_PARAMETER, 0);
     rig.run_for(500);
     assert!(rig.speed().abs() < NANO / 100);
     rig.lead(0, POSITION);
@@ -268,7 +267,7 @@ fn an_error_of_the_drive_ends_homing() {
     rig.run_until(2_000, "the fault", |rig| rig.state() == DriveState::Faulted);
     assert!(status(&rig, StatusBits::HOMING_FAILED) || !status(&rig, StatusBits::HOMED));
     rig.run_for(500);
-    assert_eq!(rig.number(homing::BY_DRIVE), 0, "the command was taken back");
+    assert_eq!(rig.number(Idn::DRIVE_CONTROLLED_HOMING), 0, "the command was taken back");
     rig.drive_mut().clear_fault(FaultCause::OVER_CURRENT);
     rig.want(|command| command.request = Some(Request::FaultReset));
     rig.run_until(3_000, "the reset", |rig| rig.state() == DriveState::Ready);
@@ -293,7 +292,7 @@ fn a_stop_ends_homing_and_takes_the_torque() {
     rig.run_until(3_000, "the end of the torque", |rig| rig.state() == DriveState::Ready);
     assert!(rig.speed().abs() < NANO / 50, "{}", rig.speed());
     rig.run_for(300);
-    assert_eq!(rig.number(homing::BY_DRIVE), 0, "the command was taken back");
+    assert_eq!(rig.number(Idn::DRIVE_CONTROLLED_HOMING), 0, "the command was taken back");
 }
 
 #[test]
@@ -310,7 +309,7 @@ fn without_its_north_side_a_homing_axis_stops() {
     });
     assert_eq!(rig.axis().fault().map(|fault| fault.cause), Some(FaultCause::COMMAND_LOST));
     rig.run_for(300);
-    assert_eq!(rig.number(homing::BY_DRIVE), 0, "the command was taken back");
+    assert_eq!(rig.number(Idn::DRIVE_CONTROLLED_HOMING), 0, "the command was taken back");
 }
 
 /// The bus is cut in the middle of homing: nothing of it is left when it is back.
@@ -345,7 +344,7 @@ fn the_controller_homes_with_the_drives_help() {
     rig.lead(NANO / 2, BY_CONTROLLER);
     rig.run_until(10_000, "the marker", |rig| status(rig, StatusBits::HOME_FOUND));
     assert_eq!(rig.feedback().selection(), BY_CONTROLLER);
-    assert_eq!(rig.number(homing::REGISTERED), 1);
+    assert_eq!(rig.number(Idn::REFERENCE_MARKER_PULSE_REGISTERED), 1);
     assert!((rig.speed() - NANO / 2).abs() < NANO / 20, "led by set-points: {}", rig.speed());
     let before = rig.position();
     rig.run_for(200);
@@ -359,7 +358,11 @@ fn the_controller_homes_with_the_drives_help() {
     assert!((rig.feedback().position.get() - here).abs() < NANO / 1_000);
     rig.run_for(200);
     assert!((rig.position() - here).abs() < NANO / 200, "a jump from {here} to {}", rig.position());
-    for command in [homing::BY_MASTER, homing::CALCULATE, homing::DISPLACE] {
+    for command in [
+        Idn::CONTROL_UNIT_CONTROLLED_HOMING,
+        Idn::CALCULATE_DISPLACEMENT,
+        Idn::DISPLACEMENT_TO_THE_REFERENCED_SYSTEM,
+    ] {
         assert_eq!(rig.number(command), 0, "{command} was taken back");
     }
     rig.lead(NANO, POSITION);
@@ -374,7 +377,7 @@ fn what_a_drive_lacks_it_is_not_asked_for() {
     let modes = [POSITION, TARGET, BY_DRIVE];
     let rig = GenericRig::ready(modes, Limits::default(), |_, line| {
         line.slaves_mut()[0].store_mut().remove(Idn::standard(258));
-        line.slaves_mut()[0].store_mut().remove(homing::BY_DRIVE);
+        line.slaves_mut()[0].store_mut().remove(Idn::DRIVE_CONTROLLED_HOMING);
     });
     let program = rig.axis().south().expect("a program");
     assert!(program.has_mode(POSITION) && !program.has_mode(TARGET) && !program.has_mode(BY_DRIVE));

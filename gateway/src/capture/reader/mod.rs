@@ -55,7 +55,7 @@ pub enum ReadError {
     Truncated {
         /// Where it begins.
         offset: u64,
-        /// What it is.
+        /// Name of the block or field.
         what: &'static str,
         /// Bytes it needs.
         expected: u64,
@@ -235,6 +235,12 @@ impl<R: Read> Reader<R> {
             _ => return Err(ReadError::UnknownFormat { found: magic }),
         };
         Ok(Self { source, format, frames: 0, body: Vec::new() })
+    }
+
+    /// Bytes of the file that were read so far.
+    #[must_use]
+    pub fn offset(&self) -> u64 {
+        self.source.offset
     }
 
     /// The next frame; `None` at the end of the file.

@@ -65,8 +65,13 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
     let settings = Arc::new(Store::open(None)?);
-    let running = runner::start(&config, mapping.clone(), Some(&arguments.capture), &settings)
-        .map_err(|error| in_use(error, arguments.listen))?;
+    let running = runner::start(
+        &config,
+        mapping.clone(),
+        runner::Extras { capture: Some(&arguments.capture), local: None },
+        &settings,
+    )
+    .map_err(|error| in_use(error, arguments.listen))?;
     progress.step(&format!(
         "gateway on {}, {} simulated drives behind: {}",
         arguments.listen,

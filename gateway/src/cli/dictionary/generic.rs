@@ -1,7 +1,15 @@
 //! The generic dictionary as a table.
 
 use super::sheet::{Cell, Sheet};
-use crate::mapping::GenericDictionary;
+use crate::mapping::{GenericDictionary, GenericParameter};
+
+/// What a parameter is; that of an overlay has its range here.
+fn note(row: &GenericParameter) -> String {
+    match row.range {
+        None => row.description.clone(),
+        Some((low, high)) => format!("{} Range: {low} to {high}.", row.description).trim_start().to_owned(),
+    }
+}
 
 /// Parameters, by number, and the signals of the process image, which have none.
 pub fn instance(dictionary: &GenericDictionary) -> Sheet {
@@ -9,13 +17,13 @@ pub fn instance(dictionary: &GenericDictionary) -> Sheet {
     let parameters = dictionary.parameters().iter().map(|row| {
         vec![
             row.parameter.0.into(),
-            row.parameter.name().into(),
+            row.name.as_str().into(),
             "parameter".into(),
             row.quantity.name().into(),
             row.quantity.unit().into(),
             row.kind.name().into(),
             row.access.name().into(),
-            row.description.into(),
+            note(row).as_str().into(),
         ]
     });
     let signals = dictionary.signals().iter().map(|signal| {

@@ -7,6 +7,27 @@ use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
 use crate::mapping::CaptureMode;
 
+/// What an axis counts in.
+pub(in crate::config) const UNITS: [(&str, AxisKind); 2] =
+    [("revolution", AxisKind::Rotary), ("millimetre", AxisKind::Linear)];
+
+/// How captures are read.
+pub(in crate::config) const EVENTS: [(&str, CaptureMode); 3] = [
+    ("cyclic", CaptureMode::Cyclic),
+    ("service-channel", CaptureMode::ServiceChannel),
+    ("off", CaptureMode::Off),
+];
+
+/// What an axis can be.
+pub(in crate::config) fn functions() -> [(&'static str, AxisFunction); 3] {
+    AxisFunction::ALL.map(|function| (function.name(), function))
+}
+
+/// What an axis can do when commands stay away.
+pub(in crate::config) fn stopping_actions() -> [(&'static str, StoppingAction); 5] {
+    StoppingAction::ALL.map(|action| (action.name(), action))
+}
+
 pub(super) fn check(
     problems: &mut Problems,
     table: &AxisTable,
@@ -20,16 +41,7 @@ pub(super) fn check(
         problems.unknown("drive", &table.drive, drives.iter().map(|(name, _)| name.get_ref()));
     }
     let function = function(problems, table);
-    let kind = match table.unit.get_ref().as_str() {
-        "revolution" => Some(AxisKind::Rotary),
-        "millimetre" => Some(AxisKind::Linear),
-        other => problems.report_as(
-            code::UNKNOWN_WORD,
-            table.unit.span(),
-            format_args!("unknown axis unit `{other}`"),
-            "expected \"revolution\" or \"millimetre\"",
-        ),
-    };
+    let kind = value::word(problems, &table.unit, "axis unit", &UNITS);
     let counts = 1..=i64::from(i32::MAX);
     let motion_resolution = value::number_or(
         problems,
@@ -56,8 +68,14 @@ pub(super) fn check(
         Some(DriveAt::Can { .. }) => CaptureMode::ServiceChannel,
         _ => CaptureMode::Cyclic,
     };
-    let events = capture_mode(problems, table.events.as_ref(), usual);
-    let on_command_loss = stopping_action(problems, table.on_command_loss.as_ref());
+    let events = value::word_or(problems, table.events.as_ref(), "way to capture events", &EVENTS, usual);
+    let on_command_loss = value::word_or(
+        problems,
+        table.on_command_loss.as_ref(),
+        "stopping action",
+        &stopping_actions(),
+        StoppingAction::RampedDecelAndDisable,
+    );
     Some(Axis {
         name: name?,
         instance: instance?,
@@ -77,8 +95,7 @@ pub(super) fn check(
 /// What the axis is, and whether that goes with the rest of its table.
 fn function(problems: &mut Problems, table: &AxisTable) -> Option<AxisFunction> {
     let Some(name) = &table.function else { return Some(AxisFunction::Drive) };
-    let all = AxisFunction::ALL.map(|function| (function.name(), function));
-    let function = value::word(problems, name, "axis function", &all)?;
+    let function = value::word(problems, name, "axis function", &functions())?;
     if function == AxisFunction::Drive {
         return Some(function);
     }
@@ -103,31 +120,6 @@ fn function(problems: &mut Problems, table: &AxisTable) -> Option<AxisFunction> 
         problems.push(problem.related(name.span(), "the function of the axis"));
     }
     (problems.len() == before).then_some(function)
-}
-
-fn capture_mode(
-    problems: &mut Problems,
-    name: Option<&Spanned<String>>,
-    usual: CaptureMode,
-) -> Option<CaptureMode> {
-    let Some(name) = name else { return Some(usual) };
-    match name.get_ref().as_str() {
-        "cyclic" => Some(CaptureMode::Cyclic),
-        "service-channel" => Some(CaptureMode::ServiceChannel),
-        "off" => Some(CaptureMode::Off),
-        other => problems.report_as(
-            code::UNKNOWN_WORD,
-            name.span(),
-            "unknown way to capture events",
-            format!("expected cyclic, service-channel or off, found {other}"),
-        ),
-    }
-}
-
-fn stopping_action(problems: &mut Problems, name: Option<&Spanned<String>>) -> Option<StoppingAction> {
-    let Some(name) = name else { return Some(StoppingAction::RampedDecelAndDisable) };
-    let all = StoppingAction::ALL.map(|action| (action.name(), action));
-    value::word(problems, name, "stopping action", &all)
 }
 
 #[cfg(test)]

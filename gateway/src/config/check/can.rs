@@ -3,7 +3,7 @@
 use profile_cia402::wire::NodeId;
 use profile_generic::can::timing::BitRate;
 use profile_generic::image::Signal;
-use profile_generic::mode::OperatingMode;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
@@ -31,15 +31,27 @@ const AXES: core::ops::RangeInclusive<i64> = 0..=7;
 /// Parts per million in the rated torque.
 const RATED: Option<Ratio> = Ratio::new(1_000_000, 1);
 
-/// What an axis can be used for.
-pub(super) const MODES: [(&str, OperatingMode); 3] = [
+/// What an axis can be used for with set-points.
+pub(in crate::config) const MODES: [(&str, OperatingMode); 3] = [
     ("position", OperatingMode::Position),
     ("velocity", OperatingMode::Velocity),
     ("torque", OperatingMode::Torque),
 ];
 
+/// What an axis can be used for besides, where its drive moves it by itself. CIP Motion has no word for either: local control has.
+const MODES_BY_DRIVE: [(&str, ModeSelection); 2] = [
+    ("positioning", ModeSelection::by_drive(OperatingMode::Position)),
+    ("homing", ModeSelection::by_drive(OperatingMode::Homing)),
+];
+
+/// All of them; an axis starts in one of [`MODES`], which come first.
+pub(in crate::config) fn modes() -> Vec<(&'static str, ModeSelection)> {
+    let led = MODES.map(|(name, mode)| (name, ModeSelection::from(mode)));
+    led.into_iter().chain(MODES_BY_DRIVE).collect()
+}
+
 /// Actual values that can be left out, and whether they are where nothing is said.
-const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
+pub(in crate::config) const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
     ("velocity", (Signal::VelocityActual, true)),
     ("torque", (Signal::TorqueActual, true)),
     ("following-error", (Signal::FollowingError, false)),
@@ -47,11 +59,12 @@ const ACTUAL_VALUES: [(&str, (Signal, bool)); 4] = [
 ];
 
 /// Modes of operation of drives (6060).
-const DRIVE_MODES: [(&str, i8); 9] =
+pub(in crate::config) const DRIVE_MODES: [(&str, i8); 9] =
     [("pp", 1), ("vl", 2), ("pv", 3), ("tq", 4), ("hm", 6), ("ip", 7), ("csp", 8), ("csv", 9), ("cst", 10)];
 
 /// Offsets that can be sent.
-const OFFSETS: [(&str, Signal); 2] = [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
+pub(in crate::config) const OFFSETS: [(&str, Signal); 2] =
+    [("velocity", Signal::VelocityOffset), ("torque", Signal::TorqueOffset)];
 
 /// All CAN buses.
 pub(super) fn check(problems: &mut Problems, tables: &[Spanned<CanTable>]) -> Option<Vec<Can>> {
@@ -63,6 +76,12 @@ pub(super) fn check(problems: &mut Problems, tables: &[Spanned<CanTable>]) -> Op
 fn check_bus(problems: &mut Problems, table: &CanTable) -> Option<Can> {
     let link = can_link(problems, &table.interface, table.set_bit_rate);
     let bit_rate = value::number_or(problems, &table.bit_rate, "the bit rate", BIT_RATES, DEFAULT_BIT_RATE);
+    if bit_rate.is_none()
+        && let Some(thousands) = table.bit_rate.as_ref().and_then(|rate| rate.get_ref().checked_mul(1_000))
+        && BIT_RATES.contains(&thousands)
+    {
+        problems.help(format!("write {thousands} if this is in kbit/s"));
+    }
     let cycle_time = sync_time(problems, &table.cycle_time);
     let node = value::number_or(problems, &table.node, "the node-id of the box", NODES, DEFAULT_NODE);
     let heartbeat_ms = match &table.heartbeat {
@@ -121,7 +140,8 @@ fn can_places(problems: &mut Problems, table: &CanTable, own: Option<u8>) {
             problems.push(problem.related(first.get_ref().node.span(), "used here first"));
         }
         if own.is_some_and(|own| i64::from(own) == *node.get_ref()) {
-            problems.report::<()>(
+            problems.report_as::<()>(
+                code::CONTRADICTION,
                 node.span(),
                 format_args!("node-id {} is that of the gateway", node.get_ref()),
                 "expected another one, or another `node` of the bus",
@@ -160,10 +180,7 @@ fn check_drive(problems: &mut Problems, table: &CanDriveTable) -> Option<CanDriv
     let name = value::name(problems, "drive", &table.name);
     let node = value::number(problems, &table.node, "the node-id", NODES);
     let axis = value::number_or(problems, &table.axis, "the axis of the device", AXES, 0);
-    let modes = value::optional(&table.modes, |names| value::words(problems, names, "mode", &MODES));
-    if let Some(names) = table.modes.as_ref().filter(|names| names.get_ref().is_empty()) {
-        problems.report::<()>(names.span(), "an axis without a mode", "expected at least one mode");
-    }
+    let modes = value::optional(&table.modes, |names| check_modes(problems, names));
     let sent = match &table.actual_values {
         None => Some(ACTUAL_VALUES.map(|(_, value)| value).into_iter().filter(|(_, usual)| *usual).collect()),
         Some(names) => value::words(problems, names, "actual value", &ACTUAL_VALUES),
@@ -209,6 +226,28 @@ fn check_drive(problems: &mut Problems, table: &CanDriveTable) -> Option<CanDriv
         way_of_a_turn: way_of_a_turn?,
         counts: counts?,
     })
+}
+
+/// What an axis is used for; the first one is active at the start, and set-points lead it.
+pub(super) fn check_modes(
+    problems: &mut Problems,
+    names: &Spanned<Vec<Spanned<String>>>,
+) -> Option<Vec<ModeSelection>> {
+    let all = modes();
+    let modes = value::words(problems, names, "mode", &all)?;
+    match (names.get_ref().first(), modes.first()) {
+        (Some(_), Some(first)) if all[..MODES.len()].iter().any(|(_, mode)| mode == first) => Some(modes),
+        (Some(name), _) => problems.report(
+            name.span(),
+            format_args!("an axis cannot start in the mode `{}`", name.get_ref()),
+            "expected \"position\", \"velocity\" or \"torque\" first",
+        ),
+        (None, _) => problems.report(
+            names.span(),
+            "an axis without a mode",
+            "expected at least one mode of \"position\", \"velocity\" and \"torque\"",
+        ),
+    }
 }
 
 fn check_counts(problems: &mut Problems, table: &CountsTable) -> Option<Vec<(Quantity, Ratio)>> {

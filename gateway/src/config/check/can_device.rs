@@ -17,10 +17,10 @@ const LIFE_TIME_FACTORS: core::ops::RangeInclusive<i64> = 2..=255;
 const DEFAULT_LIFE_TIME_FACTOR: u8 = 3;
 
 /// Whether a node-id is kept.
-const LSS: [(&str, bool); 2] = [("assign", false), ("store", true)];
+pub(in crate::config) const LSS: [(&str, bool); 2] = [("assign", false), ("store", true)];
 
 /// What a device has to say of itself.
-const DEVICE_TYPES: [(&str, Expected); 2] =
+pub(in crate::config) const DEVICE_TYPES: [(&str, Expected); 2] =
     [("drive", Expected::DRIVE), ("any", Expected { profile: None, ..Expected::DRIVE })];
 
 /// Transmission types that PDOs can be used with.
@@ -28,7 +28,7 @@ const RPDO_TYPES: &[core::ops::RangeInclusive<u8>] = &[0..=240, 254..=255];
 const TPDO_TYPES: &[core::ops::RangeInclusive<u8>] = &[1..=1, 254..=255];
 
 /// Whether the mapping of PDOs is kept.
-const MAPPINGS: [(&str, bool); 2] = [("write", false), ("keep", true)];
+pub(in crate::config) const MAPPINGS: [(&str, bool); 2] = [("write", false), ("keep", true)];
 
 /// The devices of a bus that something is said of.
 pub(super) fn check(problems: &mut Problems, bus: &CanTable) -> Option<Vec<CanDevice>> {
@@ -41,7 +41,12 @@ pub(super) fn check(problems: &mut Problems, bus: &CanTable) -> Option<Vec<CanDe
                 .expected("expected all that is said of a device in one [[south.can.device]]");
             problems.push(problem.related(first.get_ref().node.span(), "said here first"));
         }
-        if !bus.drive.iter().any(|drive| drive.get_ref().node.get_ref() == node.get_ref()) {
+        // Of two drives with the same node-id one may have been meant to have this one.
+        let nodes: Vec<_> = bus.drive.iter().map(|drive| *drive.get_ref().node.get_ref()).collect();
+        let twice = bus.drive.iter().enumerate().any(|(at, drive)| {
+            drive.get_ref().axis.is_none() && nodes[..at].contains(drive.get_ref().node.get_ref())
+        });
+        if !twice && !nodes.contains(node.get_ref()) {
             problems.report_as::<()>(
                 code::CONFIG_REFERENCE,
                 node.span(),

@@ -17,6 +17,10 @@ const DEFAULT_UPDATE_PERIOD_MAX: DurationNs = DurationNs::from_millis(32);
 const DEFAULT_REVISION: (u8, u8) = (1, 1);
 const DEFAULT_PRODUCT_NAME: &str = "Axisbridge";
 
+/// Formats of the motion connection.
+pub(in crate::config) const FORMATS: [(&str, Format); 2] =
+    [("variable", Format::Variable), ("fixed", Format::Fixed)];
+
 pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: DurationNs) -> Option<Device> {
     let name = value::name(problems, "device", &table.name);
     let listen = value::own_address(problems, &table.listen);
@@ -144,21 +148,14 @@ fn one_update_period(problems: &mut Problems, text: &Spanned<String>) -> Option<
 fn connection_format(problems: &mut Problems, table: &DeviceTable) -> Option<Format> {
     let Some(format) = &table.connection_format else { return Some(Format::Variable) };
     let axes = table.axes.get_ref().len();
-    match format.get_ref().as_str() {
-        "variable" => Some(Format::Variable),
-        "fixed" if axes > 1 => problems.report_as(
+    match value::word(problems, format, "connection format", &FORMATS)? {
+        Format::Fixed if axes > 1 => problems.report_as(
             code::CONTRADICTION,
             format.span(),
             format_args!("the fixed connection format for a device with {axes} axes"),
             "expected \"variable\", or a single axis in the device",
         ),
-        "fixed" => Some(Format::Fixed),
-        other => problems.report_as(
-            code::UNKNOWN_WORD,
-            format.span(),
-            format_args!("unknown connection format `{other}`"),
-            "expected \"variable\" or \"fixed\"",
-        ),
+        format => Some(format),
     }
 }
 

@@ -25,12 +25,12 @@ const MILLISECOND_NS: i64 = 1_000_000;
 
 /// What a drive can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(in crate::config) enum Kind {
     Motion,
     Speed,
 }
 
-const KINDS: [(&str, Kind); 2] = [("motion", Kind::Motion), ("ac-dc", Kind::Speed)];
+pub(in crate::config) const KINDS: [(&str, Kind); 2] = [("motion", Kind::Motion), ("ac-dc", Kind::Speed)];
 
 /// All DeviceNet networks.
 pub(super) fn check(problems: &mut Problems, tables: &[Spanned<DevicenetTable>]) -> Option<Vec<Devicenet>> {
@@ -110,7 +110,8 @@ fn mac_ids(problems: &mut Problems, table: &DevicenetTable, own: Option<u8>) {
             problems.push(problem.related(first.span(), "used here first"));
         }
         if own.is_some_and(|own| i64::from(own) == *mac.get_ref()) {
-            problems.report::<()>(
+            problems.report_as::<()>(
+                code::CONTRADICTION,
                 mac.span(),
                 format_args!("MAC ID {} is that of the gateway", mac.get_ref()),
                 "expected another one, or another `mac_id` of the network",

@@ -3,17 +3,17 @@
 //! One file for each subject: its function `check` takes the tables of that subject and returns what they come to, or reports what is
 //! wrong and returns `None`, so that the rest of the file is still checked.
 
-mod axis;
-mod can;
-mod can_device;
-mod device;
-mod devicenet;
+pub(super) mod axis;
+pub(super) mod can;
+pub(super) mod can_device;
+pub(super) mod device;
+pub(super) mod devicenet;
 mod limits;
 mod modbus;
 mod problems;
 mod realtime;
 mod references;
-mod sercos;
+pub(super) mod sercos;
 mod value;
 
 use std::path::PathBuf;
@@ -26,8 +26,15 @@ pub(crate) use self::sercos::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER};
 use self::problems::Problems;
 use super::file::{File, RealtimeTable, SouthTable};
 use super::{AXES_MAX, Config, DEVICES_MAX, LogLevel, TimeSource};
-use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
+
+/// Where system time can come from.
+pub(super) const TIME_SOURCES: [(&str, TimeSource); 1] = [("host", TimeSource::Host)];
+
+/// What can be logged.
+pub(super) fn log_levels() -> [(&'static str, LogLevel); 5] {
+    LogLevel::ALL.map(|level| (level.name(), level))
+}
 
 /// Checks a file.
 pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
@@ -109,31 +116,13 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
 }
 
 fn time(problems: &mut Problems, file: &File) -> Option<TimeSource> {
-    match file.time.as_ref().and_then(|table| table.source.as_ref()) {
-        Some(source) if source.get_ref() != "host" => problems.report_as(
-            code::UNKNOWN_WORD,
-            source.span(),
-            format_args!("unknown time source `{}`", source.get_ref()),
-            "expected \"host\"",
-        ),
-        _ => Some(TimeSource::Host),
-    }
+    let source = file.time.as_ref().and_then(|table| table.source.as_ref());
+    value::word_or(problems, source, "time source", &TIME_SOURCES, TimeSource::Host)
 }
 
 fn log_level(problems: &mut Problems, file: &File) -> Option<LogLevel> {
-    let Some(level) = file.log.as_ref().and_then(|table| table.level.as_ref()) else {
-        return Some(LogLevel::Info);
-    };
-    let levels = [LogLevel::Error, LogLevel::Warn, LogLevel::Info, LogLevel::Debug, LogLevel::Trace];
-    match levels.into_iter().find(|candidate| candidate.name() == level.get_ref()) {
-        Some(level) => Some(level),
-        None => problems.report_as(
-            code::UNKNOWN_WORD,
-            level.span(),
-            format_args!("unknown log level `{}`", level.get_ref()),
-            "expected \"error\", \"warn\", \"info\", \"debug\" or \"trace\"",
-        ),
-    }
+    let level = file.log.as_ref().and_then(|table| table.level.as_ref());
+    value::word_or(problems, level, "log level", &log_levels(), LogLevel::Info)
 }
 
 /// Without any bus there is nothing behind the box.

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::ops::Range;
 
 use crate::finding::registry::{self as code, Code};
-use crate::finding::{Problem, Spanned};
+use crate::finding::{Problem, Spanned, closest};
 
 /// The problems found so far. Reporting one gives `None`, for functions that return nothing where a value cannot be used.
 #[derive(Default)]
@@ -46,6 +46,13 @@ impl Problems {
         None
     }
 
+    /// What to do about the last one.
+    pub(super) fn help(&mut self, help: impl Into<String>) {
+        if let Some(last) = self.0.last_mut() {
+            last.help = help.into();
+        }
+    }
+
     pub(super) fn duplicate(&mut self, what: &str, first: Range<usize>, second: Range<usize>) {
         let problem = Problem::new(code::TWICE, second).title(format!("{what} is used twice"));
         self.0.push(problem.expected("expected one that is not used yet").related(first, "used here first"));
@@ -77,16 +84,15 @@ impl Problems {
         name: &Spanned<String>,
         known: impl Iterator<Item = &'a String>,
     ) {
-        let known: Vec<String> = known.map(|name| format!("`{name}`")).collect();
+        let known: Vec<&str> = known.map(String::as_str).collect();
+        let all: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
         let expected = match known.is_empty() {
             true => format!("expected one that is there: there is no {what}"),
-            false => format!("expected one of {}", known.join(", ")),
+            false => format!("expected one of {}", all.join(", ")),
         };
-        self.report_as::<()>(
-            code::CONFIG_REFERENCE,
-            name.span(),
-            format_args!("there is no {what} `{}`", name.get_ref()),
-            expected,
-        );
+        let title = format!("there is no {what} `{}`", name.get_ref());
+        let problem = Problem::new(code::CONFIG_REFERENCE, name.span()).title(title).expected(expected);
+        let near = closest(name.get_ref(), known).map(|near| format!("did you mean `{near}`?"));
+        self.0.push(problem.help(near.unwrap_or_default()));
     }
 }

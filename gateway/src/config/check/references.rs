@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::Problems;
 use crate::config::DriveAt;
 use crate::config::file::{AxisTable, DeviceTable, File};
-use crate::finding::Spanned;
 use crate::finding::registry as code;
+use crate::finding::{Spanned, closest};
 use crate::mapping::{ETHERNET_IP, networks};
 
 /// For each axis the device that lists it.
@@ -16,6 +16,9 @@ pub(super) fn owners(
     axes: &[Spanned<AxisTable>],
 ) -> Vec<Option<usize>> {
     let mut owners: Vec<Option<(usize, Range<usize>)>> = vec![None; axes.len()];
+    // Axes that a device names in another spelling: they are not reported again.
+    let mut meant: Vec<&str> = Vec::new();
+    let names = || axes.iter().map(|axis| axis.get_ref().name.get_ref().as_str());
     for (index, device) in devices.iter().enumerate() {
         let listed = &device.get_ref().axes;
         if listed.get_ref().is_empty() {
@@ -29,6 +32,7 @@ pub(super) fn owners(
         for name in listed.get_ref() {
             let position = axes.iter().position(|axis| axis.get_ref().name.get_ref() == name.get_ref());
             let Some(position) = position else {
+                meant.extend(closest(name.get_ref(), names()));
                 problems.unknown("axis", name, axes.iter().map(|axis| axis.get_ref().name.get_ref()));
                 continue;
             };
@@ -40,8 +44,8 @@ pub(super) fn owners(
         }
     }
     for (axis, owner) in axes.iter().zip(&owners) {
-        if owner.is_none() {
-            let name = &axis.get_ref().name;
+        let name = &axis.get_ref().name;
+        if owner.is_none() && !meant.contains(&name.get_ref().as_str()) {
             problems.report_as::<()>(
                 code::CONFIG_REFERENCE,
                 name.span(),

@@ -3,7 +3,7 @@
 use profile_generic::time::DurationNs;
 use profile_sercos::master::config::{AddressPolicy, MasterConfig};
 
-use super::can::MODES;
+use super::can::check_modes;
 use super::{Problems, names, value};
 use crate::config::file::{DriveTable, SercosTable};
 use crate::config::{Drive, Link, Sercos, duration, rated};
@@ -139,7 +139,7 @@ fn mac(problems: &mut Problems, text: &Spanned<String>) -> Option<[u8; 6]> {
     let bytes: Vec<u8> = text
         .get_ref()
         .split(':')
-        .filter(|part| part.len() == 2)
+        .filter(|part| part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_hexdigit()))
         .filter_map(|part| u8::from_str_radix(part, 16).ok())
         .collect();
     match <[u8; 6]>::try_from(bytes) {
@@ -165,14 +165,7 @@ fn check_drive(problems: &mut Problems, table: &DriveTable) -> Option<Drive> {
             )
         })
     });
-    let modes = value::optional(&table.modes, |names| match names.get_ref().is_empty() {
-        true => problems.report(
-            names.span(),
-            "an axis without a mode",
-            "expected at least one mode of \"position\", \"velocity\" and \"torque\"",
-        ),
-        false => value::words(problems, names, "mode", &MODES),
-    });
+    let modes = value::optional(&table.modes, |names| check_modes(problems, names));
     Some(Drive {
         name: name?,
         address: address?,
@@ -234,5 +227,19 @@ mod tests {
                 "`2` is not a torque or force",
             ]
         );
+    }
+
+    #[test]
+    fn modes_begin_with_one_that_set_points_lead() {
+        let with = |modes: &str| titles("cycle_time = \"1 ms\"", &format!("{DRIVE}modes = [{modes}]\n"));
+        assert_eq!(with("\"velocity\", \"homing\", \"positioning\""), Vec::<String>::new());
+        for (modes, expected) in [
+            ("\"homing\"", "an axis cannot start in the mode `homing`"),
+            ("\"positioning\", \"position\"", "an axis cannot start in the mode `positioning`"),
+            ("", "an axis without a mode"),
+            ("\"position\", \"gearing\"", "unknown mode `gearing`"),
+        ] {
+            assert_eq!(with(modes), [expected], "{modes}");
+        }
     }
 }

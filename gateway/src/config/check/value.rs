@@ -8,8 +8,8 @@ use profile_generic::time::DurationNs;
 
 use super::Problems;
 use crate::config::duration;
-use crate::finding::Spanned;
 use crate::finding::registry as code;
+use crate::finding::{Problem, Spanned, closest};
 
 const NAME_LEN_MAX: usize = 32;
 /// Longest name of a network interface on Linux.
@@ -171,13 +171,49 @@ pub(super) fn word<T: Copy>(
     let found = known.iter().find(|(word, _)| *word == name.get_ref()).map(|(_, value)| *value);
     found.or_else(|| {
         let all: Vec<_> = known.iter().map(|(word, _)| format!("\"{word}\"")).collect();
-        problems.report_as(
-            code::UNKNOWN_WORD,
-            name.span(),
-            format_args!("unknown {what} `{}`", name.get_ref()),
-            format_args!("expected one of {}", all.join(", ")),
-        )
+        let expected = match all.split_last() {
+            Some((last, others @ [_, ..])) => format!("{} or {last}", others.join(", ")),
+            _ => all.concat(),
+        };
+        let near = closest(name.get_ref(), known.iter().map(|(word, _)| *word));
+        let help = near
+            .map(|near| format!("did you mean \"{near}\"?"))
+            .or_else(|| other_word(name.get_ref(), known));
+        let problem = Problem::new(code::UNKNOWN_WORD, name.span());
+        let problem = problem.title(format!("unknown {what} `{}`", name.get_ref()));
+        problems.push(problem.expected(format!("expected {expected}")).help(help.unwrap_or_default()));
+        None
     })
+}
+
+/// What to write for a word that means one of those known.
+fn other_word<T>(word: &str, known: &[(&str, T)]) -> Option<String> {
+    const TURNS: [&str; 10] =
+        ["degree", "degrees", "deg", "\u{B0}", "rad", "radian", "rev", "turn", "turns", "rotation"];
+    const LENGTHS: [&str; 8] = ["mm", "m", "metre", "meter", "cm", "um", "inch", "in"];
+    let has = |word: &str| known.iter().any(|(known, _)| *known == word);
+    let resolution = "; `motion_resolution` says how many counts of the controller it has";
+    match word.to_lowercase().as_str() {
+        "mm" if has("millimetre") => Some("write \"millimetre\"".to_owned()),
+        word if TURNS.contains(&word) && has("revolution") => {
+            Some(format!("write \"revolution\"{resolution}"))
+        }
+        word if LENGTHS.contains(&word) && has("millimetre") => {
+            Some(format!("write \"millimetre\"{resolution}"))
+        }
+        _ => None,
+    }
+}
+
+/// A word of a list that may be missing.
+pub(super) fn word_or<T: Copy>(
+    problems: &mut Problems,
+    name: Option<&Spanned<String>>,
+    what: &str,
+    known: &[(&str, T)],
+    default: T,
+) -> Option<T> {
+    name.map_or(Some(default), |name| word(problems, name, what, known))
 }
 
 /// Words of a list, each once.
@@ -278,7 +314,7 @@ mod tests {
             read(&["one", "one", "three"]),
             Err(vec![
                 "the mode `one` is used twice: expected one that is not used yet".to_owned(),
-                "unknown mode `three`: expected one of \"one\", \"two\"".to_owned(),
+                "unknown mode `three`: expected \"one\" or \"two\"".to_owned(),
             ])
         );
     }

@@ -2,19 +2,18 @@
 //!
 //! The status word of the telegram shows only that there is an error (class 1) or a warning (class 2). The words with the
 //! bits are read when one of them shows, and again and again while it does, because another one may join it. Words
-//! that tell of errors come first; a word is asked for only when the one before it was answered.
+//! that report errors come first; a word is asked for only when the one before it was answered.
 
 use arrayvec::ArrayVec;
-use profile_generic::fault::{Fault, FaultCause, Reaction};
-use profile_generic::fault_set::{FAULT_SET_MAX, Origin};
-use profile_generic::image::StatusBits;
+use profile_generic::fault::{FaultCause, Reaction};
+use profile_generic::fault_set::FAULT_SET_MAX;
+use profile_generic::image::{AxisFeedback, StatusBits};
 use profile_generic::state::Report;
-use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime};
 
-use crate::mapping::Item;
+use crate::mapping::{DriveProgram, Item};
 
 use super::diagnostic_message::Reading;
-use super::{AxisChannel, caused_by_controller};
 
 /// How long the words of a drive with a fault are read without a pause for its cause.
 pub(super) const CAUSE_TIME_OUT: DurationNs = DurationNs::from_millis(500);
@@ -36,6 +35,9 @@ pub(super) struct Diagnosis {
     warnings: Round,
     /// A word with warnings has shown one in this round.
     warning_found: bool,
+    /// The drive shows a fault whose cause is being read since then.
+    cause_wanted: Option<MonotonicTime>,
+    pub message: Reading,
 }
 
 /// Words read one after the other, from the first to the last, then again after a pause.
@@ -45,181 +47,212 @@ struct Round {
     not_before: MonotonicTime,
 }
 
-impl AxisChannel {
-    pub(super) fn shows_error(&self) -> bool {
-        matches!(self.feedback.report, Report::Faulted | Report::FaultReaction)
+/// What the status word of a drive shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shows {
+    pub error: bool,
+    pub warning: bool,
+}
+
+impl Shows {
+    pub fn of(feedback: &AxisFeedback) -> Self {
+        Self {
+            error: matches!(feedback.report, Report::Faulted | Report::FaultReaction),
+            warning: feedback.status.contains(StatusBits::WARNING),
+        }
     }
 
-    pub(super) fn shows_warning(&self) -> bool {
-        self.feedback.status.contains(StatusBits::WARNING)
+    /// Whether it shows anything.
+    pub fn any(self) -> bool {
+        self.error || self.warning
     }
+}
 
+/// What a word has shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Shown {
+    /// Its bits.
+    pub word: u32,
+    /// What they say.
+    pub causes: ArrayVec<(FaultCause, Reaction), FAULT_SET_MAX>,
+    /// Of which kind they are.
+    pub kind: Kind,
+}
+
+/// Errors or warnings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The drive has these errors and, in this word, no others.
+    Errors,
+    /// The drive warns.
+    Warnings {
+        /// The first word of a round: warnings that it does not show are over.
+        first: bool,
+        /// The last word of a round in which none has named a warning.
+        nameless: bool,
+    },
+}
+
+impl Diagnosis {
     /// The diagnostic word that should be read now.
-    #[must_use]
-    pub fn wants_word(&self, now: MonotonicTime) -> Option<Item> {
-        let (program, _) = self.south.as_ref()?;
-        if self.diagnosis.asked.is_some_and(|(.., since)| now.since(since) < ANSWER_TIME_OUT) {
+    pub fn wanted(&self, now: MonotonicTime, program: &DriveProgram, shows: Shows) -> Option<Item> {
+        if self.asked.is_some_and(|(.., since)| now.since(since) < ANSWER_TIME_OUT) {
             return None;
         }
         let due = |round: &Round| now >= round.not_before;
-        if self.shows_error() && due(&self.diagnosis.errors) {
-            return program.diagnostic_words(true).nth(self.diagnosis.errors.place);
+        if shows.error && due(&self.errors) {
+            return program.diagnostic_words(true).nth(self.errors.place);
         }
-        if self.shows_warning() && due(&self.diagnosis.warnings) {
-            return program.diagnostic_words(false).nth(self.diagnosis.warnings.place);
+        if shows.warning && due(&self.warnings) {
+            return program.diagnostic_words(false).nth(self.warnings.place);
         }
         None
     }
 
     /// The word that was wanted is on its way.
-    pub fn word_asked(&mut self, now: MonotonicTime, item: Item) {
-        let errors = self.shows_error() && now >= self.diagnosis.errors.not_before;
-        self.diagnosis.asked = Some((item, errors, now));
+    pub fn ask(&mut self, now: MonotonicTime, item: Item, shows: Shows) {
+        let errors = shows.error && now >= self.errors.not_before;
+        self.asked = Some((item, errors, now));
     }
 
-    /// A diagnostic word of the drive has been read, or could not be.
-    pub fn diagnostic_word(&mut self, now: MonotonicTime, system: SystemTime, item: Item, word: Option<u32>) {
-        let Some((_, errors, _)) = self.diagnosis.asked.take_if(|(asked, ..)| *asked == item) else { return };
-        let mut shown: ArrayVec<(FaultCause, Reaction), FAULT_SET_MAX> = ArrayVec::new();
+    /// A word has been read, or could not be; `None` when nothing follows from it.
+    pub fn take(
+        &mut self,
+        now: MonotonicTime,
+        item: Item,
+        word: Option<u32>,
+        program: Option<&DriveProgram>,
+        shows: Shows,
+    ) -> Option<Shown> {
+        let (_, errors, _) = self.asked.take_if(|(asked, ..)| *asked == item)?;
+        let word = word.unwrap_or(0);
+        let mut causes = ArrayVec::new();
         let mut last = true;
-        if let Some((program, _)) = &self.south {
+        if let Some(program) = program {
             let of = |(_, reaction): &(FaultCause, Reaction)| reaction.stops() == errors;
-            shown.extend(program.faults(item, word.unwrap_or(0)).filter(of).take(FAULT_SET_MAX));
-            let round = if errors { &self.diagnosis.errors } else { &self.diagnosis.warnings };
+            causes.extend(program.faults(item, word).filter(of).take(FAULT_SET_MAX));
+            let round = if errors { &self.errors } else { &self.warnings };
             last = program.diagnostic_words(errors).nth(round.place + 1).is_none();
         }
-        let word = word.unwrap_or(0);
-        if errors {
-            self.errors_shown(now, system, word, &shown, last);
+        let kind = if errors {
+            self.go_on_with_errors(now, !causes.is_empty(), last, shows)?
         } else {
-            self.warnings_shown(now, system, word, &shown, last);
-        }
+            self.go_on_with_warnings(now, !causes.is_empty(), last, shows)?
+        };
+        Some(Shown { word, causes, kind })
     }
 
     /// The first word that names a cause ends the round: those after it are for drives that say nothing better.
-    fn errors_shown(
+    fn go_on_with_errors(
         &mut self,
         now: MonotonicTime,
-        system: SystemTime,
-        word: u32,
-        shown: &[(FaultCause, Reaction)],
+        found: bool,
         last: bool,
-    ) {
-        let found = !shown.is_empty();
-        let round = &mut self.diagnosis.errors;
-        let searching = self.cause_wanted.is_some();
+        shows: Shows,
+    ) -> Option<Kind> {
+        let searching = self.is_searching();
+        let round = &mut self.errors;
         *round = match (found || last, found || !searching) {
             (false, _) => Round { place: round.place + 1, ..*round },
             (true, true) => Round { place: 0, not_before: now + REREAD },
             // A drive may show the error a moment before its word.
             (true, false) => Round { place: 0, not_before: now },
         };
-        if !found || !self.shows_error() {
-            return;
-        }
-        self.faults.clear_all(Origin::Drive, |cause| shown.iter().any(|(known, _)| *known == cause));
-        for (cause, reaction) in shown {
-            self.drive_fault(now, system, *cause, *reaction, word);
-        }
+        (found && shows.error).then_some(Kind::Errors)
     }
 
-    /// The drive shows an error, and nothing is known of it yet: the axis stops for it, and the controller is told.
-    pub(super) fn undiagnosed_fault(&mut self, now: MonotonicTime, system: SystemTime) {
-        let cause = FaultCause::DRIVE_SPECIFIC;
-        self.drive_fault(now, system, cause, cause.default_reaction(), 0);
-        self.cause_wanted = Some(now);
-    }
-
-    /// The cause of an error of the drive is known, or is not known yet.
-    pub(super) fn drive_fault(
+    fn go_on_with_warnings(
         &mut self,
         now: MonotonicTime,
-        system: SystemTime,
-        cause: FaultCause,
-        reaction: Reaction,
-        word: u32,
-    ) {
-        let refines = self.cause_wanted.take().is_some();
-        let fault = Fault::new(cause, system).with_reaction(reaction).with_vendor_code(word);
-        let new = self.faults.raise(fault, Origin::Drive);
-        if new {
-            self.diagnostic_message.want();
-        }
-        // While a reset is under way the drive may still show what is being reset; what stands is found after it.
-        let resetting = self.reset.is_some_and(|reset| reset.begun);
-        if resetting {
-            return;
-        }
-        let undiagnosed = |known: &Fault| refines && known.cause == FaultCause::DRIVE_SPECIFIC;
-        if let Some(known) = self.fault.filter(undiagnosed) {
-            // It came when the drive first showed it.
-            self.fault = Some(Fault { at: known.at, ..fault });
-        }
-        if new || self.fault.is_none_or(|known| caused_by_controller(known.cause)) {
-            self.take_fault(now, system, fault);
-        }
-    }
-
-    fn warnings_shown(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        word: u32,
-        shown: &[(FaultCause, Reaction)],
+        found: bool,
         last: bool,
-    ) {
-        let round = &mut self.diagnosis.warnings;
+        shows: Shows,
+    ) -> Option<Kind> {
+        let round = &mut self.warnings;
         let first = round.place == 0;
         *round = match last {
             false => Round { place: round.place + 1, ..*round },
             true => Round { place: 0, not_before: now + REREAD },
         };
-        if !self.shows_warning() {
-            return;
+        if !shows.warning {
+            return None;
         }
-        if first {
-            self.diagnosis.warning_found = false;
-            let here = |cause: FaultCause| shown.iter().any(|(known, _)| *known == cause);
-            self.faults.clear_all(Origin::Warning, here);
-        }
-        self.diagnosis.warning_found |= !shown.is_empty();
-        for (cause, reaction) in shown {
-            let fault = Fault::new(*cause, system).with_reaction(*reaction).with_vendor_code(word);
-            self.warn(fault);
-        }
-        if last && !self.diagnosis.warning_found {
-            // It warns, and no row of the tables says of what.
-            self.warn(Fault::new(FaultCause::DRIVE_WARNING, system).with_vendor_code(word));
-        }
+        self.warning_found = found || self.warning_found && !first;
+        Some(Kind::Warnings { first, nameless: last && !self.warning_found })
     }
 
-    fn warn(&mut self, warning: Fault) {
-        if self.faults.raise(warning, Origin::Warning) {
-            self.diagnostic_message.want();
-        }
+    /// The cause of an error is wanted from now on.
+    pub fn want_cause(&mut self, now: MonotonicTime) {
+        self.cause_wanted = Some(now);
     }
 
-    /// What the drive no longer shows is gone.
-    pub(super) fn end_drive_faults(&mut self) {
-        if !self.shows_error() && !self.shows_warning() {
-            self.end_diagnostic_message();
-        }
-        if !self.shows_error() {
-            self.faults.clear_all(Origin::Drive, |_| false);
-            self.diagnosis.errors = Round::default();
-        }
-        if !self.shows_warning() {
-            self.faults.clear_all(Origin::Warning, |_| false);
-            self.diagnosis.warnings = Round::default();
-        }
+    /// Whether the cause of an error is still sought.
+    pub fn is_searching(&self) -> bool {
+        self.cause_wanted.is_some()
     }
 
-    /// The drive is gone, and with it what it was asked.
-    pub(super) fn end_diagnosis(&mut self) {
-        self.diagnosis = Diagnosis::default();
-        self.diagnostic_message = Reading::default();
-        self.cause_wanted = None;
-        self.faults.clear_all(Origin::Drive, |_| false);
-        self.faults.clear_all(Origin::Warning, |_| false);
+    /// The cause is known, or is wanted no longer; whether it was.
+    pub fn end_search(&mut self) -> bool {
+        self.cause_wanted.take().is_some()
+    }
+
+    /// Time passes. Nothing but how often its words are read depends on how long the cause is sought.
+    pub fn tick(&mut self, now: MonotonicTime) {
+        self.cause_wanted.take_if(|since| now.since(*since) > CAUSE_TIME_OUT);
+    }
+
+    /// Ends what the drive no longer shows.
+    pub fn follow(&mut self, shows: Shows) {
+        if !shows.any() {
+            self.message.end();
+        }
+        if !shows.error {
+            self.errors = Round::default();
+        }
+        if !shows.warning {
+            self.warnings = Round::default();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: MonotonicTime = MonotonicTime(9_000_000_000);
+    const ERROR: Shows = Shows { error: true, warning: false };
+    const WARNING: Shows = Shows { error: false, warning: true };
+
+    fn item() -> Item {
+        Item::object(0x603F, 0)
+    }
+
+    #[test]
+    fn only_the_word_that_was_asked_for_counts_and_only_once() {
+        let mut diagnosis = Diagnosis::default();
+        assert_eq!(diagnosis.take(NOW, item(), Some(1), None, WARNING), None, "nobody asked");
+        diagnosis.ask(NOW, item(), WARNING);
+        assert_eq!(diagnosis.take(NOW, Item::object(0x1001, 0), Some(1), None, WARNING), None);
+        let shown = diagnosis.take(NOW, item(), Some(1), None, WARNING).expect("a warning");
+        assert_eq!((shown.word, shown.kind), (1, Kind::Warnings { first: true, nameless: true }));
+        assert_eq!(diagnosis.take(NOW, item(), Some(1), None, WARNING), None);
+    }
+
+    #[test]
+    fn a_word_without_a_cause_is_read_again_at_once_while_the_cause_is_sought() {
+        let mut diagnosis = Diagnosis::default();
+        diagnosis.want_cause(NOW);
+        diagnosis.ask(NOW, item(), ERROR);
+        assert_eq!(diagnosis.take(NOW, item(), Some(0), None, ERROR), None);
+        assert_eq!(diagnosis.errors.not_before, NOW);
+        diagnosis.tick(NOW + CAUSE_TIME_OUT);
+        assert!(diagnosis.cause_wanted.is_some());
+        diagnosis.tick(NOW + CAUSE_TIME_OUT + DurationNs(1));
+        assert!(!diagnosis.end_search());
+        diagnosis.ask(NOW, item(), ERROR);
+        diagnosis.take(NOW, item(), Some(0), None, ERROR);
+        assert_eq!(diagnosis.errors.not_before, NOW + REREAD);
+        diagnosis.follow(WARNING);
+        assert_eq!(diagnosis.errors.not_before, MonotonicTime::default(), "the next error is read at once");
     }
 }

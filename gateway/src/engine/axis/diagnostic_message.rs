@@ -4,7 +4,6 @@
 use arrayvec::ArrayString;
 use profile_generic::time::MonotonicTime;
 
-use super::AxisChannel;
 use super::diagnosis::ANSWER_TIME_OUT;
 use crate::engine::access::DATA_LEN;
 use crate::mapping::Item;
@@ -33,63 +32,61 @@ pub(super) struct Reading {
     place: Option<usize>,
     asked: Option<(Item, MonotonicTime)>,
     said: DiagnosticMessage,
-    /// What it said last; that is told once as long as something is there.
+    /// What it said last; that is reported once as long as something is there.
     told: DiagnosticMessage,
 }
 
 impl Reading {
-    pub(super) fn want(&mut self) {
+    pub fn want(&mut self) {
         self.wanted = true;
     }
-}
 
-impl AxisChannel {
-    /// What should be read now, so that people are told what the drive says.
-    #[must_use]
-    pub fn wanted_diagnostic(&self, now: MonotonicTime) -> Option<Item> {
-        let Reading { wanted, place, asked, .. } = self.diagnostic_message;
-        let waits = asked.is_some_and(|(_, since)| now.since(since) < ANSWER_TIME_OUT);
-        if waits || (place.is_none() && !wanted) {
+    /// What should be read now of these items, so that people learn what the drive says.
+    pub fn wanted(&self, now: MonotonicTime, items: &[Item]) -> Option<Item> {
+        let waits = self.asked.is_some_and(|(_, since)| now.since(since) < ANSWER_TIME_OUT);
+        if waits || (self.place.is_none() && !self.wanted) {
             return None;
         }
-        self.south()?.diagnosis().get(place.unwrap_or(0)).copied()
+        items.get(self.place.unwrap_or(0)).copied()
     }
 
     /// What was wanted is on its way.
-    pub fn diagnostic_requested(&mut self, now: MonotonicTime, item: Item) {
-        let reading = &mut self.diagnostic_message;
-        if reading.place.is_none() {
-            *reading = Reading { place: Some(0), told: reading.told, ..Reading::default() };
+    pub fn ask(&mut self, now: MonotonicTime, item: Item) {
+        if self.place.is_none() {
+            *self = Self { place: Some(0), told: self.told, ..Self::default() };
         }
-        reading.asked = Some((item, now));
+        self.asked = Some((item, now));
     }
 
-    /// The drive has answered, or has nothing to say. Returns all that it said when that was the last of it, and the fault or
-    /// warning is still there.
-    pub fn diagnostic_message_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<DiagnosticMessage> {
-        self.diagnostic_message.asked.take_if(|(asked, _)| *asked == item)?;
-        let place = self.diagnostic_message.place? + 1;
-        let last = self.south().is_none_or(|program| place >= program.diagnosis().len());
-        let said = &mut self.diagnostic_message.said;
+    /// The drive has answered, or has nothing to say. Returns all that it said when that was the last of so many `items`, and the fault
+    /// or warning still `stands`.
+    pub fn take(
+        &mut self,
+        item: Item,
+        data: Option<&[u8]>,
+        items: usize,
+        stands: bool,
+    ) -> Option<DiagnosticMessage> {
+        self.asked.take_if(|(asked, _)| *asked == item)?;
+        let place = self.place? + 1;
+        let last = place >= items;
         let number = data.filter(|data| place == 1 && matches!(data.len(), 2 | NUMBER_LEN));
         match (number, data) {
-            (Some(data), _) => said.number = Some(little_endian(data)),
-            (None, Some(data)) => said.text = text(data),
+            (Some(data), _) => self.said.number = Some(little_endian(data)),
+            (None, Some(data)) => self.said.text = text(data),
             (None, None) => {}
         }
-        let said = *said;
-        self.diagnostic_message.place = (!last).then_some(place);
-        let there = self.shows_error() || self.shows_warning();
-        if !last || !there || said == DiagnosticMessage::default() || said == self.diagnostic_message.told {
+        self.place = (!last).then_some(place);
+        if !last || !stands || self.said == DiagnosticMessage::default() || self.said == self.told {
             return None;
         }
-        self.diagnostic_message.told = said;
-        Some(said)
+        self.told = self.said;
+        Some(self.said)
     }
 
     /// What the drive showed is over: it will be told again when it comes again.
-    pub(super) fn end_diagnostic_message(&mut self) {
-        self.diagnostic_message.told = DiagnosticMessage::default();
+    pub fn end(&mut self) {
+        self.told = DiagnosticMessage::default();
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) enum Lead {
     Nobody,
     /// The gateway: it holds, or ramps down.
     Gateway,
-    /// Set-points.
+    /// Set-points lead: velocity and acceleration are judged.
     SetPoints,
 }
 

@@ -3,7 +3,7 @@
 use profile_generic::quantity::Position;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-/// Cycles that are remembered: as long as a service channel needs to tell of an edge.
+/// Cycles that are remembered: as long as a service channel needs to report an edge.
 const SAMPLES: usize = 128;
 
 /// The last actual positions with their instants.

@@ -11,11 +11,9 @@ use profile_generic::image::{AxisFeedback, FeedbackSet};
 use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::scaling::{NANO, UnitKind};
-use profile_generic::sequence::SequenceStep;
-use profile_generic::state::{DriveState, Event};
-use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::{AxisChannel, START_TIME_OUT};
+use super::START_TIME_OUT;
 
 /// Longest duration of a test; the standard speaks of 30 s.
 const TIME_LIMIT: DurationNs = DurationNs::from_secs(30);
@@ -66,7 +64,7 @@ impl HookupSettings {
 
 /// A test under way.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TestRun {
+struct TestRun {
     order: TestOrder,
     since: MonotonicTime,
     last: MonotonicTime,
@@ -75,68 +73,83 @@ pub(super) struct TestRun {
     report: Option<TestReport>,
 }
 
-impl AxisChannel {
-    /// Takes the order of the north side, or that there is none any more.
-    pub fn take_test(&mut self, now: MonotonicTime, order: Option<TestOrder>) {
+/// The hookup test that the controller has asked for.
+#[derive(Debug, Default)]
+pub(super) struct HookupUnit(Option<TestRun>);
+
+/// The torque of a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TestStep {
+    pub torque: Torque,
+    /// The move is over: the drive stops in this very cycle.
+    pub ends: bool,
+}
+
+impl TestStep {
+    const IDLE: Self = Self { torque: Torque::ZERO, ends: false };
+    const END: Self = Self { torque: Torque::ZERO, ends: true };
+}
+
+impl HookupUnit {
+    /// Takes the order of the north side; `None` ends a test in progress. `able` is whether the axis may be moved by one.
+    pub fn take(&mut self, now: MonotonicTime, order: Option<TestOrder>, able: bool) {
         let Some(order) = order else {
-            self.test = None;
+            self.0 = None;
             return;
         };
-        if self.test.is_some_and(|test| test.order.id == order.id) {
+        if self.0.is_some_and(|test| test.order.id == order.id) {
             return;
         }
-        let fresh = TestRun { order, since: now, last: now, start: None, lead: None, report: None };
-        self.test = Some(fresh);
-        let able = self.limits.hookup.is_some()
-            && self.south().is_some_and(|program| program.has_mode(OperatingMode::Torque));
+        self.0 = Some(TestRun { order, since: now, last: now, start: None, lead: None, report: None });
         if order.test.is_active() && !able {
-            self.end_test(TestResult::Faulted, false);
+            self.end(TestResult::Faulted, false);
         }
     }
 
     /// Whether a test that needs torque is under way.
-    pub(super) fn tests_with_torque(&self) -> bool {
-        self.test.is_some_and(|test| test.order.test.is_active() && test.report.is_none())
+    pub fn needs_torque(&self) -> bool {
+        self.0.is_some_and(|test| test.order.test.is_active() && test.report.is_none())
     }
 
     /// The end of the test, once it has ended.
-    #[must_use]
-    pub fn test_report(&self) -> Option<TestReport> {
-        self.test.and_then(|test| test.report)
+    pub fn report(&self) -> Option<TestReport> {
+        self.0.and_then(|test| test.report)
     }
 
-    fn end_test(&mut self, result: TestResult, negative: bool) {
-        if let Some(test) = self.test.as_mut().filter(|test| test.report.is_none()) {
+    fn end(&mut self, result: TestResult, negative: bool) {
+        if let Some(test) = self.0.as_mut().filter(|test| test.report.is_none()) {
             test.report = Some(TestReport { id: test.order.id, result, negative });
         }
     }
 
-    /// Goes on with the test; returns the torque for this cycle.
-    pub(super) fn run_test(&mut self, now: MonotonicTime, system: SystemTime) -> Torque {
-        let Some(test) = self.test.filter(|test| test.report.is_none()) else { return Torque::ZERO };
-        let known = self.feedback.fresh && self.feedback.present.contains(FeedbackSet::POSITION);
-        let position = known.then_some(self.feedback.position);
-        let Some(settings) = self.limits.hookup else {
-            self.end_test(TestResult::Faulted, false);
-            return Torque::ZERO;
+    /// Goes on with the test. `led` is whether the drive is in the test, with its brake open.
+    pub fn step(
+        &mut self,
+        now: MonotonicTime,
+        feedback: &AxisFeedback,
+        settings: Option<HookupSettings>,
+        led: bool,
+    ) -> TestStep {
+        let Some(test) = self.0.filter(|test| test.report.is_none()) else { return TestStep::IDLE };
+        let known = feedback.fresh && feedback.present.contains(FeedbackSet::POSITION);
+        let position = known.then_some(feedback.position);
+        let Some(settings) = settings else {
+            self.end(TestResult::Faulted, false);
+            return TestStep::IDLE;
         };
         match test.order.test {
             Test::Feedback => {
                 self.watch_feedback(now, &test, position, settings.nanounits(test.order.distance));
-                Torque::ZERO
+                TestStep::IDLE
             }
             // Not before the brake is open.
-            Test::MotorFeedback
-                if self.state() == DriveState::Testing && self.sequence_step() == SequenceStep::Running =>
-            {
-                self.lead_motor(now, system, test, position, &settings)
-            }
+            Test::MotorFeedback if led => self.lead_motor(now, feedback, test, position, &settings),
             Test::MotorFeedback => {
                 // Not there yet. The start has a time limit of its own; this one is for a start that never began.
                 if now.since(test.since) > START_TIME_OUT {
-                    self.end_test(TestResult::TimedOut, false);
+                    self.end(TestResult::TimedOut, false);
                 }
-                Torque::ZERO
+                TestStep::IDLE
             }
         }
     }
@@ -149,25 +162,25 @@ impl AxisChannel {
         distance: Position,
     ) {
         let start = test.start.or(position);
-        if let Some(test) = self.test.as_mut() {
+        if let Some(test) = self.0.as_mut() {
             test.start = start;
         }
         let moved = position.zip(start).map_or(0, |(position, start)| position.saturating_sub(start).0);
         if moved.unsigned_abs() >= distance.0.unsigned_abs().max(1) {
-            self.end_test(TestResult::Successful, moved < 0);
+            self.end(TestResult::Successful, moved < 0);
         } else if now.since(test.since) > TIME_LIMIT {
-            self.end_test(TestResult::TimedOut, false);
+            self.end(TestResult::TimedOut, false);
         }
     }
 
     fn lead_motor(
         &mut self,
         now: MonotonicTime,
-        system: SystemTime,
+        feedback: &AxisFeedback,
         mut test: TestRun,
         position: Option<Position>,
         settings: &HookupSettings,
-    ) -> Torque {
+    ) -> TestStep {
         let span = now.since(test.last).min(SPAN_MAX);
         test.last = now;
         if test.lead.is_none()
@@ -175,36 +188,27 @@ impl AxisChannel {
         {
             test.lead = motion(&test.order, settings, position);
             if test.lead.is_none() {
-                self.finish(now, system, TestResult::Faulted, false);
-                return Torque::ZERO;
+                self.end(TestResult::Faulted, false);
+                return TestStep::END;
             }
         }
         let progress = match test.lead.as_mut() {
-            Some(lead) => lead.step(span, seen(&self.feedback)),
+            Some(lead) => lead.step(span, seen(feedback)),
             None if now.since(test.since) > TIME_LIMIT => Progress::Ended(Outcome::NoMotion),
             None => Progress::Torque(Torque::ZERO),
         };
-        self.test = Some(test);
-        match progress {
-            Progress::Torque(torque) => torque,
-            Progress::Ended(outcome) => {
-                let (status, negative) = match outcome {
-                    Outcome::Done { negative } => (TestResult::Successful, negative == Some(true)),
-                    Outcome::NoMotion => (TestResult::NoFeedback, false),
-                    Outcome::TimedOut => (TestResult::TimedOut, false),
-                    Outcome::TooFast => (TestResult::Faulted, false),
-                };
-                self.finish(now, system, status, negative);
-                Torque::ZERO
-            }
+        self.0 = Some(test);
+        let outcome = match progress {
+            Progress::Torque(torque) => return TestStep { torque, ends: false },
+            Progress::Ended(outcome) => outcome,
+        };
+        match outcome {
+            Outcome::Done { negative } => self.end(TestResult::Successful, negative == Some(true)),
+            Outcome::NoMotion => self.end(TestResult::NoFeedback, false),
+            Outcome::TimedOut => self.end(TestResult::TimedOut, false),
+            Outcome::TooFast => self.end(TestResult::Faulted, false),
         }
-    }
-
-    /// The test is over: the drive stops in this very cycle, and the motion device hears of it in the next.
-    fn finish(&mut self, now: MonotonicTime, system: SystemTime, result: TestResult, negative: bool) {
-        self.end_test(result, negative);
-        let transition = self.drive.machine.handle(Event::TestComplete);
-        self.follow(now, system, transition);
+        TestStep::END
     }
 }
 
@@ -249,5 +253,61 @@ mod tests {
         assert_eq!(seen(&AxisFeedback { present: FeedbackSet::POSITION, ..good }), None);
         assert_eq!(seen(&AxisFeedback { present: FeedbackSet::VELOCITY, ..good }), None);
         assert_eq!(seen(&AxisFeedback { mode: OperatingMode::Position, ..good }), None);
+    }
+
+    const NOW: MonotonicTime = MonotonicTime(1_000_000_000);
+
+    fn order(id: u32, test: Test) -> TestOrder {
+        TestOrder { id, test, distance: 1.0, time: 0.0 }
+    }
+
+    fn at(position: i64) -> AxisFeedback {
+        let present = FeedbackSet::POSITION;
+        AxisFeedback { fresh: true, present, position: Position(position), ..AxisFeedback::default() }
+    }
+
+    #[test]
+    fn a_feedback_test_ends_with_its_distance_and_has_no_torque() {
+        let settings = Some(HookupSettings::new(UnitKind::Rotary, None, None));
+        let mut unit = HookupUnit::default();
+        unit.take(NOW, Some(order(4, Test::Feedback)), false);
+        assert!(!unit.needs_torque());
+        for position in [500, 500 - NANO + 1] {
+            assert_eq!(unit.step(NOW, &at(position), settings, false), TestStep::IDLE);
+            assert_eq!(unit.report(), None, "{position}");
+        }
+        unit.step(NOW, &at(500 - NANO), settings, false);
+        let report = unit.report().expect("a report");
+        assert_eq!((report.id, report.result, report.negative), (4, TestResult::Successful, true));
+        unit.take(NOW, None, false);
+        assert_eq!(unit.report(), None, "gone with its order");
+    }
+
+    #[test]
+    fn a_motor_test_needs_an_axis_that_is_able_and_a_start_that_begins() {
+        let settings = Some(HookupSettings::new(UnitKind::Rotary, None, None));
+        let result = |unit: &HookupUnit| unit.report().map(|report| report.result);
+        let mut unit = HookupUnit::default();
+        unit.take(NOW, Some(order(1, Test::MotorFeedback)), false);
+        assert_eq!((result(&unit), unit.needs_torque()), (Some(TestResult::Faulted), false));
+        unit.take(NOW, Some(order(2, Test::MotorFeedback)), true);
+        assert!(unit.needs_torque());
+        unit.take(NOW + START_TIME_OUT, Some(order(2, Test::MotorFeedback)), true);
+        let late = NOW + START_TIME_OUT + DurationNs(1);
+        assert_eq!(unit.step(late, &at(0), settings, false), TestStep::IDLE);
+        assert_eq!(result(&unit), Some(TestResult::TimedOut), "the same order does not begin anew");
+    }
+
+    #[test]
+    fn a_motor_that_cannot_be_seen_ends_its_test_and_stops_the_drive() {
+        let settings = Some(HookupSettings::new(UnitKind::Rotary, None, None));
+        let mut unit = HookupUnit::default();
+        unit.take(NOW, Some(order(1, Test::MotorFeedback)), true);
+        let blind = AxisFeedback::default();
+        assert_eq!(unit.step(NOW, &blind, settings, true), TestStep::IDLE);
+        let late = NOW + TIME_LIMIT + DurationNs(1);
+        assert_eq!(unit.step(late, &blind, settings, true), TestStep::END);
+        assert_eq!(unit.report().map(|report| report.result), Some(TestResult::NoFeedback));
+        assert_eq!(unit.step(late, &blind, settings, true), TestStep::IDLE, "once");
     }
 }

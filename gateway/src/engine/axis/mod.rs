@@ -10,53 +10,83 @@
 //! of its drive is made of the tables.
 //!
 //! Everything here runs in the cycle: no allocation, no waiting. What corresponds to what stands in the two programs.
+//!
+//! An axis is made of parts, each with a state of its own. [`AxisChannel`] has the state machine in the middle and orders what the parts do:
+//! [`cycle`] in each cycle of the bus, [`north`] when the north side wants something.
+//!
+//! | part | what it owns |
+//! |---|---|
+//! | [`link`] | the drive's program, the words that went and came last, the handshake of targets |
+//! | [`supervision`] | limits, ends of travel, jumps of the position, silence |
+//! | [`diagnosis`] | what is read of a drive that shows an error or a warning |
+//! | [`faults`] | what is wrong, the fault that has stopped the axis, and the reactions that are wanted |
+//! | [`orders`] | the wish of the north side, resets |
+//! | [`start_stop`] | the steps of a start or stop, and the ramp |
+//! | [`set_points`] | what was taken of the north side, interpolator, trims, guard |
+//! | [`hookup`], [`capture`], [`procedure`] | tests, captured positions, procedures that the drive carries out |
 
 pub mod capture;
+mod cycle;
 mod diagnosis;
 mod diagnostic_message;
-mod feedback;
+mod faults;
 mod guard;
 mod handshake;
 mod history;
 mod hookup;
-mod image;
+mod link;
 mod north;
+mod orders;
 mod overtravel;
 mod position_jump;
 pub mod procedure;
+mod reactions;
 pub mod rest;
-mod sequence;
-mod set_point;
+mod set_points;
+mod start_stop;
+mod supervision;
+#[cfg(test)]
+mod tests;
 mod trim;
 mod velocimeter;
 mod waiting;
-mod wish;
 
 pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
+pub use self::orders::{Intent, Owner, Wish};
 pub use self::position_jump::PositionJump;
-pub use self::set_point::{NorthPoints, Target};
+pub use self::reactions::Reactions;
+pub use self::set_points::{NorthPoints, Target};
+pub use self::start_stop::StopSettings;
 pub use self::waiting::{Awaited, Waiting};
-pub use self::wish::{Intent, Wish};
 
-use self::hookup::TestRun;
-use crate::mapping::{CachedStatus, DriveProgram};
+use crate::mapping::DriveProgram;
 use profile_generic::capture::{CaptureResult, CaptureSet};
-use profile_generic::fault::{Fault, FaultCause, Reaction};
+use profile_generic::fault::{Fault, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
-use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, StatusBits};
-use profile_generic::interpolation::{FineInterpolator, InterpolatorConfig, TargetUpdate, UpdateError};
-use profile_generic::mode::ModeSelection;
+use profile_generic::hookup::TestReport;
+use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, Signal};
+use profile_generic::interpolation::UpdateError;
 use profile_generic::quantity::{Acceleration, Position, Velocity};
-use profile_generic::sequence::{Sequencer, StopRamp};
-use profile_generic::state::{Action, DriveState, Report};
-use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::sequence::SequenceStep;
+use profile_generic::state::{Action, BasicDrive, DriveState, Report};
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use crate::engine::access::{Access, AccessFailure, Progress};
+use crate::mapping::Item;
 
-use self::capture::CaptureAccess;
+use self::capture::{CaptureAccess, CaptureUnit};
+use self::diagnosis::{Diagnosis, Shows};
+use self::faults::Faults;
+use self::hookup::HookupUnit;
+use self::link::Link;
+use self::orders::Orders;
 use self::procedure::{ProcedureAccess, ProcedureUnit};
+use self::rest::{Rest, Unrested};
+use self::set_points::SetPoints;
+use self::start_stop::StartStop;
+use self::supervision::Supervision;
 
 /// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
 pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
@@ -65,7 +95,7 @@ pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
 pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
 
 /// How long the stop of a drive that cannot be heard is waited for. It brakes by itself, as fast as it can, when it misses
-/// its commands; whoever waits longer sees nothing either, and the axis can be of no use before it is heard again.
+/// its commands. Waiting longer shows nothing more, and the axis cannot be used before the drive is heard again.
 pub const SILENCE_TIME_OUT: DurationNs = DurationNs::from_secs(1);
 
 /// How long a drive in operation may take to another operating mode.
@@ -108,11 +138,9 @@ pub struct AxisCounters {
     pub lost_telegrams: u32,
     /// Values that were clamped in a conversion.
     pub saturated: u32,
-    /// Faults.
+    /// Faults raised since the start.
     pub faults: u32,
 }
-
-pub use sequence::StopSettings;
 
 /// Why a command counts as lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -134,174 +162,66 @@ pub enum Loss {
     End,
 }
 
-/// A reset of faults under way.
-#[derive(Debug, Clone, Copy)]
-struct Reset {
-    id: u32,
-    /// Since it was asked for, then since it was begun.
-    since: MonotonicTime,
-    begun: bool,
-}
-
-/// One axis.
+/// An axis in generic terms, between one north side at a time and one drive.
 #[derive(Debug)]
 pub struct AxisChannel {
-    /// Nanounits in a count of the north side: it cannot command anything finer.
-    count: i64,
-    /// Counts the programs of the drive that were taken or given up.
-    programs: u64,
-    south: Option<(DriveProgram, CachedStatus)>,
-    limits: Limits,
-    command_loss: Reaction,
     /// It may be switched on.
     moves: bool,
-    drive: BasicDriveClock,
-    /// Since when the drive is not heard.
-    silent_since: Option<MonotonicTime>,
-    /// That is so long ago that the end of its stop is waited for no longer.
-    unseen: bool,
-    interpolator: Option<FineInterpolator>,
-    sequencer: Sequencer,
-    stop_settings: StopSettings,
-    /// The command's way to rest, in a ramped stop.
-    ramp: Option<StopRamp>,
-    /// The speed at which the axis was started on the move, until its first set-points.
-    caught: Option<Velocity>,
-    /// The instant of the grid that the last command is for.
-    acts_at: MonotonicTime,
-    /// By how much the last cycle was late.
-    late: DurationNs,
-    /// How far set-points are ahead of the moment at which they are made.
-    ahead: DurationNs,
-    guard: guard::Guard,
-    /// The limit that the fault is about, when it is about one.
-    tripped: Option<Trip>,
-    /// Since when the drive in operation shows another operating mode than it is told.
-    other_mode_since: Option<MonotonicTime>,
+    drive: Drive,
     command: AxisCommand,
-    trims: trim::Trims,
     feedback: AxisFeedback,
-    /// The action whose bits stand in the control word.
-    action: Action,
-    /// What was sent last, and what the drive showed last: words, and operating modes above them.
-    control: u32,
-    status: u32,
-    /// Cycles for which a fault reset still stands in the control word.
-    reset_cycles: u8,
-    wish: Wish,
-    reset_id: u32,
-    reset: Option<Reset>,
-    /// Set-points of this number were taken.
-    sequence: Option<u32>,
-    /// The fault that has stopped the axis: the first one, until a reset.
-    fault: Option<Fault>,
-    /// Everything that is wrong now.
-    faults: FaultSet,
-    diagnosis: diagnosis::Diagnosis,
-    diagnostic_message: diagnostic_message::Reading,
-    /// For a drive that tells positions and no velocity.
-    velocimeter: velocimeter::Velocimeter,
-    plausibility: position_jump::Plausibility,
-    /// The jump that the fault of this instant is about.
-    jump: Option<(SystemTime, PositionJump)>,
-    loss: Option<Loss>,
-    /// The drive shows a fault whose cause is being read since then.
-    cause_wanted: Option<MonotonicTime>,
-    drive_reset_wanted: bool,
-    /// An enable was rejected and is still asked for.
-    enable_pending: bool,
-    /// The hookup test that the controller has asked for.
-    test: Option<TestRun>,
-    /// The torque was switched on for a test.
-    started_for_test: bool,
-    counters: AxisCounters,
-    captures: capture::CaptureUnit,
+    link: Link,
+    supervision: Supervision,
+    diagnosis: Diagnosis,
+    faults: Faults,
+    orders: Orders,
+    start_stop: StartStop,
+    set_points: SetPoints,
+    hookup: HookupUnit,
+    captures: CaptureUnit,
     procedure: ProcedureUnit,
-    overtravel: overtravel::Overtravel,
-    /// The same of the software limits.
-    software_overtravel: overtravel::Overtravel,
-    handshake: handshake::Handshake,
-    /// Since when the drive is told the operating mode that it is told now.
-    told_since: MonotonicTime,
-    /// Where the axis came to rest in a halt.
-    halted_at: Option<Position>,
-    /// The operation mode that the drive shows, and whether it follows command values, whatever it carries out.
-    shown: Option<ModeSelection>,
-    follows: bool,
-    /// A request of this number was taken from a north side that speaks in the generic model.
-    requested: Option<u32>,
 }
 
-/// The generic state machine and since when it is in its state.
-#[derive(Debug, Default)]
-struct BasicDriveClock {
-    machine: profile_generic::state::BasicDrive,
+/// The generic state machine.
+#[derive(Debug)]
+struct Drive {
+    machine: BasicDrive,
+    /// Since when it is in its state.
     since: MonotonicTime,
+    /// The action whose bits stand in the control word.
+    action: Action,
 }
 
 impl AxisChannel {
     /// An axis whose drive is not there yet.
-    /// `moves` is whether it may ever be switched on: an encoder or a converter may not, whoever asks.
+    /// `moves` is whether it may ever be switched on: an encoder or a converter may not, regardless of who asks.
     #[must_use]
     pub fn new(limits: Limits, command_loss: Reaction, moves: bool) -> Self {
+        let since = MonotonicTime::default();
         Self {
-            count: 1,
-            programs: 0,
-            south: None,
-            limits,
-            command_loss,
             moves,
-            drive: BasicDriveClock::default(),
-            silent_since: None,
-            unseen: false,
-            interpolator: None,
-            sequencer: Sequencer::default(),
-            stop_settings: StopSettings::default(),
-            ramp: None,
-            caught: None,
-            acts_at: MonotonicTime::default(),
-            late: DurationNs::ZERO,
-            ahead: DurationNs::ZERO,
-            guard: guard::Guard::default(),
-            tripped: None,
-            other_mode_since: None,
+            drive: Drive { machine: BasicDrive::default(), since, action: Action::TorqueOff },
             command: AxisCommand::default(),
-            trims: trim::Trims::default(),
             feedback: AxisFeedback::default(),
-            action: Action::TorqueOff,
-            control: 0,
-            status: 0,
-            reset_cycles: 0,
-            wish: Wish::default(),
-            reset_id: 0,
-            reset: None,
-            sequence: None,
-            fault: None,
-            faults: FaultSet::new(),
-            diagnosis: diagnosis::Diagnosis::default(),
-            diagnostic_message: diagnostic_message::Reading::default(),
-            velocimeter: velocimeter::Velocimeter::default(),
-            plausibility: position_jump::Plausibility::default(),
-            jump: None,
-            loss: None,
-            cause_wanted: None,
-            drive_reset_wanted: false,
-            enable_pending: false,
-            test: None,
-            started_for_test: false,
-            counters: AxisCounters::default(),
-            captures: capture::CaptureUnit::default(),
+            link: Link::default(),
+            supervision: Supervision::new(limits),
+            diagnosis: Diagnosis::default(),
+            faults: Faults::new(command_loss),
+            orders: Orders::default(),
+            start_stop: StartStop::default(),
+            set_points: SetPoints::new(),
+            hookup: HookupUnit::default(),
+            captures: CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
-            overtravel: overtravel::Overtravel::default(),
-            software_overtravel: overtravel::Overtravel::default(),
-            handshake: handshake::Handshake::default(),
-            told_since: MonotonicTime::default(),
-            halted_at: None,
-            shown: None,
-            follows: false,
-            requested: None,
         }
     }
+
+    /// Forgets what the drive was told, as an axis that has told it nothing yet. Only without torque.
+    pub fn forget_command(&mut self) {
+        self.command = AxisCommand::default();
+    }
+
+    // ---- state -------------------------------------------------------------------------------------------------
 
     /// The generic state.
     #[must_use]
@@ -309,21 +229,42 @@ impl AxisChannel {
         self.drive.machine.state()
     }
 
-    /// What the drive is told to do.
+    /// The action that the control word asks for.
     #[must_use]
     pub fn action(&self) -> Action {
-        self.action
+        self.drive.action
     }
 
-    /// Everything that is wrong now.
-    pub fn faults(&self) -> impl Iterator<Item = &ActiveFault> {
-        self.faults.iter()
-    }
-
-    /// The same, as the set that it is.
+    /// Whether the torque may be on: then no program may be replaced.
     #[must_use]
-    pub fn fault_set(&self) -> &FaultSet {
-        &self.faults
+    pub fn may_have_torque(&self) -> bool {
+        self.state().may_have_torque()
+    }
+
+    /// What the box itself watches.
+    #[must_use]
+    pub fn limits(&self) -> &Limits {
+        &self.supervision.limits
+    }
+
+    /// Whether it may ever be switched on: an encoder or a converter may not.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.moves
+    }
+
+    /// Where in a start or stop the axis is.
+    #[must_use]
+    pub fn sequence_step(&self) -> SequenceStep {
+        self.start_stop.step()
+    }
+
+    /// Whether the drive stands with torque because the reaction to a fault is to hold the position.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.state() == DriveState::FaultReaction
+            && self.drive.action == Action::Halt
+            && self.feedback.report == Report::Halted
     }
 
     /// The newest feedback.
@@ -338,78 +279,216 @@ impl AxisChannel {
         &self.command
     }
 
-    /// Counters.
+    /// The value of a signal: set-points as the drive got them last, trims as they count.
+    #[must_use]
+    pub fn signal(&self, signal: Signal) -> Option<i64> {
+        match self.set_points.trims.applied(signal) {
+            None if signal.is_command() => self.command.get(signal),
+            None => self.feedback.get(signal),
+            trim => trim,
+        }
+    }
+
+    /// What it has counted since the start.
     #[must_use]
     pub fn counters(&self) -> AxisCounters {
-        self.counters
+        AxisCounters {
+            commands: self.set_points.commands,
+            lost_telegrams: self.link.lost_telegrams,
+            saturated: self.set_points.saturated.saturating_add(self.link.saturated),
+            faults: self.faults.count(),
+        }
+    }
+
+    /// What the axis waits for; `None` when it does what it was told, or has nothing to do.
+    #[must_use]
+    pub fn waiting(&self) -> Option<Waiting> {
+        waiting::waiting(self)
+    }
+
+    /// The same without what the drive shows: cheap enough for every cycle.
+    #[must_use]
+    pub fn awaited(&self) -> Option<Awaited> {
+        waiting::awaited(self)
+    }
+
+    // ---- faults ------------------------------------------------------------------------------------------------
+
+    /// Everything that is wrong now.
+    pub fn faults(&self) -> impl Iterator<Item = &ActiveFault> {
+        self.faults.set().iter()
+    }
+
+    /// The same, as the set that it is.
+    #[must_use]
+    pub fn fault_set(&self) -> &FaultSet {
+        self.faults.set()
+    }
+
+    /// The fault that stands.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        self.faults.first()
+    }
+
+    /// Whether the drive reports a fault whose cause is still being read.
+    #[must_use]
+    pub fn is_diagnosing(&self) -> bool {
+        self.diagnosis.is_searching()
+    }
+
+    /// Why the command was lost, when that is the fault.
+    #[must_use]
+    pub fn loss(&self) -> Option<Loss> {
+        self.faults.loss()
+    }
+
+    /// The limit that a set-point has exceeded, when that is the fault.
+    #[must_use]
+    pub fn tripped(&self) -> Option<Trip> {
+        self.faults.tripped()
+    }
+
+    /// The jump of the actual position, when that is the fault.
+    #[must_use]
+    pub fn jump(&self) -> Option<PositionJump> {
+        self.faults.jump()
+    }
+
+    // ---- rest --------------------------------------------------------------------------------------------------
+
+    /// How long its stop may take by its own limits: to the end of the torque, and from there to rest.
+    #[must_use]
+    pub fn stop_limit(&self) -> DurationNs {
+        self.start_stop.limit()
+    }
+
+    /// Whether it may have torque, or is on its way to rest without.
+    #[must_use]
+    pub fn is_stopping(&self) -> bool {
+        self.may_have_torque() || self.start_stop.is_stopping()
+    }
+
+    /// What is known of its motion.
+    #[must_use]
+    pub fn rest(&self) -> Rest {
+        rest::rest(self)
+    }
+
+    /// Whether the actual velocity is known and not above the standstill speed.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.feedback.present.contains(FeedbackSet::VELOCITY)
+            && self.start_stop.stands(self.feedback.velocity)
+    }
+
+    /// Whether there is nothing to be waited for: it stands without torque, or will not be seen to.
+    #[must_use]
+    pub fn has_stopped(&self) -> bool {
+        rest::has_stopped(self)
+    }
+
+    /// What there is to say of it when it is waited for no longer; `None` when it stands without torque.
+    #[must_use]
+    pub fn unrested(&self, number: usize) -> Option<Unrested> {
+        rest::unrested(self, number)
+    }
+
+    // ---- its drive ---------------------------------------------------------------------------------------------
+
+    /// Whether its drive is there and heard.
+    #[must_use]
+    pub fn is_heard(&self) -> bool {
+        self.south().is_some() && self.feedback.report != Report::Silent
+    }
+
+    /// Whether its drive has not been heard for so long that the end of its stop is waited for no longer.
+    #[must_use]
+    pub fn is_unseen(&self) -> bool {
+        self.supervision.is_unseen()
     }
 
     /// The program of the drive, once it is commissioned.
     #[must_use]
     pub fn south(&self) -> Option<&DriveProgram> {
-        self.south.as_ref().map(|(program, _)| program)
+        self.link.program()
     }
 
     /// A number that is another one after the drive has got another program or is gone: what was made of [`Self::south`] may be kept
     /// as long as it is the same.
     #[must_use]
     pub fn programs(&self) -> u64 {
-        self.programs
-    }
-
-    /// Whether the torque may be on: then no program may be replaced.
-    #[must_use]
-    pub fn may_have_torque(&self) -> bool {
-        self.state().may_have_torque()
-    }
-
-    /// Sets how fine the north side can command, in nanounits.
-    pub fn set_count(&mut self, count: i64) {
-        self.count = count;
+        self.link.programs()
     }
 
     /// The drive is commissioned and will be spoken to by this program.
     pub fn set_south(&mut self, program: DriveProgram) {
-        let cached = program.cached_status();
         self.procedure.restart(program.procedures());
-        self.south = Some((program, cached));
-        self.programs += 1;
+        self.link.connect(program);
         self.captures.restart();
-        self.action = Action::TorqueOff;
-        (self.control, self.status, self.reset_cycles) = (0, 0, 0);
+        self.drive.action = Action::TorqueOff;
     }
 
-    /// The drive is gone: until it is commissioned again there is nobody to speak to.
-    pub fn lose_south(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.end_south(now, system, Report::Silent);
+    /// Whether the drive's own fault reset is to be executed, until [`Self::drive_reset_sent`].
+    #[must_use]
+    pub fn wants_drive_reset(&self) -> bool {
+        self.orders.drive_reset_wanted
     }
 
-    /// The bus is taken down while the axis is without torque: the drive is not ready, and nothing is wrong.
-    pub fn leave_south(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.end_south(now, system, Report::NotReady);
+    /// The drive's own fault reset is on its way.
+    pub fn drive_reset_sent(&mut self) {
+        self.orders.drive_reset_wanted = false;
+        self.link.pulse_reset();
     }
 
-    fn end_south(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
-        self.feedback.fresh = false;
-        self.feedback.present = FeedbackSet::empty();
-        self.end_diagnosis();
-        self.velocimeter.restart();
-        self.plausibility.restart();
-        self.report(now, system, report);
-        self.south = None;
-        self.programs += 1;
-        self.captures.restart();
-        self.procedure.restart(&[]);
-        self.shown = None;
-        self.follows = false;
-        self.feedback.status.remove(ProcedureUnit::STATUS | StatusBits::INPUTS);
+    /// The diagnostic word that should be read now.
+    #[must_use]
+    pub fn wants_word(&self, now: MonotonicTime) -> Option<Item> {
+        self.diagnosis.wanted(now, self.south()?, Shows::of(&self.feedback))
+    }
+
+    /// The word that was wanted is on its way.
+    pub fn word_asked(&mut self, now: MonotonicTime, item: Item) {
+        self.diagnosis.ask(now, item, Shows::of(&self.feedback));
+    }
+
+    /// What should be read now, so that people are told what the drive says.
+    #[must_use]
+    pub fn wanted_diagnostic(&self, now: MonotonicTime) -> Option<Item> {
+        self.diagnosis.message.wanted(now, self.south()?.diagnosis())
+    }
+
+    /// What was wanted is on its way.
+    pub fn diagnostic_requested(&mut self, now: MonotonicTime, item: Item) {
+        self.diagnosis.message.ask(now, item);
+    }
+
+    /// The drive has answered, or has nothing to say. Returns all that it said when that was the last of it, and the fault or
+    /// warning is still there.
+    pub fn diagnostic_message_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<DiagnosticMessage> {
+        let items = self.south().map_or(0, |program| program.diagnosis().len());
+        self.diagnosis.message.take(item, data, items, Shows::of(&self.feedback).any())
+    }
+
+    // ---- tests, captures, procedures ---------------------------------------------------------------------------
+
+    /// The end of the test, once it has ended.
+    #[must_use]
+    pub fn test_report(&self) -> Option<TestReport> {
+        self.hookup.report()
     }
 
     /// Tells what events need captured, in each cycle and after [`AxisChannel::poll_capture`] gives no more.
     pub fn want_captures(&mut self, wanted: CaptureSet) {
-        if let Some((program, _)) = &self.south {
+        if let Some(program) = self.link.program() {
             self.captures.want(program.captures(), wanted);
         }
+    }
+
+    /// The captures that the drive looks for now.
+    #[must_use]
+    pub fn checked_captures(&self) -> CaptureSet {
+        self.south().map_or(CaptureSet::default(), |program| self.captures.checking(program.captures()))
     }
 
     /// The oldest capture that has come, or has failed.
@@ -435,7 +514,7 @@ impl AxisChannel {
         generation: u8,
         result: Result<&[u8], AccessFailure>,
     ) {
-        if let Some((program, _)) = &self.south {
+        if let Some(program) = self.link.program() {
             self.captures.answer(program.captures(), access, generation, result);
         }
     }
@@ -461,42 +540,15 @@ impl AxisChannel {
         generation: u8,
         result: Result<Progress, AccessFailure>,
     ) {
-        let Some((program, cached)) = &mut self.south else { return };
+        let Some(program) = self.link.program() else { return };
         if self.procedure.answer(program.procedures(), access, generation, result, now) {
-            // The drive has given its place another position: it is what the drive says, not so many turns more.
-            cached.restart();
-            self.plausibility.restart();
+            self.restart_position();
         }
     }
 
-    /// Fine interpolation for a connection with this update period, in the way the last update asked for.
-    pub fn keep_update_period(&mut self, period: DurationNs, first: TargetUpdate) {
-        let present = self.interpolator.as_ref().map(FineInterpolator::config);
-        if present.is_none_or(|config| config.period != period) {
-            self.set_update_period(period, present.map_or(first, |config| config.target_update));
-        }
+    /// The drive has given its place another position: it is what the drive says, not so many turns more.
+    fn restart_position(&mut self) {
+        self.link.restart_position();
+        self.supervision.restart_plausibility();
     }
-
-    /// The controller's configuration of this axis makes no sense.
-    pub fn refuse_configuration(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.raise(now, system, Fault::new(FaultCause::CONFIGURATION, system));
-    }
-
-    /// Fine interpolation for a connection with this update period; without one, commands act as they come.
-    fn set_update_period(&mut self, period: DurationNs, target_update: TargetUpdate) {
-        let wanted = InterpolatorConfig { target_update, period, extrapolate_periods: EXTRAPOLATE_PERIODS };
-        if self.interpolator.as_ref().is_none_or(|present| *present.config() != wanted) {
-            self.interpolator = FineInterpolator::new(wanted);
-            self.start_interpolator();
-        }
-    }
-
-    fn count_saturated(&mut self, count: u32) {
-        self.counters.saturated = self.counters.saturated.saturating_add(count);
-    }
-}
-
-/// Faults that only say what the controller did or failed to do.
-fn caused_by_controller(cause: FaultCause) -> bool {
-    matches!(cause, FaultCause::CONTROLLER_ABORT | FaultCause::COMMAND_LOST | FaultCause::CONNECTION_CLOSED)
 }

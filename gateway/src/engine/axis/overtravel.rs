@@ -4,24 +4,7 @@
 //! be done about it. It is over when the axis is not led any more, or leaves. An axis that was started beyond one may stand
 //! there and may be led away from it, and not deeper.
 
-use super::{AxisChannel, Limits};
-use profile_generic::fault::{Fault, FaultCause};
-use profile_generic::fault_set::Origin;
-use profile_generic::image::StatusBits;
-use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::{Position, Velocity};
-use profile_generic::state::DriveState;
-use profile_generic::time::SystemTime;
-
-/// Cause and status bit of each end of the way, with the sign of the motion towards it.
-const ENDS: [(FaultCause, StatusBits, i64); 2] = [
-    (FaultCause::HARDWARE_OVERTRAVEL_POSITIVE, StatusBits::POSITIVE_LIMIT_SWITCH, 1),
-    (FaultCause::HARDWARE_OVERTRAVEL_NEGATIVE, StatusBits::NEGATIVE_LIMIT_SWITCH, -1),
-];
-
-/// Cause of each software limit, with the sign of the motion towards it.
-const SOFTWARE_ENDS: [(FaultCause, i64); 2] =
-    [(FaultCause::SOFTWARE_OVERTRAVEL_POSITIVE, 1), (FaultCause::SOFTWARE_OVERTRAVEL_NEGATIVE, -1)];
 
 /// An axis at zero speed may go deeper by what it makes in such a part of a second: it never stands quite still.
 const REST: i64 = 10;
@@ -43,15 +26,15 @@ pub(super) struct Overtravel([End; 2]);
 
 /// What an axis does.
 #[derive(Debug, Clone, Copy)]
-struct Motion {
+pub(super) struct Motion {
     /// It is led by the controller.
-    led: bool,
+    pub led: bool,
     /// It has torque, or has had it in the cycle before.
-    moves: bool,
-    position: Position,
-    velocity: Velocity,
+    pub moves: bool,
+    pub position: Position,
+    pub velocity: Velocity,
     /// Speed of an axis that stands.
-    zero_speed: Velocity,
+    pub zero_speed: Velocity,
 }
 
 impl End {
@@ -73,74 +56,17 @@ impl End {
     }
 }
 
-impl AxisChannel {
-    /// Whether the controller wants limit switches checked that the drive does not tell.
-    #[must_use]
-    pub fn misses_limit_switches(&self) -> bool {
-        self.stop_settings.checks_overtravel
-            && self.south().is_some_and(|program| !program.knows_status(StatusBits::LIMIT_SWITCHES))
-    }
-
-    /// Whether the axis may be moving.
-    pub(super) fn may_move(&self) -> bool {
-        matches!(
-            self.state(),
-            DriveState::Operating | DriveState::Testing | DriveState::Stopping | DriveState::FaultReaction
-        )
-    }
-
-    /// Looks at the limit switches. `moved` is whether the axis could move before the drive has spoken: a drive that stops by
-    /// itself tells the switch and its fault at once.
-    pub(super) fn watch_limit_switches(&mut self, system: SystemTime, moved: bool) {
-        let status = self.feedback.status;
-        // A drive that homes looks for the switches, and turns round at them.
-        let checked = self.stop_settings.checks_overtravel
-            && status.contains(StatusBits::LIMIT_SWITCHES)
-            && self.command.mode != OperatingMode::Homing;
-        let motion = Motion {
-            led: checked && matches!(self.state(), DriveState::Operating | DriveState::Testing),
-            moves: checked && (moved || self.may_move()),
-            position: self.feedback.position,
-            velocity: self.feedback.velocity,
-            zero_speed: self.stop_settings.times.zero_speed,
-        };
-        for (end, (cause, bit, sign)) in self.overtravel.0.iter_mut().zip(ENDS) {
-            if end.look(status.contains(bit), sign, &motion) {
-                self.faults.raise(Fault::new(cause, system), Origin::Watch);
-            } else {
-                self.faults.clear(cause, Origin::Watch);
-            }
-        }
+impl Motion {
+    /// The same where the ends are `checked`; else it counts as one of an axis that nobody leads.
+    pub fn counted(&self, checked: bool) -> Self {
+        Self { led: self.led && checked, moves: self.moves && checked, ..*self }
     }
 }
 
-impl AxisChannel {
-    /// Looks at the software limits as at limit switches.
-    pub(super) fn watch_software_limits(&mut self, system: SystemTime, moved: bool) {
-        let Limits { position_min, position_max, .. } = self.limits;
-        // Before its homing is done nobody knows where the axis is.
-        let known = self.command.mode != OperatingMode::Homing;
-        let position = self.feedback.position;
-        let motion = Motion {
-            led: known && matches!(self.state(), DriveState::Operating | DriveState::Testing),
-            moves: known && (moved || self.may_move()),
-            position,
-            velocity: self.feedback.velocity,
-            zero_speed: self.stop_settings.times.zero_speed,
-        };
-        let beyond = [
-            position_max.is_some_and(|limit| position > limit),
-            position_min.is_some_and(|limit| position < limit),
-        ];
-        for ((end, (cause, sign)), beyond) in
-            self.software_overtravel.0.iter_mut().zip(SOFTWARE_ENDS).zip(beyond)
-        {
-            if end.look(beyond, sign, &motion) {
-                self.faults.raise(Fault::new(cause, system), Origin::Watch);
-            } else {
-                self.faults.clear(cause, Origin::Watch);
-            }
-        }
+impl Overtravel {
+    /// Whether the axis has run onto the positive and the negative end, or deeper.
+    pub fn look(&mut self, [positive, negative]: [bool; 2], motion: &Motion) -> [bool; 2] {
+        [self.0[0].look(positive, 1, motion), self.0[1].look(negative, -1, motion)]
     }
 }
 

@@ -25,7 +25,7 @@ const TOLERANCE: i128 = 10_000_000;
 /// For so long after the position was given anew it may change at will: values of before and after are on their way.
 const SETTLING: DurationNs = DurationNs::from_millis(100);
 
-/// A jump.
+/// A change of the actual position that no motion within the limits explains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PositionJump {
     /// From the position before to the one after it, in nanounits.

@@ -1,4 +1,4 @@
-//! The velocity of an axis whose drive does not tell it: its way from one position to a later one.
+//! The velocity of an axis whose drive does not report it: its way from one position to a later one.
 
 use arrayvec::ArrayVec;
 use profile_generic::quantity::{Position, Velocity};

@@ -147,61 +147,55 @@ impl fmt::Display for Waiting {
     }
 }
 
-impl AxisChannel {
-    /// What the axis waits for; `None` when it does what it was told, or has nothing to do.
-    #[must_use]
-    pub fn waiting(&self) -> Option<Waiting> {
-        let awaited = self.awaited()?;
-        Some(Waiting { awaited, shown: self.shown_for(awaited) })
-    }
+/// See [`AxisChannel::waiting`].
+pub(super) fn waiting(axis: &AxisChannel) -> Option<Waiting> {
+    let awaited = awaited(axis)?;
+    Some(Waiting { awaited, shown: shown_for(axis, awaited) })
+}
 
-    /// The same without what the drive shows: cheap enough for every cycle.
-    #[must_use]
-    pub fn awaited(&self) -> Option<Awaited> {
-        if self.south.is_none() {
-            return Some(Awaited::Drive);
-        }
-        if self.feedback.report == Report::Silent {
-            return Some(Awaited::Hearing);
-        }
-        if self.reset.is_some_and(|reset| reset.begun) {
-            return Some(Awaited::Reset);
-        }
-        match self.state() {
-            DriveState::NotReady => Some(Awaited::Initialisation),
-            DriveState::AwaitingPower => Some(Awaited::Power),
-            DriveState::Starting => Some(Awaited::Following),
-            DriveState::Operating if self.sequencer.step() == SequenceStep::Energizing => {
-                Some(Awaited::Following)
-            }
-            DriveState::Stopping => Some(Awaited::Stop),
-            DriveState::FaultReaction if !self.holds() => Some(Awaited::FaultReaction),
-            _ => None,
-        }
+/// See [`AxisChannel::awaited`].
+pub(super) fn awaited(axis: &AxisChannel) -> Option<Awaited> {
+    if axis.south().is_none() {
+        return Some(Awaited::Drive);
     }
+    if axis.feedback.report == Report::Silent {
+        return Some(Awaited::Hearing);
+    }
+    if axis.orders.resets() {
+        return Some(Awaited::Reset);
+    }
+    match axis.state() {
+        DriveState::NotReady => Some(Awaited::Initialisation),
+        DriveState::AwaitingPower => Some(Awaited::Power),
+        DriveState::Starting => Some(Awaited::Following),
+        DriveState::Operating if axis.sequence_step() == SequenceStep::Energizing => Some(Awaited::Following),
+        DriveState::Stopping => Some(Awaited::Stop),
+        DriveState::FaultReaction if !axis.holds() => Some(Awaited::FaultReaction),
+        _ => None,
+    }
+}
 
-    /// The word, and the fewest bits of it that have to change for what is waited for.
-    fn shown_for(&self, awaited: Awaited) -> Option<(Item, u32, BitPattern)> {
-        let wanted = awaited.wanted()?;
-        let (program, status) = (self.south()?, self.status);
-        let rows = || program.reports.rows();
-        let wins = rows().find(|(pattern, _)| pattern.matches(status)).map(|(pattern, _)| pattern);
-        let changes = rows().filter(|(_, report)| wanted.contains(report)).filter_map(|(row, _)| {
-            let mask = (status ^ row.value) & row.mask;
-            if mask != 0 {
-                return Some(BitPattern::new(mask, row.value & mask));
-            }
-            // It fits, and so does one before it: that one must not.
-            let hides = wins?;
-            let mask = hides.mask & !row.mask;
-            Some(BitPattern::new(mask, !hides.value & mask))
-        });
-        let does = |change: &BitPattern| {
-            program.reports.decode(change.apply(status)).is_some_and(|report| wanted.contains(&report))
-        };
-        let nearest = changes.filter(does).min_by_key(|change| change.mask.count_ones())?;
-        Some((program.status_item()?, status, nearest))
-    }
+/// The word, and the fewest bits of it that have to change for what is waited for.
+fn shown_for(axis: &AxisChannel, awaited: Awaited) -> Option<(Item, u32, BitPattern)> {
+    let wanted = awaited.wanted()?;
+    let (program, status) = (axis.south()?, axis.link.status());
+    let rows = || program.reports.rows();
+    let wins = rows().find(|(pattern, _)| pattern.matches(status)).map(|(pattern, _)| pattern);
+    let changes = rows().filter(|(_, report)| wanted.contains(report)).filter_map(|(row, _)| {
+        let mask = (status ^ row.value) & row.mask;
+        if mask != 0 {
+            return Some(BitPattern::new(mask, row.value & mask));
+        }
+        // It fits, and so does one before it: that one must not.
+        let hides = wins?;
+        let mask = hides.mask & !row.mask;
+        Some(BitPattern::new(mask, !hides.value & mask))
+    });
+    let does = |change: &BitPattern| {
+        program.reports.decode(change.apply(status)).is_some_and(|report| wanted.contains(&report))
+    };
+    let nearest = changes.filter(does).min_by_key(|change| change.mask.count_ones())?;
+    Some((program.status_item()?, status, nearest))
 }
 
 #[cfg(test)]

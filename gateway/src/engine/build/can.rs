@@ -4,12 +4,13 @@ use profile_cia402::master::config::{
     Expected, HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, SyncConfig,
 };
 use profile_cia402::wire::NodeId;
-use profile_generic::mode::{ModeSelection, OperatingMode};
+use profile_generic::mode::OperatingMode;
 
-use super::{BuildError, kind, parameters};
+use super::{BuildError, kind, modes, parameters};
 use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
-use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, Misfit, commissioner, pdos};
+use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, commissioner, pdos};
+use crate::engine::bus::can::failure::Misfit;
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdo, FoundPdos, SpareIds};
 use crate::engine::bus::can::lss::Assignment;
 use crate::mapping::{AxisUnits, Cia402Axis, Mapping, Reference};
@@ -102,7 +103,7 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
     Ok(Network { master, devices, assignments })
 }
 
-/// The PDOs that a device keeps, where its file tells them.
+/// The PDOs that a device keeps, where its file reports them.
 #[must_use]
 pub fn described(bus: &Can, node: NodeId) -> Option<FoundPdos> {
     let device = bus.device(node).filter(|device| device.keeps_mapping)?;
@@ -147,16 +148,17 @@ pub(super) fn bus(
 /// What the commissioning has to achieve.
 #[must_use]
 pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
-    let all = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
-    let modes: &[OperatingMode] = match axis.function {
-        AxisFunction::Drive => drive.modes.as_deref().unwrap_or(&all),
+    let modes = match axis.function {
+        AxisFunction::Drive => modes(drive.modes.as_deref()).collect(),
         // What is only looked at has its position looked at.
-        AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
+        AxisFunction::Encoder | AxisFunction::Converter => {
+            [OperatingMode::Position.into()].into_iter().collect()
+        }
     };
     Cia402Axis {
         units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: None },
         axis: drive.axis,
-        modes: modes.iter().copied().map(ModeSelection::from).collect(),
+        modes,
         way_of_a_turn: drive.way_of_a_turn,
         counts: drive.counts.clone(),
         cycle: bus.cycle_time,

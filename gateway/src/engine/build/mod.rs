@@ -19,20 +19,21 @@ use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::device::motion_device::DeviceConfig;
 use profile_cip::wire::motion::Format;
 use profile_generic::fault::Reaction;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
-use super::bus::can::commissioner::Misfit;
+use super::bus::can::failure::Misfit;
 use super::bus::{self, AnyBus, Buses};
-use super::device::{DeviceChannel, StopDefaults};
+use super::device::{DeviceChannel, MemberConfig, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, DriveAt, StoppingAction};
 use crate::eds;
 use crate::latest::{self, Reader};
-use crate::mapping::{CipScaling, Mapping};
+use crate::mapping::{CipProgram, CipScaling, Mapping};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
 
@@ -133,19 +134,25 @@ pub struct Host {
 pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, BuildError> {
     let (buses, commissioners) = buses(config, host, &mapping)?;
     let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
+    let (axes, programs): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
     let mut devices = Vec::with_capacity(config.devices.len());
     let mut adapters = Vec::with_capacity(config.devices.len());
     for (number, device) in config.devices.iter().enumerate() {
         let members = members(config, number);
         let (adapter_end, device_end) = motion_link();
-        let scalings: Vec<_> =
-            members.iter().map(|(number, axis)| (*number, scaling(axis), stop_defaults(axis))).collect();
+        let member = |(number, axis): &(usize, &Axis)| MemberConfig {
+            axis: *number,
+            scaling: scaling(axis),
+            program: programs[*number].clone(),
+            stops: stop_defaults(axis),
+        };
+        let configs: Vec<_> = members.iter().map(member).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel = DeviceChannel::new(
             number,
             device_config(device, &members, &mapping, config.cycle_time()),
             device_end,
-            &scalings,
+            configs,
             &mapping,
         )
         .map_err(|error| BuildError::Device { name: device.name.clone(), error })?;
@@ -240,7 +247,8 @@ pub fn scaling(axis: &Axis) -> CipScaling {
     }
 }
 
-fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
+/// An axis, and its program of the CIP side.
+fn channel(axis: &Axis, mapping: &Mapping) -> Result<(AxisChannel, CipProgram), BuildError> {
     let missing = |what| BuildError::Tables { name: axis.name.clone(), what };
     let program =
         mapping.cip_program(&scaling(axis)).ok_or_else(|| missing("exact ratio for its resolution"))?;
@@ -255,7 +263,14 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<AxisChannel, BuildError> {
     let moves = axis.function == AxisFunction::Drive;
     let mut channel = AxisChannel::new(limits, reaction(axis.on_command_loss), moves);
     channel.set_count(program.count());
-    Ok(channel)
+    Ok((channel, program))
+}
+
+/// The modes that a drive is set up in: those that are wanted of it, else all that set-points lead.
+fn modes(wanted: Option<&[ModeSelection]>) -> impl Iterator<Item = ModeSelection> + '_ {
+    const LED: [OperatingMode; 3] = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
+    let all = wanted.is_none().then_some(LED).into_iter().flatten().map(ModeSelection::from);
+    wanted.unwrap_or_default().iter().copied().chain(all)
 }
 
 /// A hundredth of the highest speed counts as standing, as the standard takes it of the rated one; where no limit is

@@ -1,10 +1,10 @@
 //! The SERCOS III bus of a configuration.
 
-use profile_generic::mode::{ModeSelection, OperatingMode};
+use profile_generic::mode::OperatingMode;
 use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConfig};
 use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
-use super::{BuildError, Host, kind, parameters};
+use super::{BuildError, Host, kind, modes, parameters};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Drive, Sercos};
 use crate::engine::bus::sercos::commissioner::{Commissioner, commissioner};
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
@@ -22,7 +22,7 @@ pub fn master_config(sercos: &Sercos, host: Host) -> MasterConfig {
     master.mst_losses = sercos.allowed_losses;
     // The connection's own limit stops the axis; the master need not give up on the slave before.
     master.slave_valid_misses = sercos.allowed_losses.max(master.slave_valid_misses);
-    // Which connections a drive needs is known once it has told what it can.
+    // Which connections a drive needs is known once it has reported what it can.
     let slave = |drive: &Drive| SlaveConfig {
         address: drive.address,
         connections: Connections::new(),
@@ -73,11 +73,7 @@ pub fn needs(axis: &Axis, drive: &Drive) -> SercosAxis {
         units: AxisUnits { kind: kind(axis), reference: Reference::Load, rated: drive.rated },
         // A drive that is only looked at is set up in one mode, because its telegram belongs to one; it is never on.
         modes: match axis.function {
-            AxisFunction::Drive => {
-                let all = [OperatingMode::Position, OperatingMode::Velocity, OperatingMode::Torque];
-                let wanted = drive.modes.as_deref().unwrap_or(&all);
-                wanted.iter().copied().map(ModeSelection::from).collect()
-            }
+            AxisFunction::Drive => modes(drive.modes.as_deref()).collect(),
             AxisFunction::Encoder | AxisFunction::Converter => {
                 [OperatingMode::Position.into()].into_iter().collect()
             }

@@ -5,7 +5,7 @@ use arrayvec::ArrayVec;
 use super::Purpose;
 use crate::mapping::Item;
 
-/// Up to `N` accesses of one axis. `T` tells the requests of the master apart.
+/// Up to `N` accesses of one axis. `T` distinguishes the requests of the master.
 #[derive(Debug)]
 pub(super) struct Accesses<T, const N: usize>(ArrayVec<(T, Purpose, Item), N>);
 

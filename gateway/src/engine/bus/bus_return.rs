@@ -25,7 +25,7 @@ enum Place {
 }
 
 /// A bus with a short circuit is lost again as soon as somebody sends: each return that does not last is followed by a longer
-/// pause in which the box leaves the bus alone, and tells nothing.
+/// pause in which the box leaves the bus alone, and reports nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct BusReturn {
     place: Place,

@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Notes what it is told, and sends these frames.
+    /// Records its calls, and sends these frames.
     #[derive(Default)]
     struct Notes(Vec<String>, VecDeque<Frame>);
 
@@ -227,5 +227,17 @@ mod tests {
         assert_eq!(link.send(late, &mut controller, &mut notes), 1);
         assert_eq!(notes.0, [format!("failed {}", frame(0x202).id())]);
         assert!(link.is_drained() && controller.1 == 1, "the third one is new");
+    }
+
+    #[test]
+    fn a_frame_that_waits_is_not_sent_after_the_controller_was_off_the_bus() {
+        let mut link = CanLink::new(DurationNs::from_millis(4));
+        let mut notes = Notes::default();
+        notes.1.extend([frame(0x201), frame(0x202)]);
+        link.send(NOW, &mut Controller(VecDeque::new(), 1), &mut notes);
+        assert!(!link.is_drained());
+        let back = [CanInput::BusOff, CanInput::BusOn];
+        link.receive(NOW, &mut Controller(back.into(), 0), &mut notes);
+        assert!(link.is_drained() && link.is_used(), "it is old, and the bus may be used");
     }
 }

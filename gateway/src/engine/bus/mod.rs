@@ -1,4 +1,4 @@
-//! The buses behind the engine: what they have in common.
+//! The south sides of the engine: their contract [`South`], and what the buses have in common.
 
 mod accesses;
 mod backoff;
@@ -17,11 +17,12 @@ use super::access::{Access, AccessFailure, Data, Operation, Progress};
 use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
 use super::axis::procedure::ProcedureAccess;
+use super::cyclic::Received;
 use super::notice::Notice;
 use super::port::SouthPort;
 use crate::mapping::{Item, Mapping};
 
-/// What an access to a drive was for.
+/// What an access to a drive is for. Its answer comes back with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// A controller's access to an attribute that lives in the drive.
@@ -30,9 +31,9 @@ pub enum Purpose {
         ticket: u32,
         /// Index of the axis's device.
         device: u8,
-        /// The attribute.
+        /// Its number in the Motion Device Axis Object.
         attribute: u16,
-        /// Whether it writes.
+        /// Whether it is a write access.
         write: bool,
     },
     /// A diagnostic word, to find the cause of a fault or a warning.
@@ -47,108 +48,85 @@ pub enum Purpose {
     Procedure(ProcedureAccess, u8),
 }
 
-/// An answer to an access.
+/// The result of an access to a drive.
 #[derive(Debug)]
 pub struct Answer {
-    /// The axis.
+    /// Number of the axis in the gateway, from 0.
     pub axis: usize,
     /// What it was for.
     pub purpose: Purpose,
     /// What was accessed.
     pub item: Item,
-    /// What was read and how far a command is, or why there is neither.
+    /// The data read and the progress of a command, or why it failed.
     pub result: Result<(Data, Progress), AccessFailure>,
 }
 
-/// What a drive sent cyclically.
-#[derive(Debug, Clone, Copy)]
-pub struct Received<'a> {
-    /// Its values as they came last: the status word first, then what the drive's program knows.
-    pub data: &'a [u8],
-    /// Whether they came in the last cycle.
-    pub fresh: bool,
-    /// When they came, of a drive that sends by a timer of its own and not in step with the cycle: not every cycle has some.
-    pub at: Option<MonotonicTime>,
-    /// Whether the drive takes part: it was heard, and has not been lost for longer than its connection bears.
-    pub alive: bool,
-}
-
-/// What was sent in one call.
+/// The result of [`South::send`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// Whether a cycle of the bus has begun with it.
+    /// Whether a cycle of the bus began with this call.
     pub cycle: bool,
     /// Frames that could not be sent.
     pub failures: u64,
 }
 
-/// What a bus has counted since the start.
+/// Counters of a bus since the start.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Cycles.
+    /// Cycles that have begun.
     pub cycles: u64,
-    /// Cyclic telegrams that did not come back in time.
+    /// Cyclic telegrams that were not received in time.
     pub lost: u64,
-    /// Frames that were not taken.
+    /// Frames that were received and refused.
     pub refused: u64,
 }
 
-/// A cycle of a bus, as its axes have to know it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cycle {
-    /// The instant on the grid at which drives take what is sent in it.
-    pub acts_at: MonotonicTime,
-    /// Time from one cycle to the next.
-    pub span: DurationNs,
-    /// From the latest moment at which an update still counts for the cycle to the instant at which drives take it.
-    pub ahead: DurationNs,
-    /// By how much the engine was called late for it.
-    pub late: DurationNs,
-}
-
-/// A bus, as the engine sees it. Axes go by their numbers in the box.
-pub trait Bus {
+/// The contract of a south side: a bus with its drives. `axis` is always the number of an axis in the gateway, from 0.
+/// The counterpart for controllers is [`super::north::North`].
+///
+/// All methods run in the cycle: they neither allocate nor wait once the drives are in operation.
+pub trait South {
     /// Time from one cycle to the next.
     fn cycle_time(&self) -> DurationNs;
 
-    /// How long the engine may sleep at most while the bus has nothing to do by itself: what comes in has to wait so long.
+    /// Longest time between two calls while the bus has nothing to do. Frames that are received wait for that long.
     fn patience(&self) -> DurationNs;
 
-    /// When it has to do something by itself.
+    /// When the bus must be called next, regardless of frames; `None` if there is no such instant.
     fn wake_at(&self) -> Option<MonotonicTime>;
 
-    /// The instant on the grid at which its next cycle begins; `None` while it keeps no grid.
+    /// The instant on the grid at which the next cycle begins; `None` before the bus has a grid.
     fn next_cycle(&self) -> Option<MonotonicTime>;
 
-    /// Leaves out cycles that could only begin late, by more than half of their time. The grid stays where it is.
+    /// Skips cycles that would begin late by more than half of the cycle time. The grid does not move.
     fn skip_late(&mut self, now: MonotonicTime);
 
-    /// Builds what goes out at the instant of the next cycle, as far as the bus can do that ahead.
+    /// Builds the frames of the next cycle, as far as the bus can do that before its instant.
     fn prepare(&mut self);
 
-    /// Whether every drive that answers at all is in cyclic operation.
+    /// Whether every drive that answers is in cyclic operation.
     fn is_up(&self) -> bool;
 
-    /// SERCOS communication phase, of a bus that has phases.
+    /// SERCOS communication phase, 0 to 4; `None` for a bus without phases.
     fn phase(&self) -> Option<u8>;
 
-    /// What it has counted.
+    /// Counters since the start.
     fn counts(&self) -> Counts;
 
-    /// Takes what has come in.
+    /// Receives all waiting frames.
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>);
 
-    /// Whether a cycle was sent since the last call: then there is feedback to be taken.
+    /// Whether a cycle was sent since the last call of this method. If so, there is feedback to take.
     fn take_cycle(&mut self) -> bool;
 
-    /// What the drive of an axis sent in the cycle that has just ended; `None` without a drive in cyclic operation.
+    /// Values of the drive in the cycle that has ended; `None` if the drive is not in cyclic operation.
     fn feedback(&self, axis: usize) -> Option<Received<'_>>;
 
-    /// Tells whether no controller is connected: only then a bus that works may be taken down for a drive that does not.
+    /// Sets whether no controller is connected. Only then may a bus be brought up again for a drive that is missing.
     fn set_idle(&mut self, idle: bool);
 
-    /// Handles what has happened on the bus and drives the commissioning on. `answer` gets what accesses came to, `notice`
-    /// what people should know.
+    /// Handles the events of the bus and advances the commissioning. `answer` gets the results of accesses, `notice` what
+    /// people should know.
     fn run(
         &mut self,
         now: MonotonicTime,
@@ -159,19 +137,20 @@ pub trait Bus {
         notice: &mut dyn FnMut(Notice),
     );
 
-    /// Lets an axis fill its values for the next cycle; what it gives back says whether they may be sent.
+    /// Calls `fill` with the place for the command values of the next cycle, or with `None` if there is no drive. The values
+    /// are sent only if `fill` returns `true`.
     fn command(&mut self, axis: usize, fill: &mut dyn FnMut(Option<&mut [u8]>) -> bool);
 
-    /// Asks something of the drive of an axis; `false` when it is not there or too much waits.
+    /// Starts an access to the drive of an axis. Returns `false` if there is no drive or too many accesses wait.
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool;
 
-    /// Sends what is due.
+    /// Sends the frames that are due.
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent;
 
-    /// Ends operation.
+    /// Begins to end operation.
     fn stop(&mut self, now: MonotonicTime);
 
-    /// Whether it has ended.
+    /// Whether operation has ended and nothing is sent any more.
     fn is_stopped(&self) -> bool;
 }
 
@@ -195,9 +174,9 @@ pub enum AnyBus {
 }
 
 impl AnyBus {
-    /// What all of them can do.
+    /// The contract of the bus.
     #[must_use]
-    pub fn get(&self) -> &dyn Bus {
+    pub fn get(&self) -> &dyn South {
         match self {
             Self::Sercos(bus) => &**bus,
             Self::Can(bus) => &**bus,
@@ -206,7 +185,7 @@ impl AnyBus {
     }
 
     /// The same.
-    pub fn get_mut(&mut self) -> &mut dyn Bus {
+    pub fn get_mut(&mut self) -> &mut dyn South {
         match self {
             Self::Sercos(bus) => &mut **bus,
             Self::Can(bus) => &mut **bus,
@@ -216,10 +195,10 @@ impl AnyBus {
 }
 
 impl Buses {
-    /// These buses; `of` has for each axis the place of its bus.
+    /// `of` has, for each axis, the place of its bus in `list`.
     ///
     /// # Panics
-    /// When an axis is on a bus that is not there.
+    /// If `of` names a place that `list` does not have.
     #[must_use]
     pub fn new(list: Vec<AnyBus>, of: Vec<usize>) -> Self {
         assert!(of.iter().all(|bus| *bus < list.len()), "every axis is on a bus");
@@ -265,22 +244,22 @@ impl Buses {
 
     /// The bus in a place.
     #[must_use]
-    pub fn get(&self, place: usize) -> &dyn Bus {
+    pub fn get(&self, place: usize) -> &dyn South {
         self.list[place].get()
     }
 
     /// The same.
-    pub fn get_mut(&mut self, place: usize) -> &mut dyn Bus {
+    pub fn get_mut(&mut self, place: usize) -> &mut dyn South {
         self.list[place].get_mut()
     }
 
     /// All of them, in order.
-    pub fn iter(&self) -> impl Iterator<Item = &dyn Bus> {
+    pub fn iter(&self) -> impl Iterator<Item = &dyn South> {
         self.list.iter().map(AnyBus::get)
     }
 
     /// The same.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut dyn Bus> {
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut dyn South> {
         self.list.iter_mut().map(AnyBus::get_mut)
     }
 
@@ -290,14 +269,14 @@ impl Buses {
         self.of[axis]
     }
 
-    /// Asks something of the drive of an axis; `false` when it is not there or too much waits.
+    /// Starts an access to the drive of an axis. Returns `false` if there is no drive or too many accesses wait.
     pub fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let place = self.of[axis];
         self.get_mut(place).access(axis, access, purpose)
     }
 }
 
-/// Where the drive of each axis is among those of a bus, found without a search.
+/// Finds the drive of an axis on its bus without a search.
 #[derive(Debug)]
 struct Places<T>(Vec<Option<T>>);
 
@@ -320,8 +299,8 @@ impl<T: Copy> Places<T> {
     }
 }
 
-/// What an axis wants of its drive beside the cycle: the words that tell the cause of a fault or warning, its fault reset,
-/// captures and procedures, one access of each at a time.
+/// Starts the accesses that an axis wants outside the cyclic data: words with the cause of a fault or warning, fault reset,
+/// captures and procedures; one of each at a time.
 fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Access, Purpose) -> bool) {
     if axis.wants_drive_reset() {
         let sent = match axis.south().and_then(|program| program.command_of(Action::ResetFault)) {

@@ -7,22 +7,22 @@
 //! ```
 
 use profile_cip::device::drive_link::{
-    AbortOrder, AxisCommandImage, Command, DriveAction, DriveImage, HookupTest, SetPoints, TestOrder,
-    TestReport, Withheld,
+    AbortCause, AbortOrder, AxisCommandImage, Command, DriveAction, DriveImage, HookupTest, SetPoints,
+    TestOrder, TestReport, Withheld,
 };
 use profile_cip::wire::motion::codes::TestStatus;
 use profile_cip::wire::motion::test_service::{HookupTestData, hookup_status};
 use profile_generic::fault::{Fault, FaultCause};
-use profile_generic::fault_set::ActiveFault;
 use profile_generic::hookup;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::OperatingMode;
 use profile_generic::sequence::SequenceStep;
+use profile_generic::state::DriveState;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 use crate::engine::axis::{AxisChannel, Intent, Loss, NorthPoints, Target, Wish};
-use crate::mapping::{CipFault, CipProgram, CipTrackers, CyclicValues, Told};
+use crate::mapping::{CipFault, CipProgram, CipTrackers, Told};
 
 /// What CIP Motion keeps of an axis from cycle to cycle.
 #[derive(Debug)]
@@ -114,7 +114,7 @@ impl CipAxis {
         }
     }
 
-    /// The motion device wants the axis stopped for a fault, or stopped harder than before.
+    /// The motion device orders a stop for what it has found itself, or a harder one than before.
     fn take_abort(
         &mut self,
         axis: &mut AxisChannel,
@@ -124,13 +124,16 @@ impl CipAxis {
         let new = order.filter(|order| self.abort.is_none_or(|known| known.action != order.action));
         self.abort = order;
         let Some(order) = new.filter(|_| axis.may_have_torque()) else { return };
-        let is_meant = |active: &&ActiveFault| {
-            let fault = self.program.fault(active.fault.cause);
-            fault.is_some_and(|fault| fault.is(order.fault_type.0, order.code))
+        let cause = match order.cause {
+            AbortCause::Controller => FaultCause::CONTROLLER_ABORT,
+            AbortCause::IllegalMode => FaultCause::ILLEGAL_MODE,
+            AbortCause::DriveLost => FaultCause::SOUTH_SILENCE,
+            // It has stopped for that already, as it is configured for a lost command, unless it was about to stop.
+            AbortCause::Node if axis.state() == DriveState::FaultReaction => return,
+            AbortCause::Node => FaultCause::COMMAND_LOST,
         };
-        let cause = axis.faults().find(is_meant).map(|active| active.fault);
-        let fault = cause.unwrap_or_else(|| Fault::new(FaultCause::CONTROLLER_ABORT, system));
-        axis.take_fault(now, system, fault.with_reaction(self.program.reaction(order.action)));
+        let fault = Fault::new(cause, system).with_reaction(self.program.reaction(order.action));
+        axis.take_fault(now, system, fault);
     }
 
     /// Hands on set-points that shall be reached at `target` on the local clock; without a shared clock they are placed by the
@@ -158,9 +161,8 @@ impl CipAxis {
             let counts = self.program.counts(axis.feedback().position.get()).value;
             self.trackers.start(counts, points.position_reference);
         }
-        let values = CyclicValues::from(&points.values);
         let converted =
-            self.program.decode(&values, points.position_reference, &mut self.trackers, &mut command);
+            self.program.decode(&points.values, points.position_reference, &mut self.trackers, &mut command);
         let trims = self.program.decode_trims(&points.trims, &mut command);
         let target = match target {
             Some(at) => {

@@ -11,6 +11,7 @@ use profile_cip::device::attribute_worker::AttributeAccess;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
 
+use super::refusal::refusal;
 use crate::engine::access::Access;
 use crate::engine::axis::AxisChannel;
 use crate::engine::bus::{Answer, Buses, Purpose};
@@ -68,7 +69,7 @@ impl Comparison {
     pub fn take(&mut self, answer: &Answer, axis: &AxisChannel) -> Option<Result<(), GeneralStatus>> {
         self.missing = self.missing.saturating_sub(1);
         let limit = match &answer.result {
-            Err(failure) => Err(super::refusal(*failure)),
+            Err(failure) => Err(refusal(*failure)),
             Ok((data, _)) => {
                 let held = LIMITS.iter().filter_map(|limit| axis.south()?.parameter(*limit));
                 let held = held.into_iter().find(|held| held.item == answer.item);

@@ -51,7 +51,7 @@ const FULL_PAUSE: DurationNs = DurationNs::from_millis(1);
 /// How long the transmit queue may stay full: then nobody acknowledges what is sent.
 const STUCK_MAX: DurationNs = DurationNs::from_secs(1);
 
-/// Device type.
+/// 1000h: the profile in the low word, its additional information above.
 pub const DEVICE_TYPE: Mux = Mux::new(0x1000, 0);
 /// Identity: vendor, product, revision, serial number.
 pub const IDENTITY: [Mux; 4] =

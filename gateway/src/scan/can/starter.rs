@@ -20,7 +20,7 @@ const USES: [(&str, SupportedModes); 3] = [
 /// Node-id of the box, unless somebody has it.
 const OWN_NODE: u8 = 127;
 
-/// Rate that is written where the interface tells none.
+/// Rate that is written where the interface reports none.
 const BIT_RATE: u32 = 1_000_000;
 
 /// The configuration as text, for this interface and, where that is known, its rate. It is whole: `axisbridge run` takes it.

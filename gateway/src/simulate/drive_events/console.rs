@@ -50,7 +50,7 @@ fn send_lines(mut from: impl BufRead, to: &SyncSender<String>, may_read: impl Fn
     }
 }
 
-/// Whether the terminal belongs to the process group of this process, as the kernel tells it.
+/// Whether the terminal belongs to the process group of this process, as the kernel reports it.
 fn is_in_foreground() -> bool {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     belongs_to_terminal(&stat).unwrap_or(true)

@@ -17,6 +17,7 @@ mod tests;
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use profile_generic::capture::CaptureWindow;
 use profile_generic::cast;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::quantity::Position;
@@ -56,6 +57,12 @@ pub enum Change {
     Jump(Position),
     /// A delay is set.
     Delay(Delay, DurationNs),
+    /// A registration input, 1 or 2, is switched.
+    Registration(usize, bool),
+    /// Where the home switch is closed.
+    HomeSwitch(Option<CaptureWindow>),
+    /// The limit switches close at and below, and at and above these places.
+    LimitSwitches(Position, Position),
 }
 
 impl Change {
@@ -68,11 +75,12 @@ impl Change {
             Self::Power(false) => Some(Self::Power(true)),
             Self::Silence(true) => Some(Self::Silence(false)),
             Self::Freeze(true) => Some(Self::Freeze(false)),
+            Self::Registration(number, true) => Some(Self::Registration(number, false)),
             _ => None,
         }
     }
 
-    /// Carries out what concerns the servo alone; `false` for main power and silence, which are the drive's own.
+    /// Carries out what concerns the servo alone; `false` for main power, silence and limit switches, which are the drive's own.
     pub fn apply_to(self, servo: &mut Servo) -> bool {
         match self {
             Self::Fault(cause) => {
@@ -96,7 +104,9 @@ impl Change {
                 // The reader has no times below zero, the only ones that a servo refuses.
                 let _ = servo.set_parameters(parameters);
             }
-            Self::Power(_) | Self::Silence(_) => return false,
+            Self::Registration(number, on) => servo.set_registration(number, on),
+            Self::HomeSwitch(window) => servo.set_home_switch(window),
+            Self::Power(_) | Self::Silence(_) | Self::LimitSwitches(..) => return false,
         }
         true
     }
@@ -104,8 +114,10 @@ impl Change {
 
 /// As a line of the script has it.
 impl fmt::Display for Change {
+    // A flat match: one arm for each variant.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let on_off = |on: bool| if on { "on" } else { "off" };
+        let units = |place: Position| cast::f64_from_i64(place.0) / 1e9;
         match self {
             Self::Fault(cause) => write!(f, "fault {cause}"),
             Self::Clear(Some(cause)) => write!(f, "clear {cause}"),
@@ -115,7 +127,7 @@ impl fmt::Display for Change {
             Self::Power(on) => write!(f, "power {}", on_off(*on)),
             Self::Silence(on) => write!(f, "silence {}", on_off(*on)),
             Self::Freeze(on) => write!(f, "freeze {}", on_off(*on)),
-            Self::Jump(distance) => write!(f, "jump {}", cast::f64_from_i64(distance.0) / 1e9),
+            Self::Jump(distance) => write!(f, "jump {}", units(*distance)),
             Self::Delay(delay, time) => {
                 let delay = match delay {
                     Delay::Ready => "ready",
@@ -123,6 +135,12 @@ impl fmt::Display for Change {
                     Delay::Brake => "brake",
                 };
                 write!(f, "delay {delay} {}", duration::show(*time))
+            }
+            Self::Registration(number, on) => write!(f, "registration_{number} {}", on_off(*on)),
+            Self::HomeSwitch(Some(at)) => write!(f, "home_switch {} {}", units(at.from), units(at.to)),
+            Self::HomeSwitch(None) => f.write_str("home_switch off"),
+            Self::LimitSwitches(lower, upper) => {
+                write!(f, "limit_switches {} {}", units(*lower), units(*upper))
             }
         }
     }
@@ -144,7 +162,7 @@ pub struct Event {
 pub struct Names {
     /// What one of them is called: `drive`, `axis`.
     pub what: &'static str,
-    /// Their numbers.
+    /// The numbers by which events name them.
     pub numbers: RangeInclusive<u16>,
 }
 

@@ -7,7 +7,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use super::{Change, Event, Names, Script, SimulatedDrives};
 use crate::config::duration;
 
-/// Plays events on drives, and tells every change of a drive's state.
+/// Plays events on drives, and reports every change of a drive's state.
 #[derive(Debug)]
 pub struct Player<D: SimulatedDrives> {
     names: Names,

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use profile_generic::capture::CaptureWindow;
 use profile_generic::cast;
 use profile_generic::fault::FaultCause;
 use profile_generic::quantity::{Position, TorqueAbsolute};
@@ -26,7 +27,7 @@ const RATED_TORQUES: std::ops::RangeInclusive<f64> = 0.01..=100_000.0;
 const TURNS_MAX: u32 = 1_000_000;
 
 /// Each verb with its usage and what it does; `[N]` is the number of a drive, without which all are meant.
-const VERBS: [(&str, &str, &str); 14] = [
+const VERBS: [(&str, &str, &str); 18] = [
     ("fault", "fault [N] CAUSE [for TIME]", "the drive faults; its cause stays, or ends after the time"),
     ("clear", "clear [N] [CAUSE]", "ends the cause of a fault, or of all; the drive still needs a reset"),
     ("warning", "warning [N] CAUSE [for TIME] | off", "the drive warns"),
@@ -35,6 +36,10 @@ const VERBS: [(&str, &str, &str); 14] = [
     ("freeze", "freeze [N] [for TIME] | off", "feedback values stay as they are"),
     ("jump", "jump [N] UNITS", "the encoder jumps by so many revolutions or millimetres"),
     ("delay", "delay [N] ready|torque|brake TIME", "main power to ready, enable to torque, brake to move"),
+    ("registration_1", "registration_1 [N] on [for TIME] | off", "switches registration input 1"),
+    ("registration_2", "registration_2 [N] on [for TIME] | off", "switches registration input 2"),
+    ("home_switch", "home_switch [N] FROM TO | off", "the home switch is closed between these places"),
+    ("limit_switches", "limit_switches [N] LOWER UPPER", "the limit switches close there; CANopen only"),
     ("resolution", "resolution [N] COUNTS", "encoder counts in a unit; at the start only"),
     ("rated_torque", "rated_torque [N] NM", "rated torque in Nm, or force in N; at the start only"),
     ("gear", "gear [N] MOTOR:LOAD", "turns of motor and load; at the start only"),
@@ -61,7 +66,7 @@ pub enum Order {
 /// What can be typed, a line each.
 #[must_use]
 pub fn help() -> String {
-    VERBS.iter().map(|(_, usage, what)| format!("  {usage:<36} {what}\n")).collect()
+    VERBS.iter().map(|(_, usage, what)| format!("  {usage:<39} {what}\n")).collect()
 }
 
 /// The causes that a fault or a warning can have.
@@ -266,8 +271,7 @@ impl<'l> Words<'l> {
                 let drive = if self.left() > 1 { self.drive()? } else { None };
                 return match verb {
                     "jump" => {
-                        let distance = self.number("a distance", -JUMP_MAX..=JUMP_MAX)?;
-                        let change = Change::Jump(Position(cast::i64_from_f64(distance * 1e9)));
+                        let change = Change::Jump(self.units("a distance")?);
                         Ok(Order::Event(Event { drive, change, lasts: None }))
                     }
                     "resolution" => {
@@ -282,6 +286,19 @@ impl<'l> Words<'l> {
                     _ => Ok(Order::Property(drive, self.gear()?)),
                 };
             }
+            "home_switch" | "limit_switches" => {
+                let places = if self.words.last().is_some_and(|(word, _)| *word == "off") { 1 } else { 2 };
+                let drive = if self.left() > places { self.drive()? } else { None };
+                let change = match verb {
+                    "home_switch" if self.takes("off") => Change::HomeSwitch(None),
+                    "home_switch" => {
+                        let (from, to) = (self.units("a position")?, self.units("a position")?);
+                        Change::HomeSwitch(Some(CaptureWindow { from, to }))
+                    }
+                    _ => Change::LimitSwitches(self.units("a position")?, self.units("a position")?),
+                };
+                return Ok(Order::Event(Event { drive, change, lasts: None }));
+            }
             _ => {}
         }
         let drive = self.drive()?;
@@ -291,16 +308,11 @@ impl<'l> Words<'l> {
             "clear" => Change::Clear(Some(self.cause()?)),
             "warning" if self.takes("off") => Change::Warning(None),
             "warning" => Change::Warning(Some(self.cause()?)),
-            "power" => {
-                let (word, span) = self.take("`on` or `off`")?;
-                match word {
-                    "on" => Change::Power(true),
-                    "off" => Change::Power(false),
-                    _ => return problem(span, format!("`{word}` is neither on nor off"), self.expected()),
-                }
-            }
+            "power" => Change::Power(self.on_off()?),
             "silence" => Change::Silence(!self.takes("off")),
             "freeze" => Change::Freeze(!self.takes("off")),
+            "registration_1" => Change::Registration(1, self.on_off()?),
+            "registration_2" => Change::Registration(2, self.on_off()?),
             _ => {
                 let (word, span) = self.take("a delay")?;
                 let delay = match word {
@@ -314,6 +326,19 @@ impl<'l> Words<'l> {
         };
         let lasts = if change.end().is_some() && self.takes("for") { Some(self.time()?) } else { None };
         Ok(Order::Event(Event { drive, change, lasts }))
+    }
+
+    fn on_off(&mut self) -> Read<bool> {
+        match self.take("`on` or `off`")? {
+            ("on", _) => Ok(true),
+            ("off", _) => Ok(false),
+            (word, span) => problem(span, format!("`{word}` is neither on nor off"), self.expected()),
+        }
+    }
+
+    fn units(&mut self, what: &str) -> Read<Position> {
+        let units = self.number(what, -JUMP_MAX..=JUMP_MAX)?;
+        Ok(Position(cast::i64_from_f64(units * 1e9)))
     }
 
     fn takes(&mut self, word: &str) -> bool {

@@ -19,9 +19,9 @@ use profile_sercos::master::Master;
 use profile_sercos::master::config::MasterConfig;
 use profile_sercos::master::event::Output;
 use profile_sercos::slave::Application as _;
-use profile_sercos::slave::drive::scaling;
 use profile_sercos::slave::phase::State;
 use profile_sercos::wire::header::{Header, Kind, Phase};
+use profile_sercos::wire::idn::Idn;
 
 use super::player::Player;
 use super::setup::{Property, Setup};
@@ -72,6 +72,13 @@ jump 2 1
 delay ready 3 s
 delay 1 torque 700 ms
 delay brake 0 s
+registration_1 2 on for 5 ms
+registration_2 off
+home_switch 2 0.25 0.5
+home_switch 1 2
+home_switch 2 off
+home_switch off
+limit_switches 1 -1 1
 ";
     let script = script(text);
     let mut table = String::new();
@@ -288,6 +295,9 @@ at 2 s freeze 2
 at 2 s jump 2.5
 at 2.1 s freeze off
 at 3 s silence 1 for 1 s
+at 4.7 s home_switch 2 2 3
+at 4.8 s registration_1 2 on
+at 4.9 s limit_switches 2 -1 1
 delay 2 torque 700 ms
 delay 2 brake 80 ms
 delay 2 ready 900 ms
@@ -308,7 +318,8 @@ delay 2 ready 900 ms
         let other = index::AXIS_OFFSET;
         let positions = [index::POSITION_ACTUAL, index::POSITION_ACTUAL + other].map(number);
         let status = number(index::STATUSWORD + other);
-        seen.push((status & 1 << 7 != 0, status & 1 << 4 != 0, positions, DriveNode::state(node)));
+        let inputs = number(0x60FD + other) & 7;
+        seen.push((status & 1 << 7 != 0, status & 1 << 4 != 0, positions, DriveNode::state(node), inputs));
     });
     insta::assert_snapshot!(said.join("\n"));
     let emergencies = frames.iter().filter(|(_, frame)| frame.id() == Id::Standard(0x85));
@@ -320,6 +331,8 @@ delay 2 ready 900 ms
     let jump = at(2_050).2[0];
     assert!(jump > 0);
     assert_eq!((at(1_990).2, at(2_050).2, at(2_200).2), ([0, 0], [jump, 0], [jump, jump]));
+    // The axis stands at 2.5: in the home switch, and beyond the upper limit switch.
+    assert_eq!([4_690, 4_790, 4_990].map(|time| at(time).4), [0, 4, 6], "inputs");
     let states = [3_600, 4_600].map(|time| at(time).3);
     assert_eq!(states, [NmtState::PRE_OPERATIONAL, NmtState::OPERATIONAL]);
     let servo = *drive.node().application().axes()[1].servo().parameters();
@@ -393,8 +406,8 @@ fn drives_have_the_encoder_the_torque_and_the_gear_of_the_script() {
     let mut line = sercos(&setup);
     let slaves = line.network_mut().slaves();
     let gear = |slave: usize, idn| slaves[slave].store().number_of(idn);
-    assert_eq!([0, 1].map(|slave| gear(slave, scaling::idn::GEAR_INPUT)), [10, 1]);
-    assert_eq!([0, 1].map(|slave| gear(slave, scaling::idn::GEAR_OUTPUT)), [3, 1]);
+    assert_eq!([0, 1].map(|slave| gear(slave, Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR)), [10, 1]);
+    assert_eq!([0, 1].map(|slave| gear(slave, Idn::OUTPUT_REVOLUTIONS_OF_LOAD_GEAR)), [3, 1]);
     let servo = slaves[1].application().servo().parameters();
     assert_eq!((servo.encoder_counts, servo.rated_torque.0), (4_096, 7_000_000));
 

@@ -22,7 +22,7 @@ use crate::simulate::setup;
 /// Update period where nothing is said.
 const UPDATE_PERIOD: DurationNs = DurationNs::from_millis(8);
 /// Update periods of silence after which the connection times out, with their codes.
-const MULTIPLIERS: [i128; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+pub(super) const MULTIPLIERS: [i128; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 const DEFAULT_MULTIPLIER: u8 = 3;
 
 pub(super) const MODES: &[(&str, ControlMode)] = &[
@@ -43,7 +43,7 @@ pub(super) const TARGETS: &[(&str, CommandTarget)] = &[
     ("extrapolate", CommandTarget::EXTRAPOLATE),
     ("interpolate", CommandTarget::INTERPOLATE),
 ];
-const COMMANDS: &[(&str, CommandDataSet)] = &[
+pub(super) const COMMANDS: &[(&str, CommandDataSet)] = &[
     ("position", CommandDataSet::POSITION),
     ("velocity", CommandDataSet::VELOCITY),
     ("acceleration", CommandDataSet::ACCELERATION),
@@ -51,28 +51,29 @@ const COMMANDS: &[(&str, CommandDataSet)] = &[
     ("unwind_count", CommandDataSet::UNWIND_COUNT),
     ("position_displacement", CommandDataSet::POSITION_DISPLACEMENT),
 ];
-const ACTUALS: &[(&str, ActualDataSet)] = &[
+pub(super) const ACTUALS: &[(&str, ActualDataSet)] = &[
     ("position", ActualDataSet::POSITION),
     ("velocity", ActualDataSet::VELOCITY),
     ("acceleration", ActualDataSet::ACCELERATION),
     ("unwind_count", ActualDataSet::UNWIND_COUNT),
     ("position_displacement", ActualDataSet::POSITION_DISPLACEMENT),
 ];
-const STATUSES: &[(&str, StatusDataSet)] = &[
+pub(super) const STATUSES: &[(&str, StatusDataSet)] = &[
     ("fault", StatusDataSet::FAULT),
     ("alarm", StatusDataSet::ALARM),
     ("axis_status", StatusDataSet::AXIS_STATUS),
     ("io_status", StatusDataSet::IO_STATUS),
     ("safety_status", StatusDataSet::SAFETY_STATUS),
 ];
-const TIMES: &[(&str, TimeDataSet)] = &[
+pub(super) const TIMES: &[(&str, TimeDataSet)] = &[
     ("update_diagnostics", TimeDataSet::UPDATE_DIAGNOSTICS),
     ("time_diagnostics", TimeDataSet::TIME_DIAGNOSTICS),
 ];
-const FORMATS: &[(&str, Format)] = &[("variable", Format::Variable), ("fixed", Format::Fixed)];
+pub(super) const FORMATS: &[(&str, Format)] = &[("variable", Format::Variable), ("fixed", Format::Fixed)];
 /// Keys for which an update of the fixed format has no room.
 const VARIABLE_ONLY: [&str; 3] = ["grand_master", "size", "time_data"];
-const POSITION_TYPES: &[(&str, bool)] = &[("LREAL", false), ("DINT", true)];
+pub(super) const ACTUAL_POSITION_TYPES: &[(&str, bool)] = &[("DINT", false), ("LINT", true)];
+pub(super) const POSITION_TYPES: &[(&str, bool)] = &[("LREAL", false), ("DINT", true)];
 
 /// Time data of a list.
 pub(super) fn time_data(value: &Value<'_>, problems: &Problems) -> Option<TimeDataSet> {
@@ -361,7 +362,7 @@ fn axis(
     }
     setup.control_mode = keys.word_or("mode", MODES, ControlMode::POSITION)?;
     let source = keys.word_or("feedback", FEEDBACKS, FeedbackSource::MOTOR)?;
-    let lint = keys.word_or("actual_position_type", &[("DINT", false), ("LINT", true)], false)?;
+    let lint = keys.word_or("actual_position_type", ACTUAL_POSITION_TYPES, false)?;
     setup.feedback_mode = FeedbackMode(source.0).with_lint(lint);
     if format == Format::Fixed {
         setup.sets = DataSets::fixed(setup.control_mode);

@@ -22,7 +22,24 @@ const SET_ATTRIBUTE_SINGLE: u8 = 0x10;
 const BODY_MAX: usize = 1400;
 
 /// Way of an attribute: the service channel or explicit messages.
-const WAYS: &[(&str, bool)] = &[("service", false), ("explicit", true)];
+pub(super) const WAYS: &[(&str, bool)] = &[("service", false), ("explicit", true)];
+
+/// What a hookup test tests.
+pub(super) const HOOKUP_TESTS: &[(&str, u8)] =
+    &[("motor and feedback", 0), ("feedback", 1), ("marker", 2), ("commutation", 3)];
+
+/// How a motor test runs.
+pub(super) const MOTOR_TESTS: &[(&str, u8)] = &[("static", 0), ("dynamic", 1), ("calculated", 2)];
+
+/// Which way an inertia test turns.
+pub(super) const DIRECTIONS: &[(&str, u8)] = &[("forward", 0), ("reverse", 1)];
+
+/// Tests whose result can be awaited.
+pub(super) const TESTS: &[(&str, MotionService)] = &[
+    ("hookup", MotionService::GET_HOOKUP_TEST_DATA),
+    ("motor", MotionService::GET_MOTOR_TEST_DATA),
+    ("inertia", MotionService::GET_INERTIA_TEST_DATA),
+];
 
 fn keys<'a, 't>(
     value: &'a Value<'t>,
@@ -249,11 +266,9 @@ const fn real(value: f64) -> f32 {
 
 /// `run_hookup_test = { axis, type, channel, distance, time }`
 pub(super) fn hookup_test(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
-    const TYPES: &[(&str, u8)] =
-        &[("motor and feedback", 0), ("feedback", 1), ("marker", 2), ("commutation", 3)];
     let (mut keys, axis) = keys(value, "run_hookup_test", frame, 1)?;
     let request = RunHookupTest {
-        test_type: keys.word("type", TYPES)?,
+        test_type: keys.word("type", HOOKUP_TESTS)?,
         feedback_channel: keys.integer_or("channel", 0..=255, 1)?,
         distance: real(keys.number_or("distance", Some(0.0))?),
         time: real(keys.number_or("time", Some(0.0))?),
@@ -264,16 +279,14 @@ pub(super) fn hookup_test(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> 
 
 /// `run_motor_test = { axis, type }`
 pub(super) fn motor_test(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
-    const TYPES: &[(&str, u8)] = &[("static", 0), ("dynamic", 1), ("calculated", 2)];
     let (mut keys, axis) = keys(value, "run_motor_test", frame, 1)?;
-    let request = RunMotorTest { test_type: keys.word("type", TYPES)? };
+    let request = RunMotorTest { test_type: keys.word("type", MOTOR_TESTS)? };
     keys.finish()?;
     run_test(axis, MotionService::RUN_MOTOR_TEST, value, frame, |writer| request.emit(writer))
 }
 
 /// `run_inertia_test = { axis, direction, velocity, torque, travel_limit }`
 pub(super) fn inertia_test(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
-    const DIRECTIONS: &[(&str, u8)] = &[("forward", 0), ("reverse", 1)];
     let (mut keys, axis) = keys(value, "run_inertia_test", frame, 1)?;
     let request = RunInertiaTest {
         direction: keys.word_or("direction", DIRECTIONS, 0)?,
@@ -287,11 +300,6 @@ pub(super) fn inertia_test(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step>
 
 /// `test_result = { axis, test, status }`
 pub(super) fn test_result(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
-    const TESTS: &[(&str, MotionService)] = &[
-        ("hookup", MotionService::GET_HOOKUP_TEST_DATA),
-        ("motor", MotionService::GET_MOTOR_TEST_DATA),
-        ("inertia", MotionService::GET_INERTIA_TEST_DATA),
-    ];
     let mut keys = table(value, "test_result", frame.problems)?;
     let axis = axis(keys.need("axis")?, frame)?;
     let service = keys.word("test", TESTS)?;

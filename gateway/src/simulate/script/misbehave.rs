@@ -7,7 +7,7 @@ use super::reader::{Keys, Value, table, time, wrong};
 use super::step::{Frame, axes};
 
 /// Updates that one step may spoil.
-const UPDATES: std::ops::RangeInclusive<i128> = 1..=1_000_000;
+pub(super) const UPDATES: std::ops::RangeInclusive<i128> = 1..=1_000_000;
 
 /// Every kind, with the keys it takes beside its own.
 const KINDS: [&str; 12] = [

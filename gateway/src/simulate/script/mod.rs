@@ -15,7 +15,7 @@
 //! ```
 //!
 //! The whole file is read and checked before anything is sent: every key, every name of the standard, every value, and
-//! whether a step can succeed at all. Every problem is told at its place.
+//! whether a step can succeed at all. Every problem is reported at its place.
 
 mod attributes;
 mod connection;
@@ -25,6 +25,7 @@ mod expect;
 mod misbehave;
 mod motion;
 mod reader;
+pub mod schema;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -52,7 +53,7 @@ pub struct Script {
     pub places: Places,
     /// Connection and axes.
     pub config: ControllerConfig,
-    /// The steps.
+    /// What the controller does, in order.
     pub steps: Vec<Step>,
     /// What each step does, in words, with its line in the file; the last ones may have been added.
     pub titles: Vec<(String, Option<usize>)>,
@@ -87,6 +88,9 @@ impl Script {
     }
 }
 
+/// Whether a fault that no step expects fails the run.
+const UNEXPECTED_FAULTS: &[(&str, bool)] = &[("fail", true), ("ignore", false)];
+
 fn read(table: &DeTable<'_>, source: &str, mapping: &Mapping, problems: &Problems) -> Option<Script> {
     let dictionary = &mapping.dictionaries.cip;
     let mut keys = Keys::new("the script", table, 0..0, problems);
@@ -97,7 +101,7 @@ fn read(table: &DeTable<'_>, source: &str, mapping: &Mapping, problems: &Problem
         },
         None => None,
     };
-    let unexpected = keys.word_or("unexpected_faults", &[("fail", true), ("ignore", false)], true);
+    let unexpected = keys.word_or("unexpected_faults", UNEXPECTED_FAULTS, true);
     let format = connection::format(table.get("connection"));
     let axes = connection::axes(keys.find("axis"), format, dictionary, problems);
     let (setups, motion): (Vec<_>, Vec<_>) = axes.clone().unwrap_or_default().into_iter().unzip();

@@ -5,7 +5,7 @@ use profile_cip::controller::{Limits, Step};
 use profile_cip::wire::motion::codes::FeedbackMode;
 use profile_generic::time::DurationNs;
 
-use super::connection::{FEEDBACKS, MODES};
+use super::connection::{ACTUAL_POSITION_TYPES, FEEDBACKS, MODES};
 use super::reader::{Keys, Value, table, time};
 use super::step::{Frame, axis};
 
@@ -103,7 +103,7 @@ pub(super) fn mode(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
 pub(super) fn feedback(value: &Value<'_>, frame: &Frame<'_>) -> Option<Step> {
     let (mut keys, axis) = keys(value, "feedback", frame)?;
     let source = keys.word("source", FEEDBACKS)?;
-    let lint = keys.word_or("actual_position_type", &[("DINT", false), ("LINT", true)], false)?;
+    let lint = keys.word_or("actual_position_type", ACTUAL_POSITION_TYPES, false)?;
     keys.finish()?;
     Some(Step::Feedback { axis, mode: FeedbackMode(source.0).with_lint(lint) })
 }

@@ -6,6 +6,7 @@
 use std::collections::VecDeque;
 
 use profile_cia402::master::config::Direction;
+use profile_cia402::wire::Mux;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::MonotonicTime;
 
@@ -75,10 +76,23 @@ impl Tap {
         self.known = drives.map(drive).collect();
     }
 
+    /// The drives are commissioned. From now on their motors do not matter: what the drives send is replaced.
+    pub fn pause_drives(&mut self) {
+        self.bus.nodes_mut().for_each(|node| node.application_mut().set_paused(true));
+    }
+
     /// The drive of an axis holds this in place of its own value.
     pub fn hold(&mut self, axis: usize, object: Object, bytes: &[u8]) {
         self.held.retain(|(known, of, _)| (*known, *of) != (axis, object));
         self.held.push((axis, object, bytes.to_vec()));
+    }
+
+    /// What the drive of an axis holds; `None` of a drive without the object.
+    pub fn kept(&self, axis: usize, object: Object) -> Option<i64> {
+        let node = self.known.iter().find(|drive| drive.axis == axis)?.node;
+        let device = self.bus.nodes().find(|known| known.node().is_some_and(|id| id.get() == node))?;
+        let Object { index, sub } = object;
+        device.dictionary().find(Mux { index, sub }).map(|_| device.dictionary().number(index, sub))
     }
 
     /// Drives hold what they have themselves.

@@ -18,7 +18,7 @@ use profile_cip::wire::motion::fixed::FixedCommand;
 use profile_cip::wire::motion::id_list::IdList;
 use profile_cip::wire::motion::{
     CommandBlock, CommandFrame, CommandHeader, CommandInstance, CommandPosition, CommandValues,
-    CommandWriter, FORMAT_REVISION, Format, ServiceRequest,
+    CommandWriter, FORMAT_REVISION, Format, ServiceRequest, WriteBlock,
 };
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -42,7 +42,7 @@ const ALL_ACTUAL: ActualDataSet =
     ActualDataSet::POSITION.union(ActualDataSet::VELOCITY).union(ActualDataSet::ACCELERATION);
 const ALL_STATUS: StatusDataSet = StatusDataSet::AXIS_STATUS.union(StatusDataSet::IO_STATUS);
 
-/// How far the acknowledged update is from every one that was sent: what is told again and again stays in sight.
+/// How far the acknowledged update is from every one that was sent: what is reported again and again stays in sight.
 const NEVER_RECEIVED: u8 = 64;
 
 /// What an axis is told.
@@ -237,6 +237,32 @@ impl Controller {
         if let Some(said) = self.said.get_mut(place) {
             *said = Said { block, frame: None };
         }
+    }
+
+    /// An update with the block of the axis at a place and its cyclic write data.
+    pub fn written(&self, place: usize, block: CommandBlock, data: &[u8]) -> Vec<u8> {
+        let header = CommandHeader {
+            update_id: self.update_id,
+            node_control: CONTROLS,
+            instance_count: 0,
+            last_received_id: 0,
+            time_stamp: None,
+            time_offset: None,
+            diagnostics: TimeDataSet::empty(),
+        };
+        let mut bytes = vec![0; UPDATE_MAX];
+        let Ok(mut writer) = CommandWriter::new(&mut bytes, &header) else { return Vec::new() };
+        let instance = CommandInstance {
+            number: u8::try_from(place + 1).unwrap_or(u8::MAX),
+            cyclic: Some(block),
+            // The number of the list is put in its place when the update goes out.
+            write: Some(WriteBlock { write_block_id: 1, read_block_id: 0, data }),
+            ..CommandInstance::default()
+        };
+        let _ = writer.instance(&instance);
+        let len = writer.finish();
+        bytes.truncate(len);
+        bytes
     }
 
     /// The next update as a datagram; the one after it is due a period later.

@@ -23,6 +23,7 @@ mod sercos;
 use std::collections::VecDeque;
 use std::net::SocketAddrV4;
 
+use profile_cip::device::attribute::id;
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, Token};
 use profile_cip::wire::class1::Class1Datagram;
@@ -52,8 +53,9 @@ use crate::mapping::{Item, Mapping};
 use crate::north::AdapterEnd;
 use crate::simulate::drives::SIMULATED_MAC;
 
-/// Virtual time in which the drives must be ready: 511 of them take less.
-const COMMISSIONING_MAX: DurationNs = DurationNs::from_secs(120);
+/// Virtual time in which the drives must be ready, and what each of them adds: 511 of them take less.
+const COMMISSIONING_MAX: DurationNs = DurationNs::from_secs(20);
+const COMMISSIONING_AXIS: DurationNs = DurationNs::from_millis(250);
 
 /// When it begins; the instant does not matter.
 const START: MonotonicTime = MonotonicTime(1_000_000_000);
@@ -70,9 +72,6 @@ const TELEGRAM_PERIODS_MAX: i64 = 8;
 /// Services of explicit messages.
 const GET_ATTRIBUTE_SINGLE: u8 = 0x0E;
 const SET_ATTRIBUTE_SINGLE: u8 = 0x10;
-
-/// Control Status, attribute 89, which an update of the fixed format does not carry.
-const CONTROL_STATUS: u16 = 89;
 
 /// Place of Axis Control in an update of the fixed format.
 const AXIS_CONTROL_AT: usize = 6;
@@ -155,6 +154,15 @@ impl Tap {
         }
     }
 
+    /// Stops the motors of simulated drives, where they have some.
+    fn pause_drives(&mut self) {
+        match self {
+            Self::Sercos(tap) => tap.pause_drives(),
+            Self::Can(tap) => tap.pause_drives(),
+            Self::Devicenet(_) => {}
+        }
+    }
+
     fn peers(&mut self) -> &mut [Peer] {
         match self {
             Self::Sercos(tap) => &mut tap.peers,
@@ -213,7 +221,7 @@ pub(super) struct Told {
     pub command: AxisCommand,
 }
 
-/// The bench.
+/// An engine in virtual time with a controller and simulated drives.
 #[derive(Debug)]
 pub(super) struct Bench {
     engine: Engine,
@@ -283,9 +291,12 @@ impl Bench {
             aligned: false,
             used: true,
         };
-        while !bench.is_ready() && bench.now.since(START) < COMMISSIONING_MAX {
+        let end =
+            START + COMMISSIONING_MAX + COMMISSIONING_AXIS * i64::try_from(axes).unwrap_or(i64::MAX / 2);
+        while !bench.is_ready() && bench.now < end {
             bench.call();
         }
+        bench.taps.iter_mut().for_each(Tap::pause_drives);
         Ok(bench)
     }
 
@@ -295,7 +306,7 @@ impl Bench {
         self.engine.axes().iter().all(|axis| axis.south().is_some()) && buses.all(|bus| bus.is_up())
     }
 
-    /// The engine.
+    /// The engine that runs, to look at its state.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
@@ -396,7 +407,9 @@ impl Bench {
         self.run_while(PERIODS_MAX, |bench| bench.engine.axes().iter().any(|axis| axis.may_have_torque()));
         for (number, stage) in axes.iter().enumerate().take(self.engine.axes().len()) {
             self.engine.set_cip_program(number, stage.north.clone());
-            self.engine.axes_mut()[number].set_south(stage.south.clone());
+            let axis = &mut self.engine.axes_mut()[number];
+            axis.set_south(stage.south.clone());
+            axis.forget_command();
         }
         for tap in &mut self.taps {
             tap.peers().iter_mut().for_each(|peer| peer.told = None);
@@ -477,7 +490,7 @@ impl Bench {
         let request = self.controllers[device].open(first);
         self.request(device, request);
         if self.controllers[device].format == Format::Fixed {
-            self.explicit(device, SET_ATTRIBUTE_SINGLE, 1, CONTROL_STATUS, &[1]);
+            self.explicit(device, SET_ATTRIBUTE_SINGLE, 1, id::CONTROL_STATUS, &[1]);
         }
     }
 
@@ -552,6 +565,10 @@ impl Bench {
                 controller.tell(0, block);
                 controller.commands = true;
                 controller.node_control = node_control - NodeControl::SYNC_CONTROL;
+            }
+            Update::Block(place, block) => {
+                controller.tell(place, block);
+                (controller.commands, controller.node_control) = (true, controller::CONTROLS);
             }
         }
         for place in motor_feedback {
@@ -679,7 +696,7 @@ impl Bench {
     }
 
     /// A block that keeps an axis where it is, in a mode of its drive.
-    fn standing(&self, axis: usize, control_mode: ControlMode) -> CommandBlock {
+    pub fn standing(&self, axis: usize, control_mode: ControlMode) -> CommandBlock {
         let channel = &self.engine.axes()[axis];
         let north = self.engine.cip_program(axis);
         let mode = |code: ControlMode| {
@@ -713,6 +730,27 @@ impl Bench {
             .next
             .map_or(self.now, |next| next + period * (updates - 1) + DurationNs(1));
         self.run_until(end);
+    }
+
+    /// Hands the block of one axis to its device, as an update that carries no other; what its drive is told at the instant at which
+    /// it counts.
+    pub fn command(&mut self, axis: usize, block: CommandBlock) -> Option<Told> {
+        let Member { device, place, .. } = self.members[axis];
+        self.update(device, Update::Block(place, block), &[place], &[]).pop()
+    }
+
+    /// The same with cyclic write data: these attributes have these values.
+    pub fn command_with(
+        &mut self,
+        axis: usize,
+        block: CommandBlock,
+        attributes: &[u16],
+        data: &[u8],
+    ) -> Option<Told> {
+        self.list_writes(axis, attributes)?;
+        let Member { device, place, .. } = self.members[axis];
+        let update = self.controllers[device].written(place, block, data);
+        self.update(device, Update::Variable(&update), &[place], &[]).pop()
     }
 
     /// The controller agrees on a list of cyclic write data; what the device says of each attribute.
@@ -800,7 +838,7 @@ impl Bench {
         self.run_for(device, 1);
     }
 
-    /// Lets drives be heard once, up to the updates that tell of it.
+    /// Lets drives be heard once, up to the updates that report it.
     pub fn listen_once(&mut self, axes: impl Iterator<Item = usize>) {
         let mut devices: Vec<usize> = axes.map(|axis| self.members[axis].device).collect();
         devices.dedup();
@@ -858,6 +896,15 @@ impl Bench {
         }
     }
 
+    /// What the drive of an axis holds, as commissioning and later writes have left it.
+    pub fn kept(&mut self, axis: usize, item: Item) -> Option<i64> {
+        match (&mut self.taps[self.members[axis].bus], item) {
+            (Tap::Sercos(tap), Item::Idn(idn)) => tap.kept(axis, idn),
+            (Tap::Can(tap), Item::Object(object)) => tap.kept(axis, object),
+            _ => None,
+        }
+    }
+
     /// Drives hold what they have themselves.
     pub fn release(&mut self) {
         for tap in &mut self.taps {
@@ -882,6 +929,7 @@ impl Update<'_> {
         let control = match self {
             Self::Variable(bytes) => CommandFrame::parse(bytes).map(|frame| frame.header().node_control),
             Self::Fixed(_, control) => Ok(*control),
+            Self::Block(..) => Ok(controller::CONTROLS),
         };
         control.is_ok_and(|control| control.contains(NodeControl::DATA_VALID))
     }
@@ -899,6 +947,8 @@ pub(super) enum Update<'u> {
     Variable(&'u [u8]),
     /// Of the fixed one.
     Fixed(CommandBlock, NodeControl),
+    /// The block of the axis at a place of the device, in the format of the device.
+    Block(usize, CommandBlock),
 }
 
 /// The answer of a CIP Motion drive on DeviceNet that shows this, with the response to what it was told.

@@ -110,11 +110,24 @@ impl Tap {
         }
     }
 
+    /// The drives are commissioned. From now on their motors do not matter: what the drives send is replaced.
+    pub fn pause_drives(&mut self) {
+        let slaves = self.drives.network_mut().slaves_mut();
+        slaves.iter_mut().for_each(|slave| slave.application_mut().set_paused(true));
+    }
+
     /// The drive of an axis holds this in place of its own operation data.
     pub fn hold(&mut self, axis: usize, idn: Idn, value: i64) {
         let Some(drive) = self.known.iter().find(|drive| drive.axis == axis) else { return };
         self.held.retain(|(slave, known, _)| (*slave, *known) != (drive.slave, idn));
         self.held.push((drive.slave, idn, value));
+    }
+
+    /// The operation data that the drive of an axis holds; `None` of a drive without the parameter.
+    pub fn kept(&mut self, axis: usize, idn: Idn) -> Option<i64> {
+        let slave = self.known.iter().find(|drive| drive.axis == axis)?.slave;
+        let store = self.drives.network_mut().slaves().get(slave)?.store();
+        store.find(idn).map(|handle| store.number(handle))
     }
 
     /// Drives hold what they have themselves.

@@ -8,7 +8,7 @@ use profile_cia402::wire::NodeId;
 use profile_cia402::wire::pdo::mapped_len;
 use profile_generic::can::Id;
 
-use super::{Behind, StageAxis, StageError};
+use super::{Behind, RowCache, StageAxis, StageError};
 use crate::config::Config;
 use crate::engine::build::can::{described, network};
 use crate::engine::build::scaling;
@@ -26,13 +26,13 @@ pub struct CanDrive {
     pub node: u8,
     /// What it is needed for.
     pub needs: Cia402Axis,
-    /// What it has told of itself.
+    /// What it has reported about itself.
     pub facts: ObjectFacts,
     /// The PDOs that carry its values.
     pub pdos: Vec<CanPdo>,
 }
 
-/// A PDO.
+/// A PDO that carries values of the drive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CanPdo {
     /// Which way it goes, as the drive sees it.
@@ -200,6 +200,7 @@ fn on_can(mapping: &Mapping, member: CanMember, sheet: &DeviceDescription) -> Re
         instance: member.instance,
         drive: member.drive,
         scaling: member.scaling,
+        rows: RowCache::default(),
     })
 }
 

@@ -4,7 +4,7 @@ use profile_cip::devicenet::wire::MacId;
 use profile_generic::image::Signal;
 use profile_generic::program::Field;
 
-use super::{Behind, StageAxis, StageError};
+use super::{Behind, RowCache, StageAxis, StageError};
 use crate::config::Config;
 use crate::engine::build::devicenet::{Parts, parts};
 use crate::engine::build::scaling;
@@ -83,6 +83,7 @@ pub(super) fn configured(
             north: mapping.cip_program(&scaling).ok_or_else(no_ratio)?,
             attributes: mapping.attribute_table(&scaling).ok_or_else(no_ratio)?,
             south: program,
+            rows: RowCache::default(),
             scaling,
         };
         axes.push((number, made));

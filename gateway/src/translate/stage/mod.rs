@@ -7,7 +7,8 @@ mod can;
 mod devicenet;
 mod values;
 
-use std::sync::{Mutex, PoisonError};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use profile_cip::wire::motion::Format;
 use profile_sercos::wire::layout::Layout;
@@ -17,9 +18,13 @@ pub use devicenet::DevicenetDrive;
 pub use values::ValuesError;
 
 use super::bench::Bench;
+pub use super::rows::RowCache;
 use crate::config::Config;
 use crate::engine::build::{BuildError, scaling};
-use crate::mapping::{AttributeTable, CipProgram, CipScaling, DriveFacts, DriveProgram, Mapping, SercosAxis};
+use crate::mapping::{
+    AttributeTable, Cia402Dictionary, CipProgram, CipScaling, DriveFacts, DriveProgram, Item, Mapping,
+    SercosAxis,
+};
 
 /// One axis with its programs.
 #[derive(Debug, Clone)]
@@ -40,12 +45,14 @@ pub struct StageAxis {
     pub stands_in: bool,
     /// The scaling of the controller.
     pub scaling: CipScaling,
-    /// Its attributes.
+    /// The attribute table that its device serves.
     pub attributes: AttributeTable,
     /// The program of the CIP side.
     pub north: CipProgram,
     /// The program of the drive.
     pub south: DriveProgram,
+    /// Rows of its tables that were looked up.
+    pub rows: RowCache,
 }
 
 /// What is behind an axis.
@@ -62,7 +69,7 @@ pub enum Behind {
 /// A SERCOS III drive.
 #[derive(Debug, Clone)]
 pub struct SercosDrive {
-    /// Its address.
+    /// SERCOS address, 1 to 511.
     pub address: u16,
     /// Its topology address.
     pub topology: u16,
@@ -70,7 +77,7 @@ pub struct SercosDrive {
     pub silent: bool,
     /// What it is needed for.
     pub needs: SercosAxis,
-    /// What it has told of itself.
+    /// What it has reported about itself.
     pub facts: DriveFacts,
 }
 
@@ -114,13 +121,15 @@ impl StageAxis {
 pub struct Stage {
     config: Config,
     /// Benches that nobody uses now.
-    benches: Mutex<Vec<Bench>>,
+    benches: Mutex<Vec<Box<Bench>>>,
     /// The tables.
     pub mapping: Mapping,
     /// The axes in the order of the configuration.
     pub axes: Vec<StageAxis>,
     /// The SERCOS telegrams of CP4.
     pub layout: Layout,
+    /// Names of IDNs and objects that were looked up.
+    labels: Mutex<HashMap<Item, Arc<str>>>,
 }
 
 /// Why there are no programs.
@@ -209,6 +218,7 @@ impl Stage {
                 attributes,
                 north: engine.cip_program(number).ok_or_else(unready)?.clone(),
                 south: south.clone(),
+                rows: RowCache::default(),
             };
             axes.push((number, on_sercos));
         }
@@ -216,22 +226,23 @@ impl Stage {
         let axes = axes.into_iter().map(|(_, axis)| axis).collect();
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
         let layout = engine.sercos().map(|bus| bus.master().layout().to_wire(topology)).unwrap_or_default();
-        Ok(Self { config: config.clone(), axes, layout, mapping, benches: Mutex::new(vec![bench]) })
+        let (benches, labels) = (Mutex::new(vec![Box::new(bench)]), Mutex::default());
+        Ok(Self { config: config.clone(), axes, layout, mapping, benches, labels })
     }
 
     /// A bench with the programs of the stage, on which nothing was said yet.
-    pub(super) fn bench(&self) -> Result<Bench, StageError> {
+    pub(super) fn bench(&self) -> Result<Box<Bench>, StageError> {
         let kept = self.benches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut bench = match kept {
             Some(bench) => bench,
-            None => Bench::new(&self.config, self.mapping.clone())?,
+            None => Box::new(Bench::new(&self.config, self.mapping.clone())?),
         };
         bench.restart(&self.axes);
         Ok(bench)
     }
 
     /// Takes back a bench, for the next list.
-    pub(super) fn keep(&self, bench: Bench) {
+    pub(super) fn keep(&self, bench: Box<Bench>) {
         self.benches.lock().unwrap_or_else(PoisonError::into_inner).push(bench);
     }
 
@@ -243,9 +254,22 @@ impl Stage {
         Self::rehearse(&self.config, mapping)
     }
 
+    /// The same box with other programs for its axes.
+    pub(super) fn with_axes(&self, axes: Vec<StageAxis>) -> Self {
+        Self {
+            config: self.config.clone(),
+            benches: Mutex::default(),
+            mapping: self.mapping.clone(),
+            axes,
+            layout: self.layout.clone(),
+            labels: Mutex::default(),
+        }
+    }
+
     /// The same with programs for drives that hold what is known of them now.
     fn compiled_anew(mut self) -> Result<Self, StageError> {
         for axis in &mut self.axes {
+            axis.rows = RowCache::default();
             let failed = |told: String| StageError::Program { axis: axis.name.clone(), told };
             axis.south = match &axis.behind {
                 Behind::Sercos(drive) => self
@@ -261,8 +285,35 @@ impl Stage {
             };
         }
         // A bench gets these programs when it is used again.
-        self.benches.get_mut().unwrap_or_else(PoisonError::into_inner).iter_mut().for_each(Bench::note_use);
+        self.benches
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner)
+            .iter_mut()
+            .for_each(|bench| bench.note_use());
         Ok(self)
+    }
+
+    /// An IDN or object with its name.
+    pub(super) fn label(&self, item: Item) -> Arc<str> {
+        let mut labels = self.labels.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(labels.entry(item).or_insert_with(|| self.named(item).into()))
+    }
+
+    fn named(&self, item: Item) -> String {
+        let dictionaries = &self.mapping.dictionaries;
+        let name = match item {
+            Item::Idn(idn) => dictionaries.sercos.idn(idn).map(|row| row.name.clone()),
+            Item::Attribute(_) => None,
+            Item::Object(object) => {
+                let index = Cia402Dictionary::on_first_axis(object.index);
+                let row = dictionaries.cia402.object(index);
+                row.map(|row| match row.sub(object.sub).map(|sub| sub.name.as_str()) {
+                    Some(sub) if object.sub > 0 && !sub.is_empty() => format!("{}, {sub}", row.name),
+                    _ => row.name.clone(),
+                })
+            }
+        };
+        name.map_or_else(|| item.to_string(), |name| format!("{item} {name}"))
     }
 
     /// The format of the updates of a device.

@@ -202,8 +202,9 @@ fn recordings_of_a_can_bus_are_translated() {
         crate::config::Config::parse(include_str!("../../cli/demo/two-axes.toml"), "demo.toml").unwrap();
     let reader = crate::capture::reader::Reader::new(file.as_slice()).unwrap();
     let names = profile_sercos::wire::describe::NoNames;
-    let list = translate_capture(&stage, &config, reader, &names).unwrap();
-    assert_eq!((list.frames.len(), list.passed_over, list.failed), (3, 2, 0));
+    let list =
+        List::of(|sink| whole(translate_capture(&stage, &config, reader, &names, u64::MAX, sink))).unwrap();
+    assert_eq!((list.frames.len(), list.counts.passed_over, list.counts.failed), (3, 2, 0));
     let last = text(&list.frames[2]);
     assert!(last.starts_with("frame 4 283#00 10 00 00 F4 01\n"), "{last}");
     assert!(last.contains("position_actual 4.000000000 rev"), "{last}");

@@ -6,10 +6,12 @@ use profile_cip::wire::motion::{
 mod can;
 mod devicenet;
 
+use profile_generic::mode::OperatingMode;
 use profile_generic::program::{CommandProgram, Conversion, Field};
 use profile_generic::ratio::Ratio;
 
 use super::*;
+use crate::capture::reader::ReadError;
 use crate::config::Config;
 use crate::mapping::{CipScaling, Mapping};
 
@@ -48,6 +50,11 @@ fn position(counts: i32) -> CommandBlock {
         },
         ..CommandBlock::default()
     }
+}
+
+/// The counts of a recording that could be read to its end.
+fn whole(Captured { counts, error, .. }: Captured) -> Result<Counts, ReadError> {
+    error.map_or(Ok(counts), Err)
 }
 
 fn text(node: &Node) -> String {
@@ -167,6 +174,26 @@ fn what_the_engine_does_wrong_is_seen() {
     let at = format!("at drive-a 08c0 20a10700 {}", "00".repeat(6));
     let [good, bad] = [&mut right, &mut wrong].map(|one| lines(one, &[&at]));
     assert_ne!(shown(&good, "Actual Position"), shown(&bad, "Actual Position"));
+}
+
+/// What a list says does not depend on the list before: the mode of the last command is forgotten as well.
+#[test]
+fn a_restart_forgets_the_mode_of_the_last_command() {
+    let list = [
+        "idn drive-a S-0-0011 04 00",
+        "set turntable 40 01",
+        "at drive-a 08 c0 20 a1 07 00 00 00 00 00 00 00",
+    ];
+    let mut fresh = translator();
+    let expected = lines(&mut fresh, &list);
+    let mut used = translator();
+    let values = CommandValues { velocity: Some(0.75), ..CommandValues::default() };
+    let velocity = CommandBlock { control_mode: ControlMode::VELOCITY, values, ..CommandBlock::default() };
+    used.frame(&update(velocity)).unwrap();
+    assert_eq!(used.bench().unwrap().engine().axes()[0].command().mode, OperatingMode::Velocity);
+    used.line(&Line::Restart).unwrap();
+    assert_eq!(used.bench().unwrap().engine().axes()[0].command().mode, OperatingMode::None);
+    assert_eq!(lines(&mut used, &list), expected);
 }
 
 /// A drive whose scaling is another one than that of the simulated drive.

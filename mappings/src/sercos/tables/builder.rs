@@ -3,22 +3,22 @@
 use std::collections::BTreeSet;
 
 use profile_cip::device::exception::ExceptionAction;
-use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
-use profile_generic::ratio::Ratio;
-use profile_generic::state::Action;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
 use super::{
-    Elements, FixedUnit, ModeRule, ParameterRule, Polarity, ProcedureRule, ReportRule, SercosTables,
-    SignalRule, SlotRule, StatusRule, StepKind, StepRule,
+    Elements, ModeRule, ParameterAt, Polarity, ProcedureRule, ReportRule, SercosTables, SignalRule, SlotRule,
+    StatusRule, StepKind, StepRule,
 };
 use crate::cip_tables::{CipTables, ExceptionRow};
 use crate::dictionary::{Dictionaries, IdnFormat, IdnUnit, SercosIdn, Word, quantity};
 use crate::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
+use crate::drive_rows::{
+    FAILS, every_action, fixed_unit, mapped, mode_row, once, parameter_row, signal_row, written_parameter,
+};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Spanned};
 use crate::format::{
@@ -27,8 +27,7 @@ use crate::format::{
     SercosSignalRow, UnboundRow,
 };
 use crate::generic_names::{
-    action, capture_kind, cause_and_reaction, directions, interpolation, operating_mode, parameter, report,
-    signal, status_bit, unit_kind,
+    action, capture_kind, cause_and_reaction, interpolation, operating_mode, report, status_bit, unit_kind,
 };
 use crate::load::Parsed;
 use crate::resolver::{Resolver, over};
@@ -161,20 +160,7 @@ impl<'a> Builder<'a> {
 
     fn units(&mut self, rows: &GenericSercosFile) {
         for row in &rows.unit {
-            if let Some(times) = &row.times {
-                self.resolver.error(
-                    code::CONTRADICTION,
-                    times.span(),
-                    "times",
-                    "expected no `times` for a fixed unit",
-                );
-            }
-            let quantity = quantity(&mut self.resolver, &row.quantity);
-            let ratio = self.resolver.ratio("generic_per_unit", &row.generic_per_unit);
-            if let (Some(quantity), Some(ratio)) = (quantity, ratio) {
-                let (unit, texts) = (row.unit.get_ref().clone(), row.texts.clone());
-                self.tables.units.push(FixedUnit { unit, texts, quantity, ratio });
-            }
+            self.tables.units.extend(fixed_unit(&mut self.resolver, row));
         }
     }
 
@@ -294,18 +280,9 @@ impl<'a> Builder<'a> {
     }
 
     fn signal(&mut self, row: &SercosSignalRow) {
-        let signal = signal(&mut self.resolver, "signal", &row.signal);
+        let head = signal_row(&mut self.resolver, &row.signal, &row.direction, &row.missing);
         let idn = self.idn("idn", &row.idn);
-        let to_drive =
-            self.resolver.word("direction", &row.direction, &[("to_drive", true), ("from_drive", false)]);
-        let refuse = self.resolver.word("missing", &row.missing, &[("refuse", true), ("omit", false)]);
-        let (Some(signal), Some(idn), Some(to_drive), Some(refuse)) = (signal, idn, to_drive, refuse) else {
-            return;
-        };
-        if signal.is_command() != to_drive {
-            let message = format!("{signal} cannot go {}", row.direction.get_ref());
-            return self.resolver.error(code::DIRECTION, row.direction.span(), "direction", message);
-        }
+        let (Some((signal, _, refuse)), Some(idn)) = (head, idn) else { return };
         if idn.length.is_none() || idn.list {
             let message = format!("expected an IDN of known length, {} has none in the dictionary", idn.idn);
             return self.resolver.error(code::NO_LENGTH, row.idn.span(), "idn", message);
@@ -314,9 +291,7 @@ impl<'a> Builder<'a> {
             let message = format!("the unit of {} is not a unit of {}", idn.idn, signal.quantity());
             return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
-        if self.tables.signal(signal).is_some() {
-            self.resolver.error(code::TWICE, row.signal.span(), "signal", "the signal is defined twice");
-        }
+        once(&mut self.resolver, self.tables.signal(signal).is_some(), "signal", &row.signal);
         let polarity = row.polarity.as_ref().and_then(|row| self.polarity(row));
         self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity });
     }
@@ -337,7 +312,7 @@ impl<'a> Builder<'a> {
     }
 
     fn mode(&mut self, row: &SercosModeRow) {
-        let mode = operating_mode(&mut self.resolver, &row.mode);
+        let head = mode_row(&mut self.resolver, &row.mode, row.interpolation.as_ref(), &row.missing);
         let mut codes = Vec::with_capacity(row.codes.len());
         for name in &row.codes {
             let code =
@@ -352,18 +327,12 @@ impl<'a> Builder<'a> {
                 "expected at least one operation mode",
             );
         }
-        let optional = self.resolver.word("missing", &row.missing, &[("refuse", false), ("omit", true)]);
-        let command = self.mapped_signals("command", &row.command);
-        let actual = self.mapped_signals("actual", &row.actual);
-        let interpolation = match &row.interpolation {
-            None => Some(InterpolationSource::Controller),
-            Some(name) => interpolation(&mut self.resolver, name),
-        };
-        if let (Some(mode), Some(interpolation), Some(optional)) = (mode, interpolation, optional) {
-            let selection = ModeSelection { mode, interpolation };
-            if self.tables.modes.iter().any(|known| known.selection == selection) {
-                self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
-            }
+        let has = |signal| self.tables.signal(signal).is_some();
+        let command = mapped(&mut self.resolver, "command", &row.command, has);
+        let actual = mapped(&mut self.resolver, "actual", &row.actual, has);
+        if let Some((selection, optional)) = head {
+            let known = self.tables.modes.iter().any(|known| known.selection == selection);
+            once(&mut self.resolver, known, "mode", &row.mode);
             self.tables.modes.push(ModeRule { selection, optional, codes, command, actual });
         }
     }
@@ -404,36 +373,11 @@ impl<'a> Builder<'a> {
             self.resolver.error(code::CONTRADICTION, row.interpolation.span(), "led_in", message);
         }
         let modes = self.tables.modes.iter().map(|known| known.selection);
-        if modes.chain(self.tables.procedures.iter().map(|known| known.selection)).any(|one| one == selection)
-        {
-            self.resolver.error(code::TWICE, row.mode.span(), "mode", "the mode is defined twice");
-        }
+        let known = modes
+            .chain(self.tables.procedures.iter().map(|known| known.selection))
+            .any(|one| one == selection);
+        once(&mut self.resolver, known, "mode", &row.mode);
         self.tables.procedures.push(ProcedureRule { selection, led_in, commands });
-    }
-
-    fn mapped_signals(&mut self, key: &str, names: &[Name]) -> Vec<Signal> {
-        let mut signals = Vec::with_capacity(names.len());
-        for name in names {
-            let Some(signal) = signal(&mut self.resolver, key, name) else { continue };
-            if self.tables.signal(signal).is_none() {
-                self.resolver.error(
-                    code::ROW_MISSING,
-                    name.span(),
-                    key,
-                    format!("no [[signal]] row for {signal}"),
-                );
-            }
-            if signal.is_command() != (key == "command") {
-                self.resolver.error(
-                    code::DIRECTION,
-                    name.span(),
-                    key,
-                    format!("{signal} belongs to the other telegram"),
-                );
-            }
-            signals.push(signal);
-        }
-        signals
     }
 
     fn words(&mut self, rows: &GenericSercosFile) {
@@ -482,12 +426,11 @@ impl<'a> Builder<'a> {
                 self.tables.commands.extend(command.map(|idn| (action, idn)));
             }
         }
-        for action in Action::ALL {
-            if !self.tables.actions.iter().any(|(known, _)| known == action) {
-                let message = format!("expected a row for action {action}, got none");
-                self.resolver.error(code::ROW_MISSING, rows.mapping.span(), "action", message);
-            }
-        }
+        let actions = &self.tables.actions;
+        let has = |action| actions.iter().any(|(known, _)| *known == action);
+        every_action(&mut self.resolver, &rows.mapping, has, |action| {
+            format!("expected a row for action {action}, got none")
+        });
         for row in &rows.report {
             let report = report(&mut self.resolver, &row.report);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
@@ -565,14 +508,8 @@ impl<'a> Builder<'a> {
         }
         for row in &rows.capture {
             let Some(rule) = self.capture(row) else { continue };
-            if self.tables.captures.iter().any(|known| known.kind == rule.kind) {
-                self.resolver.error(
-                    code::TWICE,
-                    row.capture.span(),
-                    "capture",
-                    "the capture is defined twice",
-                );
-            }
+            let known = self.tables.captures.iter().any(|known| known.kind == rule.kind);
+            once(&mut self.resolver, known, "capture", &row.capture);
             self.tables.captures.push(rule);
         }
     }
@@ -647,48 +584,31 @@ impl<'a> Builder<'a> {
     }
 
     fn parameter(&mut self, row: &SercosParameterRow) {
-        let parameter = parameter(&mut self.resolver, &self.dictionaries.generic, &row.parameter);
+        let generic = &self.dictionaries.generic;
+        let words = (&row.direction, &row.missing, row.factor.as_ref());
+        let rule = parameter_row(&mut self.resolver, generic, &row.parameter, words);
         let idn = self.idn("idn", &row.idn);
-        let direction = directions(&mut self.resolver, &row.direction);
-        let reject = self.resolver.word("missing", &row.missing, &[("shadow", false), ("reject", true)]);
-        let factor = match &row.factor {
-            None => Some(Ratio::ONE),
-            Some(factor) => self.resolver.ratio("factor", factor),
-        };
-        let (
-            Some((parameter, quantity)),
-            Some(idn),
-            Some((to_drive, from_drive)),
-            Some(reject),
-            Some(factor),
-        ) = (parameter, idn, direction, reject, factor)
-        else {
-            return;
-        };
+        let (Some(rule), Some(idn)) = (rule, idn) else { return };
+        let quantity = rule.quantity;
         if row.unit_by_drive != (idn.unit == IdnUnit::None && quantity != Quantity::None) {
             let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for no other";
-            self.resolver.error(code::UNIT, row.idn.span(), "unit_by_drive", message);
+            let help = match row.unit_by_drive {
+                true => "remove `unit_by_drive`",
+                false => "add `unit_by_drive = true`, or the `unit` of the IDN to its row in the dictionary",
+            };
+            self.resolver.helped(code::UNIT, row.idn.span(), "unit_by_drive", message, help);
         } else if !row.unit_by_drive && !self.measures(idn, quantity) {
             let message = format!("the unit of {} is not a unit of {quantity}", idn.idn);
             return self.resolver.error(code::UNIT, row.idn.span(), "idn", message);
         }
-        if to_drive && idn.write.as_ref().is_some_and(Vec::is_empty) {
+        if rule.to_drive && idn.write.as_ref().is_some_and(Vec::is_empty) {
             let message = format!("{} is read only", idn.idn);
             self.resolver.error(code::READ_ONLY, row.direction.span(), "direction", message);
         }
-        if self.tables.parameters.iter().any(|known| known.parameter == parameter) {
-            self.resolver.error(
-                code::TWICE,
-                row.parameter.span(),
-                "parameter",
-                "the parameter is defined twice",
-            );
-        }
-        let idn = idn.idn;
-        let unit_by_drive = row.unit_by_drive;
-        let rule =
-            ParameterRule { parameter, quantity, idn, to_drive, from_drive, reject, factor, unit_by_drive };
-        self.tables.parameters.push(rule);
+        let known = self.tables.parameters.iter().any(|known| known.parameter == rule.parameter);
+        once(&mut self.resolver, known, "parameter", &row.parameter);
+        let at = ParameterAt { idn: idn.idn, unit_by_drive: row.unit_by_drive };
+        self.tables.parameters.push(rule.at(at));
     }
 
     fn step(&mut self, row: &CommissionRow) {
@@ -709,7 +629,7 @@ impl<'a> Builder<'a> {
             ("write_modes", Verb::WriteModes),
         ];
         let Some(verb) = self.resolver.word("do", &row.step, &words) else { return };
-        let fail = self.resolver.word("refused", &row.refused, &[("fail", true), ("continue", false)]);
+        let fail = self.resolver.word("refused", &row.refused, &FAILS);
         let Some(kind) = self.step_kind(row, verb, phase) else { return };
         let mut rule = StepRule {
             phase,
@@ -749,13 +669,9 @@ impl<'a> Builder<'a> {
                 Some(StepKind::WriteValue(idn.idn, *value.get_ref()))
             }
             (Verb::Write, None, None, Some(name)) => {
-                let (parameter, _) = parameter(&mut self.resolver, &self.dictionaries.generic, name)?;
-                let rule = self.tables.parameters.iter().find(|rule| rule.parameter == parameter);
-                if rule.is_none_or(|rule| !rule.to_drive) {
-                    let message = "expected a parameter with a [[parameter]] row that goes to the drive";
-                    self.resolver.error(code::ROW_MISSING, name.span(), "parameter", message);
-                }
-                Some(StepKind::WriteParameter(parameter))
+                let generic = &self.dictionaries.generic;
+                written_parameter(&mut self.resolver, generic, &self.tables.parameters, name)
+                    .map(StepKind::WriteParameter)
             }
             (Verb::Read, Some(idn), None, None) => {
                 let words = [

@@ -7,8 +7,6 @@ use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::program::BitPattern;
-use profile_generic::quantity::Quantity;
-use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
@@ -18,6 +16,7 @@ use super::captures::CaptureRule;
 use super::scaling::ScalingRule;
 use crate::dictionary::{Dictionaries, IdnUnit};
 use crate::drive_program::FaultRow;
+use crate::drive_rows::FixedUnit;
 
 #[derive(Debug, Clone)]
 pub(crate) struct SignalRule {
@@ -34,22 +33,6 @@ pub(crate) struct SignalRule {
 pub(crate) struct Polarity {
     pub idn: Idn,
     pub bit: u32,
-}
-
-/// A fixed unit and how drives spell it.
-#[derive(Debug, Clone)]
-pub(crate) struct FixedUnit {
-    pub unit: String,
-    pub texts: Vec<String>,
-    pub quantity: Quantity,
-    pub ratio: Ratio,
-}
-
-impl FixedUnit {
-    /// Whether a drive that says this means the unit.
-    pub fn is(&self, text: &str) -> bool {
-        self.texts.iter().chain([&self.unit]).any(|known| known.eq_ignore_ascii_case(text))
-    }
 }
 
 #[derive(Debug, Clone)]
@@ -101,18 +84,15 @@ pub(crate) struct StatusRule {
     pub acknowledges: Option<bool>,
 }
 
+/// Where a drive keeps a parameter.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ParameterRule {
-    pub parameter: Parameter,
-    pub quantity: Quantity,
+pub(crate) struct ParameterAt {
     pub idn: Idn,
-    pub to_drive: bool,
-    pub from_drive: bool,
-    pub reject: bool,
-    pub factor: Ratio,
-    /// The drive's element 4 tells the unit.
+    /// The drive's element 4 reports the unit.
     pub unit_by_drive: bool,
 }
+
+pub(crate) type ParameterRule = crate::drive_rows::ParameterRule<ParameterAt>;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum StepKind {
@@ -217,18 +197,7 @@ impl SercosTables {
         let IdnUnit::Scaled(scaling) = &dictionaries.sercos.idn(idn)?.unit else { return None };
         let rule = self.scalings.iter().find(|rule| rule.scaling == *scaling)?;
         let quantity = rule.methods.first()?.quantity;
-        // The number of the parameter does not matter for the conversion.
-        let parameter = Parameter::default();
-        Some(ParameterRule {
-            parameter,
-            quantity,
-            idn,
-            to_drive: true,
-            from_drive: true,
-            reject: false,
-            factor: Ratio::ONE,
-            unit_by_drive: false,
-        })
+        Some(ParameterRule::plain(quantity, ParameterAt { idn, unit_by_drive: false }))
     }
 
     /// Whether a row looks for faults in this word.
@@ -244,10 +213,5 @@ impl SercosTables {
     /// What a status word says, in the order of the rows.
     pub fn reports(&self) -> &[ReportRule] {
         &self.reports
-    }
-
-    /// The scaling rules, for those who want to know what they look at.
-    pub fn scaling_rules(&self) -> &[ScalingRule] {
-        &self.scalings
     }
 }

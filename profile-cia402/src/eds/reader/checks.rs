@@ -4,9 +4,10 @@ use super::{Reader, SectionKind};
 use crate::eds::description::{DeviceDescription, ObjectList};
 use crate::eds::diagnostic::{Kind, Place};
 use crate::eds::drive::{Direction, MappingEntry};
+use crate::generated::objects;
 
 /// Objects that every device has.
-const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
+const MANDATORY: [u16; 3] = [objects::DEVICE_TYPE, objects::ERROR_REGISTER, objects::IDENTITY];
 
 /// Objects below this number are data types, which stand for gaps in a mapping.
 const DUMMIES_END: u16 = 0x20;

@@ -4,7 +4,8 @@ use profile_generic::fault::FaultCause;
 
 use crate::drive::ErrorCode;
 
-/// The error code that tells what the servo has noticed, or what somebody has made it notice.
+/// The error code that reports what the servo has noticed, or what somebody has made it notice.
+// Flat: a table from cause to code.
 pub fn code_of(cause: FaultCause) -> ErrorCode {
     use ErrorCode as E;
     use FaultCause as F;

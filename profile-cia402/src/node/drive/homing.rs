@@ -116,10 +116,11 @@ impl Homing {
     }
 
     /// One step. Returns the home position, once the axis stands behind it.
+    // Flat: one arm per step.
     pub fn advance(&mut self, motion: &mut Motion, senses: &Senses, speeds: &Speeds) -> Option<i64> {
         let rate = speeds.acceleration.max(1);
         let pace = Pace { velocity: speeds.fast.max(1), acceleration: rate, deceleration: rate };
-        let go = |motion: &mut Motion, toward: Direction, speed: i64| {
+        let mut go = |toward: Direction, speed: i64| {
             motion.advance(senses.span, toward.sign() * speed.max(1), pace);
         };
         match (self.step, self.plan) {
@@ -131,23 +132,15 @@ impl Homing {
                 }
             }
             (Step::Index(toward, edge), _) => {
-                go(motion, toward, speeds.slow);
-                let ahead = toward.sign();
-                let beyond = |place: i64| edge.is_none_or(|edge| (place - edge) * ahead >= 0);
-                let found =
-                    senses.passed.index.filter(|place| senses.moves == toward.sign() && beyond(*place));
-                match found {
-                    Some(place) => self.step = Step::Brake(place),
-                    None if blocked(toward, self.plan, senses) => self.step = Step::Failing,
-                    None => {}
-                }
+                go(toward, speeds.slow);
+                self.look_for_index(toward, edge, senses);
             }
             (step, Some(Plan::Edge { switch, end, passed, turns, index, .. })) => {
                 let closed = is_closed(switch, senses);
                 let was = core::mem::replace(&mut self.closed, closed);
                 match step {
                     Step::Seek { toward, turned } => {
-                        go(motion, toward, speeds.fast);
+                        go(toward, speeds.fast);
                         let closed = closed || switch == Switch::Home && senses.passed.closed.is_some();
                         self.step = match (closed, blocked(toward, self.plan, senses)) {
                             (true, _) if end == passed => Step::Cross,
@@ -161,30 +154,20 @@ impl Homing {
                     }
                     Step::Leave => {
                         let back = passed.reversed();
-                        go(motion, back, speeds.fast);
+                        go(back, speeds.fast);
                         // Open on the far side, where braking has led it, does not count.
-                        if senses.passed.opened.is_some() && senses.moves == back.sign() {
-                            self.step = Step::Cross;
-                        } else if blocked(back, self.plan, senses) {
-                            self.step = Step::Failing;
-                        }
+                        let open = senses.passed.opened.is_some() && senses.moves == back.sign();
+                        self.step_or_fail(open.then_some(Step::Cross), back, senses);
                     }
                     _ => {
-                        go(motion, passed, speeds.slow);
-                        let opens = end == passed;
-                        let place = match switch {
-                            Switch::Home if opens => senses.passed.opened,
-                            Switch::Home => senses.passed.closed,
-                            Switch::NegativeLimit => (was && !closed).then_some(senses.limit_places[0]),
-                            Switch::PositiveLimit => (was && !closed).then_some(senses.limit_places[1]),
-                        };
+                        go(passed, speeds.slow);
+                        let place = edge_of(switch, end == passed, was && !closed, senses);
                         let place = place.filter(|_| senses.moves == passed.sign());
-                        if let Some(place) = place {
-                            self.step =
-                                if index { Step::Index(passed, Some(place)) } else { Step::Brake(place) };
-                        } else if blocked(passed, self.plan, senses) {
-                            self.step = Step::Failing;
-                        }
+                        let next = place.map(|place| match index {
+                            true => Step::Index(passed, Some(place)),
+                            false => Step::Brake(place),
+                        });
+                        self.step_or_fail(next, passed, senses);
                     }
                 }
             }
@@ -192,6 +175,23 @@ impl Homing {
             (_, _) => self.step = Step::Failing,
         }
         None
+    }
+
+    /// The index pulse behind the edge, if there was one, on the way `toward`.
+    fn look_for_index(&mut self, toward: Direction, edge: Option<i64>, senses: &Senses) {
+        let ahead = toward.sign();
+        let beyond = |place: i64| edge.is_none_or(|edge| (place - edge) * ahead >= 0);
+        let found = senses.passed.index.filter(|place| senses.moves == ahead && beyond(*place));
+        self.step_or_fail(found.map(Step::Brake), toward, senses);
+    }
+
+    /// Goes on with the next step, once it is known; fails where the way ends before.
+    fn step_or_fail(&mut self, next: Option<Step>, toward: Direction, senses: &Senses) {
+        match next {
+            Some(next) => self.step = next,
+            None if blocked(toward, self.plan, senses) => self.step = Step::Failing,
+            None => {}
+        }
     }
 
     fn come_to_rest(&mut self, here: i64) -> Option<i64> {
@@ -212,6 +212,16 @@ impl Homing {
         if self.is_active() {
             self.step = if self.step == Step::Stopping { Step::Idle } else { Step::Failed };
         }
+    }
+}
+
+/// Where the edge of a switch was passed: the one at which it opens, or closes. A limit switch has `left` its place.
+fn edge_of(switch: Switch, opens: bool, left: bool, senses: &Senses) -> Option<i64> {
+    match switch {
+        Switch::Home if opens => senses.passed.opened,
+        Switch::Home => senses.passed.closed,
+        Switch::NegativeLimit => left.then_some(senses.limit_places[0]),
+        Switch::PositiveLimit => left.then_some(senses.limit_places[1]),
     }
 }
 

@@ -44,6 +44,8 @@ use crate::wire::{AbortCode, Mux};
 #[derive(Debug)]
 pub struct Device {
     axes: Vec<Axis>,
+    /// Time does not pass for the axes.
+    paused: bool,
 }
 
 /// Why there is no device.
@@ -91,10 +93,16 @@ impl Device {
             let axis = usize::from(number) + 1;
             Axis::new(number, *servo).map_err(|error| DeviceError::Servo { axis, error })
         });
-        Ok(Self { axes: axes.collect::<Result<_, _>>()? })
+        Ok(Self { axes: axes.collect::<Result<_, _>>()?, paused: false })
     }
 
-    /// Its axes.
+    /// Stops the time of the axes, or lets it go on. Objects keep what was written last meanwhile and controlwords have no effect: for
+    /// a test bench that answers in place of the drive.
+    pub fn set_paused(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// Its axes, whose objects are 800h apart.
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
@@ -160,7 +168,9 @@ impl Application for Device {
         if dictionary.take_changed() {
             self.axes.iter_mut().for_each(|axis| axis.adopt(dictionary));
         }
-        self.axes.iter_mut().for_each(|axis| axis.step(elapsed, dictionary));
+        if !self.paused {
+            self.axes.iter_mut().for_each(|axis| axis.step(elapsed, dictionary));
+        }
     }
 
     fn event(&mut self, event: Event, dictionary: &mut Dictionary) {

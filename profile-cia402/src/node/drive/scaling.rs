@@ -82,6 +82,7 @@ impl Scales {
     }
 
     /// The scales that these numbers make, by the index that an object of the first axis has.
+    // Flat: one line per ratio, each of which may not exist.
     pub fn of(number: impl Fn(u16, u8) -> i64) -> Option<Self> {
         let ratio = |upper: (u16, u8), lower: (u16, u8)| {
             Ratio::new(number(upper.0, upper.1), number(lower.0, lower.1))

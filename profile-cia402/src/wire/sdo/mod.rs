@@ -167,7 +167,7 @@ impl BlockSegment {
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let [first, data @ ..] = exact::<SDO_LEN>("SDO block segment", bytes)?;
         match first & 0x7F {
-            0 => Err(Error::Value { what: "sequence number", expected: "1 to 127", found: 0 }),
+            0 => Err(Error::value("sequence number", "1 to 127", 0)),
             sequence => Ok(Self { sequence, last: first & 0x80 != 0, data }),
         }
     }
@@ -248,5 +248,5 @@ fn with_bytes(first: u8, a: u8, b: u8) -> [u8; SDO_LEN] {
 }
 
 const fn unknown(what: &'static str, found: u8) -> Error {
-    Error::Value { what, expected: "a known command specifier", found: found as u32 }
+    Error::value(what, "a known command specifier", found as u32)
 }

@@ -206,7 +206,7 @@ fn the_crc_is_that_of_the_recorded_transfers() {
 fn wrong_lengths_and_unknown_commands_are_named() {
     for len in (0..16).filter(|&len| len != SDO_LEN) {
         let bytes = &[0x80; 16][..len];
-        let error = |what| Error::Length { what, expected: 8, found: len };
+        let error = |what| Error::length(what, 8, len);
         assert_eq!(SdoRequest::parse(bytes), Err(error("SDO request")));
         assert_eq!(SdoResponse::parse(bytes), Err(error("SDO response")));
         assert_eq!(BlockSegment::parse(bytes), Err(error("SDO block segment")));

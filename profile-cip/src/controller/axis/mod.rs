@@ -130,7 +130,7 @@ impl Axis {
         self.scale.is_some()
     }
 
-    /// The device has told its scaling.
+    /// The device has reported its scaling.
     pub fn set_scale(&mut self, counts: f64) {
         self.scale = Some(counts);
     }

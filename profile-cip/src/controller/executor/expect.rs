@@ -74,6 +74,7 @@ fn near(found: Option<f64>, wanted: f64, tolerance: f64) -> Option<Found> {
 }
 
 /// What is there instead; `None` when the condition holds.
+// Flat: one arm per condition.
 fn look(condition: &Condition, cx: &mut Context<'_>) -> Result<Option<Found>, Failure> {
     let otherwise = |holds: bool, found: Found| (!holds).then_some(found);
     Ok(match condition {

@@ -11,6 +11,7 @@ use profile_generic::time::DurationNs;
 /// Update periods in a row within the window that end a wait.
 const WINDOW_UPDATES: u8 = 3;
 
+// Flat: one arm per step.
 pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<(), Failure> {
     run.length = match step {
         Step::MoveAbsolute { axis, position, limits } => cx.axis(*axis)?.move_to(*position, *limits)?,
@@ -45,6 +46,7 @@ pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<
     Ok(())
 }
 
+// Flat: one arm per motion.
 pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     match step {

@@ -33,6 +33,7 @@ pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Resul
 }
 
 /// Asks every axis of the step and waits for all of them.
+// Flat: one arm per step.
 fn ask(request: AxisControl, run: &mut Run, cx: &mut Context<'_>) -> Result<bool, Failure> {
     let waited = cx.now - run.since;
     let time_out = run.time_out.unwrap_or(cx.config.time_outs.axis_control);

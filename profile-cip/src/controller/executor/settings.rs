@@ -11,6 +11,7 @@ use crate::controller::program::{CyclicAttribute, CyclicDirection, Step};
 use crate::controller::services::Outcome;
 use crate::wire::motion::Format;
 
+// Flat: one arm per step.
 pub(super) fn start(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Result<(), Failure> {
     match step {
         Step::Feedback { axis, mode } => {

@@ -74,6 +74,7 @@ impl ListJob {
     ///
     /// # Errors
     /// The request is malformed.
+    // Flat: one arm per format of a list.
     pub fn new(format: ListFormat, body: &[u8], limit: usize) -> Result<Self, GeneralStatus> {
         let mut request = ArrayVec::new();
         request.try_extend_from_slice(body).map_err(|_| GeneralStatus::TOO_MUCH_DATA)?;

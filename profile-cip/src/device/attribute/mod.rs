@@ -18,6 +18,7 @@ pub mod worker;
 
 pub use data_type::{DataType, SHORT_STRING_MAX};
 pub use definition::{Access, AttributeDefinition, Backing, DefaultValue, ElementRule, Scope};
+pub(crate) use engine::attributes;
 pub use engine::{OBJECT_REVISION, id};
 pub use entry::{Entry, Part};
 pub use store::AttributeStore;

@@ -1,4 +1,4 @@
-//! What passes between the motion device and whoever runs the drive of an axis.
+//! What passes between the motion device and the application that runs the drive of an axis.
 //!
 //! The law: an axis never moves on a stale, late, malformed or half-understood command. These types are made so that
 //! breaking it takes effort:
@@ -14,7 +14,7 @@
 use crate::wire::motion::CommandValues;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
-    AxisIoStatus, AxisStatus, CommandTarget, ControlMode, EventChecking, FaultType, FeedbackMode,
+    AxisIoStatus, AxisStatus, CommandTarget, ControlMode, EventChecking, FeedbackMode,
 };
 use crate::wire::motion::test_service::HookupTestData;
 
@@ -154,7 +154,7 @@ impl HookupTest {
 pub struct TestOrder {
     /// Names the test; to be returned in [`TestReport::id`].
     pub id: u32,
-    /// Which test.
+    /// The motor with torque, or the feedback alone.
     pub test: HookupTest,
     /// Distance that has to be gone in either direction: revolutions, or metres of a linear axis. 0 when `time` counts.
     pub distance: f32,
@@ -183,7 +183,8 @@ pub struct AxisCommandImage {
     /// Changes whenever the drive has to reset its faults, for the controller or because a connection begins or ends; to
     /// be returned in [`DriveImage::reset_id`] once it has tried, with success or not. A reset moves nothing.
     pub reset_id: u32,
-    /// With [`DriveAction::Abort`]: how to stop. It may become more severe while the axis stops.
+    /// With [`DriveAction::Abort`]: the stop that the device itself orders; it may become more severe while the axis stops.
+    /// `None` where the conditions of the drive are the reason: the application that runs the drive stops it for those without an order.
     pub abort: Option<AbortOrder>,
     /// Set-points.
     pub command: Command,
@@ -191,15 +192,26 @@ pub struct AxisCommandImage {
     pub test: Option<TestOrder>,
 }
 
-/// How an axis has to stop for a major fault.
+/// A stop for a fault that the motion device has found itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AbortOrder {
-    /// Axis Fault Action, attribute 668: the worst of all major faults that stand.
+    /// Axis Fault Action, attribute 668: the worst of those that the device has found.
     pub action: u8,
-    /// Type of the fault that came first.
-    pub fault_type: FaultType,
-    /// Its bit number.
-    pub code: u8,
+    /// What it has found first.
+    pub cause: AbortCause,
+}
+
+/// What the motion device orders a stop for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AbortCause {
+    /// An Abort request of the controller.
+    Controller,
+    /// Modes that the axis cannot go on with, or an update without their set-point.
+    IllegalMode,
+    /// The drive went offline while energized, and nothing says why.
+    DriveLost,
+    /// The connection is lost, or the node has a fault.
+    Node,
 }
 
 /// What the drive of an axis reports each cycle.
@@ -244,13 +256,13 @@ pub struct DriveImage {
     pub unwind: Option<u32>,
     /// Changes when a position control unit becomes something else; changes of the position reference are then forgotten.
     pub scaling_id: u32,
-    /// Actual velocity, velocity control units; `None` when the drive does not tell it.
+    /// Actual velocity, velocity control units; `None` when the drive does not report it.
     pub velocity: Option<f32>,
-    /// Actual acceleration, acceleration control units; `None` when the drive does not tell it.
+    /// Actual acceleration, acceleration control units; `None` when the drive does not report it.
     pub acceleration: Option<f32>,
     /// Bits of Axis Status that only the drive knows; those that the state machine owns are replaced.
     pub axis_status: AxisStatus,
-    /// Axis Status - Mfg.
+    /// Axis Status - Mfg: bits of the vendor.
     pub axis_status_mfg: u32,
     /// Axis I/O Status.
     pub io_status: AxisIoStatus,
@@ -260,7 +272,7 @@ pub struct DriveImage {
     pub safety: Option<SafetyStatus>,
     /// System time at which the actual values were captured, ns; 0 if it is not known.
     pub captured_at: u64,
-    /// Actual torque, % of the rated one, of a drive that tells it.
+    /// Actual torque, % of the rated one, of a drive that reports it.
     pub torque: Option<f32>,
     /// Events that can be checked for on this axis, and for registration edges the window checks: those that the drive
     /// looks for, and of [`EventChecking::WATCHES`] and [`EventChecking::HOME_TORQUE`], which the device evaluates itself

@@ -139,19 +139,28 @@ impl<'a> ExceptionActions<'a> {
         Self { standard, manufacturer }
     }
 
-    /// What follows from a condition. An exception that nobody expected stops the axis; so does every fault that is no
-    /// exception, but for those of the absolute position recovery, which clause 5-2.6.2.12 does not count as major.
+    /// What follows from a condition; no less than it demands itself, unless it is one that is never major.
     #[must_use]
     pub fn action(&self, condition: &DriveCondition) -> ExceptionAction {
-        let array = match condition.fault_type {
+        let set = self.configured(condition.fault_type, condition.code);
+        match condition.fault_type {
+            FaultType::APR | FaultType::APR_MFG => set,
+            _ => set.max(condition.least),
+        }
+    }
+
+    /// What the controller wants done about a code. An exception that nobody expected stops the axis; so does every fault
+    /// that is no exception, but for those of the absolute position recovery, which clause 5-2.6.2.12 does not count as major.
+    #[must_use]
+    pub fn configured(&self, fault_type: FaultType, code: u8) -> ExceptionAction {
+        let array = match fault_type {
             FaultType::AXIS => self.standard,
             FaultType::AXIS_MFG => self.manufacturer,
             FaultType::APR | FaultType::APR_MFG => return ExceptionAction::MINOR_FAULT,
             _ => return ExceptionAction::MAJOR_FAULT,
         };
-        let set = array.get(usize::from(condition.code)).copied().map(ExceptionAction);
-        let known = set.filter(|action| *action <= ExceptionAction::MAJOR_FAULT);
-        known.unwrap_or(ExceptionAction::MAJOR_FAULT).max(condition.least)
+        let set = array.get(usize::from(code)).copied().map(ExceptionAction);
+        set.filter(|action| *action <= ExceptionAction::MAJOR_FAULT).unwrap_or(ExceptionAction::MAJOR_FAULT)
     }
 }
 

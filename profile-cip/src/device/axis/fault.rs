@@ -1,11 +1,11 @@
 //! Faults and alarms of an axis: from the conditions that are there to words of bits, records and the log.
 
-use super::drive_link::DriveImage;
+use super::drive_link::{AbortCause, AbortOrder, DriveImage};
 use super::exception::{DriveCondition, ExceptionAction, ExceptionActions, worst_action};
 use super::fault_log::{FaultLog, LogEntry, LogKind};
 use super::reported::RecordLog;
 use super::state::AxisState;
-use super::{RAMP_AND_DISABLE, fault_code};
+use super::{RAMP_AND_DISABLE, STATE_CHANGE_SHUTDOWN, fault_code};
 use crate::wire::motion::codes::{AlarmType, ClearingEvent, FaultType};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
 use arrayvec::ArrayVec;
@@ -53,8 +53,10 @@ pub(crate) struct Faults {
     words: FaultWords,
     /// Those of the latched faults that are major.
     majors: [u64; FAULT_WORDS],
-    /// The worst stopping action of the major faults, and the fault that stands behind it.
-    abort: Option<DriveCondition>,
+    /// A major fault has latched a shutdown.
+    shutdown: bool,
+    /// The stop that the axis orders for what it has found itself.
+    order: Option<AbortOrder>,
     /// Conditions that were there before this are said to have come now when they are latched again.
     cleared_at: u64,
     newest_fault: FaultRecord,
@@ -90,6 +92,14 @@ fn with_bit(condition: DriveCondition) -> (DriveCondition, usize, u64) {
     }
 }
 
+/// What an exception that the axis has found is about.
+fn found_cause(condition: &DriveCondition) -> AbortCause {
+    match condition.code {
+        fault_code::CONTROLLER_INITIATED => AbortCause::Controller,
+        _ => AbortCause::IllegalMode,
+    }
+}
+
 impl Faults {
     pub const fn new() -> Self {
         let newest_fault = FaultRecord {
@@ -104,7 +114,8 @@ impl Faults {
         Self {
             words: FaultWords { exceptions: [0; 2], faults: [0; FAULT_WORDS], alarms: [0; ALARM_WORDS] },
             majors: [0; FAULT_WORDS],
-            abort: None,
+            shutdown: false,
+            order: None,
             cleared_at: 0,
             newest_fault,
             newest_alarm,
@@ -129,7 +140,7 @@ impl Faults {
         }
         self.words = FaultWords::default();
         self.majors = [0; FAULT_WORDS];
-        self.abort = None;
+        (self.shutdown, self.order) = (false, None);
         self.fault_records.clear();
         self.alarm_records.clear();
         self.newest_alarm = AlarmRecord::default();
@@ -142,7 +153,7 @@ impl Faults {
             self.words.faults[place] = 0;
             *majors = 0;
         }
-        self.abort = None;
+        (self.shutdown, self.order) = (false, None);
         self.cleared_at = system_time;
         self.log.end_faults(by, system_time, |fault_type| !is_unrecoverable(fault_type));
         self.record_cleared(by, system_time);
@@ -217,13 +228,24 @@ impl Faults {
         if none { AlarmRecord::default() } else { self.newest_alarm }
     }
 
-    /// How to stop, and for which fault.
-    pub fn abort(&self) -> Option<&DriveCondition> {
-        self.abort.as_ref()
+    /// The stop that the axis orders for what it has found itself.
+    pub fn order(&self) -> Option<AbortOrder> {
+        self.order
     }
 
-    /// Latches a fault; a fault that is latched as minor may become major.
-    pub(super) fn latch(&mut self, condition: &DriveCondition, major: bool, state: AxisState) {
+    /// Whether a major fault has latched a shutdown.
+    pub fn shuts_down(&self) -> bool {
+        self.shutdown
+    }
+
+    /// Latches a fault; a fault that is latched as minor may become major. `cause` is what the axis has found itself.
+    pub(super) fn latch(
+        &mut self,
+        condition: &DriveCondition,
+        major: bool,
+        cause: Option<AbortCause>,
+        state: AxisState,
+    ) {
         let (condition, place, bit) = with_bit(*condition);
         let known = self.words.faults[place] & bit != 0 && (!major || self.majors[place] & bit != 0);
         if known {
@@ -238,8 +260,11 @@ impl Faults {
         self.words.faults[place] |= bit;
         if major {
             self.majors[place] |= bit;
-            let before = self.abort.unwrap_or(DriveCondition { action: 0, ..condition });
-            self.abort = Some(DriveCondition { action: worst_action(before.action, action), ..before });
+            self.shutdown |= action >> 4 == STATE_CHANGE_SHUTDOWN;
+            if let Some(cause) = cause {
+                let before = self.order.unwrap_or(AbortOrder { action: 0, cause });
+                self.order = Some(AbortOrder { action: worst_action(before.action, action), ..before });
+            }
         }
         let at = condition.at.max(self.cleared_at);
         let record = FaultRecord {
@@ -279,7 +304,9 @@ impl Faults {
         let mut alarms = [0; ALARM_WORDS];
         alarms[0] = u64::from(image.start_inhibits);
         alarms[1] = u64::from(image.start_inhibits_mfg);
-        for condition in image.conditions.as_slice().iter().chain(found) {
+        let reported = image.conditions.as_slice().iter().map(|condition| (condition, None));
+        let own = found.iter().map(|condition| (condition, Some(found_cause(condition))));
+        for (condition, cause) in reported.chain(own) {
             let (condition, place, bit) = with_bit(*condition);
             let bank = place.checked_sub(usize::from(FaultType::AXIS.0 - 1)).filter(|bank| *bank < 2);
             if let Some(bank) = bank {
@@ -289,7 +316,9 @@ impl Faults {
                 (ExceptionAction::IGNORE, _) => {}
                 (ExceptionAction::ALARM, Some(bank)) => alarms[AXIS_ALARMS + bank] |= bit,
                 _ if initializing && !is_unrecoverable(condition.fault_type) => {}
-                (action, _) => self.latch(&condition, action == ExceptionAction::MAJOR_FAULT, state),
+                (action, _) => {
+                    self.latch(&condition, action == ExceptionAction::MAJOR_FAULT, cause, state);
+                }
             }
         }
         self.words.exceptions = exceptions;

@@ -2,7 +2,7 @@
 //! (clause 5-2.3.14 leaves its form to the device).
 //!
 //! It outlives connections. The newest [`FAULT_LOG_LEN`] entries are kept; older ones give way, and
-//! [`FaultLog::total`] tells how many there were.
+//! [`FaultLog::total`] reports how many there were.
 
 use arrayvec::ArrayVec;
 

@@ -1,10 +1,10 @@
 //! The axis follows its drive, its connection and the requests in progress.
 
-use super::drive_link::DriveAction;
+use super::drive_link::{AbortCause, DriveAction};
 use super::exception::{DriveCondition, ExceptionAction, ExceptionActions};
 use super::refused::RefusalReason;
 use super::state::{AxisEvent, AxisState, ControlKind};
-use super::{Axis, COAST_AND_DISABLE, Context, STATE_CHANGE_SHUTDOWN, fault_code, sub_code};
+use super::{Axis, COAST_AND_DISABLE, Context, fault_code, sub_code};
 use crate::wire::motion::codes::{
     AxisControl, ClearingEvent, ControlMode, ControlStatus, FaultType, TestStatus,
 };
@@ -59,8 +59,7 @@ impl Axis {
             && !self.drive.online
             && self.machine.state != AxisState::Aborting
         {
-            let code = fault_code::EXTERNAL;
-            self.raise(code, sub_code::DRIVE_LOST, COAST_AND_DISABLE, context.system_time);
+            self.lose_drive(context.system_time);
         }
         if context.node_fault {
             self.fire(AxisEvent::MajorFault);
@@ -70,19 +69,18 @@ impl Axis {
         self.follow_drive(context);
     }
 
-    /// Raises a fault of the device itself: an event, not a condition that lasts. All of them are fundamental to the axis
-    /// and major.
-    pub(super) fn raise(&mut self, code: u8, sub_code: u8, action: u8, system_time: u64) {
+    /// The drive is gone, and no condition of it says so.
+    fn lose_drive(&mut self, system_time: u64) {
         let condition = DriveCondition {
             fault_type: FaultType::AXIS,
-            code,
-            sub_code,
+            code: fault_code::EXTERNAL,
+            sub_code: sub_code::DRIVE_LOST,
             detail: 0,
-            action,
+            action: COAST_AND_DISABLE,
             least: ExceptionAction::MAJOR_FAULT,
             at: system_time,
         };
-        self.faults.latch(&condition, true, self.machine.state);
+        self.faults.latch(&condition, true, Some(AbortCause::DriveLost), self.machine.state);
         self.follow_major_faults();
     }
 
@@ -118,7 +116,7 @@ impl Axis {
         if !self.faults.any_major() {
             return;
         }
-        if self.faults.abort().is_some_and(|abort| abort.action >> 4 == STATE_CHANGE_SHUTDOWN) {
+        if self.faults.shuts_down() {
             self.machine.shutdown = true;
         }
         self.fire(AxisEvent::MajorFault);

@@ -17,7 +17,7 @@
 use crate::wire::motion::codes::AxisControl;
 use crate::wire::status::GeneralStatus;
 
-/// The handshake of one axis.
+/// The handshake of Axis Control and Axis Response of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AxisControlHandshake {
     /// Code of the last update.

@@ -11,7 +11,7 @@ use crate::wire::status::GeneralStatus;
 pub enum RefusalReason {
     /// The axis controls nothing: an encoder, a converter.
     ControlsNothing,
-    /// Control Mode 0: the axis tells its feedback and does nothing else.
+    /// Control Mode 0: the axis reports its feedback and does nothing else.
     FeedbackOnly,
     /// A hookup test is under way.
     Testing,
@@ -59,6 +59,7 @@ impl RefusalReason {
 }
 
 impl fmt::Display for RefusalReason {
+    // A flat match: one arm for each variant.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ControlsNothing => f.write_str("the axis controls nothing"),
@@ -91,7 +92,7 @@ impl fmt::Display for RefusalReason {
 /// A request that was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RefusedRequest {
-    /// Which.
+    /// What the controller has asked for.
     pub request: AxisControl,
     /// What the controller was told.
     pub status: GeneralStatus,

@@ -2,7 +2,10 @@
 
 use profile_generic::time::MonotonicTime;
 
-use super::drive_link::{AbortOrder, AxisCommandImage, Command, DriveAction, SetPoints, Withheld};
+use super::RAMP_AND_DISABLE;
+use super::drive_link::{
+    AbortCause, AbortOrder, AxisCommandImage, Command, DriveAction, SetPoints, Withheld,
+};
 use super::state::{AxisState, ControlKind};
 use super::status::allowed;
 use crate::device::axis::{Axis, Context};
@@ -50,17 +53,15 @@ pub(super) fn command(
             }
         }
     };
-    let abort = axis.faults.abort().filter(|_| axis.orders.action == DriveAction::Abort);
+    let unled = (!context.connected || context.node_fault)
+        .then_some(AbortOrder { action: RAMP_AND_DISABLE, cause: AbortCause::Node });
+    let abort = axis.faults.order().or(unled).filter(|_| axis.orders.action == DriveAction::Abort);
     AxisCommandImage {
         state: axis.machine.state,
         action: axis.orders.action,
         action_id: axis.orders.action_id,
         reset_id: axis.orders.reset_id,
-        abort: abort.map(|fault| AbortOrder {
-            action: fault.action,
-            fault_type: fault.fault_type,
-            code: fault.code,
-        }),
+        abort,
         command,
         test: axis.test.order().filter(|_| context.connected && context.remote && !context.node_fault),
     }
@@ -114,7 +115,7 @@ pub(super) fn actual_block(
 }
 
 /// The actual values that the controller asks for and this axis has. A bit for which there is no value is clear in the
-/// answer, so that nobody takes a zero for a measurement: everything of a converter, what the drive does not tell, and
+/// answer, so that nobody takes a zero for a measurement: everything of a converter, what the drive does not report, and
 /// the Unwind Cycle Count where nothing is unwound. Of a drive that is not online only the position remains, the last
 /// one that it has reported: state and faults of the axis say that it is not measured any more.
 fn actual_values(axis: &Axis, lint: bool, stamp: Option<u64>) -> ActualValues {

@@ -1,6 +1,6 @@
 //! The hookup test of an axis, clauses 5-2.5.1.9, 5-2.5.1.10 and 5-2.6.2.8.
 //!
-//! The device keeps the order, the state and the result; whoever runs the drive runs the test and reports its end
+//! The device keeps the order, the state and the result; the application that runs the drive runs the test and reports its end
 //! ([`TestOrder`], [`super::drive_link::TestReport`]). An active test goes Stopped, Starting, Testing, Stopping, Stopped; a
 //! passive one changes no state. In Process stands from the order until the axis is out of motion again, and whatever
 //! ends the motion ends the test: the order is taken back in the same step.

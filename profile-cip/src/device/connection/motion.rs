@@ -17,7 +17,7 @@
 use super::path::MotionPath;
 use super::refusal::Refusal;
 use crate::device::config::MotionConfig;
-use crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
+use crate::device::objects::class::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::Reader;
 use crate::wire::epath::{Encoding, Segment, emit_path, path_len};
 use crate::wire::forward_open::{ForwardOpen, Transport, Trigger};

@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::refusal::Refusal;
 use crate::device::config::{IdentityConfig, KeyMismatch};
-use crate::device::objects::router::{CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS};
+use crate::device::objects::class::{CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS};
 use crate::wire::epath::{self, ElectronicKey, Encoding, LogicalType, Segment};
 use crate::wire::status::ConnectionStatus;
 

@@ -244,7 +244,7 @@ impl Adapter {
         self.node.poll_event()
     }
 
-    /// When [`Adapter::handle_timeout`] has to be called next.
+    /// When [`Adapter::handle_time`] has to be called next.
     pub fn wake_at(&self) -> Option<MonotonicTime> {
         let inactivity = self.node.config.interface.inactivity_timeout_s;
         let sessions = self.sessions.iter().flatten().filter_map(|session| {
@@ -256,8 +256,8 @@ impl Adapter {
 
     /// Ends what has taken too long: requests at the motion device, explicit connections, silent streams.
     /// Afterwards [`Adapter::ready`] tells which streams want service.
-    pub fn handle_timeout(&mut self, now: MonotonicTime) {
-        self.node.handle_timeout(now);
+    pub fn handle_time(&mut self, now: MonotonicTime) {
+        self.node.handle_time(now);
         let inactivity = self.node.config.interface.inactivity_timeout_s;
         for index in 0..self.sessions.len() {
             let Some(session) = self.sessions[index].as_mut() else { continue };
@@ -323,7 +323,7 @@ impl Adapter {
         }
     }
 
-    /// Handles one packet; tells whether it was one a client would send.
+    /// Handles one packet; reports whether it was one a client would send.
     fn packet(&mut self, now: MonotonicTime, slot: SessionSlot, bytes: &[u8]) -> bool {
         let Ok(packet) = Packet::parse(bytes) else { return false };
         if packet.options != 0 || packet.status != EncapsulationStatus::SUCCESS {

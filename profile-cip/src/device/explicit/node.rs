@@ -19,6 +19,9 @@ use crate::device::motion_link::{
     CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
     OpenParameters, Token,
 };
+use crate::device::objects::class::{
+    CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS,
+};
 use crate::device::objects::connection_manager::{self, Statistics};
 use crate::device::objects::ethernet_link::{CLASS_ETHERNET_LINK, Cleared, EthernetLink, GET_AND_CLEAR};
 use crate::device::objects::file::{Asker, CLASS_FILE, File, INSTANCE_EDS, Uploads};
@@ -26,9 +29,7 @@ use crate::device::objects::identity::CLASS_IDENTITY;
 use crate::device::objects::identity::{Health, Identity, Ownership};
 use crate::device::objects::object::{Answer, serve};
 use crate::device::objects::qos::{CLASS_QOS, Qos};
-use crate::device::objects::router::{
-    self, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS, MessageRouter,
-};
+use crate::device::objects::router::{self, MessageRouter};
 use crate::device::objects::tcp_ip::{CLASS_TCP_IP, TcpIp};
 use crate::device::objects::time_sync::{CLASS_TIME_SYNC, TimeSync, TimeSyncState};
 use crate::wire::message_router::Request;
@@ -385,7 +386,7 @@ impl Node {
         answer.into_reply(awaited.service, usize::MAX)
     }
 
-    /// Counts and tells a refused Forward_Open, and makes its answer.
+    /// Counts and reports a refused Forward_Open, and makes its answer.
     pub fn refuse_open(&mut self, triad: ConnectionTriad, peer: SocketAddrV4, refusal: Refusal) -> Answer {
         let (general, extended) = (refusal.general.0, refusal.first_extended());
         if general == GeneralStatus::CONNECTION_FAILURE.0
@@ -417,7 +418,7 @@ impl Node {
     }
 
     /// Ends the connections whose time is up.
-    pub fn handle_timeout(&mut self, now: MonotonicTime) {
+    pub fn handle_time(&mut self, now: MonotonicTime) {
         if self.connections.motion.deadline().is_some_and(|deadline| deadline <= now) {
             self.motion_device_silent();
         }

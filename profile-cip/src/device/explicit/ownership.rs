@@ -17,8 +17,8 @@
 use core::net::Ipv4Addr;
 
 use super::node::Node;
+use crate::device::objects::class::{CLASS_CONNECTION_MANAGER, CLASS_MOTION_DEVICE_AXIS};
 use crate::device::objects::file::{CLASS_FILE, INITIATE_UPLOAD, UPLOAD_TRANSFER};
-use crate::device::objects::router::{CLASS_CONNECTION_MANAGER, CLASS_MOTION_DEVICE_AXIS};
 use crate::wire::status::Service;
 
 /// Whether a service of this class changes nothing that is not its requester's own. What is not known to be harmless

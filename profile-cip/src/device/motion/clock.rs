@@ -3,7 +3,6 @@
 use super::time_offset::{OffsetCompensation, Offsets};
 use crate::device::axis::reported::Reported;
 use crate::device::motion_link::SyncState;
-use crate::wire::Error;
 use crate::wire::motion::codes::SyncStatus;
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::status::GeneralStatus;
@@ -78,7 +77,7 @@ impl Clock {
     ) -> (GeneralStatus, SyncStatus) {
         let grandmaster = match parse_group_sync(body) {
             Ok(id) => id,
-            Err(Error::Trailing { .. }) => {
+            Err(error) if error.is_too_long() => {
                 return (GeneralStatus::TOO_MUCH_DATA, SyncStatus::NOT_SYNCHRONIZED);
             }
             Err(_) => return (GeneralStatus::NOT_ENOUGH_DATA, SyncStatus::NOT_SYNCHRONIZED),

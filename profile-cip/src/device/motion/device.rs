@@ -29,6 +29,7 @@ use crate::device::attribute::{AttributeDefinition, Scope, TableError};
 pub use crate::device::axis::SequenceSettings;
 use crate::device::axis::drive_link::{AxisCommandImage, DriveImage};
 use crate::device::axis::event_channel::EventCounters;
+use crate::device::axis::exception::ExceptionActions;
 use crate::device::axis::fault_log::{FaultLog, LogEntry};
 use crate::device::axis::refused::RefusedRequest;
 use crate::device::axis::state::AxisState;
@@ -220,7 +221,7 @@ impl MotionDevice {
     /// Whether the device produces its updates synchronously.
     #[must_use]
     pub fn is_synchronous(&self) -> bool {
-        self.engine.connection.as_ref().is_some_and(|c| c.mode == Mode::Synchronous)
+        self.engine.connection.as_ref().is_some_and(|c| c.schedule.mode == Mode::Synchronous)
     }
 
     /// The attributes of a scope in the order of their IDs.
@@ -356,6 +357,12 @@ impl MotionDevice {
     /// There is no such axis or attribute.
     pub fn attribute(&self, axis: usize, id: u16) -> Result<&[u8], GeneralStatus> {
         self.engine.instances.get(axis, id)
+    }
+
+    /// What the controller wants done about the exceptions of an axis.
+    #[must_use]
+    pub fn exception_actions(&self, axis: usize) -> ExceptionActions<'_> {
+        self.engine.instances.exception_actions(axis)
     }
 
     /// A number that is another one after an attribute of an axis has changed, or `None` if there is no such axis. What was made

@@ -155,7 +155,7 @@ impl Engine {
             } else if missed > self.instances.low_limit() {
                 self.node.post(NodeAlarm::CONNECTION_UPDATE, now);
             }
-            if connection.mode == Mode::Synchronous {
+            if connection.schedule.mode == Mode::Synchronous {
                 self.node.synchronization(self.clock.is_synchronized(), now);
             }
         }

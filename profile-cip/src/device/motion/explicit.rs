@@ -12,7 +12,7 @@ use super::service::{self, Started};
 use crate::device::attribute::list_job::ListFormat;
 use crate::device::attribute::worker::{AttributeAccess, AttributeWorker};
 use crate::device::motion_link::{EXPLICIT_DATA_MAX, ExplicitReply, ExplicitRequest, MotionReply, Token};
-use crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
+use crate::device::objects::class::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::motion::codes::MotionService;
 use crate::wire::status::GeneralStatus;
 

@@ -6,6 +6,7 @@ use super::slot::Slot;
 use crate::device::attribute::worker::{AttributeAccess, AttributeSpace};
 use crate::device::attribute::{AttributeStore, AttributeTable, Scope, TableError, id};
 use crate::device::axis::Context;
+use crate::device::axis::exception::ExceptionActions;
 use crate::wire::status::GeneralStatus;
 
 /// The class with its attributes and channel.
@@ -54,6 +55,14 @@ impl Instances {
         match instance.checked_sub(1) {
             None => Some(&mut self.class.service),
             Some(axis) => self.slots.get_mut(axis).map(|slot| &mut slot.service),
+        }
+    }
+
+    /// What the controller wants done about the exceptions of an axis, counted from 0.
+    pub fn exception_actions(&self, axis: usize) -> ExceptionActions<'_> {
+        match self.slots.get(axis) {
+            Some(slot) => ExceptionActions::of(&self.axis_table, &slot.store),
+            None => ExceptionActions::NONE,
         }
     }
 

@@ -6,7 +6,7 @@
 //! with the axis. Others are told "privilege violation" for the whole service, before its data are looked at.
 //!
 //! The documents leave this to the device maker; status 0x0F is that of a permission which the requester lacks. With no
-//! connection open there is no owner, and whoever configures the device may set what can be set.
+//! connection open there is no owner, and any client that configures the device may set what can be set.
 
 use core::net::Ipv4Addr;
 

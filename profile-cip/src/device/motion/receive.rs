@@ -170,7 +170,7 @@ impl Engine {
         connection.heard(sequence, now);
         connection.header = Some(header);
         connection.received_at = system_time.map_or(0, |t| t.0);
-        let paced_at = connection.arrive(arrival, lost);
+        let paced_at = connection.stamps.arrive(arrival, lost);
         self.node_control(before, header.node_control);
         self.statistics.lost(lost);
         if u64::from(lost) > self.instances.high_limit() {
@@ -209,7 +209,7 @@ impl Engine {
         if !after.contains(NodeControl::SYNC_CONTROL)
             && let Some(connection) = &mut self.connection
         {
-            connection.desynchronize();
+            connection.schedule.desynchronize();
         }
     }
 
@@ -235,7 +235,7 @@ impl Engine {
         let synchronous =
             self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
         if !synchronous {
-            connection.forget_stamps();
+            connection.stamps.forget();
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
         let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
@@ -243,21 +243,21 @@ impl Engine {
             return Verdict::CommandsRefused;
         };
         let time_stamp = self.clock.compensate(received);
-        let age = connection.age(time_stamp, system_time, low, high);
+        let age = connection.stamps.age(time_stamp, system_time, low, high);
         let skewed = Clock::is_skewed(time_stamp, period, system_time);
-        if connection.mode == Mode::Asynchronous {
-            connection.forget_stamps();
+        if connection.schedule.mode == Mode::Asynchronous {
+            connection.stamps.forget();
             self.node.skew(skewed, now);
             if !skewed && self.clock.is_synchronized() {
                 let start = time_stamp.saturating_add(period.saturating_mul(2));
                 let in_ns =
                     start.saturating_sub(system_time).saturating_sub(self.config.transmission_processing_ns);
-                connection.synchronize(header.update_id, in_ns, now);
+                connection.schedule.synchronize(header.update_id, in_ns, now);
             }
             // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
-        if !connection.follows(self.clock.to_local(time_stamp), header.update_id, arrival) {
+        if !connection.stamps.follows(self.clock.to_local(time_stamp), header.update_id, arrival) {
             // A clock was set and the offsets do not say so, or do not yet: the update counts as one that did not come.
             self.statistics.counters.stamp_jumps += 1;
             return Verdict::CommandsRefused;
@@ -288,7 +288,7 @@ impl Engine {
                 return Verdict::CommandsRefused;
             }
         }
-        connection.align(cycle.saturating_sub(processing), now);
+        connection.schedule.align(cycle.saturating_sub(processing), now);
         Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 

@@ -78,7 +78,7 @@ impl Engine {
         let control = connection.node_control();
         let mut status = NodeStatus::empty();
         status.set(NodeStatus::REMOTE_MODE, control.contains(NodeControl::REMOTE_CONTROL));
-        status.set(NodeStatus::SYNC_MODE, connection.mode == Mode::Synchronous);
+        status.set(NodeStatus::SYNC_MODE, connection.schedule.mode == Mode::Synchronous);
         let valid = control.contains(NodeControl::DATA_VALID) && connection.has_data();
         status.set(NodeStatus::DATA_VALID, valid);
         status.set(NodeStatus::FAULT, self.node.is_faulted());
@@ -95,7 +95,7 @@ impl Engine {
         let size = self.transmit_size()?.min(out.len());
         let (sequence, update) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
         let len = self.produce(now, system_time, update)?;
-        *sequence = self.connection.as_ref()?.transmit_sequence.to_le_bytes();
+        *sequence = self.connection.as_ref()?.schedule.sequence.to_le_bytes();
         Some(SEQUENCE_LEN + len)
     }
 

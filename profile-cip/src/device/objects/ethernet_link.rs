@@ -1,6 +1,6 @@
 //! The Ethernet Link object (class 0xF6): the port as the host sees it.
 //!
-//! What the host does not tell is not made up: without counters attributes 4 and 5 are not there.
+//! What the host does not report is not made up: without counters attributes 4 and 5 are not there.
 
 use super::identity::short_string;
 use super::object::{Answer, Object};
@@ -104,6 +104,7 @@ impl Object for EthernetLink<'_> {
     const ALL: &'static [u16] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
     const ATTRIBUTE_MAX: u16 = 11;
 
+    // Flat: one arm per attribute.
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
         let c = self.config;
         let state = &c.state;

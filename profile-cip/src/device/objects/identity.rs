@@ -99,7 +99,7 @@ impl ModuleState {
     }
 }
 
-/// How the device is, as the Identity object tells it.
+/// How the device is, as the Identity object reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Health {
     /// State of the device.

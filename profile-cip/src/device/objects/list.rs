@@ -1,14 +1,13 @@
 //! The object classes of the device: what the Message Router lists and the electronic data sheet names.
 
+use super::class::{CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS};
 use super::connection_manager::Statistics;
 use super::ethernet_link::{CLASS_ETHERNET_LINK, EthernetLink};
 use super::file::{CLASS_FILE, File};
 use super::identity::{CLASS_IDENTITY, Identity};
 use super::object::Object;
 use super::qos::{CLASS_QOS, Qos};
-use super::router::{
-    CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS, MessageRouter,
-};
+use super::router::MessageRouter;
 use super::tcp_ip::{CLASS_TCP_IP, TcpIp};
 use super::time_sync::{CLASS_TIME_SYNC, TimeSync};
 

@@ -5,6 +5,7 @@ use arrayvec::ArrayVec;
 use crate::device::motion_link::ObjectPath;
 use crate::wire::attributes::{AttributeIds, AttributeStatus};
 use crate::wire::message_router::{EXTENDED_STATUS_MAX, Reply};
+use crate::wire::status::length_status;
 use crate::wire::status::{ConnectionStatus, GeneralStatus, Service};
 use crate::wire::{Error, Reader, Writer};
 
@@ -50,14 +51,7 @@ impl From<Result<Vec<u8>, GeneralStatus>> for Answer {
 
 /// General status for malformed service data.
 pub(crate) fn data_status(error: Error) -> GeneralStatus {
-    match error {
-        Error::Truncated { .. } => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Length { expected, found, .. } if found < expected => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Trailing { .. } | Error::Length { .. } => GeneralStatus::TOO_MUCH_DATA,
-        Error::Invalid { .. } | Error::OutOfRange { .. } | Error::Value { .. } => {
-            GeneralStatus::INVALID_PARAMETER
-        }
-    }
+    length_status(&error).unwrap_or(GeneralStatus::INVALID_PARAMETER)
 }
 
 /// An object with one instance.

@@ -8,13 +8,6 @@ use crate::device::motion_link::ObjectPath;
 use crate::wire::epath::{self, Encoding, LogicalType, Segment};
 use crate::wire::status::GeneralStatus;
 
-/// Class code of the Message Router object.
-pub const CLASS_MESSAGE_ROUTER: u16 = 0x02;
-/// Class code of the Connection Manager object.
-pub const CLASS_CONNECTION_MANAGER: u16 = 0x06;
-/// Class code of the Motion Device Axis Object.
-pub const CLASS_MOTION_DEVICE_AXIS: u16 = 0x42;
-
 /// Resolves the path of an explicit request: class, instance, attribute, member, connection point, each at
 /// most once; an electronic key is checked; a missing instance is the class.
 ///

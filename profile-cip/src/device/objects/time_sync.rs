@@ -3,7 +3,7 @@
 //! CIP Volume 1, which defines it, is not among our documents. Attribute numbers and layouts are those of Wireshark's
 //! dissector and of the manuals of makers of CIP Sync devices, which agree; the class revision is from one such manual.
 //!
-//! The object tells what the device knows and refuses the rest with "attribute not supported". A device that runs no
+//! The object reports what the device knows and refuses the rest with "attribute not supported". A device that runs no
 //! PTP itself has measured neither an offset from a master nor a path delay, and has no parent, intervals, priorities
 //! or domain; it has an opinion whether its time is everybody's time, and which clock that is.
 //!
@@ -101,7 +101,7 @@ pub struct Measurement {
     pub mean_path_delay: i64,
 }
 
-/// How the clock of the device is, as the Time Sync object tells it. Group_Sync judges by the same [`SyncState`].
+/// How the clock of the device is, as the Time Sync object reports it. Group_Sync judges by the same [`SyncState`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TimeSyncState {
     /// Whether it is synchronized, and with whom.
@@ -139,6 +139,7 @@ impl Object for TimeSync<'_> {
     const ALL: &'static [u16] = &[];
     const ATTRIBUTE_MAX: u16 = 28;
 
+    // Flat: one arm per attribute.
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
         const NONE: GeneralStatus = GeneralStatus::ATTRIBUTE_NOT_SUPPORTED;
         let state = self.state;

@@ -108,6 +108,7 @@ impl LineText {
     /// Before the code on a display of seven segments, or the whole of it (Table 9-1.3).
     ///
     /// "Device is operational" is everything behind the start of the device; a display of one digit has no more.
+    // Flat: the table of the display, one arm per character.
     const fn segments(self) -> &'static str {
         match self {
             Self::NONE => "",

@@ -1,7 +1,7 @@
 //! What the indicators of the device show (Volume 9 clause 9-1.1, IEC 61800-7-202 clause 7.6.5): Module Status, Network
 //! Status and Axis Status LED here, the alphanumeric display in [`display`].
 //!
-//! Everything is a pure function of states and conditions; who has lamps lights them, and a box without lamps tells what
+//! Everything is a pure function of states and conditions; who has lamps lights them, and a box without lamps reports what
 //! they would show.
 //!
 //! Table 9-1.2; 1 and 2 are its footnotes, in [`axis_status`]:
@@ -149,6 +149,7 @@ pub const fn module_status(state: ModuleState) -> Indication {
 /// With both the fault is shown, which is the worse. An axis in Initializing has neither footnote. A bus that comes up in
 /// Pre-Charge takes the axis out of it, so the bus does not count there.
 #[must_use]
+// Flat: the table of the display, one arm per row.
 pub fn axis_status(axis: &AxisCondition) -> Indication {
     let (plain, minor_faults, alarms) = match (axis.state, axis.bus_up) {
         (AxisState::Off | AxisState::PreCharge, _)

@@ -25,7 +25,7 @@
 
 use core::fmt;
 
-use profile_generic::open_code;
+pub use crate::generated::devicenet::{ConnectionState, WatchdogAction};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::wire::{Identifier, MacId};
@@ -95,38 +95,6 @@ impl fmt::Display for ConnectionKind {
     }
 }
 
-open_code! {
-    /// State, attribute 1.
-    pub struct ConnectionState(u8) {
-        /// Not there.
-        NON_EXISTENT = 0 => "non-existent",
-        /// Allocated; the expected packet rate is missing.
-        CONFIGURING = 1 => "configuring",
-        /// Waits for an identifier. Connections of the predefined set have theirs, and are never in this state.
-        WAITING_FOR_CONNECTION_ID = 2 => "waiting for connection ID",
-        /// Messages go.
-        ESTABLISHED = 3 => "established",
-        /// The watchdog has run out.
-        TIMED_OUT = 4 => "timed out",
-        /// The watchdog of an explicit connection has run out, and it stays for the sake of an I/O connection.
-        DEFERRED_DELETE = 5 => "deferred delete",
-    }
-}
-
-open_code! {
-    /// Watchdog time-out action, attribute 12.
-    pub struct WatchdogAction(u8) {
-        /// Stay, timed out.
-        TIME_OUT = 0 => "transition to timed out",
-        /// Go.
-        AUTO_DELETE = 1 => "auto delete",
-        /// Go on.
-        AUTO_RESET = 2 => "auto reset",
-        /// Go when the last I/O connection has gone.
-        DEFERRED_DELETE = 3 => "deferred delete",
-    }
-}
-
 /// What happens to a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConnectionEvent {
@@ -173,6 +141,7 @@ impl ConnectionState {
     /// What an event makes of a connection. `io` tells I/O connections from the explicit one; `io_established` says, for the
     /// explicit one, that an I/O connection is established.
     #[must_use]
+    // Flat: the table of the standard, one arm per transition.
     pub const fn next(self, io: bool, event: ConnectionEvent, io_established: bool) -> ConnectionTransition {
         use ConnectionEvent as E;
         const fn go(next: ConnectionState) -> ConnectionTransition {
@@ -439,6 +408,7 @@ impl Connection {
     ///
     /// # Errors
     /// The instance does not exist, or has no such attribute.
+    // Flat: one arm per attribute.
     pub fn get(
         &self,
         attribute: u8,
@@ -475,6 +445,7 @@ impl Connection {
     ///
     /// # Errors
     /// The attribute, its length, its value or the state does not permit it; nothing changes.
+    // Flat: one arm per attribute.
     pub fn set(&mut self, now: MonotonicTime, attribute: u8, value: &[u8]) -> Result<Change, GeneralStatus> {
         if self.state == ConnectionState::NON_EXISTENT {
             return Err(GeneralStatus::OBJECT_DOES_NOT_EXIST);

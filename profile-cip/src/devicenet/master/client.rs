@@ -253,12 +253,12 @@ impl Client {
             Ok(Response::Success { service, data }) if service.0 == asked => {
                 Outcome::Done(data.iter().copied().take(EXPLICIT_MAX).collect())
             }
-            Ok(Response::Success { service, .. }) => Outcome::Malformed(Error::Invalid {
-                what: "service of a response",
-                offset: 0,
-                found: u32::from(service.0),
-                expected: u32::from(asked),
-            }),
+            Ok(Response::Success { service, .. }) => Outcome::Malformed(Error::invalid(
+                "service of a response",
+                0,
+                u32::from(asked),
+                u32::from(service.0),
+            )),
             Ok(Response::Error { status, additional }) => Outcome::Refused { status, additional },
             Err(error) => Outcome::Malformed(error),
         };
@@ -269,5 +269,5 @@ impl Client {
 }
 
 const fn short() -> Error {
-    Error::Truncated { what: "explicit message", offset: 0, needed: 1, available: 0 }
+    Error::truncated("explicit message", 0, 1, 0)
 }

@@ -130,7 +130,7 @@ fn message_bits(len: usize) -> u32 {
     whole * frame(IO_FRAGMENT_MAX + 1) + if rest == 0 { 0 } else { frame(rest + 1) }
 }
 
-/// A slave.
+/// A slave: its MAC ID, what it must be, and its connections.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SlaveConfig {
     /// Its MAC ID.
@@ -188,7 +188,7 @@ pub struct MasterConfig {
     pub retry_max: DurationNs,
     /// After bus off it goes through the duplicate MAC ID check again, and otherwise stays off.
     pub bus_off_reset: bool,
-    /// The slaves.
+    /// The slaves to allocate, each with a MAC ID of its own.
     pub slaves: Vec<SlaveConfig>,
 }
 

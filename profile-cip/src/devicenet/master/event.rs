@@ -13,7 +13,7 @@ use crate::wire::status::{GeneralStatus, Service};
 /// Names one submitted request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ticket {
-    /// The slave.
+    /// MAC ID of the slave.
     pub slave: MacId,
     pub(super) serial: u64,
 }
@@ -111,7 +111,7 @@ pub enum LossReason {
         /// Why more exactly.
         additional: u8,
     },
-    /// Its answer makes no sense.
+    /// Its answer is not a valid response to the request.
     Malformed(Phase),
     /// It is another device than expected.
     Identity {
@@ -160,6 +160,7 @@ pub enum LossReason {
 }
 
 impl fmt::Display for LossReason {
+    // Flat: one arm per event.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoAnswer(phase) => write!(f, "no answer ({phase})"),
@@ -216,7 +217,7 @@ pub enum Event {
     },
     /// Another node has tried to take the MAC ID of a slave, which goes on.
     SlaveDuplicate {
-        /// The slave.
+        /// MAC ID of the slave.
         slave: MacId,
         /// Vendor ID of the other node.
         vendor: u16,
@@ -226,7 +227,7 @@ pub enum Event {
     /// Another master polls a slave. One that is not taken yet is left alone until that has ended; for one that is exchanged
     /// with the application stops its axis and calls `give_way`. Told once until it has ended.
     OtherMaster {
-        /// The slave.
+        /// MAC ID of the slave.
         slave: MacId,
         /// The other master, where it was heard how it has asked for the slave.
         master: Option<MacId>,
@@ -236,16 +237,16 @@ pub enum Event {
     /// A slave is allocated and set up, and exchanged with from the next cycle on.
     Exchanging(MacId),
     /// A slave is not exchanged with any more, or could not be brought to it. It is tried again after a while. The same
-    /// reason is told once in a row.
+    /// reason is reported once in a row.
     Lost {
-        /// The slave.
+        /// MAC ID of the slave.
         slave: MacId,
         /// Why.
         reason: LossReason,
     },
     /// A slave was given back.
     Released {
-        /// The slave.
+        /// MAC ID of the slave.
         slave: MacId,
         /// What was given back.
         choice: AllocationChoice,
@@ -254,7 +255,7 @@ pub enum Event {
     Refused(Refusal),
     /// A submitted request has ended.
     Explicit {
-        /// Which.
+        /// The ticket that `submit` returned.
         ticket: Ticket,
         /// How.
         outcome: Outcome,

@@ -74,7 +74,7 @@ pub enum SubmitError {
 /// What the master has counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Statistics {
-    /// Cycles.
+    /// Cycles that have begun.
     pub cycles: u64,
     /// Cycles that were left out, because they could only have begun late.
     pub skipped: u64,

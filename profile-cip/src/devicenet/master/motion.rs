@@ -25,12 +25,13 @@ use crate::wire::motion::{ActualPosition, CommandPosition, CommandValues};
 use crate::wire::{Error, Writer};
 
 use super::event::ExplicitRequest;
+use crate::device::attribute::id;
 
 /// Class code of the Motion Device Axis Object.
-const CLASS: u16 = crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
+const CLASS: u16 = crate::device::objects::class::CLASS_MOTION_DEVICE_AXIS;
 
 /// Attribute Control Status, whose bit 0 is Configuration Complete.
-const CONTROL_STATUS: u8 = 89;
+const CONTROL_STATUS: u8 = id::CONTROL_STATUS.to_le_bytes()[0];
 
 /// Bytes of either message.
 pub const UPDATE_LEN: usize = LEN;

@@ -13,6 +13,8 @@ use crate::wire::status::{GeneralStatus, Service};
 
 /// Attributes of the Identity object that are asked for: vendor, device type, product code, serial number.
 const IDENTITY: [u8; 4] = [1, 2, 3, 6];
+/// Serial number, the one of them that has four bytes.
+const SERIAL: u8 = 6;
 
 /// Status word of the Identity object.
 const IDENTITY_STATUS: u8 = 5;
@@ -49,6 +51,7 @@ fn devicenet(service: u8, data: &[u8]) -> Option<ExplicitRequest> {
 
 impl Station {
     /// The question of the present phase; `None` when everything has been asked.
+    // Flat: one arm per phase.
     fn question(&self, master: MacId) -> Option<(bool, ExplicitRequest)> {
         let choice = self.config.choice().bits();
         let connection = u16::from(CLASS_CONNECTION);
@@ -122,7 +125,7 @@ impl Station {
                 };
                 return Err((PhaseEvent::Refused, reason));
             }
-            // One that does not tell its paths has no others: its data say what it is.
+            // One that does not report its paths has no others: its data say what it is.
             Outcome::Refused { .. } => self.step += 1,
             Outcome::NoAnswer | Outcome::NotTaken(_) | Outcome::Lost => {
                 return Err((PhaseEvent::NoAnswer, LossReason::NoAnswer(Phase::Paths)));
@@ -135,6 +138,7 @@ impl Station {
     }
 
     /// What the answer to a question makes of the phase.
+    // Flat: one arm per kind of outcome, then one per phase.
     fn judge(&mut self, outcome: &Outcome) -> Result<(), (PhaseEvent, LossReason)> {
         let phase = self.phase;
         if phase == Phase::Paths {
@@ -167,44 +171,51 @@ impl Station {
             Phase::Allocate | Phase::AllocateAgain => {
                 let format = *data.first().ok_or(malformed)?;
                 self.format = BodyFormat(format & 0x0F);
+                Ok(())
             }
-            Phase::Identify => {
-                let attribute = IDENTITY[self.step.min(3)];
-                if attribute == 6 {
-                    let bytes = data[..].try_into().map_err(|_| malformed)?;
-                    self.facts.serial = Some(u32::from_le_bytes(bytes));
-                    return Ok(());
-                }
-                let found = word().ok_or(malformed)?;
-                let identity = &self.config.identity;
-                let (fact, expected) = match attribute {
-                    1 => (&mut self.facts.vendor, identity.vendor),
-                    2 => (&mut self.facts.device_type, identity.device_type),
-                    _ => (&mut self.facts.product_code, identity.product_code),
-                };
-                *fact = Some(found);
-                if let Some(expected) = expected.filter(|expected| *expected != found) {
-                    return Err((PhaseEvent::Refused, LossReason::Identity { attribute, expected, found }));
-                }
+            Phase::Identify if IDENTITY[self.step.min(3)] == SERIAL => {
+                let bytes = data[..].try_into().map_err(|_| malformed)?;
+                self.facts.serial = Some(u32::from_le_bytes(bytes));
+                Ok(())
             }
-            Phase::Sizes => {
-                let found = usize::from(word().ok_or(malformed)?);
-                let produced = self.step.is_multiple_of(2);
-                let Some(one) = self.config.connections.get(self.step / 2) else { return Ok(()) };
-                let kind = one.kind;
-                // What a slave consumes by bit strobe or as acknowledge is not told in the same way by all.
-                let expected = match kind {
-                    _ if produced => one.input,
-                    ConnectionKind::Poll => one.output,
-                    _ => found,
-                };
-                if expected != found {
-                    return Err((PhaseEvent::Refused, LossReason::Size { kind, produced, expected, found }));
-                }
-            }
-            _ => {}
+            Phase::Identify => self.judge_identity(word().ok_or(malformed)?),
+            Phase::Sizes => self.judge_size(usize::from(word().ok_or(malformed)?)),
+            _ => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Vendor, device type or product code.
+    fn judge_identity(&mut self, found: u16) -> Result<(), (PhaseEvent, LossReason)> {
+        let attribute = IDENTITY[self.step.min(3)];
+        let identity = &self.config.identity;
+        let (fact, expected) = match attribute {
+            1 => (&mut self.facts.vendor, identity.vendor),
+            2 => (&mut self.facts.device_type, identity.device_type),
+            _ => (&mut self.facts.product_code, identity.product_code),
+        };
+        *fact = Some(found);
+        match expected.filter(|expected| *expected != found) {
+            Some(expected) => Err((PhaseEvent::Refused, LossReason::Identity { attribute, expected, found })),
+            None => Ok(()),
+        }
+    }
+
+    /// The size of what a connection produces or consumes.
+    fn judge_size(&self, found: usize) -> Result<(), (PhaseEvent, LossReason)> {
+        let produced = self.step.is_multiple_of(2);
+        let Some(one) = self.config.connections.get(self.step / 2) else { return Ok(()) };
+        let kind = one.kind;
+        // What a slave consumes by bit strobe or as acknowledge is not told in the same way by all.
+        let expected = match kind {
+            _ if produced => one.input,
+            ConnectionKind::Poll => one.output,
+            _ => found,
+        };
+        if expected == found {
+            Ok(())
+        } else {
+            Err((PhaseEvent::Refused, LossReason::Size { kind, produced, expected, found }))
+        }
     }
 
     fn end_requests(&mut self) {

@@ -16,6 +16,7 @@ use super::super::wire::{Allocate, AllocationChoice, MacId};
 use super::application::ServiceError;
 use crate::wire::Error;
 use crate::wire::status::GeneralStatus;
+use crate::wire::status::length_status;
 
 /// Additional code: allocation conflict.
 pub const ALLOCATION_CONFLICT: u8 = 0x01;
@@ -40,14 +41,7 @@ const fn refuse<T>(status: GeneralStatus, additional: u8) -> Result<T, ServiceEr
 }
 
 fn data_error(error: Error) -> ServiceError {
-    let status = match error {
-        Error::Truncated { .. } => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Length { expected, found, .. } if found < expected => GeneralStatus::NOT_ENOUGH_DATA,
-        Error::Trailing { .. } | Error::Length { .. } => GeneralStatus::TOO_MUCH_DATA,
-        Error::Invalid { .. } | Error::OutOfRange { .. } | Error::Value { .. } => {
-            GeneralStatus::INVALID_ATTRIBUTE_VALUE
-        }
-    };
+    let status = length_status(&error).unwrap_or(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
     ServiceError { status, additional: NO_ADDITIONAL_CODE }
 }
 

@@ -25,7 +25,7 @@ pub enum SlaveEvent {
     BusOff,
     /// A master has taken connections.
     Allocated {
-        /// The master.
+        /// MAC ID of the master.
         master: MacId,
         /// Which ones.
         choice: AllocationChoice,

@@ -18,9 +18,9 @@ use super::application::{Application, ServiceError};
 use super::event::SlaveEvent;
 use super::objects::{DeviceNetObject, Router};
 use crate::device::motion_link::ObjectPath;
+use crate::device::objects::class::CLASS_MESSAGE_ROUTER;
 use crate::device::objects::identity::{CLASS_IDENTITY, Identity, Ownership, reset_kind};
 use crate::device::objects::object::{self, Answer, Object};
-use crate::device::objects::router::CLASS_MESSAGE_ROUTER;
 use crate::wire::Error;
 use crate::wire::status::{GeneralStatus, REPLY_BIT, Service};
 
@@ -114,12 +114,7 @@ impl<A: Application> Slave<A> {
         let (first, body) = data.split_first().ok_or(malformed(short()))?;
         let header = Header::parse(*first);
         if header.fragmented {
-            return Err(malformed(Error::Invalid {
-                what: "fragmentation of an unconnected request",
-                offset: 0,
-                found: 1,
-                expected: 0,
-            }));
+            return Err(malformed(Error::invalid("fragmentation of an unconnected request", 0, 0, 1)));
         }
         // The format that the answer to an allocation names is that of the explicit connection.
         let request = Request::parse(BodyFormat::CLASS_8_INSTANCE_8, body).map_err(malformed)?;
@@ -318,6 +313,7 @@ impl<A: Application> Slave<A> {
         Ok(())
     }
 
+    // Flat: one arm per service.
     fn serve_connection(
         &mut self,
         now: MonotonicTime,
@@ -381,7 +377,7 @@ impl<A: Application> Slave<A> {
 }
 
 const fn short() -> Error {
-    Error::Truncated { what: "explicit message", offset: 0, needed: 1, available: 0 }
+    Error::truncated("explicit message", 0, 1, 0)
 }
 
 /// The body of a response.

@@ -62,7 +62,7 @@ pub struct SlaveConfig {
     pub body_format: BodyFormat,
 }
 
-/// A slave.
+/// A group 2 only server around an application.
 #[derive(Debug)]
 pub struct Slave<A> {
     config: SlaveConfig,
@@ -157,13 +157,13 @@ impl<A: Application> Slave<A> {
         self.access.state()
     }
 
-    /// One of its connections.
+    /// The connection of this kind, allocated or not.
     #[must_use]
     pub const fn connection(&self, kind: ConnectionKind) -> &Connection {
         &self.connections[kind.index()]
     }
 
-    /// The master that has it.
+    /// MAC ID of the master that has allocated it; `None` while nobody has.
     #[must_use]
     pub const fn master(&self) -> Option<MacId> {
         self.master

@@ -46,8 +46,8 @@ use crate::device::motion_link::{
     CloseParameters, ConnectionTriad, EXPLICIT_DATA_MAX, ExplicitRequest, MotionReply, MotionRequest,
     OpenParameters, Token,
 };
+use crate::device::objects::class::CLASS_MOTION_DEVICE_AXIS;
 use crate::device::objects::identity::{Health, ModuleState};
-use crate::device::objects::router::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::motion::codes::{ControlMode, FaultType};
 use crate::wire::motion::{CommandPosition, FORMAT_REVISION, Format, fixed};
 use crate::wire::status::GeneralStatus;
@@ -84,7 +84,7 @@ pub struct MotionDriveConfig {
     pub attributes: Vec<AttributeDefinition>,
     /// Axis Fault (attribute 657) of the servo's faults: bit number. What is not here is Axis Fault - Mfg 1.
     pub faults: Vec<(FaultCause, u8)>,
-    /// The servo.
+    /// Mechanics and loops of the simulated axis.
     pub servo: ServoParameters,
 }
 
@@ -99,7 +99,7 @@ pub enum MotionDriveError {
     Servo(#[from] ServoError),
 }
 
-/// The drive.
+/// A CIP Motion drive in the fixed format, with a simulated axis.
 pub struct MotionDrive {
     config: MotionDriveConfig,
     device: MotionDevice,

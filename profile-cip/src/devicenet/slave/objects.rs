@@ -2,9 +2,9 @@
 
 use super::super::wire::{AllocationChoice, MacId};
 use super::SlaveConfig;
+use crate::device::objects::class::CLASS_MESSAGE_ROUTER;
 use crate::device::objects::identity::CLASS_IDENTITY;
 use crate::device::objects::object::Object;
-use crate::device::objects::router::CLASS_MESSAGE_ROUTER;
 use crate::wire::status::GeneralStatus;
 
 /// Classes of this module.

@@ -90,11 +90,11 @@ impl Allocate {
         let reader = &mut Reader::new(data);
         let [choice, allocator] = reader.array(CHOICE)?;
         reader.finish(CHOICE)?;
-        let allocator = MacId::new(allocator).ok_or(Error::OutOfRange {
-            what: "MAC ID of the allocator",
-            value: u32::from(allocator),
-            max: u32::from(MacId::MAX.get()),
-        })?;
+        let allocator = MacId::new(allocator).ok_or(Error::too_large(
+            "MAC ID of the allocator",
+            u32::from(MacId::MAX.get()),
+            u32::from(allocator),
+        ))?;
         Ok(Self { choice: AllocationChoice::from_bits_retain(choice), allocator })
     }
 
@@ -120,7 +120,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::Expected;
+    use profile_generic::wire::check::check_vectors;
 
     /// ICP DAS CAN-8x24, 7.2.2 (07 0A); BEI MHK5, 4.1 (03 0A).
     #[test]
@@ -136,7 +137,7 @@ mod tests {
             ),
         ];
         check_vectors!(&vectors, Allocate);
-        assert!(matches!(Allocate::parse(&[3, 10, 0]), Err(Error::Trailing { .. })));
+        assert!(matches!(Allocate::parse(&[3, 10, 0]), Err(Error { expected: Expected::End, .. })));
         assert_eq!(
             Allocate::parse(&[3, 64]).map_err(|error| error.to_string()),
             Err("MAC ID of the allocator: expected at most 63, found 64".to_owned())

@@ -62,11 +62,11 @@ impl DuplicateMac {
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         if self.port & RESPONSE != 0 {
             let (value, max) = (u32::from(self.port), 127);
-            return Err(Error::OutOfRange { what: "physical port number", value, max });
+            return Err(Error::too_large("physical port number", max, value));
         }
         let available = buffer.len();
         let Some(buffer) = buffer.get_mut(..LEN) else {
-            return Err(Error::Truncated { what: MESSAGE, offset: 0, needed: LEN, available });
+            return Err(Error::truncated(MESSAGE, 0, LEN, available));
         };
         let writer = &mut Writer::new(buffer);
         writer.u8(MESSAGE, if self.response { RESPONSE } else { 0 } | self.port)?;
@@ -89,7 +89,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::wire::check::check_vectors;
+    use profile_generic::wire::check::check_vectors;
 
     /// Layout: Lika SFA-5000 and Datalogic AMT58 manuals, 6.4.1.
     const VECTORS: &[(&str, &[u8], DuplicateMac)] = &[
@@ -108,10 +108,7 @@ mod tests {
     #[test]
     fn vectors() {
         check_vectors!(VECTORS, DuplicateMac);
-        assert_eq!(
-            DuplicateMac::parse(&[0; 8]),
-            Err(Error::Trailing { what: MESSAGE, offset: 7, excess: 1 })
-        );
+        assert_eq!(DuplicateMac::parse(&[0; 8]), Err(Error::trailing(MESSAGE, 7, 1)));
         let port = DuplicateMac { port: 128, ..VECTORS[0].2 };
         assert!(port.emit(&mut [0; 8]).is_err());
         assert_eq!(

@@ -18,7 +18,7 @@
 
 use core::fmt;
 
-use profile_generic::open_code;
+pub use crate::generated::devicenet::BodyFormat;
 
 use super::id::MacId;
 use crate::wire::status::{GeneralStatus, REPLY_BIT, Service};
@@ -66,22 +66,6 @@ impl Header {
     }
 }
 
-open_code! {
-    /// Message body format: the widths of class and instance in a request.
-    pub struct BodyFormat(u8) {
-        /// Class 8 bits, instance 8 bits. The predefined master/slave connection set has it unless the slave says otherwise.
-        CLASS_8_INSTANCE_8 = 0 => "DeviceNet (8/8)",
-        /// Class 8 bits, instance 16 bits.
-        CLASS_8_INSTANCE_16 = 1 => "DeviceNet (8/16)",
-        /// Class 16 bits, instance 16 bits.
-        CLASS_16_INSTANCE_16 = 2 => "DeviceNet (16/16)",
-        /// Class 16 bits, instance 8 bits.
-        CLASS_16_INSTANCE_8 = 3 => "DeviceNet (16/8)",
-        /// A packed path in the place of class and instance. Not read and not written here.
-        CIP_PATH = 4 => "CIP Path",
-    }
-}
-
 impl BodyFormat {
     /// Whether class and instance have 16 bits, in this order.
     const fn wide(self) -> Option<(bool, bool)> {
@@ -96,7 +80,7 @@ impl BodyFormat {
 
     fn widths(self) -> Result<(bool, bool), Error> {
         let (what, found) = ("message body format", u32::from(self.0));
-        self.wide().ok_or(Error::Invalid { what, offset: 0, found, expected: 0 })
+        self.wide().ok_or(Error::invalid(what, 0, 0, found))
     }
 }
 
@@ -127,7 +111,7 @@ impl<'a> Request<'a> {
         let service = reader.u8(REQUEST)?;
         if service & REPLY_BIT != 0 {
             let (what, found) = ("service of a request", u32::from(service));
-            return Err(Error::Invalid { what, offset: 0, found, expected: found & 0x7F });
+            return Err(Error::invalid(what, 0, found & 0x7F, found));
         }
         let mut number = |wide| if wide { reader.u16(REQUEST) } else { reader.u8(REQUEST).map(u16::from) };
         let (class, instance) = (number(class_16)?, number(instance_16)?);
@@ -152,7 +136,7 @@ impl<'a> Request<'a> {
         let mut number = |what, wide, value: u16| match u8::try_from(value) {
             _ if wide => writer.u16(REQUEST, value),
             Ok(value) => writer.u8(REQUEST, value),
-            Err(_) => Err(Error::OutOfRange { what, value: u32::from(value), max: 255 }),
+            Err(_) => Err(Error::too_large(what, 255, u32::from(value))),
         };
         number("class in this message body format", class_16, self.class)?;
         number("instance in this message body format", instance_16, self.instance)?;
@@ -197,7 +181,7 @@ impl<'a> Response<'a> {
         let service = reader.u8(RESPONSE)?;
         if service & REPLY_BIT == 0 {
             let (what, found) = ("service of a response", u32::from(service));
-            return Err(Error::Invalid { what, offset: 0, found, expected: found | 0x80 });
+            return Err(Error::invalid(what, 0, found | 0x80, found));
         }
         if service & !REPLY_BIT == ERROR_RESPONSE {
             let [status, additional] = reader.array(RESPONSE)?;
@@ -225,7 +209,7 @@ impl<'a> Response<'a> {
         match *self {
             Self::Success { service, .. } if service.0 & !REPLY_BIT == ERROR_RESPONSE => {
                 let (what, found) = ("service of a response", u32::from(service.0));
-                return Err(Error::Invalid { what, offset: 0, found, expected: 0 });
+                return Err(Error::invalid(what, 0, 0, found));
             }
             Self::Success { service, data } => {
                 writer.u8(RESPONSE, service.0 | REPLY_BIT)?;
@@ -256,6 +240,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use profile_generic::wire::Expected;
 
     const FORMATS: [BodyFormat; 4] = [
         BodyFormat::CLASS_8_INSTANCE_8,
@@ -306,12 +291,21 @@ mod tests {
             }
         }
         let buffer = &mut [0; 12];
-        assert!(matches!(far.emit(FORMATS[0], buffer), Err(Error::OutOfRange { max: 255, .. })));
+        assert!(matches!(far.emit(FORMATS[0], buffer), Err(Error { expected: Expected::AtMost(255), .. })));
         let instance = Request { class: 5, ..far };
-        assert!(matches!(instance.emit(FORMATS[0], buffer), Err(Error::OutOfRange { max: 255, .. })));
+        assert!(matches!(
+            instance.emit(FORMATS[0], buffer),
+            Err(Error { expected: Expected::AtMost(255), .. })
+        ));
         for format in [BodyFormat::CIP_PATH, BodyFormat(9)] {
-            assert!(matches!(set_epr.emit(format, buffer), Err(Error::Invalid { .. })), "{format}");
-            assert!(matches!(Request::parse(format, &[0; 8]), Err(Error::Invalid { .. })), "{format}");
+            assert!(
+                matches!(set_epr.emit(format, buffer), Err(Error { expected: Expected::Value(_), .. })),
+                "{format}"
+            );
+            assert!(
+                matches!(Request::parse(format, &[0; 8]), Err(Error { expected: Expected::Value(_), .. })),
+                "{format}"
+            );
         }
         let response = Request::parse(FORMATS[0], &[0x90, 5, 2]).map_err(|error| error.to_string());
         assert_eq!(response, Err("service of a request at byte 0: expected 0x10, found 0x90".to_owned()));

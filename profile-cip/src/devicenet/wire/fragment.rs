@@ -11,7 +11,7 @@
 
 use core::fmt;
 
-use profile_generic::open_code;
+pub use crate::generated::devicenet::AcknowledgeStatus;
 
 /// Which part of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,16 +79,6 @@ impl fmt::Display for Fragment {
             FragmentKind::Acknowledge => "acknowledge of fragment",
         };
         write!(f, "{kind} {}", self.count)
-    }
-}
-
-open_code! {
-    /// Status in the acknowledge of a fragment.
-    pub struct AcknowledgeStatus(u8) {
-        /// Taken.
-        SUCCESS = 0 => "success",
-        /// The message is longer than the receiver can take; it is dropped.
-        TOO_MUCH_DATA = 1 => "too much data",
     }
 }
 

@@ -57,7 +57,7 @@ impl fmt::Display for MacId {
     }
 }
 
-/// What an identifier says. `slave` is the slave's MAC ID, whoever sends.
+/// What an identifier says. `slave` is the slave's MAC ID, regardless of the sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Identifier {
     /// Group 1, message ID 0 to 11: connections that were not predefined.
@@ -127,6 +127,7 @@ impl Identifier {
     ///
     /// # Errors
     /// 7F0 and above are no identifiers of DeviceNet.
+    // Flat: a table of ranges of identifiers.
     pub fn parse(bits: u16) -> Result<Self, Error> {
         let mac = MacId::of(bits);
         let [low, _] = bits.to_le_bytes();
@@ -166,13 +167,14 @@ impl Identifier {
             },
             _ => {
                 let (value, max) = (u32::from(bits), u32::from(LAST));
-                return Err(Error::OutOfRange { what: "identifier of DeviceNet", value, max });
+                return Err(Error::too_large("identifier of DeviceNet", max, value));
             }
         })
     }
 
     /// The 11 bits. Message IDs that the group does not have are cut to its bits.
     #[must_use]
+    // Flat: one arm per message.
     pub const fn bits(self) -> u16 {
         const fn group_1(message: u8, mac: MacId) -> u16 {
             ((message & 0xF) as u16) << 6 | mac.0 as u16
@@ -227,6 +229,7 @@ impl Identifier {
 
     /// Name of the message, as the tables of the predefined master/slave connection set have it.
     #[must_use]
+    // Flat: one arm per message.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Group1 { .. } => "group 1 message",

@@ -19,31 +19,9 @@
 
 use core::fmt;
 
-use profile_generic::open_code;
-
+pub use crate::generated::devicenet::{Assembly, SupervisorState};
+use crate::generated::devicenet::{speed_control, speed_status};
 use crate::wire::{Error, Reader, Writer};
-
-open_code! {
-    /// Instance of the Assembly object (class 4).
-    pub struct Assembly(u8) {
-        /// Output.
-        BASIC_SPEED_CONTROL = 20 => "basic speed control",
-        /// Output.
-        EXTENDED_SPEED_CONTROL = 21 => "extended speed control",
-        /// Output.
-        BASIC_TORQUE_CONTROL = 22 => "basic speed and torque control",
-        /// Output.
-        EXTENDED_TORQUE_CONTROL = 23 => "extended speed and torque control",
-        /// Input.
-        BASIC_SPEED_STATUS = 70 => "basic speed control status",
-        /// Input.
-        EXTENDED_SPEED_STATUS = 71 => "extended speed control status",
-        /// Input.
-        BASIC_TORQUE_STATUS = 72 => "basic speed and torque control status",
-        /// Input.
-        EXTENDED_TORQUE_STATUS = 73 => "extended speed and torque control status",
-    }
-}
 
 impl Assembly {
     /// Whether it is one that a drive consumes.
@@ -92,15 +70,15 @@ bitflags::bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct SpeedControl: u8 {
         /// Run1: run forward.
-        const RUN_FORWARD = 1 << 0;
+        const RUN_FORWARD = 1 << speed_control::RUN_FORWARD.0;
         /// Run2: run reverse.
-        const RUN_REVERSE = 1 << 1;
+        const RUN_REVERSE = 1 << speed_control::RUN_REVERSE.0;
         /// FaultRst: a rising edge resets the fault.
-        const FAULT_RESET = 1 << 2;
+        const FAULT_RESET = 1 << speed_control::FAULT_RESET.0;
         /// NetCtrl: start and stop come from the network.
-        const NET_CONTROL = 1 << 5;
+        const NET_CONTROL = 1 << speed_control::NET_CONTROL.0;
         /// NetRef: the reference comes from the network.
-        const NET_REFERENCE = 1 << 6;
+        const NET_REFERENCE = 1 << speed_control::NET_REFERENCE.0;
     }
 }
 
@@ -113,48 +91,26 @@ bitflags::bitflags! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
     pub struct SpeedStatus: u8 {
         /// Faulted.
-        const FAULTED = 1 << 0;
+        const FAULTED = 1 << speed_status::FAULTED.0;
         /// Warning.
-        const WARNING = 1 << 1;
+        const WARNING = 1 << speed_status::WARNING.0;
         /// Running1: running forward.
-        const RUNNING_FORWARD = 1 << 2;
+        const RUNNING_FORWARD = 1 << speed_status::RUNNING_FORWARD.0;
         /// Running2: running in reverse.
-        const RUNNING_REVERSE = 1 << 3;
+        const RUNNING_REVERSE = 1 << speed_status::RUNNING_REVERSE.0;
         /// Ready.
-        const READY = 1 << 4;
+        const READY = 1 << speed_status::READY.0;
         /// CtrlFromNet.
-        const CONTROL_FROM_NET = 1 << 5;
+        const CONTROL_FROM_NET = 1 << speed_status::CONTROL_FROM_NET.0;
         /// RefFromNet.
-        const REFERENCE_FROM_NET = 1 << 6;
+        const REFERENCE_FROM_NET = 1 << speed_status::REFERENCE_FROM_NET.0;
         /// AtReference.
-        const AT_REFERENCE = 1 << 7;
+        const AT_REFERENCE = 1 << speed_status::AT_REFERENCE.0;
     }
 }
 
 impl SpeedStatus {
     const BASIC: Self = Self::FAULTED.union(Self::RUNNING_FORWARD);
-}
-
-open_code! {
-    /// State of the Control Supervisor object, attribute 6.
-    pub struct SupervisorState(u8) {
-        /// The vendor's own.
-        VENDOR = 0 => "vendor specific",
-        /// Starts up.
-        STARTUP = 1 => "startup",
-        /// No power, for example.
-        NOT_READY = 2 => "not ready",
-        /// Ready to run.
-        READY = 3 => "ready",
-        /// Runs.
-        ENABLED = 4 => "enabled",
-        /// Slows down to a stop.
-        STOPPING = 5 => "stopping",
-        /// Slows down to a stop for a fault.
-        FAULT_STOP = 6 => "fault stop",
-        /// Stopped by a fault.
-        FAULTED = 7 => "faulted",
-    }
 }
 
 /// Contents of an output assembly.
@@ -185,7 +141,7 @@ const DATA: &str = "drive assembly";
 
 fn check(assembly: Assembly, fits: bool, expected: u32) -> Result<(), Error> {
     let found = u32::from(assembly.0);
-    if fits { Ok(()) } else { Err(Error::Invalid { what: "assembly instance", offset: 0, found, expected }) }
+    if fits { Ok(()) } else { Err(Error::invalid("assembly instance", 0, expected, found)) }
 }
 
 /// The four parts of either assembly.
@@ -283,6 +239,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use profile_generic::wire::Expected;
 
     /// Layouts: Rockwell 160-DN2, Toshiba DEV003Z, ABB FDNA-01.
     #[test]
@@ -312,7 +269,7 @@ mod tests {
             }
             let long = [bytes, &[0]].concat();
             assert!(
-                matches!(SpeedCommand::parse(assembly, &long), Err(Error::Trailing { .. })),
+                matches!(SpeedCommand::parse(assembly, &long), Err(Error { expected: Expected::End, .. })),
                 "{assembly}"
             );
         }

@@ -227,6 +227,7 @@ impl StatusValues {
     }
 
     #[inline]
+    // Flat: one item per field that may be there.
     fn parse(reader: &mut Reader<'_>, set: StatusDataSet) -> Result<Self, Error> {
         let mut values = Self::default();
         if set.contains(StatusDataSet::FAULT) {
@@ -262,6 +263,7 @@ impl StatusValues {
         Ok(values)
     }
 
+    // Flat: one item per field that may be there.
     fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         if let Some(r) = self.fault {
             writer.slice(BLOCK, &[r.fault_type.0, r.code, r.sub_code, r.action])?;
@@ -419,6 +421,7 @@ impl fmt::Display for ActualValues {
 }
 
 impl fmt::Display for ActualBlock {
+    // Flat: one item per field that may be there.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "    Axis State: {}", self.axis_state)?;
         writeln!(f, "    Control Mode: {}", self.control_mode)?;

@@ -108,7 +108,7 @@ impl AttributeSelector {
         let mut selector = Self::scalar(id, element_size);
         if usize::from(dimension) > MAX_DIMENSIONS {
             let max = u32::try_from(MAX_DIMENSIONS).unwrap_or(u32::MAX);
-            return Err(Error::OutOfRange { what: "attribute dimension", value: u32::from(dimension), max });
+            return Err(Error::too_large("attribute dimension", max, u32::from(dimension)));
         }
         selector.dimensions = dimension;
         for range in &mut selector.ranges[..usize::from(dimension)] {
@@ -277,12 +277,12 @@ impl<'b> ListWriter<'b> {
         let needed = selector.head_len() + padded;
         let available = self.writer.remaining();
         if needed > available {
-            return Err(Error::Truncated { what: BODY, offset: self.writer.written(), needed, available });
+            return Err(Error::truncated(BODY, self.writer.written(), needed, available));
         }
         if selector.value_len() != Some(value.len()) {
             let clip = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
             let max = clip(selector.value_len().unwrap_or(usize::MAX));
-            return Err(Error::OutOfRange { what: "attribute value", value: clip(value.len()), max });
+            return Err(Error::too_large("attribute value", max, clip(value.len())));
         }
         selector.emit(&mut self.writer)?;
         self.writer.slice(BODY, value)?;

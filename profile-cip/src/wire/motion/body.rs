@@ -40,6 +40,7 @@ macro_rules! wire {
     };
 }
 
+// Flat: one arm per service.
 fn write_known(f: &mut fmt::Formatter<'_>, service: MotionService, response: bool, data: &[u8]) -> Written {
     match (service, response) {
         (MotionService::GET_AXIS_ATTRIBUTES_LIST, false) => {

@@ -128,7 +128,7 @@ fn check_asked(asked: ActualDataSet) -> Result<(), Error> {
 
 fn too_long(len: usize) -> Error {
     let value = u32::try_from(len).unwrap_or(u32::MAX);
-    Error::OutOfRange { what: "octets of values in a fixed format", value, max: 4 }
+    Error::too_large("octets of values in a fixed format", 4, value)
 }
 
 impl FixedCommand {

@@ -13,7 +13,6 @@ use super::header::{ActualHeader, CommandHeader};
 use super::instance::{Blocks, Sequence, Sizes};
 use super::read_write::{ReadBlock, WriteBlock};
 use super::service::{ServiceRequest, ServiceResponse};
-use super::value::at;
 use crate::wire::{Error, Reader, Writer};
 
 /// Instance data block of a C-to-D update.
@@ -58,7 +57,7 @@ fn block<'a, T>(
     if octets.is_empty() {
         return Ok(None);
     }
-    parse(octets).map(Some).map_err(|error| at(base, error))
+    parse(octets).map(Some).map_err(|error| error.behind(base))
 }
 
 macro_rules! frame {
@@ -225,12 +224,7 @@ macro_rules! frame {
             pub fn new(buffer: &'b mut [u8], header: &$header) -> Result<Self, Error> {
                 let needed = header.buffer_len();
                 let available = buffer.len();
-                let (head, body) = buffer.split_at_mut_checked(needed).ok_or(Error::Truncated {
-                    what: "connection header",
-                    offset: 0,
-                    needed,
-                    available,
-                })?;
+                let (head, body) = buffer.split_at_mut_checked(needed).ok_or(Error::truncated("connection header", 0, needed, available))?;
                 let header = $header { instance_count: 0, ..*header };
                 Ok(Self { header, head, writer: Writer::new(body) })
             }
@@ -251,11 +245,11 @@ macro_rules! frame {
                 let available = self.writer.remaining();
                 if needed > available {
                     let offset = self.head.len() + self.writer.written();
-                    return Err(Error::Truncated { what: "instance data block", offset, needed, available });
+                    return Err(Error::truncated("instance data block", offset, needed, available));
                 }
                 let max = u32::from(u8::MAX);
                 let count = self.header.instance_count.checked_add(1);
-                let count = count.ok_or(Error::OutOfRange { what: "instance count", value: max + 1, max })?;
+                let count = count.ok_or(Error::too_large("instance count", max, max + 1))?;
                 // With the room proven, only a size over 255 words can fail, and that before anything is written.
                 instance.emit_sized(&mut self.writer, sizes)?;
                 self.header.instance_count = count;

@@ -185,6 +185,7 @@ impl ActualHeader {
     ///
     /// # Errors
     /// The octets are too few, or format, revision or time data set are not those of this edition.
+    // Flat: one line per field, each with its error.
     pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
         expect_format(reader, ConnectionFormat::VARIABLE_ACTUAL)?;
         let update_id = reader.u8(HEADER)?;
@@ -250,6 +251,7 @@ impl ActualHeader {
     ///
     /// # Errors
     /// The buffer is too short.
+    // Flat: one line per field, each with its error.
     pub fn emit(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         writer.u8(HEADER, ConnectionFormat::VARIABLE_ACTUAL.0)?;
         writer.u8(HEADER, FORMAT_REVISION)?;

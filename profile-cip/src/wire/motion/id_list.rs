@@ -83,7 +83,7 @@ impl<'a> IdList<'a> {
 
 fn count(len: usize) -> Result<u16, Error> {
     let value = u32::try_from(len).unwrap_or(u32::MAX);
-    u16::try_from(len).map_err(|_| Error::OutOfRange { what: BODY, value, max: u32::from(u16::MAX) })
+    u16::try_from(len).map_err(|_| Error::too_large(BODY, u32::from(u16::MAX), value))
 }
 
 impl<'a> IdStatusList<'a> {

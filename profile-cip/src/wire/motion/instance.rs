@@ -112,10 +112,12 @@ impl Sizes {
     pub fn emit(&self, writer: &mut Writer<'_>, number: u8) -> Result<(), Error> {
         let words = |octets: usize| {
             let words = octets.div_ceil(4);
-            u8::try_from(words).map_err(|_| Error::OutOfRange {
-                what: "block size in words",
-                value: u32::try_from(words).unwrap_or(u32::MAX),
-                max: u32::from(u8::MAX),
+            u8::try_from(words).map_err(|_| {
+                Error::too_large(
+                    "block size in words",
+                    u32::from(u8::MAX),
+                    u32::try_from(words).unwrap_or(u32::MAX),
+                )
             })
         };
         let (instance, cyclic) = (words(self.total())?, words(self.cyclic + self.read_write)?);

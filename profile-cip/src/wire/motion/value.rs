@@ -64,19 +64,5 @@ impl WriteValue for Writer<'_> {
 
 /// A field has a value that is not `expected`.
 pub(crate) fn invalid(what: &'static str, offset: usize, found: u8, expected: u8) -> Error {
-    Error::Invalid { what, offset, found: u32::from(found), expected: u32::from(expected) }
-}
-
-/// Moves the offset of an error of a block that starts at `base` of the whole frame.
-pub(crate) fn at(base: usize, error: Error) -> Error {
-    match error {
-        Error::Truncated { what, offset, needed, available } => {
-            Error::Truncated { what, offset: offset + base, needed, available }
-        }
-        Error::Invalid { what, offset, found, expected } => {
-            Error::Invalid { what, offset: offset + base, found, expected }
-        }
-        Error::Trailing { what, offset, excess } => Error::Trailing { what, offset: offset + base, excess },
-        other => other,
-    }
+    Error::invalid(what, offset, u32::from(expected), u32::from(found))
 }

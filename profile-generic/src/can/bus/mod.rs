@@ -22,6 +22,7 @@ mod station;
 mod tests;
 mod violation;
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 
 pub use self::disturbance::{DISTURBANCES_MAX, Disturbance, Effect};
@@ -30,7 +31,7 @@ pub use self::station::{State, Statistics};
 use self::violation::Checker;
 pub use self::violation::{Rule, VIOLATIONS_MAX, Violation};
 use super::frame::{Frame, Id};
-use super::timing::{BitRate, ERROR_FRAME_BITS, RECOVERY_BITS, exact};
+use super::timing::{BitRate, Bits, ERROR_FRAME_BITS, RECOVERY_BITS, exact};
 use crate::time::{DurationNs, MonotonicTime};
 
 /// Stations that a bus has at most; more than its 127 node numbers and a few listeners.
@@ -154,7 +155,7 @@ impl Senders {
     }
 }
 
-/// A bus.
+/// A CAN bus in virtual time, with its stations.
 #[derive(Debug)]
 pub struct Bus {
     rate: BitRate,
@@ -170,6 +171,8 @@ pub struct Bus {
     disturbances: disturbance::List,
     checker: Checker,
     restart: Option<DurationNs>,
+    /// The frame whose bits were counted last: it is asked for again and again while it waits.
+    counted: Cell<Option<(Frame, Bits)>>,
 }
 
 impl Bus {
@@ -187,7 +190,16 @@ impl Bus {
             disturbances: disturbance::List::default(),
             checker: Checker::default(),
             restart: None,
+            counted: Cell::new(None),
         }
+    }
+
+    /// How long a frame takes.
+    fn time_of(&self, frame: &Frame) -> DurationNs {
+        let counted = self.counted.get().filter(|(known, _)| known == frame);
+        let (_, bits) = counted.unwrap_or_else(|| (*frame, exact(frame)));
+        self.counted.set(Some((*frame, bits)));
+        self.rate.time(bits)
     }
 
     /// Adds a station whose queue holds `queue` frames; `None` beyond [`STATIONS_MAX`]. The only call that allocates.
@@ -306,7 +318,7 @@ impl Bus {
             Some(carried) => Some(carried.end),
             None => self.next_start().and_then(|start| {
                 let (winner, ..) = self.arbitrate(start)?;
-                Some(start + self.rate.time(exact(&winner)))
+                Some(start + self.time_of(&winner))
             }),
         };
         let cards = self.cards.iter().filter_map(Card::wake_at);
@@ -452,7 +464,7 @@ impl Bus {
         let listens = |place: usize| self.cards[place].listens() && !senders.has(place);
         let heard = (0..self.cards.len()).any(listens) || rival.is_some();
         let first = self.stations().find(|station| senders.has(station.index()));
-        let mut time = self.rate.time(exact(&frame));
+        let mut time = self.time_of(&frame);
         let fate = if let (Some(rival), Some(station)) = (rival, first) {
             let rule =
                 Rule::Collision { with: Station(u8::try_from(rival).unwrap_or(u8::MAX)), id: frame.id() };

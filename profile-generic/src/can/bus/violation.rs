@@ -121,7 +121,7 @@ impl Checker {
         count
     }
 
-    /// Keeps a violation; what repeats itself without end, as a collision does, is told once.
+    /// Keeps a violation; what repeats itself without end, as a collision does, is reported once.
     pub fn broken(&mut self, violation: Violation) {
         let same = |last: &Violation| (last.station, last.rule) == (violation.station, violation.rule);
         if self.violations.last().is_some_and(same) {

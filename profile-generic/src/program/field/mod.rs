@@ -303,7 +303,7 @@ impl<I: SignalImage> Program<I> {
     }
 }
 
-/// Whether every value of `0..modulo`, folded as [`Field::modulo`] says, can be told apart in the width.
+/// Whether every value of `0..modulo`, folded as [`Field::modulo`] says, can be distinguished in the width.
 fn modulo_fits(modulo: i64, width: Width) -> bool {
     let (min, max) = width.range();
     modulo >= 2 && i128::from(modulo) <= i128::from(max) - i128::from(min) + 1

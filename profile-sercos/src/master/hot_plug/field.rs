@@ -15,7 +15,7 @@ pub(super) const fn quiet(supported: bool) -> HotPlug {
     HotPlug { selection: 0, word: if supported { HotPlug::SUPPORTED } else { 0 }, info: 0 }
 }
 
-/// Parameter number `step` of HP0, for whoever is there.
+/// Parameter number `step` of HP0, for all slaves that are there.
 pub(super) fn parameter(step: u8, config: &MasterConfig, layout: &CyclicLayout) -> HotPlug {
     let (t6, t7) = layout.times.uc_ns.unwrap_or((0, 0));
     let place = usize::from(step) % 4;

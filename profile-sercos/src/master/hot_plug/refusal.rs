@@ -29,7 +29,7 @@ pub enum HotPlugRefusal {
     /// The scan failed in the slave.
     #[error("it answers the scan of HP1 with error {code}")]
     Scan {
-        /// The code.
+        /// The code in the answer of the slave.
         code: u8,
     },
     /// Its address is not one of those for which a place is kept.

@@ -1,8 +1,9 @@
 //! HP2: the new slave is set up over its service channel as in CP2 and CP3, while CP4 goes on.
 
 use super::stage::{Stage, StageEvent};
-use super::{HotPlugRefusal, Master};
+use super::{Admission, HotPlugRefusal};
 use crate::master::event::{Event, SlaveId};
+use crate::master::network::Network;
 use crate::master::plan::{self, Step};
 use crate::master::startup::make_ends;
 use crate::master::station::Work;
@@ -21,14 +22,14 @@ const fn steps(stage: Stage) -> Option<(&'static [Step], Phase)> {
     }
 }
 
-impl Master {
-    pub(super) fn enter_set_up(&mut self, stage: Stage) {
-        let Some(index) = self.admission.slave else { return };
-        let station = &mut self.stations[index];
+impl Admission {
+    pub(super) fn enter_set_up(&mut self, net: &mut Network, stage: Stage) {
+        let Some(index) = self.newcomer.slave else { return };
+        let station = &mut net.stations[index];
         station.channel.set_open(stage.serves());
         let awaits = match stage {
             Stage::Await2 => {
-                station.read_rows = station.report.len();
+                station.setup.read_rows = station.setup.report.len();
                 Some(Phase::CP2)
             }
             Stage::Await3 => Some(Phase::CP3),
@@ -36,37 +37,37 @@ impl Master {
         };
         if let Some(phase) = awaits {
             let (slave, address) = (SlaveId::from_index(index), station.address);
-            self.emit(Event::HotPlugAwaits { slave, address, phase });
+            net.emit(Event::HotPlugAwaits { slave, address, phase });
         }
         if steps(stage).is_some() {
-            self.begin_steps(index);
+            net.begin_steps(index);
         }
         if stage == Stage::Connect {
-            self.begin_connections(index);
+            net.begin_connections(index);
         }
     }
 
     /// One cycle of a stage in which the slave is set up.
-    pub(super) fn set_up_slave(&mut self) -> Result<Option<StageEvent>, HotPlugRefusal> {
-        let Some(index) = self.admission.slave else { return Err(HotPlugRefusal::SetUp) };
-        let stage = self.admission.stage;
+    pub(super) fn set_up_slave(&mut self, net: &mut Network) -> Result<Option<StageEvent>, HotPlugRefusal> {
+        let Some(index) = self.newcomer.slave else { return Err(HotPlugRefusal::SetUp) };
+        let stage = self.stage;
         let Some((steps, phase)) = steps(stage) else {
             // The application works, until it is through and its requests are too.
-            let through = self.admission.proceed && self.stations[index].channel.is_idle();
+            let through = self.newcomer.proceed && net.stations[index].channel.is_idle();
             return Ok(through.then_some(StageEvent::Done));
         };
-        match self.work_on(index, steps, phase) {
+        match net.work_on(index, steps, phase) {
             Work::Free | Work::Asked(..) => Ok(None),
             Work::Failed => Err(HotPlugRefusal::SetUp),
             Work::Done if stage == Stage::Connect => {
-                let station = &mut self.stations[index];
-                self.layout.fit(index, &station.need, station.facts.gap)?;
+                let station = &mut net.stations[index];
+                net.layout.fit(index, &station.need, station.facts.gap)?;
                 make_ends(station);
                 Ok(Some(StageEvent::Done))
             }
             Work::Done if matches!(stage, Stage::Check2 | Stage::Check3) => {
                 // The application's running requests are finished first.
-                let channel = &mut self.stations[index].channel;
+                let channel = &mut net.stations[index].channel;
                 channel.set_open(false);
                 Ok((!channel.is_running()).then_some(StageEvent::Done))
             }

@@ -100,6 +100,7 @@ impl Stage {
     ];
 
     /// The stage after `event`; `None` when it means nothing here.
+    // Flat: the table above, one arm per row.
     pub const fn next(self, event: StageEvent) -> Option<Stage> {
         use Stage as S;
         use StageEvent as E;

@@ -1,6 +1,8 @@
 use super::request::{SvcData, SvcOperation};
 use super::*;
+use crate::wire::data_status::DataStatus;
 use crate::wire::idn::Idn;
+use crate::wire::svc::{Element, SvcStatus};
 
 const CYCLE: u64 = 1_000_000;
 
@@ -259,10 +261,13 @@ fn a_command_in_process_lets_others_pass() {
             channel.receive(MonotonicTime(cycle * CYCLE), Some(answer));
         }
     };
-    let (place, serial) = channel.submit(SvcRequest::command(Idn::standard(100))).unwrap();
-    assert_eq!(channel.progress(place, serial), None);
+    channel.submit(SvcRequest::command(Idn::standard(100))).unwrap();
+    let status = |channel: &ServiceChannel| channel.active.as_ref().map(|(_, transfer, _)| transfer.status());
+    assert!(!channel.is_running());
+    assert_eq!(status(&channel), None);
     cycles(&mut channel, &mut peer, 8, false);
-    assert_eq!(channel.progress(place, serial), Some(DataStatus::from_bits_retain(7)));
+    assert_eq!(status(&channel), Some(DataStatus::from_bits_retain(7)));
+    assert_eq!(channel.request(), Some((Idn::standard(100), SvcOperation::Command)));
     assert_eq!(peer.seen[..4], ["open 100", "write 100", "open 100", "write 100"]);
     // Nothing else waits: asked about in every cycle.
     assert_eq!(peer.seen[4..], ["open 100", "open 100", "open 100"]);
@@ -398,21 +403,8 @@ fn states() -> Vec<(&'static str, ServiceChannel, Commands)> {
 
 /// A channel as a line: the step on the wire, the requests, and what has come out.
 fn shown(channel: &mut ServiceChannel) -> String {
-    let name = |place: &Place| match place {
-        Place::Free => None,
-        Place::Waiting => Some("waiting"),
-        Place::Active => Some("active"),
-        Place::Parked(..) => Some("parked"),
-        Place::Finished(Ok(_)) => Some("done"),
-        Place::Finished(Err(_)) => Some("failed"),
-    };
-    let places: Vec<_> = channel.slots.iter().filter_map(|slot| name(&slot.place)).collect();
-    let failure = channel.slots.iter().find_map(|slot| match slot.place {
-        Place::Finished(Err(failure)) => Some(format!(" ({failure})")),
-        _ => None,
-    });
     let sent = channel.outgoing();
-    format!("{:04x} {:08x} {}{}", sent.control.0, sent.info, places.join(" "), failure.unwrap_or_default())
+    format!("{:04x} {:08x} {}", sent.control.0, sent.info, channel.slots.shown())
 }
 
 /// What happens to a channel.

@@ -57,7 +57,7 @@ enum Stage {
 /// Whether the transfer goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flow {
-    /// [`Transfer::step`] tells the next step.
+    /// [`Transfer::step`] reports the next step.
     Next,
     /// The procedure command is still in process: the next step asks again, at any time.
     InProcess,
@@ -107,6 +107,7 @@ impl Transfer {
     }
 
     /// The data status which the slave gave last.
+    #[cfg(test)]
     pub fn status(&self) -> DataStatus {
         self.reply.status
     }
@@ -139,6 +140,7 @@ impl Transfer {
     }
 
     /// Takes the slave's answer to the step on the wire.
+    // Flat: one arm per stage.
     pub fn advance(
         &mut self,
         now: MonotonicTime,

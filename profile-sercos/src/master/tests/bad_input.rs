@@ -8,11 +8,12 @@ use super::*;
 use crate::checker::checked_bus::Tried;
 use crate::checker::light::{FEEDBACK, MODE, Mirror};
 use crate::checker::{Offender, Rule, Violation};
-use crate::slave::communication::{FixedConnection, idn};
+use crate::slave::communication::FixedConnection;
 use crate::slave::{self, Slave};
 use crate::wire::data_status::DataStatus;
 use crate::wire::device_status::DeviceStatus;
 use crate::wire::header::{Kind, TelegramType};
+use crate::wire::idn::Idn;
 use crate::wire::layout::Offset;
 use crate::wire::scp::{ScpClass, ScpEntry};
 use crate::wire::svc::SVC_LEN;
@@ -101,7 +102,7 @@ fn damaged_on_the_way_out(said: &str, broken: fn(&Rule) -> bool, damage: fn(&mut
     let mut rig = in_cp4();
     let msts_missed = |rig: &FullRig| {
         let stores = rig.line.slaves().iter().map(Slave::store);
-        stores.map(|store| store.number_of(idn::MST_ERRORS)).collect::<Vec<_>>()
+        stores.map(|store| store.number_of(Idn::MST_ERROR_COUNTER)).collect::<Vec<_>>()
     };
     let before = msts_missed(&rig);
     rig.outward = Box::new(move |frame| {

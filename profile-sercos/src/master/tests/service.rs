@@ -39,7 +39,7 @@ fn cycles_a_parameter() {
     let write = SvcRequest::write(Idn::INTER_FRAME_GAP, inline(&[20, 0]));
     let lengths = SvcRequest::write(Idn::MDT_LENGTHS, inline(&[46, 0, 0, 0, 0, 0, 0, 0]));
     let list = Shape::List;
-    let long = SvcRequest::read(crate::slave::communication::idn::ALL).with_shape(list);
+    let long = SvcRequest::read(Idn::IDN_LIST_OF_ALL_OPERATION_DATA).with_shape(list);
     let items = full_rig(1).line.slaves()[0].store().iter().count();
     // What stands in the buffer of a read request is discarded.
     let room = |request: SvcRequest| request.with_buffer(vec![0; 4 * items]);
@@ -103,7 +103,7 @@ fn lists_longer_than_a_request_use_the_callers_buffer() {
     rig.auto_proceed = false;
     rig.master.set_target_phase(Phase::CP2);
     rig.state(State::Await2);
-    let all = crate::slave::communication::idn::ALL;
+    let all = Idn::IDN_LIST_OF_ALL_OPERATION_DATA;
     let count = rig.line.slaves()[0].store().iter().count();
     let outcome = rig.request(SlaveId(0), SvcRequest::read(all).with_buffer(Vec::with_capacity(4 * count)));
     assert_eq!(outcome.data.double_words().count(), count);

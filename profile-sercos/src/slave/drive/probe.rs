@@ -16,33 +16,30 @@ use profile_generic::servo::{Servo, ServoActual, input};
 
 use super::super::application::{Order, Progress};
 use super::super::parameter::{Cyclic, Definition, Store};
+use crate::wire::idn::Idn;
 
 /// IDNs of probing.
 pub mod idn {
     use crate::wire::idn::Idn;
 
-    /// Probe value 1 positive edge; 1 negative, 2 positive and 2 negative follow.
-    pub const VALUES: [Idn; 4] =
-        [Idn::standard(130), Idn::standard(131), Idn::standard(132), Idn::standard(133)];
-    /// Probe control parameter: bits 0 to 3 select the edges.
-    pub const CONTROL: Idn = Idn::standard(169);
-    /// Probing cycle procedure command.
-    pub const COMMAND: Idn = Idn::standard(170);
-    /// Probe status: bits 0 to 3 say which edges have come.
-    pub const STATUS: Idn = Idn::standard(179);
-    /// Home switch.
-    pub const HOME_SWITCH: Idn = Idn::standard(400);
-    /// Probe 1 and 2: the levels of the inputs.
-    pub const INPUTS: [Idn; 2] = [Idn::standard(401), Idn::standard(402)];
-    /// Probe 1 and 2 enable.
-    pub const ENABLES: [Idn; 2] = [Idn::standard(405), Idn::standard(406)];
-    /// The bits of S-0-0179, each by itself.
-    pub const LATCHED: [Idn; 4] =
-        [Idn::standard(409), Idn::standard(410), Idn::standard(411), Idn::standard(412)];
-    /// Marker position feedback 1.
-    pub const MARKER: Idn = Idn::standard(440);
-    /// Counter marker position feedback 1.
-    pub const MARKER_COUNTER: Idn = Idn::standard(442);
+    /// S-0-0130 to S-0-0133: in the order of the bits of S-0-0169 and S-0-0179.
+    pub const VALUES: [Idn; 4] = [
+        Idn::PROBE_VALUE_1_POSITIVE_EDGE,
+        Idn::PROBE_VALUE_1_NEGATIVE_EDGE,
+        Idn::PROBE_VALUE_2_POSITIVE_EDGE,
+        Idn::PROBE_VALUE_2_NEGATIVE_EDGE,
+    ];
+    /// S-0-0401 and S-0-0402: the levels of the inputs.
+    pub const INPUTS: [Idn; 2] = [Idn::PROBE_1, Idn::PROBE_2];
+    /// S-0-0405 and S-0-0406.
+    pub const ENABLES: [Idn; 2] = [Idn::PROBE_1_ENABLE, Idn::PROBE_2_ENABLE];
+    /// S-0-0409 to S-0-0412: the bits of S-0-0179, each by itself.
+    pub const LATCHED: [Idn; 4] = [
+        Idn::PROBE_1_POSITIVE_LATCHED,
+        Idn::PROBE_1_NEGATIVE_LATCHED,
+        Idn::PROBE_2_POSITIVE_LATCHED,
+        Idn::PROBE_2_NEGATIVE_LATCHED,
+    ];
 }
 
 /// Element 3.
@@ -79,16 +76,19 @@ pub fn define(store: &mut Store, length: &'static str) {
         store.define(value(idn::LATCHED[edge], a::BITS_READ, latched_name).cyclic(Feedback));
     }
     let definitions = [
-        value(idn::CONTROL, a::BITS, "Probe control parameter"),
-        Definition::command(idn::COMMAND, a::COMMAND_CP4, "Probing cycle procedure command"),
-        value(idn::STATUS, a::BITS_READ, "Probe status").cyclic(Feedback),
-        value(idn::HOME_SWITCH, a::BITS_READ, "Home switch").cyclic(Feedback),
+        value(Idn::PROBE_CONTROL_PARAMETER, a::BITS, "Probe control parameter"),
+        Definition::command(Idn::PROBING_CYCLE, a::COMMAND_CP4, "Probing cycle procedure command"),
+        value(Idn::PROBE_STATUS, a::BITS_READ, "Probe status").cyclic(Feedback),
+        value(Idn::HOME_SWITCH, a::BITS_READ, "Home switch").cyclic(Feedback),
         value(idn::INPUTS[0], a::BITS_READ, "Probe 1").cyclic(Feedback),
         value(idn::INPUTS[1], a::BITS_READ, "Probe 2").cyclic(Feedback),
         value(idn::ENABLES[0], a::BITS_CP4, "Probe 1 enable").cyclic(Both),
         value(idn::ENABLES[1], a::BITS_CP4, "Probe 2 enable").cyclic(Both),
-        value(idn::MARKER, a::POSITION_READ, "Marker position feedback 1").cyclic(Feedback).unit(length),
-        value(idn::MARKER_COUNTER, a::COUNTER_READ, "Counter marker position feedback 1").cyclic(Feedback),
+        value(Idn::MARKER_POSITION_FEEDBACK_1, a::POSITION_READ, "Marker position feedback 1")
+            .cyclic(Feedback)
+            .unit(length),
+        value(Idn::COUNTER_MARKER_POSITION_FEEDBACK_1, a::COUNTER_READ, "Counter marker position feedback 1")
+            .cyclic(Feedback),
     ];
     for definition in definitions {
         store.define(definition);
@@ -151,13 +151,13 @@ impl Probe {
             if result.source == CaptureSource::Marker {
                 self.homing.1 = Some(result.position);
                 self.markers = self.markers.wrapping_add(1);
-                store.set_number_of(idn::MARKER, counts(result.position));
+                store.set_number_of(Idn::MARKER_POSITION_FEEDBACK_1, counts(result.position));
                 continue;
             }
             let Some(edge) = EDGES.iter().position(|known| *known == (result.source, result.edge)) else {
                 continue;
             };
-            let selected = store.number_of(idn::CONTROL) & 1 << edge != 0;
+            let selected = store.number_of(Idn::PROBE_CONTROL_PARAMETER) & 1 << edge != 0;
             let open = self.active && self.enabled[edge / 2] && selected && self.latched & 1 << edge == 0;
             if open {
                 self.latched |= 1 << edge;
@@ -173,15 +173,15 @@ impl Probe {
 
     /// The words for the master.
     pub fn publish(&self, actual: &ServoActual, store: &mut Store) {
-        store.set_number_of(idn::STATUS, i64::from(self.latched));
+        store.set_number_of(Idn::PROBE_STATUS, i64::from(self.latched));
         for (edge, idn) in idn::LATCHED.into_iter().enumerate() {
             store.set_number_of(idn, i64::from(self.latched >> edge & 1));
         }
         let level = |bit| i64::from(actual.digital_inputs & bit != 0);
-        store.set_number_of(idn::HOME_SWITCH, level(input::HOME_SWITCH));
+        store.set_number_of(Idn::HOME_SWITCH, level(input::HOME_SWITCH));
         store.set_number_of(idn::INPUTS[0], level(input::REGISTRATION_1));
         store.set_number_of(idn::INPUTS[1], level(input::REGISTRATION_2));
-        store.set_number_of(idn::MARKER_COUNTER, i64::from(self.markers));
+        store.set_number_of(Idn::COUNTER_MARKER_POSITION_FEEDBACK_1, i64::from(self.markers));
     }
 }
 
@@ -206,7 +206,7 @@ mod tests {
             let mut drive = Drive::new(ServoParameters::default()).expect("a drive");
             let mut store = Store::new();
             drive.define(&mut store);
-            store.set_number_of(idn::CONTROL, 0xF);
+            store.set_number_of(Idn::PROBE_CONTROL_PARAMETER, 0xF);
             Self { drive, store }
         }
 
@@ -243,7 +243,7 @@ mod tests {
         fn status(&self) -> i64 {
             let bits = idn::LATCHED.into_iter().rev();
             let single = bits.fold(0, |word, idn| word << 1 | self.store.number_of(idn));
-            assert_eq!(self.store.number_of(idn::STATUS), single);
+            assert_eq!(self.store.number_of(Idn::PROBE_STATUS), single);
             single
         }
     }
@@ -258,12 +258,12 @@ mod tests {
                     if command {
                         let store = &mut rig.store;
                         assert_eq!(
-                            rig.drive.order(idn::COMMAND, Order::Start, store),
+                            rig.drive.order(Idn::PROBING_CYCLE, Order::Start, store),
                             Ok(Progress::InProcess)
                         );
-                        assert_eq!(rig.drive.progress(idn::COMMAND, store), Progress::InProcess);
+                        assert_eq!(rig.drive.progress(Idn::PROBING_CYCLE, store), Progress::InProcess);
                     }
-                    rig.store.set_number_of(idn::CONTROL, control);
+                    rig.store.set_number_of(Idn::PROBE_CONTROL_PARAMETER, control);
                     rig.enable([enables & 1 != 0, enables & 2 != 0]);
                     let open = [0, 0b0011, 0b1100, 0b1111][usize::from(enables)];
                     let expected = if command { open & control } else { 0 };
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn an_edge_that_was_latched_is_blocked_until_the_enable_rises_again() {
         let mut rig = Rig::new();
-        rig.drive.order(idn::COMMAND, Order::Start, &mut rig.store).expect("a command");
+        rig.drive.order(Idn::PROBING_CYCLE, Order::Start, &mut rig.store).expect("a command");
         rig.enable([true, false]);
         // 0.0001 degree: 3600 counts are a thousandth of a turn.
         assert_eq!(rig.pulse(1_000_000), 0b0011);
@@ -288,7 +288,7 @@ mod tests {
         rig.enable([true, true]);
         assert_eq!(rig.pulse(4_000_000), 0b1111);
         assert_eq!(idn::VALUES.map(|idn| rig.store.number_of(idn)), [14_400; 4]);
-        rig.drive.order(idn::COMMAND, Order::Cancel, &mut rig.store).expect("a command");
+        rig.drive.order(Idn::PROBING_CYCLE, Order::Cancel, &mut rig.store).expect("a command");
         rig.cycle();
         assert_eq!(rig.status(), 0);
         assert_eq!(rig.pulse(5_000_000), 0, "cancelled");
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn marks_markers_and_the_home_switch_show_where_they_are_passed() {
         let mut rig = Rig::new();
-        rig.drive.order(idn::COMMAND, Order::Start, &mut rig.store).expect("a command");
+        rig.drive.order(Idn::PROBING_CYCLE, Order::Start, &mut rig.store).expect("a command");
         let marks = Marks { from: Position(250_000_000), length: Position(100_000_000), every: None };
         rig.drive.servo_mut().set_marks(2, Some(marks));
         rig.enable([true, true]);
@@ -320,8 +320,11 @@ mod tests {
         let values = idn::VALUES.map(|idn| rig.store.number_of(idn));
         assert_eq!(values, [0, 0, 250_000_000, 349_999_999]);
         rig.cycle();
-        assert_eq!(rig.store.number_of(idn::MARKER_COUNTER), passed / 1_000_000_000);
-        assert_eq!(rig.store.number_of(idn::MARKER), passed / 1_000_000_000 * 1_000_000_000);
+        assert_eq!(rig.store.number_of(Idn::COUNTER_MARKER_POSITION_FEEDBACK_1), passed / 1_000_000_000);
+        assert_eq!(
+            rig.store.number_of(Idn::MARKER_POSITION_FEEDBACK_1),
+            passed / 1_000_000_000 * 1_000_000_000
+        );
         assert_eq!(rig.status(), 0b1100);
     }
 }

@@ -19,48 +19,6 @@ use profile_generic::servo::ServoParameters;
 use super::super::parameter::Store;
 use crate::wire::idn::Idn;
 
-/// IDNs of scaling.
-pub mod idn {
-    use crate::wire::idn::Idn;
-
-    /// Position scaling type.
-    pub const POSITION_TYPE: Idn = Idn::standard(76);
-    /// Linear position factor.
-    pub const POSITION_FACTOR: Idn = Idn::standard(77);
-    /// Linear position exponent.
-    pub const POSITION_EXPONENT: Idn = Idn::standard(78);
-    /// Rotational position resolution, counts a turn.
-    pub const POSITION_RESOLUTION: Idn = Idn::standard(79);
-    /// Velocity scaling type.
-    pub const VELOCITY_TYPE: Idn = Idn::standard(44);
-    /// Velocity factor.
-    pub const VELOCITY_FACTOR: Idn = Idn::standard(45);
-    /// Velocity exponent.
-    pub const VELOCITY_EXPONENT: Idn = Idn::standard(46);
-    /// Acceleration scaling type.
-    pub const ACCELERATION_TYPE: Idn = Idn::standard(160);
-    /// Acceleration factor.
-    pub const ACCELERATION_FACTOR: Idn = Idn::standard(161);
-    /// Acceleration exponent.
-    pub const ACCELERATION_EXPONENT: Idn = Idn::standard(162);
-    /// Torque scaling type.
-    pub const TORQUE_TYPE: Idn = Idn::standard(86);
-    /// Torque factor.
-    pub const TORQUE_FACTOR: Idn = Idn::standard(93);
-    /// Torque exponent.
-    pub const TORQUE_EXPONENT: Idn = Idn::standard(94);
-    /// Modulo value.
-    pub const MODULO: Idn = Idn::standard(103);
-    /// Input revolutions of the load gear: turns of the motor.
-    pub const GEAR_INPUT: Idn = Idn::standard(121);
-    /// Output revolutions of the load gear: turns of the load.
-    pub const GEAR_OUTPUT: Idn = Idn::standard(122);
-    /// Feed constant, 0.0001 mm a turn.
-    pub const FEED_CONSTANT: Idn = Idn::standard(123);
-    /// Temperature data scaling type.
-    pub const TEMPERATURE_TYPE: Idn = Idn::standard(208);
-}
-
 /// Bits of a scaling type.
 mod bits {
     pub const METHOD: i64 = 7;
@@ -134,16 +92,17 @@ impl Scales {
     pub fn read(store: &Store, servo: &ServoParameters) -> Result<Scales, Idn> {
         let rotary = servo.kind == UnitKind::Rotary;
         let position = position(store, rotary, servo).and_then(|ratio| Scale::new(Some(ratio)));
-        let modulo = store.number_of(idn::POSITION_TYPE) & bits::MODULO != 0;
-        let value = store.number_of(idn::MODULO);
+        let modulo = store.number_of(Idn::POSITION_DATA_SCALING_TYPE) & bits::MODULO != 0;
+        let value = store.number_of(Idn::MODULO);
         if modulo && value < 2 {
-            return Err(idn::MODULO);
+            return Err(Idn::MODULO);
         }
         Ok(Scales {
-            position: position.ok_or(idn::POSITION_TYPE)?,
-            velocity: Scale::new(velocity(store, rotary)).ok_or(idn::VELOCITY_TYPE)?,
-            acceleration: Scale::new(acceleration(store, rotary)).ok_or(idn::ACCELERATION_TYPE)?,
-            torque: Scale::new(torque(store, servo)).ok_or(idn::TORQUE_TYPE)?,
+            position: position.ok_or(Idn::POSITION_DATA_SCALING_TYPE)?,
+            velocity: Scale::new(velocity(store, rotary)).ok_or(Idn::VELOCITY_DATA_SCALING_TYPE)?,
+            acceleration: Scale::new(acceleration(store, rotary))
+                .ok_or(Idn::ACCELERATION_DATA_SCALING_TYPE)?,
+            torque: Scale::new(torque(store, servo)).ok_or(Idn::TORQUE_FORCE_DATA_SCALING_TYPE)?,
             modulo: if modulo { value } else { 1 << 32 },
             from_zero: modulo,
         })
@@ -185,7 +144,7 @@ fn length(kind: i64) -> Option<Ratio> {
 /// Nanounits of the axis in what the scaling type measures: a turn (`turn` nanoturns of it) or a length, of motor or load.
 fn displacement(store: &Store, kind: i64, rotary: bool, turn: Ratio) -> Option<Ratio> {
     // Nanomillimetres of the load in a nanoturn of it.
-    let feed = Ratio::new(store.number_of(idn::FEED_CONSTANT), 10_000)?;
+    let feed = Ratio::new(store.number_of(Idn::FEED_CONSTANT), 10_000)?;
     let unit = match (kind & bits::METHOD, rotary) {
         (bits::ROTATIONAL, true) => turn,
         (bits::ROTATIONAL, false) => turn.then_nearest(feed)?,
@@ -198,41 +157,48 @@ fn displacement(store: &Store, kind: i64, rotary: bool, turn: Ratio) -> Option<R
 
 /// Turns of the load in a turn of the motor.
 fn gear(store: &Store) -> Option<Ratio> {
-    Ratio::new(store.number_of(idn::GEAR_OUTPUT), store.number_of(idn::GEAR_INPUT))
-        .filter(|gear| gear.num() > 0)
+    Ratio::new(
+        store.number_of(Idn::OUTPUT_REVOLUTIONS_OF_LOAD_GEAR),
+        store.number_of(Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR),
+    )
+    .filter(|gear| gear.num() > 0)
 }
 
 fn position(store: &Store, rotary: bool, servo: &ServoParameters) -> Option<Ratio> {
-    let kind = store.number_of(idn::POSITION_TYPE);
+    let kind = store.number_of(Idn::POSITION_DATA_SCALING_TYPE);
     let turn = Ratio::new(TURN, 1)?;
     match kind & bits::METHOD {
         bits::NONE => Ratio::new(TURN, i64::from(servo.encoder_counts)),
         bits::ROTATIONAL => {
-            let counts = Ratio::new(1, store.number_of(idn::POSITION_RESOLUTION))?;
+            let counts = Ratio::new(1, store.number_of(Idn::ROTATIONAL_POSITION_RESOLUTION))?;
             displacement(store, kind, rotary, turn)?.then(counts)
         }
-        _ => factor(store, idn::POSITION_FACTOR, idn::POSITION_EXPONENT)?
-            .then(displacement(store, kind, rotary, turn)?),
+        _ => factor(
+            store,
+            Idn::LINEAR_POSITION_DATA_SCALING_FACTOR,
+            Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT,
+        )?
+        .then(displacement(store, kind, rotary, turn)?),
     }
 }
 
 fn velocity(store: &Store, rotary: bool) -> Option<Ratio> {
-    let kind = store.number_of(idn::VELOCITY_TYPE);
+    let kind = store.number_of(Idn::VELOCITY_DATA_SCALING_TYPE);
     let seconds = if kind & bits::SECOND != 0 { 1 } else { 60 };
-    factor(store, idn::VELOCITY_FACTOR, idn::VELOCITY_EXPONENT)?
+    factor(store, Idn::VELOCITY_DATA_SCALING_FACTOR, Idn::VELOCITY_DATA_SCALING_EXPONENT)?
         .then_nearest(displacement(store, kind, rotary, Ratio::new(TURN, 1)?)?)?
         .then_nearest(Ratio::new(1, seconds)?)
 }
 
 fn acceleration(store: &Store, rotary: bool) -> Option<Ratio> {
-    let kind = store.number_of(idn::ACCELERATION_TYPE);
+    let kind = store.number_of(Idn::ACCELERATION_DATA_SCALING_TYPE);
     let radian = Ratio::new(TURNS * TURN, RADIANS)?;
-    factor(store, idn::ACCELERATION_FACTOR, idn::ACCELERATION_EXPONENT)?
+    factor(store, Idn::ACCELERATION_DATA_SCALING_FACTOR, Idn::ACCELERATION_DATA_SCALING_EXPONENT)?
         .then_nearest(displacement(store, kind, rotary, radian)?)
 }
 
 fn torque(store: &Store, servo: &ServoParameters) -> Option<Ratio> {
-    let kind = store.number_of(idn::TORQUE_TYPE);
+    let kind = store.number_of(Idn::TORQUE_FORCE_DATA_SCALING_TYPE);
     let inch = kind & bits::INCH != 0;
     // Micro newton (metre); the motor is rated in that of the axis.
     let rotary = servo.kind == UnitKind::Rotary;
@@ -246,18 +212,49 @@ fn torque(store: &Store, servo: &ServoParameters) -> Option<Ratio> {
     // What the load sees is more by as much as it turns slower.
     let unit = if kind & bits::LOAD != 0 { unit.then_nearest(gear(store)?)? } else { unit };
     let rated = Ratio::new(1_000_000, servo.rated_torque.0)?;
-    factor(store, idn::TORQUE_FACTOR, idn::TORQUE_EXPONENT)?.then_nearest(unit)?.then_nearest(rated)
+    factor(store, Idn::TORQUE_FORCE_DATA_SCALING_FACTOR, Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT)?
+        .then_nearest(unit)?
+        .then_nearest(rated)
 }
 
 /// A temperature in millidegree Celsius as counts of 0.1 degree of the scaling type.
 pub fn temperature(store: &Store, millidegree: i64) -> i64 {
-    if store.number_of(idn::TEMPERATURE_TYPE) & 1 == 0 {
+    if store.number_of(Idn::TEMPERATURE_DATA_SCALING_TYPE) & 1 == 0 {
         return millidegree / 100;
     }
     millidegree * 9 / 500 + 320
 }
 
+/// The scaling type that a factor or an exponent belongs to.
+pub fn type_of_factor(factor: Idn) -> Option<Idn> {
+    const TYPES: [(Idn, Idn, Idn); 4] = [
+        (
+            Idn::LINEAR_POSITION_DATA_SCALING_FACTOR,
+            Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT,
+            Idn::POSITION_DATA_SCALING_TYPE,
+        ),
+        (
+            Idn::VELOCITY_DATA_SCALING_FACTOR,
+            Idn::VELOCITY_DATA_SCALING_EXPONENT,
+            Idn::VELOCITY_DATA_SCALING_TYPE,
+        ),
+        (
+            Idn::ACCELERATION_DATA_SCALING_FACTOR,
+            Idn::ACCELERATION_DATA_SCALING_EXPONENT,
+            Idn::ACCELERATION_DATA_SCALING_TYPE,
+        ),
+        (
+            Idn::TORQUE_FORCE_DATA_SCALING_FACTOR,
+            Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT,
+            Idn::TORQUE_FORCE_DATA_SCALING_TYPE,
+        ),
+    ];
+    let row = TYPES.iter().find(|(factors, exponents, _)| factor == *factors || factor == *exponents);
+    row.map(|row| row.2)
+}
+
 /// What the drive sets by itself when a scaling type is preferential: pairs of IDN and value.
+// Flat: a table by scaling type and method.
 pub fn preferential(type_idn: Idn, kind: i64) -> &'static [(Idn, i64)] {
     if kind & bits::PARAMETER != 0 {
         return &[];
@@ -265,30 +262,46 @@ pub fn preferential(type_idn: Idn, kind: i64) -> &'static [(Idn, i64)] {
     let linear = kind & bits::METHOD == bits::LINEAR;
     let inch = linear && kind & bits::INCH != 0;
     match (type_idn, linear, kind & bits::SECOND != 0) {
-        (idn::POSITION_TYPE, true, _) if inch => &[(idn::POSITION_FACTOR, 1), (idn::POSITION_EXPONENT, -5)],
-        (idn::POSITION_TYPE, true, _) => &[(idn::POSITION_FACTOR, 1), (idn::POSITION_EXPONENT, -7)],
-        (idn::POSITION_TYPE, false, _) => &[(idn::POSITION_RESOLUTION, 3_600_000)],
-        (idn::VELOCITY_TYPE, true, false) if inch => {
-            &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -5)]
+        (Idn::POSITION_DATA_SCALING_TYPE, true, _) if inch => {
+            &[(Idn::LINEAR_POSITION_DATA_SCALING_FACTOR, 1), (Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT, -5)]
         }
-        (idn::VELOCITY_TYPE, true, false) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
-        (idn::VELOCITY_TYPE, true, true) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -7)],
-        (idn::VELOCITY_TYPE, false, false) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -4)],
-        (idn::VELOCITY_TYPE, false, true) => &[(idn::VELOCITY_FACTOR, 1), (idn::VELOCITY_EXPONENT, -6)],
-        (idn::ACCELERATION_TYPE, true, _) if inch => {
-            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -4)]
+        (Idn::POSITION_DATA_SCALING_TYPE, true, _) => {
+            &[(Idn::LINEAR_POSITION_DATA_SCALING_FACTOR, 1), (Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT, -7)]
         }
-        (idn::ACCELERATION_TYPE, true, _) => {
-            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -6)]
+        (Idn::POSITION_DATA_SCALING_TYPE, false, _) => &[(Idn::ROTATIONAL_POSITION_RESOLUTION, 3_600_000)],
+        (Idn::VELOCITY_DATA_SCALING_TYPE, true, false) if inch => {
+            &[(Idn::VELOCITY_DATA_SCALING_FACTOR, 1), (Idn::VELOCITY_DATA_SCALING_EXPONENT, -5)]
         }
-        (idn::ACCELERATION_TYPE, false, _) => {
-            &[(idn::ACCELERATION_FACTOR, 1), (idn::ACCELERATION_EXPONENT, -3)]
+        (Idn::VELOCITY_DATA_SCALING_TYPE, true, false) => {
+            &[(Idn::VELOCITY_DATA_SCALING_FACTOR, 1), (Idn::VELOCITY_DATA_SCALING_EXPONENT, -6)]
         }
-        (idn::TORQUE_TYPE, true, _) => &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, 0)],
-        (idn::TORQUE_TYPE, false, _) if kind & bits::METHOD == bits::ROTATIONAL => {
-            &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, -2)]
+        (Idn::VELOCITY_DATA_SCALING_TYPE, true, true) => {
+            &[(Idn::VELOCITY_DATA_SCALING_FACTOR, 1), (Idn::VELOCITY_DATA_SCALING_EXPONENT, -7)]
         }
-        (idn::TORQUE_TYPE, false, _) => &[(idn::TORQUE_FACTOR, 1), (idn::TORQUE_EXPONENT, -1)],
+        (Idn::VELOCITY_DATA_SCALING_TYPE, false, false) => {
+            &[(Idn::VELOCITY_DATA_SCALING_FACTOR, 1), (Idn::VELOCITY_DATA_SCALING_EXPONENT, -4)]
+        }
+        (Idn::VELOCITY_DATA_SCALING_TYPE, false, true) => {
+            &[(Idn::VELOCITY_DATA_SCALING_FACTOR, 1), (Idn::VELOCITY_DATA_SCALING_EXPONENT, -6)]
+        }
+        (Idn::ACCELERATION_DATA_SCALING_TYPE, true, _) if inch => {
+            &[(Idn::ACCELERATION_DATA_SCALING_FACTOR, 1), (Idn::ACCELERATION_DATA_SCALING_EXPONENT, -4)]
+        }
+        (Idn::ACCELERATION_DATA_SCALING_TYPE, true, _) => {
+            &[(Idn::ACCELERATION_DATA_SCALING_FACTOR, 1), (Idn::ACCELERATION_DATA_SCALING_EXPONENT, -6)]
+        }
+        (Idn::ACCELERATION_DATA_SCALING_TYPE, false, _) => {
+            &[(Idn::ACCELERATION_DATA_SCALING_FACTOR, 1), (Idn::ACCELERATION_DATA_SCALING_EXPONENT, -3)]
+        }
+        (Idn::TORQUE_FORCE_DATA_SCALING_TYPE, true, _) => {
+            &[(Idn::TORQUE_FORCE_DATA_SCALING_FACTOR, 1), (Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT, 0)]
+        }
+        (Idn::TORQUE_FORCE_DATA_SCALING_TYPE, false, _) if kind & bits::METHOD == bits::ROTATIONAL => {
+            &[(Idn::TORQUE_FORCE_DATA_SCALING_FACTOR, 1), (Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT, -2)]
+        }
+        (Idn::TORQUE_FORCE_DATA_SCALING_TYPE, false, _) => {
+            &[(Idn::TORQUE_FORCE_DATA_SCALING_FACTOR, 1), (Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT, -1)]
+        }
         _ => &[],
     }
 }
@@ -327,8 +340,8 @@ mod tests {
         assert_eq!(scales.position.generic(1), 100_000);
         assert_eq!(scales.velocity.generic(60), 1_000_000);
         assert_eq!(scales.acceleration.generic(1), 1_000_000);
-        store.set_number_of(idn::POSITION_TYPE, bits::LINEAR | bits::PARAMETER | bits::INCH);
-        store.set_number_of(idn::POSITION_EXPONENT, -4);
+        store.set_number_of(Idn::POSITION_DATA_SCALING_TYPE, bits::LINEAR | bits::PARAMETER | bits::INCH);
+        store.set_number_of(Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT, -4);
         let scales = Scales::read(&store, &servo).unwrap();
         assert_eq!(scales.position.generic(10_000), 25_400_000_000, "one inch");
     }
@@ -336,8 +349,8 @@ mod tests {
     #[test]
     fn torque_in_newton_metre() {
         let (mut store, servo) = store(UnitKind::Rotary);
-        store.set_number_of(idn::TORQUE_TYPE, bits::ROTATIONAL);
-        for &(idn, value) in preferential(idn::TORQUE_TYPE, bits::ROTATIONAL) {
+        store.set_number_of(Idn::TORQUE_FORCE_DATA_SCALING_TYPE, bits::ROTATIONAL);
+        for &(idn, value) in preferential(Idn::TORQUE_FORCE_DATA_SCALING_TYPE, bits::ROTATIONAL) {
             store.set_number_of(idn, value);
         }
         // The default servo is rated for 1 Nm; one count is 0.01 Nm.
@@ -348,8 +361,8 @@ mod tests {
     #[test]
     fn motor_and_load_turns_and_ways() {
         let (mut store, servo) = store(UnitKind::Linear);
-        store.set_number_of(idn::GEAR_INPUT, 5);
-        store.set_number_of(idn::GEAR_OUTPUT, 2);
+        store.set_number_of(Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR, 5);
+        store.set_number_of(Idn::OUTPUT_REVOLUTIONS_OF_LOAD_GEAR, 2);
         for (kind, counts, way) in [
             (0x02, 3_600_000, 4_000_000_000),
             (0x42, 3_600_000, 10_000_000_000),
@@ -357,33 +370,33 @@ mod tests {
             (0x41, 10_000, 1_000_000_000),
             (0x59, 10_000_000, 25_400_000_000),
         ] {
-            store.set_number_of(idn::POSITION_TYPE, kind);
-            store.set_number_of(idn::POSITION_EXPONENT, -7);
+            store.set_number_of(Idn::POSITION_DATA_SCALING_TYPE, kind);
+            store.set_number_of(Idn::LINEAR_POSITION_DATA_SCALING_EXPONENT, -7);
             assert_eq!(Scales::read(&store, &servo).unwrap().position.generic(counts), way, "{kind:#x}");
         }
-        store.set_number_of(idn::TORQUE_TYPE, 0x41);
-        store.set_number_of(idn::TORQUE_EXPONENT, 0);
+        store.set_number_of(Idn::TORQUE_FORCE_DATA_SCALING_TYPE, 0x41);
+        store.set_number_of(Idn::TORQUE_FORCE_DATA_SCALING_EXPONENT, 0);
         // 2.5 N at the load are 1 N of the motor, which is rated for 1 N.
         assert_eq!(Scales::read(&store, &servo).unwrap().torque.generic(5), 2_000_000);
-        store.set_number_of(idn::TEMPERATURE_TYPE, 1);
+        store.set_number_of(Idn::TEMPERATURE_DATA_SCALING_TYPE, 1);
         assert_eq!(temperature(&store, 100_000), 2_120);
     }
 
     #[test]
     fn impossible_scalings_are_named() {
         let cases = [
-            (idn::POSITION_TYPE, 3, idn::POSITION_TYPE),
-            (idn::GEAR_INPUT, 0, idn::POSITION_TYPE),
-            (idn::POSITION_RESOLUTION, 0, idn::POSITION_TYPE),
-            (idn::VELOCITY_TYPE, 0, idn::VELOCITY_TYPE),
-            (idn::VELOCITY_EXPONENT, 30, idn::VELOCITY_TYPE),
-            (idn::ACCELERATION_FACTOR, 0, idn::ACCELERATION_TYPE),
-            (idn::TORQUE_TYPE, 0x01, idn::TORQUE_TYPE),
-            (idn::POSITION_TYPE, 0x82, idn::MODULO),
+            (Idn::POSITION_DATA_SCALING_TYPE, 3, Idn::POSITION_DATA_SCALING_TYPE),
+            (Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR, 0, Idn::POSITION_DATA_SCALING_TYPE),
+            (Idn::ROTATIONAL_POSITION_RESOLUTION, 0, Idn::POSITION_DATA_SCALING_TYPE),
+            (Idn::VELOCITY_DATA_SCALING_TYPE, 0, Idn::VELOCITY_DATA_SCALING_TYPE),
+            (Idn::VELOCITY_DATA_SCALING_EXPONENT, 30, Idn::VELOCITY_DATA_SCALING_TYPE),
+            (Idn::ACCELERATION_DATA_SCALING_FACTOR, 0, Idn::ACCELERATION_DATA_SCALING_TYPE),
+            (Idn::TORQUE_FORCE_DATA_SCALING_TYPE, 0x01, Idn::TORQUE_FORCE_DATA_SCALING_TYPE),
+            (Idn::POSITION_DATA_SCALING_TYPE, 0x82, Idn::MODULO),
         ];
         for (idn, value, wanted) in cases {
             let (mut store, servo) = store(UnitKind::Rotary);
-            store.set_number_of(super::idn::MODULO, 0);
+            store.set_number_of(Idn::MODULO, 0);
             store.set_number_of(idn, value);
             assert_eq!(Scales::read(&store, &servo), Err(wanted), "{idn} = {value}");
         }
@@ -398,8 +411,8 @@ mod tests {
         ) {
             let (mut store, servo) = store(UnitKind::Rotary);
             if modulo {
-                store.set_number_of(idn::POSITION_TYPE, 0x82);
-                store.set_number_of(idn::MODULO, 3_600_000);
+                store.set_number_of(Idn::POSITION_DATA_SCALING_TYPE, 0x82);
+                store.set_number_of(Idn::MODULO, 3_600_000);
             }
             let scales = Scales::read(&store, &servo).unwrap();
             let there = reference + step;

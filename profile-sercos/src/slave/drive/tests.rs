@@ -6,6 +6,7 @@ use profile_generic::servo::ServoParameters;
 use profile_generic::time::MonotonicTime;
 
 use super::*;
+use crate::slave::phase::State;
 
 /// Bits of S-0-0135 that the states are told by: ready, error, halt, follows.
 const STATE_BITS: u16 = 0xE018;
@@ -23,8 +24,8 @@ impl Rig {
         let mut store = Store::new();
         drive.define(&mut store);
         // A brake that takes its time, so that the delays show.
-        store.set_number_of(idn::ON_DELAY, 200);
-        store.set_number_of(idn::OFF_DELAY, 300);
+        store.set_number_of(Idn::DRIVE_ON_DELAY_TIME, 200);
+        store.set_number_of(Idn::DRIVE_OFF_DELAY_TIME, 300);
         drive.adopt(&store);
         Self { drive, store, phase: State::In(Phase::CP4), connected: true }
     }
@@ -61,11 +62,11 @@ impl Rig {
     /// The drive follows, standing or at ten turns a second.
     fn follow(&mut self, velocity: bool) {
         self.watch(1_000);
-        self.store.set_number_of(idn::MODE, i64::from(MODES[1]));
+        self.store.set_number_of(Idn::PRIMARY_OPERATION_MODE, i64::from(MODES[1]));
         self.control(0xE000);
         self.watch(300);
         if velocity {
-            self.store.set_number_of(idn::VELOCITY_COMMAND, 6_000_000);
+            self.store.set_number_of(Idn::VELOCITY_COMMAND, 6_000_000);
             self.watch(300);
             assert!(self.drive.actual().velocity.0 > 9_000_000_000);
         }

@@ -6,7 +6,7 @@
 //! An element is read or written in parts of four bytes; only the step with the last part has the end bit.
 //! Lists and texts begin with a part of their own, the current and the greatest length.
 
-use super::parameter::{Handle, Store};
+use super::parameter::{Handle, Parameter, Store};
 use crate::wire::data_status::DataStatus;
 use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
@@ -39,7 +39,7 @@ struct Progress {
     done: usize,
 }
 
-/// The server.
+/// The slave end of one service channel.
 #[derive(Debug)]
 pub struct Server {
     valid: bool,
@@ -206,12 +206,7 @@ impl Server {
         let parameter = host.store().get(handle);
         let attribute = parameter.attribute();
         if attribute.is_command() {
-            if !step.control.last() {
-                return Err(SvcError::DATA_LONG);
-            }
-            let [low, high, _, _] = step.info.to_le_bytes();
-            host.control(handle, u16::from_le_bytes([low, high]))?;
-            return Ok((0, true));
+            return command(handle, step, host);
         }
         if let Some(error) = parameter.write_protection(phase) {
             return Err(error);
@@ -243,6 +238,16 @@ impl Server {
     }
 }
 
+/// Takes the control word of a procedure command.
+fn command(handle: Handle, step: MdtSvc, host: &mut impl Host) -> Result<(u32, bool), SvcError> {
+    if !step.control.last() {
+        return Err(SvcError::DATA_LONG);
+    }
+    let [low, high, _, _] = step.info.to_le_bytes();
+    host.control(handle, u16::from_le_bytes([low, high]))?;
+    Ok((0, true))
+}
+
 /// Whether an element comes with a list head.
 fn has_head(handle: Handle, element: Element, host: &mut impl Host) -> bool {
     match element {
@@ -250,6 +255,32 @@ fn has_head(handle: Handle, element: Element, host: &mut impl Host) -> bool {
         Element::Data => host.store().get(handle).attribute().is_list(),
         _ => false,
     }
+}
+
+/// The bytes of an element, and how many there may be where it is a list. Numbers are put into `number`.
+fn content<'a>(
+    parameter: &'a Parameter,
+    element: Element,
+    number: &'a mut [u8; 8],
+) -> Result<(&'a [u8], Option<usize>), SvcError> {
+    let not_available = SvcError::of_element(element, 1);
+    let attribute = parameter.attribute();
+    Ok(match element {
+        Element::Name => (parameter.name().as_bytes(), Some(parameter.name().len())),
+        Element::Unit if parameter.unit().is_empty() => return Err(not_available),
+        Element::Unit => (parameter.unit().as_bytes(), Some(parameter.unit().len())),
+        Element::Attribute => {
+            *number = i64::from(attribute.0).to_le_bytes();
+            (&number[..4], None)
+        }
+        Element::Minimum | Element::Maximum => {
+            let value = if element == Element::Minimum { parameter.minimum() } else { parameter.maximum() };
+            *number = value.ok_or(not_available)?.to_le_bytes();
+            (&number[..usize::from(attribute.item_length().bytes())], None)
+        }
+        _ if attribute.is_list() => (parameter.data(), Some(parameter.capacity())),
+        _ => (parameter.data(), None),
+    })
 }
 
 /// Reads the part of an element at `done`. Returns it and the length of the whole element, head included.
@@ -262,27 +293,8 @@ fn read(
     if element == Element::Data && done == 0 {
         host.refresh(handle);
     }
-    let parameter = host.store().get(handle);
-    let not_available = SvcError::of_element(element, 1);
-    let attribute = parameter.attribute();
-    let value_len = usize::from(attribute.item_length().bytes());
-    let limit;
-    let (data, capacity): (&[u8], Option<usize>) = match element {
-        Element::Name => (parameter.name().as_bytes(), Some(parameter.name().len())),
-        Element::Unit if parameter.unit().is_empty() => return Err(not_available),
-        Element::Unit => (parameter.unit().as_bytes(), Some(parameter.unit().len())),
-        Element::Attribute => {
-            limit = i64::from(attribute.0).to_le_bytes();
-            (&limit[..4], None)
-        }
-        Element::Minimum | Element::Maximum => {
-            let value = if element == Element::Minimum { parameter.minimum() } else { parameter.maximum() };
-            limit = value.ok_or(not_available)?.to_le_bytes();
-            (&limit[..value_len], None)
-        }
-        _ if attribute.is_list() => (parameter.data(), Some(parameter.capacity())),
-        _ => (parameter.data(), None),
-    };
+    let mut number = [0; 8];
+    let (data, capacity) = content(host.store().get(handle), element, &mut number)?;
     let word = |len: usize| u16::try_from(len).unwrap_or(u16::MAX);
     let head = match capacity {
         Some(capacity) if done == 0 => {

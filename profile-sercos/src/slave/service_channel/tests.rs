@@ -194,7 +194,7 @@ fn lists_are_written_at_once_when_they_are_complete() {
     assert_eq!(pair.write(true, 0xFFFF_0009), Ok(0));
     assert_eq!(data(&pair), [9, 0]);
     assert_eq!(pair.write(true, 0x0080_0000), Ok(0), "an empty list has no part but its head");
-    assert_eq!(data(&pair), []);
+    assert_eq!(data(&pair), [0u8; 0]);
     assert_eq!(pair.read(Element::Data, true), Ok(0x000A_0000));
 }
 

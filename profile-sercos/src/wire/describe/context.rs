@@ -9,13 +9,16 @@ use super::super::header::{Kind, Phase, TELEGRAMS_MAX};
 use super::super::idn::Idn;
 use super::super::layout::{ConnectionLayout, DeviceLayout, Layout, Offset};
 use super::super::slot::SvcSlot;
-use super::super::svc::{Element, LIST_HEAD_LEN, SvcControl, SvcStatus};
+use super::super::svc::{Element, LIST_HEAD_LEN, SVC_LEN, SvcControl, SvcStatus};
 use super::super::telegram::PhaseTracker;
+use crate::generated::idns::connection;
 
 /// Longest element that is collected, bytes with list head; what is longer cannot be part of a layout.
 const COLLECT_MAX: usize = 256;
 /// Attributes kept; more would only be for show.
 const ATTRIBUTES_MAX: usize = 4096;
+/// Transfers kept until they are taken.
+const TRANSFERS_MAX: usize = 256;
 /// Connections kept for one slave: the range of x in S-0-1050.x that real slaves use.
 const CONNECTIONS_MAX: usize = 64;
 
@@ -50,6 +53,8 @@ pub(super) struct Channel {
     pub(super) control: Option<SvcControl>,
     /// Parts of the current element sent by the master, list head included.
     written: Vec<u8>,
+    /// Parts of the current element given by the slave.
+    read: Vec<u8>,
     /// Number of the step within its element, from 0.
     pub(super) part: usize,
     /// The answer to the current step has been taken.
@@ -73,6 +78,19 @@ pub struct DecodeContext<'n> {
     connections: BTreeMap<(u16, u8), Connection>,
     attributes: BTreeMap<Idn, Attribute>,
     layout: Layout,
+    addresses: BTreeMap<u16, u16>,
+    transfers: Vec<Transfer>,
+}
+
+/// Operation data that a slave has given, or that were written to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Transfer {
+    /// Topology address of the slave.
+    pub topology: u16,
+    /// The parameter.
+    pub idn: Idn,
+    /// The data; a list with its head.
+    pub data: Vec<u8>,
 }
 
 impl Default for DecodeContext<'_> {
@@ -91,6 +109,8 @@ impl<'n> DecodeContext<'n> {
             connections: BTreeMap::new(),
             attributes: BTreeMap::new(),
             layout: Layout::unknown(),
+            addresses: BTreeMap::new(),
+            transfers: Vec::new(),
         }
     }
 
@@ -102,6 +122,62 @@ impl<'n> DecodeContext<'n> {
     /// The IDNs in a connection of a slave, in order: S-0-1050.x.6.
     pub fn connection_idns(&self, address: u16, index: u8) -> &[Idn] {
         self.connections.get(&(address, index)).map_or(&[], |connection| &connection.idns)
+    }
+
+    /// The SERCOS address of a slave, if CP0 was among the frames that were followed.
+    pub fn address(&self, topology: u16) -> Option<u16> {
+        self.addresses.get(&topology).copied()
+    }
+
+    /// Takes the operation data that service channels have carried to the end since the last call.
+    pub fn take_transfers(&mut self) -> Vec<Transfer> {
+        std::mem::take(&mut self.transfers)
+    }
+
+    pub(super) fn note_address(&mut self, topology: u16, address: Option<u16>) {
+        if usize::from(topology) <= SLAVES_MAX
+            && let Some(address) = address
+        {
+            self.addresses.insert(topology, address);
+        }
+    }
+
+    /// Takes in the service channels of a telegram of CP3 or CP4, behind its header.
+    pub(super) fn follow_channels(&mut self, kind: Kind, number: u8, data: &[u8]) {
+        for device in 0..self.layout.devices.len() {
+            let DeviceLayout { address, svc_mdt, svc_at, .. } = self.layout.devices[device];
+            let place = match kind {
+                Kind::Mdt => svc_mdt,
+                Kind::At => svc_at,
+            };
+            let bytes = place.filter(|at| at.telegram == number).and_then(|at| data.get(at.range(SVC_LEN)));
+            if let Some(Ok(slot)) = bytes.map(SvcSlot::parse) {
+                self.take_slot(kind, address, slot);
+            }
+        }
+    }
+
+    /// Takes in a slot. Returns whether it is a new step, or answers one for the first time; `None` where it is empty.
+    pub(super) fn take_slot(&mut self, kind: Kind, address: u16, slot: SvcSlot) -> Option<bool> {
+        match kind {
+            // An AT as it leaves the master has nothing in it.
+            Kind::At if slot == SvcSlot::default() => None,
+            Kind::Mdt => Some(self.master_slot(address, slot)),
+            Kind::At => Some(self.slave_slot(address, slot)),
+        }
+    }
+
+    /// Keeps operation data that have come to their end. What is longer than can be collected is not whole, and not kept.
+    fn transfer(&mut self, address: u16, idn: Idn, mut data: Vec<u8>) {
+        if data.len() >= COLLECT_MAX {
+            return;
+        }
+        if let Some(length) = self.length(idn) {
+            data.truncate(length);
+        }
+        if self.transfers.len() < TRANSFERS_MAX {
+            self.transfers.push(Transfer { topology: address, idn, data });
+        }
     }
 
     /// The attribute of an IDN, if some slave has shown it.
@@ -145,6 +221,7 @@ impl<'n> DecodeContext<'n> {
         channel.part = if same_element { channel.part + 1 } else { 0 };
         if !same_element {
             channel.written.clear();
+            channel.read.clear();
         }
         channel.control = Some(control);
         channel.answered = false;
@@ -160,6 +237,7 @@ impl<'n> DecodeContext<'n> {
                 {
                     let written = std::mem::take(&mut channel.written);
                     self.learn(address, idn, &written);
+                    self.transfer(address, idn, written);
                 }
             }
             _ => {}
@@ -183,11 +261,20 @@ impl<'n> DecodeContext<'n> {
             return true;
         }
         let Some(idn) = channel.open else { return true };
+        if control.element() == Element::Data {
+            if channel.read.len() < COLLECT_MAX {
+                channel.read.extend_from_slice(&slot.info.to_le_bytes());
+            }
+            if control.last() {
+                let read = std::mem::take(&mut channel.read);
+                self.transfer(address, idn, read);
+            }
+        }
         match control.element() {
             Element::Attribute if self.attributes.len() < ATTRIBUTES_MAX => {
                 self.attributes.insert(idn, Attribute(slot.info));
             }
-            Element::Data if idn.block() == Idn::CONNECTION_BLOCK && idn.element() == 5 => {
+            Element::Data if idn.block() == Idn::CONNECTION_BLOCK && idn.element() == connection::LENGTH => {
                 let len = low_word(slot.info);
                 self.connection(address, idn.instance(), |connection| connection.len = Some(len));
             }
@@ -211,9 +298,9 @@ impl<'n> DecodeContext<'n> {
             _ if idn.block() == Idn::CONNECTION_BLOCK && !idn.is_product() => {
                 let element = idn.element();
                 self.connection(address, idn.instance(), |connection| match element {
-                    1 => connection.setup = ConnectionSetup::from_bits_retain(word),
-                    3 => connection.assignment = Some(word),
-                    6 => connection.idns = idns(data),
+                    connection::SETUP => connection.setup = ConnectionSetup::from_bits_retain(word),
+                    connection::ASSIGNMENT => connection.assignment = Some(word),
+                    connection::LIST => connection.idns = idns(data),
                     _ => {}
                 });
             }
@@ -263,7 +350,7 @@ impl<'n> DecodeContext<'n> {
         }
     }
 
-    /// Whether the parts of telegrams of `kind` can be told apart at all.
+    /// Whether the parts of telegrams of `kind` can be distinguished at all.
     pub(super) fn knows(&self, kind: Kind) -> bool {
         match kind {
             Kind::Mdt => self.layout.mdt_len[0] != 0,

@@ -1,14 +1,14 @@
 //! A frame as an indented tree for people.
 //!
 //! [`describe`] never fails: what cannot be read is said and shown as bytes. A [`DecodeContext`] carries what
-//! the frames before have told: the phase, the data block that is open at each slave, and the layout of CP3 and
+//! the frames before have reported: the phase, the data block that is open at each slave, and the layout of CP3 and
 //! CP4, which the master writes over the service channel in CP2.
 
 mod context;
 
 use core::fmt::{self, Write};
 
-pub use context::{DecodeContext, Names, NoNames};
+pub use context::{DecodeContext, Names, NoNames, Transfer};
 
 use super::connection::ConnectionControl;
 use super::cyclic::Part;
@@ -16,7 +16,7 @@ use super::data_status::DataStatus;
 use super::device_control::DeviceControl;
 use super::device_status::DeviceStatus;
 use super::drive_words::{DriveControl, DriveStatus};
-use super::header::{Header, Kind, Phase};
+use super::header::{HEADER_LEN, Header, Kind, Phase};
 use super::idn::Idn;
 use super::layout::Layout;
 use super::procedure::ProcedureControl;
@@ -33,6 +33,31 @@ pub fn describe(frame: &[u8], context: &mut DecodeContext<'_>) -> String {
     // Writing to a String cannot fail.
     let _ = write_frame(&mut text, frame, context);
     text
+}
+
+/// Takes in a frame without printing it: addresses of slaves, and what the service channels carry.
+pub fn follow(frame: &[u8], context: &mut DecodeContext<'_>) {
+    let Ok(header) = Header::parse(frame) else { return };
+    let phase = context.tracker.layout_phase(&header);
+    context.enter(phase);
+    let kind = header.telegram.kind();
+    if matches!(phase, Phase::CP3 | Phase::CP4) {
+        context.follow_channels(kind, header.telegram.number(), &frame[HEADER_LEN..]);
+        return;
+    }
+    match Frame::parse_body(header, frame, phase, &Layout::unknown()).map(|frame| frame.body) {
+        Ok(Body::Cp0At(repr)) => {
+            for (topology, field) in repr.slaves() {
+                context.note_address(topology, field.address());
+            }
+        }
+        Ok(Body::Cp12(repr)) if phase == Phase::CP2 => {
+            for (address, slot) in repr.active(header.telegram.number()) {
+                context.take_slot(kind, address, slot.svc);
+            }
+        }
+        _ => {}
+    }
 }
 
 fn write_frame(out: &mut String, frame: &[u8], context: &mut DecodeContext<'_>) -> fmt::Result {
@@ -123,6 +148,7 @@ fn write_slots(
     Ok(())
 }
 
+// Flat: one arm per part of the telegram.
 fn write_cyclic(
     out: &mut String,
     kind: Kind,
@@ -170,13 +196,8 @@ fn write_svc(
     slot: SvcSlot,
     context: &mut DecodeContext<'_>,
 ) -> fmt::Result {
-    // An AT as it leaves the master has nothing in it.
-    if kind == Kind::At && slot == SvcSlot::default() {
+    let Some(new) = context.take_slot(kind, address, slot) else {
         return writeln!(out, "    S-SVC empty");
-    }
-    let new = match kind {
-        Kind::Mdt => context.master_slot(address, slot),
-        Kind::At => context.slave_slot(address, slot),
     };
     write!(out, "    {}", RawSvc(kind, slot))?;
     let channel = context.channel(address);
@@ -197,6 +218,7 @@ fn write_svc(
 }
 
 /// What the INFO of a step means.
+// Flat: one arm per element and direction.
 fn write_info(
     out: &mut String,
     kind: Kind,
@@ -206,7 +228,6 @@ fn write_info(
     first: bool,
     context: &DecodeContext<'_>,
 ) -> fmt::Result {
-    let attribute = open.and_then(|idn| context.attribute(idn));
     let command = open.is_some_and(|idn| context.is_command(idn));
     let carries = kind == Kind::At || control.write();
     match (control.element(), kind) {
@@ -224,21 +245,14 @@ fn write_info(
         (element, _) => {
             write!(out, ", {element} ")?;
             let text = matches!(element, Element::Name | Element::Unit);
-            let list =
-                text || attribute.is_some_and(|a| a.is_list()) || (attribute.is_none() && !control.last());
+            let attribute = open.and_then(|idn| context.attribute(idn));
+            let list = text || attribute.map_or(!control.last(), |attribute| attribute.is_list());
             if list && first && !control.last() {
                 write!(out, "{}", ListHead::from_info(info))
             } else if text {
                 write!(out, "{:?}", String::from_utf8_lossy(&info.to_le_bytes()).trim_end_matches('\0'))
             } else if command && kind == Kind::Mdt {
-                let word = low_word(info);
-                let meaning = match ProcedureControl::from_bits_retain(word) {
-                    ProcedureControl::EXECUTE => "set and start",
-                    ProcedureControl::INTERRUPT => "interrupt",
-                    ProcedureControl::CANCEL => "cancel",
-                    _ => "undefined",
-                };
-                write!(out, "{word:#06x} ({meaning})")
+                write_command(out, low_word(info))
             } else {
                 let two = open.and_then(|idn| context.length(idn)) == Some(2);
                 let value = if two { u32::from(low_word(info)) } else { info };
@@ -246,6 +260,17 @@ fn write_info(
             }
         }
     }
+}
+
+/// The control word of a procedure command.
+fn write_command(out: &mut String, word: u16) -> fmt::Result {
+    let meaning = match ProcedureControl::from_bits_retain(word) {
+        ProcedureControl::EXECUTE => "set and start",
+        ProcedureControl::INTERRUPT => "interrupt",
+        ProcedureControl::CANCEL => "cancel",
+        _ => "undefined",
+    };
+    write!(out, "{word:#06x} ({meaning})")
 }
 
 fn validity(status: DataStatus) -> &'static str {
@@ -268,27 +293,31 @@ fn write_values(
         let Some((bytes, after)) = rest.split_at_checked(len) else { break };
         rest = after;
         write!(out, "    {} = ", Named(idn, context))?;
-        match (idn, bytes) {
-            (Idn::DRIVE_CONTROL, &[low, high]) => {
-                let word = DriveControl::from_bits_retain(u16::from_le_bytes([low, high]));
-                let on = |bit, name: &'static str| if word.contains(bit) { name } else { "" };
-                let words = [
-                    on(DriveControl::ON, " on"),
-                    on(DriveControl::ENABLE, " enable"),
-                    on(DriveControl::RESTART, " follow"),
-                ];
-                writeln!(out, "{:#06x}{}, mode {}", word.bits(), words.concat(), word.mode())?;
-            }
-            (Idn::DRIVE_STATUS, &[low, high]) => {
-                let word = DriveStatus::from_bits_retain(u16::from_le_bytes([low, high]));
-                writeln!(out, "{:#06x} {word}", word.bits())?;
-            }
-            (_, &[low, high]) => writeln!(out, "{}", i16::from_le_bytes([low, high]))?,
-            (_, &[a, b, c, d]) => writeln!(out, "{}", i32::from_le_bytes([a, b, c, d]))?,
-            _ => writeln!(out, "{}", Hex(bytes))?,
-        }
+        write_value(out, idn, bytes)?;
     }
     if rest.is_empty() { Ok(()) } else { writeln!(out, "    {}", Hex(rest)) }
+}
+
+fn write_value(out: &mut String, idn: Idn, bytes: &[u8]) -> fmt::Result {
+    match (idn, bytes) {
+        (Idn::DRIVE_CONTROL, &[low, high]) => {
+            let word = DriveControl::from_bits_retain(u16::from_le_bytes([low, high]));
+            let on = |bit, name: &'static str| if word.contains(bit) { name } else { "" };
+            let words = [
+                on(DriveControl::ON, " on"),
+                on(DriveControl::ENABLE, " enable"),
+                on(DriveControl::RESTART, " follow"),
+            ];
+            writeln!(out, "{:#06x}{}, mode {}", word.bits(), words.concat(), word.mode())
+        }
+        (Idn::DRIVE_STATUS, &[low, high]) => {
+            let word = DriveStatus::from_bits_retain(u16::from_le_bytes([low, high]));
+            writeln!(out, "{:#06x} {word}", word.bits())
+        }
+        (_, &[low, high]) => writeln!(out, "{}", i16::from_le_bytes([low, high])),
+        (_, &[a, b, c, d]) => writeln!(out, "{}", i32::from_le_bytes([a, b, c, d])),
+        _ => writeln!(out, "{}", Hex(bytes)),
+    }
 }
 
 /// An IDN with its name, where the caller knows one.

@@ -90,7 +90,6 @@ impl NorthScale {
         let counts = f64_from_i64(north.counts(MANY).value - north.counts(0).value);
         let values = CommandValues { velocity: Some(1e3), torque: Some(100.0), ..CommandValues::default() };
         let mut command = AxisCommand::default();
-        let values = axisbridge::mapping::CyclicValues::from(&values);
         north.decode(&values, 0, &mut north.trackers(), &mut command);
         Self {
             position: f64_from_i64(MANY) / counts,

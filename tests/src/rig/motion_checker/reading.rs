@@ -15,12 +15,10 @@ use profile_generic::ratio::Ratio;
 use profile_generic::state::Report;
 use profile_generic::time::MonotonicTime;
 use profile_sercos::slave::Slave;
-use profile_sercos::slave::communication::connection;
 use profile_sercos::slave::drive::Drive;
-use profile_sercos::slave::drive::parameters::idn;
 use profile_sercos::slave::drive::scaling::Scales as SercosScales;
 use profile_sercos::wire::drive_words::{DriveControl, DriveStatus, ReadyState};
-use profile_sercos::wire::idn::Idn;
+use profile_sercos::wire::idn::{Idn, connection};
 
 use super::curve::Quantity;
 
@@ -122,13 +120,15 @@ pub fn sercos_scaling(slave: &Slave<Drive>) -> Option<Scaling> {
     let store = slave.store();
     let scales = SercosScales::read(store, slave.application().servo().parameters()).ok()?;
     // The axis counts as the drive reports its position, whichever way its motor turns.
-    let way = sign(store.number_of(idn::POSITION_POLARITY) & FEEDBACK != 0);
+    let way = sign(store.number_of(Idn::POSITION_POLARITY_PARAMETERS) & FEEDBACK != 0);
     let polarity = |idn| f64_from_i64(way * sign(store.number_of(idn) & 1 != 0));
     let many = f64_from_i64(MANY);
     Some(Scaling {
-        position: polarity(idn::POSITION_POLARITY) * f64_from_i64(scales.position.generic(MANY)) / many,
-        velocity: polarity(idn::VELOCITY_POLARITY) * f64_from_i64(scales.velocity.generic(MANY)) / many,
-        torque: polarity(idn::TORQUE_POLARITY) * f64_from_i64(scales.torque.generic(MANY)) / many,
+        position: polarity(Idn::POSITION_POLARITY_PARAMETERS) * f64_from_i64(scales.position.generic(MANY))
+            / many,
+        velocity: polarity(Idn::VELOCITY_POLARITY_PARAMETER) * f64_from_i64(scales.velocity.generic(MANY))
+            / many,
+        torque: polarity(Idn::TORQUE_POLARITY_PARAMETER) * f64_from_i64(scales.torque.generic(MANY)) / many,
         modulo: scales.modulo,
         turn: 1.0,
         way_round: way,
@@ -168,9 +168,15 @@ pub fn sercos(slave: &Slave<Drive>, scaling: &Scaling) -> Option<Reading> {
     let follows = operates && control.contains(asked) && shows && !leads_itself;
     let set_point = |quantity| {
         let (command, additive, polarity) = match quantity {
-            Quantity::Position => (idn::POSITION_COMMAND, idn::POSITION_ADDITIVE, idn::POSITION_POLARITY),
-            Quantity::Velocity => (idn::VELOCITY_COMMAND, idn::VELOCITY_ADDITIVE, idn::VELOCITY_POLARITY),
-            Quantity::Torque => (idn::TORQUE_COMMAND, idn::TORQUE_ADDITIVE, idn::TORQUE_POLARITY),
+            Quantity::Position => {
+                (Idn::POSITION_COMMAND, Idn::ADDITIVE_POSITION_COMMAND, Idn::POSITION_POLARITY_PARAMETERS)
+            }
+            Quantity::Velocity => {
+                (Idn::VELOCITY_COMMAND, Idn::ADDITIVE_VELOCITY_COMMAND, Idn::VELOCITY_POLARITY_PARAMETER)
+            }
+            Quantity::Torque => {
+                (Idn::TORQUE_COMMAND, Idn::ADDITIVE_TORQUE_COMMAND, Idn::TORQUE_POLARITY_PARAMETER)
+            }
         };
         let polarity = store.number_of(polarity);
         let opposite = sign((polarity ^ polarity >> 1) & 1 != 0);

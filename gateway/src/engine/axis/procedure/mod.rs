@@ -90,18 +90,18 @@ pub enum ProcedureAccess {
     Start(usize),
     /// Asks how far it is.
     Ask(usize),
-    /// Cancels it.
+    /// Cancels the command.
     Cancel(usize),
 }
 
 /// What the unit has to know of the axis in each cycle.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings {
-    /// Now.
+    /// The instant of this cycle, on the local clock.
     pub now: MonotonicTime,
     /// The axis is in operation.
     pub operating: bool,
-    /// It stands.
+    /// The actual velocity is not above the standstill speed.
     pub stands: bool,
     /// It follows command values.
     pub follows: bool,

@@ -3,17 +3,16 @@
 
 use std::collections::VecDeque;
 
-use profile_cia402::master::CallError;
 use profile_cia402::master::config::{Direction, MasterConfig, PdoConfig};
 use profile_cia402::master::pdo_set::PdoSet;
 use profile_cia402::sdo::request::{SdoData, SdoFailure, SdoOutcome, SdoRequest};
 use profile_cia402::wire::{Mux, NodeId};
 
 use super::super::commissioner::{CommissionerHandle, Done, Run, Work};
-use super::layout::{AxisPdos, FoundPdos, NoRoom, NotMapped, PdoMap, object};
+use super::failure::{Misfit, StepFailure};
+use super::layout::{AxisPdos, FoundPdos, NotMapped, PdoMap, object};
 use super::readback::Readback;
 use super::trial::Trial;
-pub use super::trial::Tried;
 use crate::engine::notice::Notice;
 use crate::mapping::{
     Cia402Axis, Cia402Dictionary, Cia402Error, DriveIdentity, DriveProgram, Item, Mapping, Object,
@@ -59,53 +58,18 @@ pub struct AxisSetup {
     pub pdos: AxisPdos,
 }
 
-/// A step that the drive did not take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{what} {object}: {failure}")]
-pub struct StepFailure {
-    /// What was tried.
-    pub what: &'static str,
-    /// The object.
-    pub object: Object,
-    /// Why it failed.
-    pub failure: SdoFailure,
-}
-
-/// Why a drive cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Misfit {
-    /// It does not fit the tables.
-    #[error("{0}")]
-    Program(#[from] Cia402Error),
-    /// Its values do not fit its PDOs.
-    #[error("{0}")]
-    Room(#[from] NoRoom),
-    /// Its values are not in the PDOs that it keeps.
-    #[error("{0}")]
-    Mapped(#[from] NotMapped),
-    /// More devices with several axes than there are free identifiers.
-    #[error("no identifiers are left for its PDOs: expected fewer devices with several axes")]
-    Identifiers,
-    /// The network is not possible with its PDOs.
-    #[error("{0}")]
-    Network(#[from] CallError),
-    /// Nobody says how long a value is.
-    #[error("the dictionary has no length for {0}")]
-    Length(Item),
-}
-
 /// What is done with an axis.
 #[derive(Debug)]
 enum Task {
     /// A plan of the tables.
     Plan(Plan),
-    /// Modes of operation are tried, of a drive that does not tell them.
+    /// Modes of operation are tried, of a drive that does not report them.
     Try(Trial),
     /// The PDOs are read that its device keeps.
     Readback(Readback),
 }
 
-/// One device.
+/// The commissioning of one device with all of its axes.
 #[derive(Debug)]
 pub struct DeviceWork {
     node: NodeId,

@@ -6,7 +6,7 @@
 //!                nobody                another one         refused  ----------------------------------> all wait
 //! ```
 //!
-//! The device tells its boot-up once it is out of the configuration again, and the master brings it up. One that has another
+//! The device reports its boot-up once it is out of the configuration again, and the master brings it up. One that has another
 //! node-id keeps that: who gave it to it may lead it. Nothing here allocates.
 
 use core::fmt;

@@ -7,11 +7,12 @@
 //! What a drive is told goes out after SYNC and counts from the next one; what it tells was captured at SYNC.
 
 pub mod commissioner;
+pub mod failure;
 pub mod layout;
 pub mod load;
 pub mod lss;
 mod readback;
-mod trial;
+pub mod trial;
 
 use arrayvec::ArrayVec;
 use profile_cia402::master::boot::{BootState, BootStatus};
@@ -32,9 +33,10 @@ use super::accesses::Accesses;
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
-use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
+use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
+use crate::engine::cyclic::Received;
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
@@ -103,7 +105,7 @@ struct Device {
     keeps: bool,
 }
 
-/// The bus.
+/// A CANopen bus: the master, its devices and their commissioning.
 #[derive(Debug)]
 pub struct CanBus {
     /// Its number among the CAN buses of the box.
@@ -172,7 +174,7 @@ impl CanBus {
         })
     }
 
-    /// The master.
+    /// The CANopen master, for status and tests.
     #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
@@ -437,7 +439,7 @@ impl Device {
     }
 }
 
-impl Bus for CanBus {
+impl South for CanBus {
     fn cycle_time(&self) -> DurationNs {
         self.link.cycle_time()
     }

@@ -24,9 +24,10 @@ use self::setup::{SetupFailure, SetupStep};
 use super::accesses::Accesses;
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
-use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
+use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
+use crate::engine::cyclic::Received;
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
@@ -75,7 +76,7 @@ struct Drive {
     fresh: bool,
     /// Cycles in a row without an answer that counts.
     vain: u16,
-    /// Why the first one of them did not, and whether that has been told.
+    /// Why the first one of them did not, and whether that has been reported.
     error: Option<(MessageError, bool)>,
     /// It has been tried: nobody waits for it any longer.
     tried: bool,
@@ -86,7 +87,7 @@ struct Drive {
 /// Cycles in which a drive that was taken may have nothing valid to tell.
 const BEGINNING: u16 = 100;
 
-/// The bus.
+/// A DeviceNet network: the master and its drives.
 #[derive(Debug)]
 pub struct DevicenetBus {
     /// Its number among the DeviceNet networks of the box.
@@ -148,7 +149,7 @@ impl DevicenetBus {
         })
     }
 
-    /// The master.
+    /// The DeviceNet master, for status and tests.
     #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
@@ -173,7 +174,7 @@ impl DevicenetBus {
                 Some(Err(error)) => {
                     self.refused += 1;
                     drive.vain = drive.vain.saturating_add(1);
-                    // It is told once, until one counts again.
+                    // It is reported once, until one counts again.
                     drive.error = drive.error.or(Some((error, false)));
                 }
                 None => drive.vain = drive.vain.saturating_add(1),
@@ -347,7 +348,7 @@ fn reply(
     Ok((access::value(attribute, outcome)?, Progress::None))
 }
 
-impl Bus for DevicenetBus {
+impl South for DevicenetBus {
     fn cycle_time(&self) -> DurationNs {
         self.master.config().cycle
     }

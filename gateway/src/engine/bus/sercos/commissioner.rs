@@ -30,7 +30,7 @@ pub enum Progress {
     Failed(Notice),
 }
 
-/// The setup of one drive. `T` tells its requests apart.
+/// The setup of one drive. `T` distinguishes its requests.
 #[derive(Debug)]
 pub struct Setup<T> {
     /// Number of its axis.

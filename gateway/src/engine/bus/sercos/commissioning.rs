@@ -28,7 +28,7 @@ pub struct StepFailure {
     pub failure: SvcFailure,
 }
 
-/// One plan under way. `T` tells its requests apart.
+/// One plan under way. `T` distinguishes its requests.
 #[derive(Debug)]
 pub struct Commissioning<T> {
     plan: CommissioningPlan,
@@ -36,7 +36,7 @@ pub struct Commissioning<T> {
     at: usize,
     /// The value of a write, or the element of a read, under way.
     part: usize,
-    /// How that element is transferred, where the attribute has told it.
+    /// How that element is transferred, where the attribute has reported it.
     shape: Option<Shape>,
     ticket: Option<T>,
     failure: Option<StepFailure>,
@@ -82,7 +82,7 @@ impl<T: Copy + PartialEq> Commissioning<T> {
         self.ticket.is_some()
     }
 
-    /// Whether the phase is to be planned again, with what the drive has told.
+    /// Whether the phase is to be planned again, with what the drive has reported.
     #[must_use]
     pub fn wants_more(&self) -> bool {
         self.plan.more && self.failure.is_none()
@@ -147,7 +147,7 @@ impl<T: Copy + PartialEq> Commissioning<T> {
                 }
                 self.next_part(facts);
             }
-            // An element that is not there tells nothing; the drive may have the parameter all the same.
+            // An element that is not there reports nothing; the drive may have the parameter all the same.
             Err(SvcFailure::Refused { .. })
                 if matches!(
                     outcome.operation,

@@ -31,12 +31,13 @@ use self::progress::PhaseProgress;
 use self::recovery::Recovery;
 use super::accesses::Accesses;
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
-use super::{Answer, Bus, Counts, Places, Purpose, Received, Sent, ask};
+use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
+use crate::engine::cyclic::Received;
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
-use crate::mapping::{DriveFacts, DriveProgram, Item, Mapping, SercosAxis, SercosError};
+use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -44,7 +45,7 @@ pub const COMMAND_CONNECTION: u8 = 0;
 /// y of S-0-1050.x.y, the configuration list.
 const CONFIGURATION_LIST: u8 = 6;
 
-/// The connection in the AT.
+/// The connection that the slave produces in the AT: its actual values (S-0-1050.1).
 pub const FEEDBACK_CONNECTION: u8 = 1;
 
 /// Slaves that are left out at the same time; a bus with more of them needs a person anyway.
@@ -89,7 +90,7 @@ struct Drive {
     accesses: Accesses<Ticket, ACCESSES_MAX>,
 }
 
-/// The bus.
+/// A SERCOS III bus: the master, its drives and their commissioning.
 #[derive(Debug)]
 pub struct SercosBus {
     master: Master,
@@ -151,13 +152,13 @@ impl SercosBus {
         })
     }
 
-    /// The master.
+    /// The SERCOS III master, for status and tests.
     #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
     }
 
-    /// What the drive of an axis is needed for, and what it has told of itself.
+    /// What the drive of an axis is needed for, and what it has reported about itself.
     #[must_use]
     pub fn drive(&self, axis: usize) -> Option<(&SercosAxis, &DriveFacts)> {
         self.drive_of(axis).map(|drive| (&drive.setup.needs, &drive.setup.facts))
@@ -348,7 +349,7 @@ impl SercosBus {
             drive.plan(mapping, Phase::CP2, notice);
         } else {
             drive.stage = Stage::Absent;
-            // One that was refused has been told with the reason.
+            // One that was refused has been reported with the reason.
             if !drive.hot_plug && found.is_none() {
                 notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.setup.address });
             }
@@ -570,7 +571,7 @@ impl SercosBus {
     }
 }
 
-impl Bus for SercosBus {
+impl South for SercosBus {
     fn cycle_time(&self) -> DurationNs {
         DurationNs(i64::from(self.master.config().cycle_ns))
     }
@@ -773,7 +774,7 @@ impl Drive {
     }
 }
 
-/// The two connections of a drive, from what it has told in CP2.
+/// The two connections of a drive, from what it has reported in CP2.
 ///
 /// # Errors
 /// As [`Mapping::telegram`], and when a connection is too long for the master.
@@ -796,7 +797,7 @@ pub(super) fn connections(
     for (instance, slave_produces, items, bytes) in both {
         let idns: Vec<Idn> = items.iter().copied().filter_map(Item::idn).collect();
         let connection = ConnectionConfig::new(instance, slave_produces, &idns);
-        let connection = connection.ok_or(SercosError::Full("a connection"))?;
+        let connection = connection.ok_or(Full("a connection"))?;
         connections.push(ConnectionConfig { allowed_losses, data_len: Some(bytes), ..connection });
     }
     Ok(connections)

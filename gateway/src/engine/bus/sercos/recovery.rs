@@ -85,7 +85,7 @@ impl Recovery {
         self.isolated = true;
     }
 
-    /// Phase 0 has begun: the scan gets past whoever is left.
+    /// Phase 0 has begun: the scan can pass every slave that is left.
     pub(super) const fn begin_scan(&mut self) {
         self.isolated = false;
     }

@@ -72,7 +72,7 @@ pub enum ControlKind {
     Converter,
 }
 
-/// State of an axis.
+/// State of an axis (attribute 650, Axis State).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisState {
     /// Without power.
@@ -187,6 +187,7 @@ impl AxisState {
 
     /// The state after `event`, or `None` if the event has no effect in this state.
     #[must_use]
+    // A flat match: one arm for each row of the table.
     pub fn next(self, kind: ControlKind, event: AxisEvent, conditions: &AxisConditions) -> Option<Self> {
         match (self, event) {
             (Self::Off, AxisEvent::PowerUp) => Some(Self::SelfTest),
@@ -226,6 +227,7 @@ impl AxisState {
         }
     }
 
+    // A flat match: one arm for each row of the table.
     fn next_active(self, event: AxisEvent, conditions: &AxisConditions) -> Option<Self> {
         match (self, event) {
             (Self::Initializing, AxisEvent::InitializationComplete)

@@ -188,7 +188,7 @@ impl Rig {
 
     pub fn pass(&mut self, time: DurationNs) {
         self.now = self.now + time;
-        self.adapter.handle_timeout(self.now);
+        self.adapter.handle_time(self.now);
     }
 
     pub fn stream(&mut self, last: u8) -> SessionSlot {

@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 
 use super::*;
 use crate::device::attribute::id;
+use crate::device::axis::SequenceSettings;
+use crate::device::axis::drive_link::{AbortCause, AbortOrder};
 use crate::device::axis::fault_log::LogKind;
 use crate::device::axis::state::AxisState;
-use crate::wire::motion::codes::{AlarmType, AxisStatus, ClearingEvent, FaultType};
+use crate::wire::motion::codes::{AlarmType, AxisStatus, ClearingEvent, FaultType, NodeFault};
 
 const MFG: FaultType = FaultType::AXIS_MFG;
 
@@ -273,20 +275,22 @@ fn records_arrive_one_by_one_whatever_is_lost() {
 }
 
 #[test]
-fn two_faults_at_once_stop_the_axis_by_the_worse_of_their_actions() {
+fn a_condition_of_the_drive_is_shown_and_no_stop_is_ordered_for_it() {
     let mut rig = listening();
     set_actions(&mut rig, 3);
     rig.drives[0].stuck = true;
     raise(&mut rig, &[DriveCondition { action: 0x23, ..condition(FaultType::AXIS, 54) }]);
-    rig.cycle();
-    let order = rig.command(0).abort.expect("an order");
-    assert_eq!((order.code, order.action), (54, 0x23));
+    assert_eq!(records(&mut rig, 1), ["Axis Fault 54 sub 7 action 0x23"]);
+    assert_eq!((rig.command(0).action, rig.command(0).abort), (DriveAction::Abort, None));
     let mut both = rig.drives[0].image.conditions;
     both.push(DriveCondition { action: 0x34, ..condition(FaultType::AXIS, 10) });
     rig.drives[0].image.conditions = both;
-    rig.cycle();
-    let order = rig.command(0).abort.expect("an order");
-    assert_eq!((order.code, order.action), (54, 0x34), "harder, for the fault that came first");
+    assert_eq!(
+        records(&mut rig, 5),
+        ["Axis Fault 10 sub 7 action 0x34"],
+        "each with the stop that it leaves"
+    );
+    assert_eq!((rig.command(0).action, rig.command(0).abort), (DriveAction::Abort, None));
     rig.drives[0].stuck = false;
     rig.cycles(3);
     assert_eq!(rig.state(0), AxisState::MajorFaulted);
@@ -295,7 +299,43 @@ fn two_faults_at_once_stop_the_axis_by_the_worse_of_their_actions() {
     rig.request_all(AxisControl::FAULT_RESET);
     rig.cycles(4);
     assert_eq!(rig.state(0), AxisState::Shutdown);
-    assert_eq!(rig.command(0).abort, None);
+}
+
+#[test]
+fn what_the_device_finds_itself_orders_a_stop_with_its_cause() {
+    let mut rig = listening();
+    set_actions(&mut rig, 3);
+    rig.drives[0].stuck = true;
+    // A condition of the drive beside it changes nothing about the order.
+    raise(&mut rig, &[DriveCondition { action: 0x34, ..condition(FaultType::AXIS, 10) }]);
+    rig.device.set_sequence(0, SequenceSettings { flying_start: false, abort: 0x13 });
+    rig.request_all(AxisControl::ABORT);
+    rig.cycle();
+    let order = AbortOrder { action: 0x13, cause: AbortCause::Controller };
+    assert_eq!((rig.command(0).action, rig.command(0).abort), (DriveAction::Abort, Some(order)));
+    // A second one makes it harder, and what came first stays the cause.
+    let found = |rig: &mut Rig| rig.command(0).abort.expect("an order");
+    rig.blocks[0].control_mode = ControlMode(9);
+    rig.cycles(2);
+    assert_eq!(found(&mut rig), order, "an axis that aborts has no modes to be wrong");
+    rig.close();
+    assert_eq!(rig.command(0).abort, None, "the connection has ended");
+
+    let mut rig = listening();
+    rig.blocks[0].control_mode = ControlMode(9);
+    rig.cycle();
+    assert_eq!(found(&mut rig), AbortOrder { action: 0x22, cause: AbortCause::IllegalMode });
+
+    let mut rig = listening();
+    rig.drives[0].image.online = false;
+    rig.cycle();
+    assert_eq!(found(&mut rig), AbortOrder { action: 0x24, cause: AbortCause::DriveLost });
+
+    let mut rig = listening();
+    rig.drives[0].stuck = true;
+    rig.device.raise_node_fault(NodeFault::DATA_FORMAT);
+    rig.cycle();
+    assert_eq!(found(&mut rig), AbortOrder { action: 0x22, cause: AbortCause::Node });
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::device::axis::state::AxisState;
 use crate::device::motion::io_counters::MotionCounters;
 use crate::wire::Error;
 use crate::wire::motion::codes::NodeFault;
+use profile_generic::wire::Expected;
 
 /// Sends a packet to a running rig, and returns the counters that changed, the node fault and the follow-up state.
 fn after(packet: impl FnOnce(&mut Rig) -> Vec<u8>) -> (MotionCounters, NodeFault, Rig) {
@@ -68,7 +69,10 @@ fn wrong_forms_raise_node_fault_4() {
             packet
         });
         assert_eq!((counters, fault), (malformed, format), "octet {octet}");
-        assert!(matches!(rig.device.last_error(), Some(Error::Invalid { found: 0x40, .. })));
+        assert!(matches!(
+            rig.device.last_error(),
+            Some(Error { expected: Expected::Value(_), found: 0x40, .. })
+        ));
         assert_eq!(rig.withheld(0), Some(Withheld::NodeFault));
         assert_eq!(rig.command(0).action, DriveAction::Abort, "and the axis stops");
     }

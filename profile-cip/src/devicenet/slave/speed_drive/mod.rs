@@ -62,7 +62,7 @@ pub struct SpeedDriveConfig {
     pub output: Assembly,
     /// `FaultCode` (29:13) of the servo's faults. What is not here is 1000.
     pub faults: Vec<(FaultCause, u16)>,
-    /// The servo.
+    /// Mechanics and loops of the simulated axis.
     pub servo: ServoParameters,
 }
 
@@ -77,7 +77,7 @@ pub enum SpeedDriveError {
     Servo(#[from] ServoError),
 }
 
-/// The drive.
+/// An AC/DC drive (classes 28h, 29h, 2Ah), with a simulated axis.
 #[derive(Debug)]
 pub struct SpeedDrive {
     config: SpeedDriveConfig,

@@ -182,6 +182,7 @@ impl Object for AcDcDrive<'_> {
     const ALL: &'static [u16] = &[];
     const ATTRIBUTE_MAX: u16 = 29;
 
+    // Flat: one arm per attribute.
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
         let drive = &self.0;
         let settings = &drive.settings;
@@ -222,6 +223,7 @@ impl Object for AcDcDrive<'_> {
         }
     }
 
+    // Flat: one arm per attribute.
     fn set(&mut self, attribute: u16, value: &[u8]) -> Result<(), GeneralStatus> {
         self.0.check_idle()?;
         let word = || match value {

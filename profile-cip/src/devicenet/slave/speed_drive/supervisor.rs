@@ -23,7 +23,7 @@ pub struct Inputs {
     pub fault: bool,
     /// The axis stands still, or has no torque any more.
     pub standstill: bool,
-    /// Run forward or run reverse, from whoever has the control.
+    /// Run forward or run reverse, from the side that has the control.
     pub run: bool,
     /// Run has come since the last step.
     pub run_edge: bool,
@@ -33,6 +33,7 @@ pub struct Inputs {
 
 /// The state behind `state` with these inputs.
 #[must_use]
+// Flat: the table of the standard, one arm per transition.
 pub const fn next(state: SupervisorState, inputs: Inputs) -> SupervisorState {
     use SupervisorState as S;
     match state {

@@ -7,6 +7,7 @@ use super::super::{
 };
 use super::{emit, header};
 use crate::wire::Error;
+use profile_generic::wire::Expected;
 
 /// An update with the class and two axes and every kind of block.
 fn full() -> Vec<u8> {
@@ -49,7 +50,7 @@ fn refused(change: impl FnOnce(&mut Vec<u8>)) -> Error {
 }
 
 fn invalid(what: &'static str, offset: usize, found: u32, expected: u32) -> Error {
-    Error::Invalid { what, offset, found, expected }
+    Error::invalid(what, offset, expected, found)
 }
 
 #[test]
@@ -73,24 +74,18 @@ fn sizes_that_disagree_with_the_content_are_refused() {
     // The velocity bit taken away leaves four octets too many in the block.
     let set = AXIS_1 + 8 + 4;
     let what = "cyclic command block";
-    assert_eq!(refused(|o| o[set] = 1), Error::Trailing { what, offset: AXIS_1 + 8 + 16, excess: 4 });
+    assert_eq!(refused(|o| o[set] = 1), Error::trailing(what, AXIS_1 + 8 + 16, 4));
     // One more bit asks for four octets that are not there.
-    let expected = Error::Truncated { what, offset: AXIS_1 + 8 + 20, needed: 4, available: 0 };
+    let expected = Error::truncated(what, AXIS_1 + 8 + 20, 4, 0);
     assert_eq!(refused(|o| o[set] = 7), expected);
     // An event block that announces two acknowledgements fits its padding; three do not.
     let events = AXIS_1 + 8 + 20 + 8;
-    let expected = Error::Truncated { what: "event block", offset: events + 8, needed: 1, available: 0 };
+    let expected = Error::truncated("event block", events + 8, 1, 0);
     assert_eq!(refused(|o| o[events + 3] = 0x30), expected);
-    assert_eq!(
-        refused(|o| o.push(0)),
-        Error::Trailing { what: "instance data blocks", offset: full().len(), excess: 1 }
-    );
+    assert_eq!(refused(|o| o.push(0)), Error::trailing("instance data blocks", full().len(), 1));
     let len = full().len();
-    assert_eq!(
-        refused(|o| o[4] = 4),
-        Error::Truncated { what: "instance header", offset: len, needed: 8, available: 0 }
-    );
-    assert!(matches!(refused(|o| o[4] = 2), Error::Trailing { offset: AXIS_2, .. }));
+    assert_eq!(refused(|o| o[4] = 4), Error::truncated("instance header", len, 8, 0));
+    assert!(matches!(refused(|o| o[4] = 2), Error { offset: Some(AXIS_2), expected: Expected::End, .. }));
 }
 
 #[test]
@@ -152,7 +147,7 @@ fn a_service_over_255_words_cannot_be_written() {
     let instance = CommandInstance { service: Some(service), ..CommandInstance::default() };
     let mut buffer = [0xA5; 2048];
     let mut writer = crate::wire::Writer::new(&mut buffer);
-    let expected = Error::OutOfRange { what: "block size in words", value: 258, max: 255 };
+    let expected = Error::too_large("block size in words", 255, 258);
     assert_eq!(instance.emit(&mut writer), Err(expected));
     assert_eq!(writer.written(), 0);
 }

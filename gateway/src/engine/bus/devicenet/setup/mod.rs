@@ -5,6 +5,7 @@
 //! | its limits, as the configuration has them | SpeedScale: it has to be the one of the configuration |
 //! | Configuration Complete (attribute 89) | control and reference from the network, where its assembly has no bits for them |
 
+use profile_cip::device::attribute::id;
 use profile_cip::devicenet::master::event::{ExplicitRequest, Outcome};
 
 use super::access::{read, value, write, written};
@@ -12,16 +13,13 @@ use crate::engine::access::{AccessFailure, Refusal};
 use crate::mapping::Attribute;
 use crate::mapping::devicenet::{motion, speed};
 
-/// Control Status, whose bit 0 is Configuration Complete.
-const CONTROL_STATUS: u16 = 89;
-
 /// `NetCtrl` of the Control Supervisor.
 const NET_CONTROL: u16 = 5;
 
 /// `NetRef` of the AC/DC Drive object.
 const NET_REFERENCE: u16 = 4;
 
-/// One step.
+/// One explicit message before operation, and the answer that it must have.
 #[derive(Debug, Clone)]
 pub struct SetupStep {
     /// What it is about.
@@ -45,7 +43,7 @@ pub enum SetupFailure {
     /// It has not taken a value.
     #[error("writing {attribute}: {}", why(*failure))]
     NotWritten {
-        /// The attribute.
+        /// Class, instance and attribute that it was about.
         attribute: Attribute,
         /// Why.
         failure: AccessFailure,
@@ -53,7 +51,7 @@ pub enum SetupFailure {
     /// It has not told a value.
     #[error("reading {attribute}: {}", why(*failure))]
     NotRead {
-        /// The attribute.
+        /// Class, instance and attribute that it was about.
         attribute: Attribute,
         /// Why.
         failure: AccessFailure,
@@ -61,7 +59,7 @@ pub enum SetupFailure {
     /// It has another value than the configuration says.
     #[error("{attribute}: expected {expected}, the drive has {found}")]
     Other {
-        /// The attribute.
+        /// Class, instance and attribute that it was about.
         attribute: Attribute,
         /// What the configuration says.
         expected: i8,
@@ -89,7 +87,7 @@ fn set(class: u16, id: u16, bytes: &[u8]) -> Option<SetupStep> {
 #[must_use]
 pub fn motion_steps(limits: &[(u16, f32)]) -> Vec<SetupStep> {
     let limits = limits.iter().filter_map(|(id, value)| set(motion::CLASS, *id, &value.to_le_bytes()));
-    limits.chain(set(motion::CLASS, CONTROL_STATUS, &[1])).collect()
+    limits.chain(set(motion::CLASS, id::CONTROL_STATUS, &[1])).collect()
 }
 
 /// The steps of a velocity drive with this SpeedScale; `extended` is whether its output assembly has bits for control and

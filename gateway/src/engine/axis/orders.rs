@@ -1,0 +1,221 @@
+//! What the north side wants the axis to be, as a level, and resets of faults under way.
+
+use profile_generic::state::Request;
+use profile_generic::time::MonotonicTime;
+
+use super::RESET_TIME_OUT;
+
+/// What a north side wants the axis to be: it holds until the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Intent {
+    /// Nothing: without torque.
+    #[default]
+    Standby,
+    /// In operation.
+    Enable,
+    /// In a test, with torque where the test needs it.
+    Test,
+    /// Stopped as configured.
+    Disable,
+    /// Shut down.
+    Shutdown,
+    /// Stopped for a fault.
+    Abort,
+}
+
+/// An intent, and the request to the generic state machine by which it is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wish {
+    /// What the axis shall be.
+    pub intent: Intent,
+    /// The request; `None` when nothing is asked of the drive.
+    pub request: Option<Request>,
+}
+
+/// Who controls an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Owner {
+    /// A controller or a local client may take it.
+    #[default]
+    Nobody,
+    /// The controller that is connected to its device.
+    Controller,
+    /// A client of local control.
+    Local,
+}
+
+impl Owner {
+    /// Its name in the protocol of local control.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nobody => "nobody",
+            Self::Controller => "controller",
+            Self::Local => "local",
+        }
+    }
+}
+
+/// A reset of faults under way.
+#[derive(Debug, Clone, Copy)]
+struct Reset {
+    id: u32,
+    /// Since it was asked for, then since it was begun.
+    since: MonotonicTime,
+    begun: bool,
+}
+
+/// What one axis is asked for.
+#[derive(Debug, Default)]
+pub(super) struct Orders {
+    wish: Wish,
+    /// An enable was rejected and is still asked for.
+    enable_pending: bool,
+    /// The reset that was carried out last.
+    reset_id: u32,
+    reset: Option<Reset>,
+    /// The drive's own fault reset is to be executed.
+    pub drive_reset_wanted: bool,
+    /// A request of this number was taken from a north side that speaks in the generic model.
+    requested: Option<u32>,
+    /// A controller is connected to the device of the axis.
+    pub controller: bool,
+    /// A client of local control controls the axis.
+    pub local: bool,
+}
+
+/// What follows from a reset that goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ResetStep {
+    /// The faults are to be cleared now.
+    Clear,
+    /// It takes too long: it is not waited for any longer.
+    Abandon,
+}
+
+impl Orders {
+    pub fn owner(&self) -> Owner {
+        match (self.local, self.controller) {
+            (true, _) => Owner::Local,
+            (false, true) => Owner::Controller,
+            (false, false) => Owner::Nobody,
+        }
+    }
+
+    pub fn wish(&self) -> Wish {
+        self.wish
+    }
+
+    /// Takes another wish.
+    pub fn want(&mut self, wish: Wish) {
+        self.wish = wish;
+        self.enable_pending = false;
+    }
+
+    /// The request for it was rejected: an enable that came in the very cycle in which the drive was not ready is still
+    /// asked for.
+    pub fn reject(&mut self) {
+        self.enable_pending = matches!(self.wish.intent, Intent::Enable | Intent::Test);
+    }
+
+    /// Whether such an enable is to be tried again, now that the drive is ready.
+    pub fn take_pending(&mut self) -> bool {
+        std::mem::take(&mut self.enable_pending)
+    }
+
+    /// Whether the request of this number is another one than the last.
+    pub fn is_new(&mut self, sequence: u32) -> bool {
+        self.requested.replace(sequence) != Some(sequence)
+    }
+
+    /// The reset that was carried out last.
+    pub fn reset_id(&self) -> u32 {
+        self.reset_id
+    }
+
+    /// Whether this reset was neither carried out nor is under way.
+    pub fn is_new_reset(&self, id: u32) -> bool {
+        id != self.reset_id && self.reset.is_none_or(|reset| reset.id != id)
+    }
+
+    pub fn begin_reset(&mut self, now: MonotonicTime, id: u32) {
+        self.reset = Some(Reset { id, since: now, begun: false });
+    }
+
+    /// Whether a reset waits or is under way.
+    pub fn has_reset(&self) -> bool {
+        self.reset.is_some()
+    }
+
+    /// Whether a reset is under way: the drive may still show what is being reset.
+    pub fn resets(&self) -> bool {
+        self.reset.is_some_and(|reset| reset.begun)
+    }
+
+    /// Begins a reset that waits, once the axis does not stop any more: a stop under way is not interrupted.
+    pub fn advance_reset(&mut self, now: MonotonicTime, stops: bool) -> Option<ResetStep> {
+        let reset = self.reset.as_mut().filter(|reset| !reset.begun && !stops)?;
+        *reset = Reset { since: now, begun: true, ..*reset };
+        Some(ResetStep::Clear)
+    }
+
+    /// Ends a reset under way when the axis is not `faulted` any more, or its time is over.
+    pub fn end_reset(&mut self, now: MonotonicTime, faulted: bool) -> Option<ResetStep> {
+        let reset = self.reset.filter(|reset| reset.begun)?;
+        let late = now.since(reset.since) > RESET_TIME_OUT;
+        if !faulted || late {
+            self.reset = None;
+            self.reset_id = reset.id;
+        }
+        late.then_some(ResetStep::Abandon)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use profile_generic::time::DurationNs;
+
+    const NOW: MonotonicTime = MonotonicTime(1_000);
+
+    #[test]
+    fn a_reset_waits_for_the_stop_and_ends_when_the_drive_is_well_or_its_time_is_over() {
+        let mut orders = Orders::default();
+        assert!(!orders.is_new_reset(0) && orders.is_new_reset(7));
+        orders.begin_reset(NOW, 7);
+        assert!(!orders.is_new_reset(7) && orders.has_reset() && !orders.resets());
+        assert_eq!(orders.advance_reset(NOW, true), None);
+        assert_eq!(orders.end_reset(NOW, false), None, "it has not begun");
+        assert_eq!(orders.reset_id(), 0);
+        assert_eq!(orders.advance_reset(NOW, false), Some(ResetStep::Clear));
+        assert_eq!(orders.advance_reset(NOW, false), None, "once");
+        assert_eq!((orders.end_reset(NOW + RESET_TIME_OUT, true), orders.resets()), (None, true));
+        assert_eq!((orders.end_reset(NOW, false), orders.reset_id()), (None, 7));
+        orders.begin_reset(NOW, 8);
+        orders.advance_reset(NOW, false);
+        let late = NOW + RESET_TIME_OUT + DurationNs(1);
+        assert_eq!((orders.end_reset(late, true), orders.reset_id()), (Some(ResetStep::Abandon), 8));
+        assert!(!orders.has_reset());
+    }
+
+    #[test]
+    fn only_a_rejected_enable_or_test_is_tried_again_and_another_wish_ends_it() {
+        for (intent, again) in
+            [(Intent::Enable, true), (Intent::Test, true), (Intent::Disable, false), (Intent::Abort, false)]
+        {
+            let mut orders = Orders::default();
+            orders.want(Wish { intent, request: None });
+            orders.reject();
+            assert_eq!((orders.take_pending(), orders.take_pending()), (again, false), "{intent:?}");
+            orders.reject();
+            orders.want(Wish::default());
+            assert!(!orders.take_pending(), "{intent:?}");
+        }
+    }
+
+    #[test]
+    fn a_request_counts_once() {
+        let mut orders = Orders::default();
+        assert!(orders.is_new(0) && !orders.is_new(0) && orders.is_new(1) && orders.is_new(0));
+    }
+}

@@ -1,0 +1,180 @@
+//! The whole axis, without a drive's program: what its parts do together about faults.
+
+use super::*;
+use profile_generic::fault::FaultCause;
+use profile_generic::fault_set::Origin;
+use profile_generic::inhibit::Inhibits;
+use profile_generic::state::Request;
+use profile_generic::time::SystemTime;
+
+const NOW: MonotonicTime = MonotonicTime(5_000_000_000);
+const SYSTEM: SystemTime = SystemTime(9);
+
+const OVERTRAVEL: FaultCause = FaultCause::HARDWARE_OVERTRAVEL_POSITIVE;
+const OVERSPEED: FaultCause = FaultCause::MOTOR_OVER_SPEED_USER_LIMIT;
+
+/// An axis in operation.
+fn operating() -> AxisChannel {
+    let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+    axis.report(NOW, SYSTEM, Report::Ready);
+    axis.request(NOW, SYSTEM, Request::Enable);
+    axis.report(NOW, SYSTEM, Report::Operating);
+    assert_eq!((axis.state(), axis.action()), (DriveState::Operating, Action::Enable));
+    axis
+}
+
+fn wants(axis: &mut AxisChannel, rows: &[(FaultCause, Reaction)]) {
+    let mut reactions = Reactions::default();
+    for (cause, reaction) in rows {
+        reactions.set(*cause, *reaction);
+    }
+    axis.set_reactions(NOW, SYSTEM, &reactions);
+}
+
+fn watched(axis: &mut AxisChannel, cause: FaultCause) {
+    axis.watch_conditions(NOW, SYSTEM, &[(cause, true)]);
+}
+
+fn cause(axis: &AxisChannel) -> Option<FaultCause> {
+    axis.fault().map(|fault| fault.cause)
+}
+
+#[test]
+fn what_is_watched_stops_the_axis_at_once_or_is_only_there_as_the_north_side_wants() {
+    let rows = [
+        (None, DriveState::FaultReaction, Action::Disable),
+        (Some(Reaction::Ignore), DriveState::Operating, Action::Enable),
+        (Some(Reaction::Alarm), DriveState::Operating, Action::Enable),
+        (Some(Reaction::HoldPosition), DriveState::FaultReaction, Action::Disable),
+        (Some(Reaction::CoastAndDisable), DriveState::FaultReaction, Action::TorqueOff),
+    ];
+    for (configured, state, action) in rows {
+        let mut axis = operating();
+        wants(&mut axis, &configured.map_or(vec![], |reaction| vec![(OVERSPEED, reaction)]));
+        watched(&mut axis, OVERSPEED);
+        assert_eq!((axis.state(), axis.action()), (state, action), "{configured:?}");
+        assert!(axis.fault_set().contains(OVERSPEED, Origin::Watch), "{configured:?}");
+        assert_eq!(cause(&axis).is_some(), state == DriveState::FaultReaction, "{configured:?}");
+    }
+}
+
+#[test]
+fn two_faults_at_once_stop_the_axis_by_the_more_severe_reaction_and_the_first_is_its_fault() {
+    for (first, second, action) in [
+        (Reaction::DecelerateAndDisable, Reaction::CoastAndDisable, Action::TorqueOff),
+        (Reaction::CoastAndDisable, Reaction::DecelerateAndDisable, Action::TorqueOff),
+        (Reaction::Alarm, Reaction::DecelerateAndDisable, Action::Disable),
+    ] {
+        let mut axis = operating();
+        wants(&mut axis, &[(OVERSPEED, first), (OVERTRAVEL, second)]);
+        watched(&mut axis, OVERSPEED);
+        watched(&mut axis, OVERTRAVEL);
+        assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, action), "{first} {second}");
+        let expected = if first.stops() { (OVERSPEED, first) } else { (OVERTRAVEL, second) };
+        let fault = axis.fault().expect("a fault");
+        assert_eq!((fault.cause, fault.reaction), expected, "each with its own reaction");
+    }
+}
+
+#[test]
+fn a_fault_of_the_drive_is_not_made_milder_by_the_configuration() {
+    let mut axis = operating();
+    wants(&mut axis, &[(FaultCause::OVER_CURRENT, Reaction::Ignore)]);
+    let reaction = FaultCause::OVER_CURRENT.default_reaction();
+    axis.drive_fault(NOW, SYSTEM, FaultCause::OVER_CURRENT, reaction, 7);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::TorqueOff));
+    // The same cause as something that the gateway watches is for the configuration to say.
+    let mut axis = operating();
+    let ignored = [FaultCause::OVER_CURRENT, FaultCause::VELOCITY_COMMAND_LIMIT];
+    wants(&mut axis, &ignored.map(|cause| (cause, Reaction::Ignore)));
+    watched(&mut axis, FaultCause::OVER_CURRENT);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Operating, None));
+    // And what the gateway stops for itself stops it.
+    axis.raise(NOW, SYSTEM, Fault::new(FaultCause::VELOCITY_COMMAND_LIMIT, SYSTEM));
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Disable));
+}
+
+#[test]
+fn a_warning_stops_the_axis_only_where_it_is_told_to() {
+    let warning = Fault::new(FaultCause::MOTOR_OVERLOAD, SYSTEM).with_reaction(Reaction::Alarm);
+    let mut axis = operating();
+    assert!(axis.notice(NOW, SYSTEM, warning, Origin::Warning));
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Operating, None));
+    let mut axis = operating();
+    wants(&mut axis, &[(FaultCause::MOTOR_OVERLOAD, Reaction::HoldPosition)]);
+    assert!(axis.notice(NOW, SYSTEM, warning, Origin::Warning));
+    assert_eq!(axis.action(), Action::Disable, "a controlled stop is the best that it leaves");
+}
+
+#[test]
+fn another_configuration_counts_for_a_fault_that_stands() {
+    let mut axis = operating();
+    wants(&mut axis, &[(OVERSPEED, Reaction::Alarm), (OVERTRAVEL, Reaction::Ignore)]);
+    watched(&mut axis, OVERSPEED);
+    watched(&mut axis, OVERTRAVEL);
+    assert_eq!(axis.state(), DriveState::Operating);
+    // Another cause altogether: nothing follows.
+    wants(
+        &mut axis,
+        &[
+            (OVERSPEED, Reaction::Alarm),
+            (OVERTRAVEL, Reaction::Ignore),
+            (FaultCause::HOMING, Reaction::Shutdown),
+        ],
+    );
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Operating, None));
+    wants(&mut axis, &[(OVERSPEED, Reaction::Alarm), (OVERTRAVEL, Reaction::HoldPosition)]);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Disable));
+    assert_eq!(cause(&axis), Some(OVERTRAVEL), "the one that now stops it, and not the one that came first");
+}
+
+#[test]
+fn another_configuration_makes_a_stop_under_way_harder_and_never_milder() {
+    let mut axis = operating();
+    wants(&mut axis, &[(OVERSPEED, Reaction::DecelerateAndDisable)]);
+    watched(&mut axis, OVERSPEED);
+    assert_eq!(axis.action(), Action::Disable);
+    wants(&mut axis, &[(OVERSPEED, Reaction::CoastAndDisable)]);
+    assert_eq!(axis.action(), Action::TorqueOff);
+    wants(&mut axis, &[(OVERSPEED, Reaction::Ignore)]);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::TorqueOff));
+    assert_eq!(cause(&axis), Some(OVERSPEED), "it has stopped the axis, and stays until a reset");
+}
+
+#[test]
+fn what_stands_without_torque_stops_nothing_and_lets_no_axis_start() {
+    let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+    axis.report(NOW, SYSTEM, Report::Ready);
+    let warning = Fault::new(FaultCause::MOTOR_OVERLOAD, SYSTEM).with_reaction(Reaction::Alarm);
+    axis.notice(NOW, SYSTEM, warning, Origin::Warning);
+    wants(&mut axis, &[(FaultCause::MOTOR_OVERLOAD, Reaction::HoldPosition)]);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Ready, None), "nothing to stop");
+    axis.request(NOW, SYSTEM, Request::Enable);
+    assert_eq!(axis.state(), DriveState::FaultReaction);
+    assert_eq!((axis.action(), cause(&axis)), (Action::Disable, Some(FaultCause::MOTOR_OVERLOAD)));
+}
+
+#[test]
+fn a_fault_that_the_state_machine_finds_has_the_configured_reaction_too() {
+    let mut axis = operating();
+    wants(&mut axis, &[(FaultCause::SAFE_TORQUE_OFF, Reaction::Shutdown)]);
+    axis.set_inhibits(NOW, SYSTEM, Inhibits::SAFETY);
+    let fault = axis.fault().expect("a fault");
+    assert_eq!((fault.cause, fault.reaction), (FaultCause::SAFE_TORQUE_OFF, Reaction::Shutdown));
+}
+
+#[test]
+fn a_reset_ends_the_fault_and_a_condition_that_comes_again_is_one_again() {
+    let mut axis = operating();
+    watched(&mut axis, OVERSPEED);
+    axis.watch_conditions(NOW, SYSTEM, &[(OVERSPEED, false)]);
+    axis.report(NOW, SYSTEM, Report::Ready);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Faulted, Some(OVERSPEED)));
+    axis.want_reset(NOW, SYSTEM, 1);
+    axis.report(NOW, SYSTEM, Report::Ready);
+    assert_eq!((axis.state(), cause(&axis), axis.reset_id()), (DriveState::Ready, None, 1));
+    axis.request(NOW, SYSTEM, Request::Enable);
+    axis.report(NOW, SYSTEM, Report::Operating);
+    watched(&mut axis, OVERSPEED);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::FaultReaction, Some(OVERSPEED)));
+}

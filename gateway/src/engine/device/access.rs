@@ -1,0 +1,235 @@
+//! Attributes that live in the drive, or in its process image: the controller's accesses to them.
+
+use arrayvec::ArrayVec;
+use profile_cip::device::attribute_worker::{AccessOperation, AttributeAccess};
+use profile_cip::device::motion_device::MotionDevice;
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::parameter::Parameter;
+
+use super::refusal::refusal;
+use super::scaling::signal_octets;
+use super::stopping_torque::{self, Comparison};
+use crate::engine::access::Access;
+use crate::engine::axis::AxisChannel;
+use crate::engine::bus::{Answer, Buses, Purpose};
+use crate::mapping::{self, AttributeEntry, AttributeTable, Backing, ParameterEntry, SequenceAttributes};
+
+/// Writes to the drive that may be under way for one axis.
+const WRITES_MAX: usize = 8;
+
+/// The accesses of one axis that wait for its drive.
+#[derive(Debug, Default)]
+pub(super) struct Accesses {
+    /// Attributes of the sequences that are being written to the drive: ticket, attribute and bytes. What the drive has
+    /// taken is kept here as well, because the gateway goes by it.
+    writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
+    /// A Stopping Torque that is being compared with the drive's torque limits.
+    comparison: Option<Comparison>,
+}
+
+/// The axis whose attributes are accessed.
+pub(super) struct Accessed<'a> {
+    pub device: &'a mut MotionDevice,
+    /// Number of the device in the gateway.
+    pub number: u8,
+    /// Place of the axis in the device.
+    pub place: usize,
+    /// Number of the axis in the engine.
+    pub axis_number: usize,
+    pub attributes: &'a AttributeTable,
+    pub axis: &'a AxisChannel,
+}
+
+impl Accesses {
+    /// Begins an access; an error is its answer.
+    pub fn begin(
+        &mut self,
+        on: &mut Accessed<'_>,
+        access: &AttributeAccess,
+        buses: &mut Buses,
+        sequence: &SequenceAttributes,
+    ) -> Result<(), GeneralStatus> {
+        let entry = *on.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let (parameter, reject) = match entry.backing {
+            Backing::Signal { .. } => return on.read_signal(access),
+            Backing::Parameter { parameter, reject, .. } => (parameter, reject),
+            _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        };
+        let program = on.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        let Some(held) = program.parameter(parameter) else {
+            if reject || program.rejects(parameter) {
+                return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+            }
+            if let AccessOperation::Write(bytes) = &access.operation
+                && stopping_torque::is_stopping_torque(&entry)
+            {
+                return self.compare(on, access, bytes, &entry, buses);
+            }
+            return on.shadow(access);
+        };
+        if held.to_drive.is_none() && entry.access != mapping::Access::Get {
+            match (&access.operation, parameter.is_of_vendor()) {
+                // The drive lets the parameter only be read: what the controller sets is kept beside it.
+                (_, false) => return on.shadow(access),
+                (AccessOperation::Write(_), true) => return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
+                (AccessOperation::Read(_), true) => {}
+            }
+        }
+        let (request, write) = match &access.operation {
+            AccessOperation::Read(_) => (Access::read(held.item), false),
+            AccessOperation::Write(bytes) => (on.write(&entry, bytes, parameter, held)?, true),
+        };
+        let (ticket, attribute) = (access.ticket, access.id);
+        let purpose = Purpose::Attribute { ticket, device: on.number, attribute, write };
+        if !buses.access(on.axis_number, &request, purpose) {
+            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+        }
+        self.note_write(access, sequence);
+        Ok(())
+    }
+
+    /// Compares a Stopping Torque with the drive's torque limits. A comparison in progress is overtaken, or its drive was lost.
+    fn compare(
+        &mut self,
+        on: &mut Accessed<'_>,
+        access: &AttributeAccess,
+        bytes: &[u8],
+        entry: &AttributeEntry,
+        buses: &mut Buses,
+    ) -> Result<(), GeneralStatus> {
+        if let Some(before) = self.comparison.take() {
+            on.device.complete_attribute(before.ticket, Err(GeneralStatus::DEVICE_STATE_CONFLICT));
+        }
+        let number = (on.number, on.axis_number);
+        self.comparison = Some(Comparison::begin(access, bytes, entry, number, on.axis, buses)?);
+        Ok(())
+    }
+
+    /// Remembers what is written to the drive for an attribute that the sequences go by.
+    fn note_write(&mut self, access: &AttributeAccess, sequence: &SequenceAttributes) {
+        if let AccessOperation::Write(bytes) = &access.operation
+            && [sequence.zero_speed, sequence.ramp_deceleration].contains(&access.id)
+            && let Ok(value) = ArrayVec::try_from(&bytes[..])
+        {
+            if self.writes.is_full() {
+                self.writes.remove(0);
+            }
+            self.writes.push((access.ticket, access.id, value));
+        }
+    }
+
+    /// Takes the drive's answer to an access, and answers the controller.
+    pub fn answer(
+        &mut self,
+        on: &mut Accessed<'_>,
+        answer: &Answer,
+        (ticket, attribute, write): (u32, u16, bool),
+    ) {
+        if let Some(at) = self.writes.iter().position(|(of, ..)| *of == ticket) {
+            let (_, id, value) = self.writes.remove(at);
+            if answer.result.is_ok() {
+                // It was checked against the type of the attribute when it was encoded.
+                let _ = on.device.put_attribute(on.place, id, &value);
+            }
+        }
+        if let Some(comparison) = self.comparison.as_mut().filter(|comparison| comparison.ticket == ticket) {
+            if let Some(verdict) = comparison.take(answer, on.axis) {
+                let (id, value) = (comparison.attribute, comparison.bytes.clone());
+                self.comparison = None;
+                let kept = verdict.and_then(|()| on.device.put_attribute(on.place, id, &value));
+                on.device.complete_attribute(ticket, kept.map(|()| &[][..]));
+            }
+            return;
+        }
+        let mut bytes = [0; 8];
+        let result = match &answer.result {
+            Err(failure) => Err(refusal(*failure)),
+            Ok(_) if write => Ok(0),
+            Ok((data, _)) => on.read(attribute, data, &mut bytes),
+        };
+        on.device.complete_attribute(ticket, result.map(|len| &bytes[..len]));
+    }
+}
+
+impl Accessed<'_> {
+    fn read_signal(&mut self, access: &AttributeAccess) -> Result<(), GeneralStatus> {
+        let mut bytes = [0; 8];
+        let view = self.device.position_view(self.place);
+        let len = view
+            .and_then(|view| signal_octets(self.attributes, self.axis, &view, access.id, &mut bytes))
+            .ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
+        Ok(())
+    }
+
+    /// A parameter that the drive lacks: kept and given back.
+    fn shadow(&mut self, access: &AttributeAccess) -> Result<(), GeneralStatus> {
+        match &access.operation {
+            AccessOperation::Read(_) => {
+                let mut bytes = [0; 8];
+                let held = self.device.attribute(self.place, access.id)?;
+                let len = held.len().min(bytes.len());
+                bytes[..len].copy_from_slice(&held[..len]);
+                self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
+            }
+            AccessOperation::Write(bytes) => {
+                self.device.put_attribute(self.place, access.id, bytes)?;
+                self.device.complete_attribute(access.ticket, Ok(&[]));
+            }
+        }
+        Ok(())
+    }
+
+    /// The request that writes an attribute to the drive.
+    fn write(
+        &self,
+        entry: &AttributeEntry,
+        bytes: &[u8],
+        parameter: Parameter,
+        held: &ParameterEntry,
+    ) -> Result<Access, GeneralStatus> {
+        let generic = entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?;
+        let kept = |id| generic_of(self.attributes, self.device, self.place, id);
+        if stopping_torque::exceeds(parameter, generic, self.attributes, kept, self.axis) {
+            return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+        }
+        let (bytes, len, clamped) = held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
+        if clamped {
+            return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+        }
+        Access::write(held.item, &bytes[..len]).ok_or(GeneralStatus::TOO_MUCH_DATA)
+    }
+
+    /// What the drive has answered to a read, as the attribute; its length.
+    fn read(&self, attribute: u16, data: &[u8], bytes: &mut [u8; 8]) -> Result<usize, GeneralStatus> {
+        let entry = self.attributes.get(attribute);
+        let generic = held(self.attributes, self.axis, attribute).and_then(|held| held.decode(data));
+        let (entry, generic) = entry.zip(generic).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        match entry.from_generic(generic, bytes) {
+            Ok((len, false)) => Ok(len),
+            // The attribute cannot hold what the drive has.
+            Ok((_, true)) => Err(GeneralStatus::DEVICE_STATE_CONFLICT),
+            Err(_) => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        }
+    }
+}
+
+/// The value that the device holds of an attribute, in its generic unit.
+pub(super) fn generic_of(
+    attributes: &AttributeTable,
+    device: &MotionDevice,
+    place: usize,
+    id: u16,
+) -> Option<i64> {
+    attributes.get(id)?.to_generic(device.attribute(place, id).ok()?).ok()
+}
+
+/// The parameter of the drive that holds an attribute.
+pub(super) fn held<'a>(
+    attributes: &AttributeTable,
+    axis: &'a AxisChannel,
+    id: u16,
+) -> Option<&'a ParameterEntry> {
+    let Backing::Parameter { parameter, .. } = attributes.get(id)?.backing else { return None };
+    axis.south()?.parameter(parameter)
+}

@@ -1,0 +1,17 @@
+//! What a refusal of the drive means to the controller.
+
+use profile_cip::wire::status::GeneralStatus;
+
+use crate::engine::access::{AccessFailure, Refusal};
+
+/// The status with which an access of the controller ends.
+pub(super) fn refusal(failure: AccessFailure) -> GeneralStatus {
+    match failure {
+        AccessFailure::Refused(Refusal::Unknown) => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+        AccessFailure::Refused(Refusal::ReadOnly) => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+        AccessFailure::Refused(Refusal::Value) => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+        AccessFailure::Refused(Refusal::Other) | AccessFailure::Unanswered => {
+            GeneralStatus::DEVICE_STATE_CONFLICT
+        }
+    }
+}

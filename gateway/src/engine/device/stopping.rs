@@ -1,0 +1,124 @@
+//! How an axis starts and stops, from the attributes that the controller has set.
+
+use profile_cip::device::motion_device::{MotionDevice, SequenceSettings};
+use profile_cip::wire::motion::codes::ControlMode;
+use profile_generic::fault::Reaction;
+use profile_generic::mode::OperatingMode;
+use profile_generic::quantity::{Acceleration, Velocity};
+use profile_generic::sequence::SequenceTimes;
+use profile_generic::time::DurationNs;
+
+use super::access::{generic_of, held};
+use super::axis::CipAxis;
+use super::scaling::number_of;
+use crate::engine::axis::{AxisChannel, StopSettings};
+use crate::mapping::{AttributeTable, SequenceAttributes};
+
+/// What a stop falls back to where the controller has set nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StopDefaults {
+    /// Speed of an axis that stands.
+    pub zero_speed: Velocity,
+    /// Deceleration of a ramp.
+    pub deceleration: Option<Acceleration>,
+}
+
+/// The settings of starts and stops of one axis. They are worked out again when something has changed that they are made of.
+#[derive(Debug)]
+pub(super) struct Stopping {
+    defaults: StopDefaults,
+    held: Option<(Sources, (StopSettings, SequenceSettings))>,
+}
+
+/// What the settings are made of, besides [`StopDefaults`]: attributes of the axis, its programs, and the control mode of the
+/// last update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Sources {
+    attributes: Option<u64>,
+    programs: (u64, u32),
+    control_mode: Option<ControlMode>,
+}
+
+/// Where the settings come from.
+#[derive(Clone, Copy)]
+pub(super) struct Settings<'a> {
+    pub rows: &'a SequenceAttributes,
+    pub device: &'a MotionDevice,
+    /// Place of the axis in the device.
+    pub place: usize,
+    pub attributes: &'a AttributeTable,
+    pub cip: &'a CipAxis,
+    pub axis: &'a AxisChannel,
+}
+
+impl Stopping {
+    pub fn new(defaults: StopDefaults) -> Self {
+        Self { defaults, held: None }
+    }
+
+    /// How the axis starts and stops now.
+    pub fn settings(&mut self, from: Settings<'_>) -> (StopSettings, SequenceSettings) {
+        let now = Sources {
+            attributes: from.device.attribute_changes(from.place),
+            programs: (from.axis.programs(), from.cip.scaling_id()),
+            control_mode: from.device.control_mode(from.place),
+        };
+        if let Some((sources, settings)) = self.held
+            && sources == now
+        {
+            debug_assert_eq!(settings, from.work_out(&self.defaults), "it is stale");
+            return settings;
+        }
+        let settings = from.work_out(&self.defaults);
+        self.held = Some((now, settings));
+        settings
+    }
+}
+
+impl Settings<'_> {
+    fn work_out(&self, defaults: &StopDefaults) -> (StopSettings, SequenceSettings) {
+        let Self { rows, device, place, cip, .. } = *self;
+        let raw = |id| number_of(device.attribute(place, id), false);
+        let stopping = u8::try_from(raw(rows.stopping_action)).ok();
+        let stopping = stopping.and_then(|code| cip.program().stopping(code));
+        let by_velocity = device.control_mode(place).and_then(|mode| cip.program().mode(mode.0))
+            == Some(OperatingMode::Velocity);
+        let settings = StopSettings {
+            plan: stopping.map(|row| row.plan).unwrap_or_default(),
+            times: self.times(defaults),
+            deceleration: self.value(rows.ramp_deceleration).map(Acceleration).or(defaults.deceleration),
+            flying_start: raw(rows.flying_start) != 0 && by_velocity,
+            checks_overtravel: raw(rows.overtravel_checking) != 0,
+        };
+        let abort: Reaction = stopping.map(|row| row.abort).unwrap_or_default();
+        let abort = cip.program().fault_action(abort);
+        (settings, SequenceSettings { flying_start: settings.flying_start, abort })
+    }
+
+    fn times(&self, defaults: &StopDefaults) -> SequenceTimes {
+        let Self { rows, .. } = *self;
+        let time = |id| self.value(id).map(DurationNs);
+        // A delay that the drive waits out by itself is not waited twice.
+        let delay = |id| if self.is_in_drive(id) { DurationNs::ZERO } else { time(id).unwrap_or_default() };
+        let stopping_limit = time(rows.stopping_time_limit).unwrap_or(SequenceTimes::FACTORY_LIMIT);
+        SequenceTimes {
+            brake_release_delay: delay(rows.brake_release_delay),
+            brake_engage_delay: delay(rows.brake_engage_delay),
+            stopping_limit,
+            // Where it is not set the stopping time limit applies (attribute 617).
+            coasting_limit: time(rows.coasting_time_limit).unwrap_or(stopping_limit),
+            zero_speed: self.value(rows.zero_speed).map_or(defaults.zero_speed, Velocity),
+            zero_speed_time: time(rows.zero_speed_time).unwrap_or_default(),
+        }
+    }
+
+    /// An attribute in its generic unit; `None` unless it is above 0.
+    fn value(&self, id: u16) -> Option<i64> {
+        generic_of(self.attributes, self.device, self.place, id).filter(|generic| *generic > 0)
+    }
+
+    /// Whether the drive has a parameter for the attribute.
+    fn is_in_drive(&self, id: u16) -> bool {
+        held(self.attributes, self.axis, id).is_some()
+    }
+}

@@ -1,0 +1,232 @@
+//! The published status of the box: made at each change, and every 10 ms otherwise.
+
+use profile_cip::device::visualization::display::{self, Line};
+use profile_cip::device::visualization::{self, Indication};
+use profile_generic::inhibit::Inhibits;
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::axis::{Awaited, AxisChannel};
+use super::bus::{Buses, South};
+use super::changes::Changes;
+use super::device::DeviceChannel;
+use crate::latest::Publisher;
+use crate::mapping::CipProgram;
+use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
+
+/// Longest age of the published status while no state changes.
+const PUBLISH_PERIOD: DurationNs = DurationNs::from_millis(10);
+
+/// The status, and when it was published.
+#[derive(Debug)]
+pub(super) struct Publication {
+    pub status: BoxStatus,
+    publisher: Publisher<BoxStatus>,
+    started: Option<MonotonicTime>,
+    /// When the status was published last, and what it was in outline.
+    published: Option<(MonotonicTime, Outline)>,
+}
+
+/// What the status is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Sources<'a> {
+    pub stopping: bool,
+    pub buses: &'a Buses,
+    pub devices: &'a [DeviceChannel],
+    pub axes: &'a [AxisChannel],
+    pub changes: &'a Changes,
+}
+
+/// The facts that the state of the box depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Outline {
+    stopping: bool,
+    /// All buses are in cyclic operation.
+    up: bool,
+    /// Controllers that are connected.
+    connections: u8,
+}
+
+impl Outline {
+    fn of(sources: &Sources<'_>) -> Self {
+        let connected = sources.devices.iter().filter(|channel| channel.device().connection().is_some());
+        Self {
+            stopping: sources.stopping,
+            up: sources.buses.iter().all(South::is_up),
+            connections: u8::try_from(connected.count()).unwrap_or(u8::MAX),
+        }
+    }
+
+    fn state(self, before: BoxState) -> BoxState {
+        match self {
+            Self { stopping: true, .. } => BoxState::STOPPING,
+            Self { up: true, connections: 0, .. } => BoxState::READY,
+            Self { up: true, .. } => BoxState::RUNNING,
+            _ if matches!(before, BoxState::STARTING | BoxState::PHASE_UP) => BoxState::PHASE_UP,
+            _ => BoxState::BUS_LOST,
+        }
+    }
+}
+
+impl Publication {
+    pub fn new(
+        publisher: Publisher<BoxStatus>,
+        cycle_time: DurationNs,
+        axes: usize,
+        devices: &[DeviceChannel],
+    ) -> Self {
+        let mut status = BoxStatus::STARTING;
+        status.cycle_time_ns = u32::try_from(cycle_time.as_nanos()).unwrap_or(u32::MAX);
+        status.axis_count = u8::try_from(axes).unwrap_or(u8::MAX);
+        for channel in devices {
+            let several = channel.axis_states().count() > 1;
+            for (place, (axis, _)) in channel.axis_states().enumerate() {
+                if let Some(entry) = status.axes.get_mut(axis) {
+                    entry.indicators.several = several;
+                    entry.instance = u8::try_from(place + 1).unwrap_or(u8::MAX);
+                    entry.device = channel.number();
+                }
+            }
+        }
+        Self { status, publisher, started: None, published: None }
+    }
+
+    /// Counts a call that is late by so much, of a box whose shortest cycle is this.
+    pub fn count_lateness(&mut self, late: DurationNs, cycle_time: DurationNs) {
+        let max = &mut self.status.lateness_max_ns;
+        *max = (*max).max(u32::try_from(late.as_nanos()).unwrap_or(u32::MAX));
+        self.status.counters.late_cycles += u64::from(late.as_nanos() > cycle_time.as_nanos() / 2);
+    }
+
+    /// Publishes the status if an axis has changed, the outline has, or the last one is old.
+    pub fn publish(&mut self, now: MonotonicTime, changed: bool, sources: &Sources<'_>) {
+        let started = *self.started.get_or_insert(now);
+        let outline = Outline::of(sources);
+        let stale = |(last, known): (MonotonicTime, _)| now.since(last) >= PUBLISH_PERIOD || known != outline;
+        if changed || self.published.is_none_or(stale) {
+            self.published = Some((now, outline));
+            self.status.uptime = now.since(started);
+            self.status.connections = outline.connections;
+            self.status.state = outline.state(self.status.state);
+            self.fill(now, sources);
+            self.publisher.publish(&self.status);
+        }
+    }
+
+    fn fill(&mut self, now: MonotonicTime, sources: &Sources<'_>) {
+        let status = &mut self.status;
+        status.phase = sources.buses.iter().find_map(South::phase).unwrap_or(PHASE_NONE);
+        let counters = &mut status.counters;
+        (counters.cycles, counters.lost_telegrams, counters.refused_frames) = (0, 0, 0);
+        for counts in sources.buses.iter().map(South::counts) {
+            counters.cycles += counts.cycles;
+            counters.lost_telegrams += counts.lost;
+            counters.refused_frames += counts.refused;
+        }
+        counters.lost_updates = 0;
+        for channel in sources.devices {
+            let device = channel.device();
+            let lost_updates = device.counters().lost_updates;
+            status.counters.lost_updates += lost_updates;
+            status.counters.refused_frames += channel.counters().refused;
+            // Each of them looks at all axes of the device.
+            let (node, module) = (device.node_condition(), device.module_state());
+            let network = channel.network_status();
+            for (place, (number, state)) in channel.axis_states().enumerate() {
+                if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), sources.axes.get(number)) {
+                    of_axis(entry, axis);
+                    let shown = device.axis_condition(place);
+                    entry.indicators = Indicators {
+                        module,
+                        network,
+                        axis: shown.as_ref().map_or(Indication::OFF, visualization::axis_status),
+                        line: shown.as_ref().map_or(Line::default(), |axis| display::line(&node, axis)),
+                        several: entry.indicators.several,
+                        minor_fault: shown.is_some_and(|axis| axis.minor_fault),
+                    };
+                    entry.lost_updates = u32::try_from(lost_updates).unwrap_or(u32::MAX);
+                    let counts =
+                        |program: &CipProgram| low_word(program.counts(axis.feedback().position.get()).value);
+                    entry.position_counts = channel.program(number).map_or(0, counts);
+                    entry.wait = sources.changes.wait(now, number, axis);
+                    entry.cip_axis_state = state.code().0;
+                }
+            }
+        }
+    }
+}
+
+fn of_axis(entry: &mut AxisStatus, axis: &AxisChannel) {
+    let feedback = axis.feedback();
+    let counters = axis.counters();
+    entry.state = axis.state();
+    entry.owner = axis.owner();
+    entry.mode = feedback.mode;
+    entry.status = feedback.status;
+    entry.inhibits = feedback.inhibits.union(axis.awaited().map_or(Inhibits::empty(), Awaited::inhibits));
+    entry.fault = axis.fault().map(|fault| fault.cause);
+    entry.fault_vendor_code = axis.fault().map_or(0, |fault| fault.vendor_code);
+    entry.position = feedback.position;
+    entry.velocity = feedback.velocity;
+    entry.torque = feedback.torque;
+    entry.following_error = feedback.following_error;
+    entry.commands = counters.commands;
+    entry.lost_telegrams = counters.lost_telegrams;
+    entry.saturated = counters.saturated;
+    entry.faults = counters.faults;
+}
+
+/// The DINT that a position is on the controller's side: it wraps.
+fn low_word(counts: i64) -> i32 {
+    let [a, b, c, d, ..] = counts.to_le_bytes();
+    i32::from_le_bytes([a, b, c, d])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::latest::latest;
+
+    fn at(millis: i64) -> MonotonicTime {
+        MonotonicTime::ZERO + DurationNs::from_millis(millis)
+    }
+
+    #[test]
+    fn status_is_published_at_a_change_and_every_ten_milliseconds() {
+        let (publisher, reader) = latest(BoxStatus::STARTING);
+        let mut publication = Publication::new(publisher, DurationNs::from_millis(2), 0, &[]);
+        let (buses, changes) = (Buses::default(), Changes::new(&[]));
+        let mut publish = |millis, changed, stopping| {
+            let sources = Sources { stopping, buses: &buses, devices: &[], axes: &[], changes: &changes };
+            publication.publish(at(millis), changed, &sources);
+            let status = reader.read();
+            (status.uptime, status.state)
+        };
+        let uptime = DurationNs::from_millis;
+        assert_eq!(publish(100, false, false), (uptime(0), BoxState::READY));
+        assert_eq!(publish(109, false, false), (uptime(0), BoxState::READY), "nothing is new");
+        assert_eq!(publish(110, false, false), (uptime(10), BoxState::READY));
+        assert_eq!(publish(111, true, false), (uptime(11), BoxState::READY), "an axis has changed");
+        assert_eq!(publish(112, false, true), (uptime(12), BoxState::STOPPING));
+    }
+
+    #[test]
+    fn call_late_by_more_than_half_a_cycle_is_counted() {
+        let (publisher, _) = latest(BoxStatus::STARTING);
+        let cycle = DurationNs::from_millis(2);
+        let mut publication = Publication::new(publisher, cycle, 0, &[]);
+        for micros in [0, 1_000, 1_001, 20] {
+            publication.count_lateness(DurationNs::from_micros(micros), cycle);
+        }
+        let status = &publication.status;
+        assert_eq!((status.counters.late_cycles, status.lateness_max_ns), (1, 1_001_000));
+    }
+
+    #[test]
+    fn bus_that_fails_is_lost_only_if_it_was_up() {
+        let down = Outline { stopping: false, up: false, connections: 1 };
+        assert_eq!(down.state(BoxState::STARTING), BoxState::PHASE_UP);
+        assert_eq!(down.state(BoxState::RUNNING), BoxState::BUS_LOST);
+        assert_eq!(Outline { up: true, ..down }.state(BoxState::BUS_LOST), BoxState::RUNNING);
+        assert_eq!(Outline { stopping: true, ..down }.state(BoxState::RUNNING), BoxState::STOPPING);
+    }
+}

@@ -1,0 +1,6 @@
+//! Local control over a Unix socket: the text protocol and its server. What the orders do is in [`crate::engine::local`].
+
+pub mod protocol;
+mod server;
+
+pub use self::server::{LocalServer, Shared, SocketFile};

@@ -1,0 +1,473 @@
+//! The Unix socket of local control: a bounded number of clients, each with its own connection.
+//!
+//! ```text
+//! client task --line--> parse --Request--> hub --queue--> engine
+//!             <--reply--             <--Answer--  <--queue--
+//! ```
+//!
+//! A client that disconnects, hangs up, or does not read its replies loses its axes: they stop.
+
+use std::collections::{HashMap, VecDeque};
+use std::io;
+use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::{UnixListener, UnixStream};
+use tokio::sync::mpsc;
+use tracing::{info, warn};
+
+use super::protocol::{self, BadRequest, LINE_MAX};
+use crate::config::AxisKind;
+use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
+use crate::latest::Reader;
+use crate::status::BoxStatus;
+
+/// Clients connected at the same time.
+const CLIENTS_MAX: usize = 4;
+
+/// Orders of a client without an answer.
+const PENDING_MAX: usize = 32;
+
+/// Requests of all clients that wait for the engine.
+const WAITING_MAX: usize = CLIENTS_MAX * PENDING_MAX;
+
+/// How long a client may leave a reply unread.
+const WRITE_TIME_OUT: Duration = Duration::from_secs(1);
+
+/// How often the queues of the engine are looked at.
+const HUB_INTERVAL: Duration = Duration::from_millis(2);
+
+/// What the clients need to know of the gateway.
+#[derive(Debug)]
+pub struct Shared {
+    /// Names of the axes in the order of the configuration.
+    pub names: Vec<String>,
+    /// Rotary or linear, in the order of the axes: it decides the unit in replies.
+    pub kinds: Vec<AxisKind>,
+    /// The status of the gateway.
+    pub status: Reader<BoxStatus>,
+}
+
+impl Shared {
+    /// The state of an axis in the words of the protocol.
+    fn state(&self, axis: usize) -> String {
+        let status = self.status.read();
+        let kind = self.kinds.get(axis).copied().unwrap_or(AxisKind::Rotary);
+        status.axes.get(axis).map_or_else(String::new, |axis| protocol::state(axis, kind))
+    }
+}
+
+/// The file of a socket, removed when this is dropped.
+#[derive(Debug)]
+pub struct SocketFile(PathBuf);
+
+impl Drop for SocketFile {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// The server of the socket.
+#[derive(Debug)]
+pub struct LocalServer {
+    listener: UnixListener,
+    shared: Arc<Shared>,
+    end: ClientEnd,
+    uid: u32,
+}
+
+/// From a client's task to the hub.
+#[derive(Debug)]
+enum ToHub {
+    Order { client: ClientId, id: u32, axis: u8, order: Order },
+    Gone { client: ClientId },
+}
+
+impl LocalServer {
+    /// Creates the socket, for this user only. A socket that a gateway left behind is replaced.
+    ///
+    /// # Errors
+    /// The path is in use, or cannot be created.
+    pub fn bind(path: &Path, shared: Shared, end: ClientEnd) -> io::Result<(Self, SocketFile)> {
+        if let Ok(known) = std::fs::symlink_metadata(path) {
+            if !known.file_type().is_socket() {
+                return Err(io::Error::new(
+                    io::ErrorKind::AlreadyExists,
+                    "a file that is not a socket is there",
+                ));
+            }
+            if std::os::unix::net::UnixStream::connect(path).is_ok() {
+                return Err(io::Error::new(io::ErrorKind::AddrInUse, "another process serves this socket"));
+            }
+            std::fs::remove_file(path)?;
+        }
+        let listener = UnixListener::bind(path)?;
+        let file = SocketFile(path.to_owned());
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
+        let uid = rustix::process::getuid().as_raw();
+        Ok((Self { listener, shared: Arc::new(shared), end, uid }, file))
+    }
+
+    /// Serves clients until the future is dropped.
+    pub async fn run(self) {
+        let Self { listener, shared, mut end, uid } = self;
+        let (to_hub, mut from_clients) = mpsc::channel::<ToHub>(WAITING_MAX);
+        let mut clients: HashMap<ClientId, mpsc::Sender<Answer>> = HashMap::new();
+        let mut waiting: VecDeque<Request> = VecDeque::new();
+        let mut last: ClientId = 0;
+        let mut interval = tokio::time::interval(HUB_INTERVAL);
+        interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                accepted = listener.accept() => match accepted {
+                    Ok((stream, _)) => {
+                        if let Some(stream) = admit(stream, uid, clients.len()) {
+                            last = last.wrapping_add(1).max(1);
+                            let (answers, for_client) = mpsc::channel(PENDING_MAX);
+                            clients.insert(last, answers);
+                            let client = Client { id: last, shared: Arc::clone(&shared), to_hub: to_hub.clone() };
+                            tokio::spawn(client.run(stream, for_client));
+                        }
+                    }
+                    Err(error) => {
+                        warn!(%error, "local control cannot accept a client");
+                        tokio::time::sleep(Duration::from_millis(100)).await;
+                    }
+                },
+                Some(message) = from_clients.recv() => waiting.push_back(match message {
+                    ToHub::Order { client, id, axis, order } => Request::Order { client, id, axis, order },
+                    ToHub::Gone { client } => {
+                        clients.remove(&client);
+                        Request::Gone { client }
+                    }
+                }),
+                _ = interval.tick() => {}
+            }
+            while let Some(request) = waiting.pop_front() {
+                if let Err(rtrb::PushError::Full(request)) = end.requests.push(request) {
+                    waiting.push_front(request);
+                    break;
+                }
+            }
+            while let Ok(answer) = end.answers.pop() {
+                // The channel of a client that does not read its replies is full: it is disconnected.
+                if let Some(client) = clients.get(&answer.client)
+                    && client.try_send(answer).is_err()
+                {
+                    clients.remove(&answer.client);
+                }
+            }
+        }
+    }
+}
+
+/// Lets a client in: one of the gateway's own user or of root, as long as there is room.
+fn admit(stream: UnixStream, uid: u32, clients: usize) -> Option<UnixStream> {
+    match stream.peer_cred() {
+        Ok(peer) if may_connect(peer.uid(), uid) => {}
+        Ok(peer) => {
+            warn!(uid = peer.uid(), "local control refused a client of another user");
+            return None;
+        }
+        Err(error) => {
+            warn!(%error, "local control refused a client of an unknown user");
+            return None;
+        }
+    }
+    if clients >= CLIENTS_MAX {
+        warn!(limit = CLIENTS_MAX, "local control refused a client: too many are connected");
+        return None;
+    }
+    Some(stream)
+}
+
+/// Whether a user may control axes: the one that runs the gateway, and root.
+const fn may_connect(peer: u32, own: u32) -> bool {
+    peer == own || peer == 0
+}
+
+/// The task of one client.
+struct Client {
+    id: ClientId,
+    shared: Arc<Shared>,
+    to_hub: mpsc::Sender<ToHub>,
+}
+
+impl Client {
+    async fn run(self, mut stream: UnixStream, answers: mpsc::Receiver<Answer>) {
+        info!(client = self.id, "local control: client connected");
+        let ended = self.serve(&mut stream, answers).await;
+        let _ = self.to_hub.send(ToHub::Gone { client: self.id }).await;
+        match ended {
+            Ok(()) => info!(client = self.id, "local control: client disconnected"),
+            Err(error) => warn!(client = self.id, %error, "local control: connection lost"),
+        }
+    }
+
+    async fn serve(&self, stream: &mut UnixStream, mut answers: mpsc::Receiver<Answer>) -> io::Result<()> {
+        let mut lines = Lines::default();
+        let mut pending: HashMap<u32, (&'static str, usize)> = HashMap::new();
+        let mut last = 0_u32;
+        let mut buffer = [0; 512];
+        loop {
+            let reply = tokio::select! {
+                read = stream.read(&mut buffer) => {
+                    let len = read?;
+                    if len == 0 {
+                        return Ok(());
+                    }
+                    let mut replies = String::new();
+                    for byte in &buffer[..len] {
+                        let Some(line) = lines.push(*byte) else { continue };
+                        last = last.wrapping_add(1);
+                        match self.request(&line, pending.len()) {
+                            Ok(Accepted { axis, order }) => {
+                                pending.insert(last, (order.name(), axis));
+                                let axis = u8::try_from(axis).unwrap_or(u8::MAX);
+                                let message = ToHub::Order { client: self.id, id: last, axis, order };
+                                if self.to_hub.send(message).await.is_err() {
+                                    return Ok(());
+                                }
+                            }
+                            Err(reply) => replies.push_str(&reply),
+                        }
+                    }
+                    replies
+                }
+                answer = answers.recv() => {
+                    let Some(answer) = answer else {
+                        return Err(unread());
+                    };
+                    match pending.remove(&answer.id) {
+                        Some((order, axis)) => self.reply(order, axis, &answer),
+                        None => String::new(),
+                    }
+                }
+            };
+            let written = tokio::time::timeout(WRITE_TIME_OUT, stream.write_all(reply.as_bytes())).await;
+            written.map_err(|_| unread())??;
+        }
+    }
+
+    /// What a line asks the engine for, or the reply to it.
+    fn request(&self, line: &Result<String, BadRequest>, pending: usize) -> Result<Accepted, String> {
+        let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
+        let names = &self.shared.names;
+        match protocol::parse(line, names).map_err(|error| protocol::bad(line, &error))? {
+            protocol::Request::Axes => Err(protocol::list(names, |axis| self.shared.state(axis))),
+            protocol::Request::Status { axis } => {
+                Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
+            }
+            protocol::Request::Order { .. } if pending >= PENDING_MAX => {
+                Err(protocol::bad(line, &BadRequest::TooMany))
+            }
+            protocol::Request::Order { axis, order } => Ok(Accepted { axis, order }),
+        }
+    }
+
+    fn reply(&self, order: &str, axis: usize, answer: &Answer) -> String {
+        let name = self.shared.names.get(axis).map_or("-", String::as_str);
+        match &answer.result {
+            Ok(()) => protocol::done(order, name, &self.shared.state(axis)),
+            Err(failure) => protocol::failed(order, name, failure),
+        }
+    }
+}
+
+fn unread() -> io::Error {
+    io::Error::new(io::ErrorKind::TimedOut, "the client does not read its replies")
+}
+
+/// An order that goes to the engine.
+struct Accepted {
+    axis: usize,
+    order: Order,
+}
+
+/// Cuts a stream of bytes into lines of bounded length.
+#[derive(Debug, Default)]
+struct Lines {
+    line: Vec<u8>,
+    too_long: bool,
+}
+
+impl Lines {
+    /// Takes a byte; returns the line that it ends.
+    fn push(&mut self, byte: u8) -> Option<Result<String, BadRequest>> {
+        if byte != b'\n' {
+            match self.line.len() < LINE_MAX {
+                true => self.line.push(byte),
+                false => self.too_long = true,
+            }
+            return None;
+        }
+        let line = std::mem::take(&mut self.line);
+        if std::mem::take(&mut self.too_long) {
+            return Some(Err(BadRequest::TooLong));
+        }
+        let text = String::from_utf8(line).ok().map(|text| text.trim_end_matches('\r').to_owned());
+        Some(
+            text.filter(|text| !text.contains(|c: char| c.is_control() && c != '\t'))
+                .ok_or(BadRequest::NotText),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::MetadataExt as _;
+
+    use tokio::io::{AsyncBufReadExt as _, BufReader};
+
+    use super::*;
+    use crate::engine::local::Failure;
+    use crate::latest::latest;
+    use crate::status::tests::distinct;
+
+    /// A server, and the engine's side of its queues.
+    struct Bench {
+        path: PathBuf,
+        requests: rtrb::Consumer<Request>,
+        answers: rtrb::Producer<Answer>,
+        _file: SocketFile,
+        folder: PathBuf,
+    }
+
+    fn shared() -> Shared {
+        let (publisher, status) = latest(distinct());
+        drop(publisher);
+        let names = ["x", "y"].map(str::to_owned).to_vec();
+        Shared { names, kinds: vec![AxisKind::Rotary, AxisKind::Linear], status }
+    }
+
+    fn queues() -> (ClientEnd, rtrb::Consumer<Request>, rtrb::Producer<Answer>) {
+        let (requests, taken) = rtrb::RingBuffer::new(8);
+        let (given, answers) = rtrb::RingBuffer::new(8);
+        (ClientEnd { requests, answers }, taken, given)
+    }
+
+    impl Bench {
+        fn start(name: &str) -> Self {
+            let folder = std::env::temp_dir().join(format!("axisbridge-local-{}-{name}", std::process::id()));
+            std::fs::create_dir_all(&folder).unwrap();
+            let path = folder.join("socket");
+            let (end, requests, answers) = queues();
+            let (server, file) = LocalServer::bind(&path, shared(), end).unwrap();
+            tokio::spawn(server.run());
+            Self { path, requests, answers, _file: file, folder }
+        }
+
+        async fn connect(&self) -> BufReader<UnixStream> {
+            BufReader::new(UnixStream::connect(&self.path).await.unwrap())
+        }
+
+        /// The next request that reaches the engine.
+        async fn request(&mut self) -> Request {
+            for _ in 0..5_000 {
+                if let Ok(request) = self.requests.pop() {
+                    return request;
+                }
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+            panic!("no request reaches the engine");
+        }
+    }
+
+    impl Drop for Bench {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.folder);
+        }
+    }
+
+    async fn say(client: &mut BufReader<UnixStream>, text: &str) {
+        client.get_mut().write_all(text.as_bytes()).await.unwrap();
+    }
+
+    async fn hear(client: &mut BufReader<UnixStream>) -> String {
+        let mut line = String::new();
+        let read = tokio::time::timeout(Duration::from_secs(10), client.read_line(&mut line));
+        read.await.expect("a reply").unwrap();
+        line
+    }
+
+    #[tokio::test]
+    async fn an_order_goes_to_the_engine_and_its_answer_comes_back() {
+        let mut bench = Bench::start("order");
+        let mut client = bench.connect().await;
+        say(&mut client, "enable y\r\nstatus x\nreset x\n").await;
+        let Request::Order { client: number, id, axis: 1, order: Order::Enable } = bench.request().await
+        else {
+            panic!("not the enable");
+        };
+        assert!(
+            hear(&mut client).await.starts_with("ok status x state=operating owner=local mode=position ")
+        );
+        let Request::Order { id: second, axis: 0, order: Order::Reset, .. } = bench.request().await else {
+            panic!("not the reset");
+        };
+        bench.answers.push(Answer { client: number, id: second, result: Err(Failure::Controller) }).unwrap();
+        bench.answers.push(Answer { client: number, id, result: Ok(()) }).unwrap();
+        assert_eq!(
+            hear(&mut client).await,
+            "error reset x controller: a controller is connected to the device of this axis\n"
+        );
+        assert!(hear(&mut client).await.starts_with("ok enable y state=faulted owner=controller "));
+        drop(client);
+        assert_eq!(bench.request().await, Request::Gone { client: number });
+    }
+
+    #[tokio::test]
+    async fn a_line_that_is_no_request_gets_an_error_and_the_next_one_counts() {
+        let bench = Bench::start("line");
+        let mut client = bench.connect().await;
+        let long = "x".repeat(LINE_MAX + 1);
+        say(&mut client, &format!("{long}\nenable \u{1b}[2J\nwhat\naxes\n")).await;
+        assert_eq!(hear(&mut client).await, "error - - syntax: the line is longer than 256 bytes\n");
+        assert_eq!(hear(&mut client).await, "error - - syntax: the line is not printable UTF-8 text\n");
+        assert!(hear(&mut client).await.starts_with("error what - syntax: unknown word `what`"));
+        assert!(hear(&mut client).await.starts_with("axis x state="));
+        assert!(hear(&mut client).await.starts_with("axis y state="));
+        assert_eq!(hear(&mut client).await, "ok axes 2\n");
+    }
+
+    #[tokio::test]
+    async fn one_client_too_many_is_disconnected() {
+        let bench = Bench::start("many");
+        let mut clients = Vec::new();
+        for _ in 0..CLIENTS_MAX {
+            let mut client = bench.connect().await;
+            say(&mut client, "axes\n").await;
+            assert!(hear(&mut client).await.starts_with("axis x "));
+            clients.push(client);
+        }
+        let mut client = bench.connect().await;
+        assert_eq!(hear(&mut client).await, "", "the connection ends");
+    }
+
+    #[test]
+    fn only_root_and_the_user_of_the_gateway_may_connect() {
+        let users = [0, 1000, 1001].map(|peer| [0, 1000].map(|own| may_connect(peer, own)));
+        assert_eq!(users, [[true, true], [false, true], [false, false]]);
+    }
+
+    #[tokio::test]
+    async fn the_socket_is_this_users_and_replaces_only_what_nobody_serves() {
+        let bench = Bench::start("file");
+        assert_eq!(std::fs::metadata(&bench.path).unwrap().mode() & 0o777, 0o600);
+        let again = LocalServer::bind(&bench.path, shared(), queues().0);
+        assert_eq!(again.expect_err("it is served").kind(), io::ErrorKind::AddrInUse);
+        let file = bench.path.with_extension("txt");
+        std::fs::write(&file, "kept").unwrap();
+        let refused = LocalServer::bind(&file, shared(), queues().0);
+        assert_eq!(refused.expect_err("a file").kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+        let stale = bench.path.with_extension("stale");
+        drop(std::os::unix::net::UnixListener::bind(&stale).unwrap());
+        let (_server, guard) = LocalServer::bind(&stale, shared(), queues().0).expect("nobody serves it");
+        drop(guard);
+        assert!(!stale.exists(), "removed at the end");
+    }
+}

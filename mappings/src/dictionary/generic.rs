@@ -1,0 +1,219 @@
+//! Signals and parameters of the generic model, and the parameters that overlays add to it.
+
+use profile_generic::functional_element::FunctionalElement;
+use profile_generic::image::Signal;
+use profile_generic::parameter::{Access, Parameter, ParameterType};
+use profile_generic::quantity::Quantity;
+
+use crate::finding::Findings;
+use crate::finding::registry as code;
+use crate::format::{GenericFile, Name, ParameterRow as GenericParameterRow};
+use crate::load::Parsed;
+use crate::resolver::Resolver;
+
+use super::quantity;
+
+/// Parameters that overlays may define: the registers of a drive's maker are hundreds, and every access is by binary search.
+const VENDOR_PARAMETERS_MAX: usize = 1_024;
+
+/// A parameter of the catalogue, or of an overlay.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GenericParameter {
+    /// Its number.
+    pub parameter: Parameter,
+    /// Its name in the tables.
+    pub name: String,
+    /// Functional element that it belongs to.
+    pub element: FunctionalElement,
+    /// What it measures; decides the unit.
+    pub quantity: Quantity,
+    /// How it is held.
+    pub kind: ParameterType,
+    /// When it may be written.
+    pub access: Access,
+    /// What it is, in a sentence; may be empty for a parameter of an overlay.
+    pub description: String,
+    /// Least and greatest value that may be set, in the unit of the quantity.
+    pub range: Option<(i64, i64)>,
+}
+
+/// Signals and parameters of the generic model, as the generic dictionary lists them. The signals are the fields of the
+/// process image, and the constants of the parameters are generated from the shipped dictionary: another one that says
+/// otherwise is refused. Parameters of overlays come on top.
+#[derive(Debug, Clone, Default)]
+pub struct GenericDictionary {
+    signals: Vec<Signal>,
+    parameters: Vec<GenericParameter>,
+}
+
+impl GenericDictionary {
+    pub(super) fn resolve(file: &Parsed<GenericFile>, errors: &mut Findings) -> Self {
+        let mut resolver = Resolver::new(&file.text, errors);
+        let rows = &file.rows;
+        resolver.head(&rows.format, "profile", &rows.profile, "generic");
+        let mut dictionary = Self::default();
+        for row in &rows.signal {
+            let signals = Signal::ALL.iter().map(|signal| signal.name());
+            let what = "a signal of the generic model";
+            let Some(signal) = resolver.name("name", &row.name, what, Signal::parse, signals) else {
+                continue;
+            };
+            let access = if signal.is_command() { "command" } else { "feedback" };
+            same(&mut resolver, "quantity", &row.quantity, signal.quantity().name());
+            same(&mut resolver, "access", &row.access, access);
+            if let Some(about) = &row.about {
+                same(&mut resolver, "about", about, signal.description());
+            }
+            if dictionary.signals.contains(&signal) {
+                resolver.error(code::TWICE, row.name.span(), "name", "the signal is defined twice");
+            }
+            dictionary.signals.push(signal);
+        }
+        for row in &rows.parameter {
+            let is_of_vendor =
+                row.number.as_ref().is_some_and(|number| Parameter(*number.get_ref()).is_of_vendor());
+            let known = Parameter::from_name(row.name.get_ref()).is_some();
+            let found = match is_of_vendor && !known {
+                true => of_vendor(&mut resolver, row),
+                false => of_catalogue(&mut resolver, row),
+            };
+            dictionary.extend(&mut resolver, row, found);
+        }
+        dictionary.limit(&mut resolver, &rows.profile);
+        dictionary
+    }
+
+    fn extend(
+        &mut self,
+        resolver: &mut Resolver<'_>,
+        row: &GenericParameterRow,
+        found: Option<GenericParameter>,
+    ) {
+        let Some(found) = found else { return };
+        if self.parameters.iter().any(|other| other.name == found.name) {
+            resolver.error(code::TWICE, row.name.span(), "name", "the parameter is defined twice");
+        } else if let Some(other) = self.parameters.iter().find(|other| other.parameter == found.parameter) {
+            let message = format!("0x{:04X} is the number of {}", found.parameter.0, other.name);
+            let span = row.number.as_ref().map_or(row.name.span(), |number| number.span());
+            resolver.error(code::TWICE, span, "number", message);
+        }
+        self.parameters.push(found);
+    }
+
+    fn limit(&self, resolver: &mut Resolver<'_>, at: &Name) {
+        let count = self.parameters.iter().filter(|row| row.parameter.is_of_vendor()).count();
+        if count > VENDOR_PARAMETERS_MAX {
+            let message =
+                format!("expected at most {VENDOR_PARAMETERS_MAX} parameters of vendors, got {count}");
+            resolver.error(code::TOO_MANY, at.span(), "parameter", message);
+        }
+    }
+
+    /// All signals.
+    pub fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    /// All parameters.
+    pub fn parameters(&self) -> &[GenericParameter] {
+        &self.parameters
+    }
+
+    /// The parameter with this name.
+    pub fn parameter(&self, name: &str) -> Option<&GenericParameter> {
+        self.parameters.iter().find(|known| known.name == name)
+    }
+
+    /// The parameter with this number.
+    pub fn by_number(&self, parameter: Parameter) -> Option<&GenericParameter> {
+        self.parameters.iter().find(|known| known.parameter == parameter)
+    }
+
+    /// The names of all parameters.
+    pub fn names(&self) -> impl Iterator<Item = &str> + Clone + '_ {
+        self.parameters.iter().map(|row| row.name.as_str())
+    }
+}
+
+/// A row that repeats the catalogue.
+fn of_catalogue(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<GenericParameter> {
+    let names = Parameter::NAMED.iter().map(|(_, name)| *name);
+    let what = "a parameter of the generic model, or a number from 0x8000 to 0xFFFF for one of your own";
+    let find = |name: &str| Parameter::from_name(name).and_then(Parameter::row);
+    let known = resolver.name("name", &row.name, what, find, names)?;
+    if let Some(number) = row.number.as_ref().filter(|number| *number.get_ref() != known.parameter.0) {
+        let (expected, got) = (known.parameter.0, number.get_ref());
+        let message = format!("expected 0x{expected:04X}, got 0x{got:04X}");
+        resolver.error(code::CONTRADICTS_CATALOGUE, number.span(), "number", message);
+    }
+    if let Some(element) = &row.element {
+        same(resolver, "element", element, known.element.name());
+    }
+    if let Some(about) = &row.about {
+        same(resolver, "about", about, known.description);
+    }
+    same(resolver, "quantity", &row.quantity, known.quantity.name());
+    same(resolver, "type", &row.data_type, known.kind.name());
+    same(resolver, "access", &row.access, known.access.name());
+    if let Some(range) = &row.range {
+        let message = "expected no range: that of a parameter of the catalogue is the drive's";
+        resolver.error(code::CONTRADICTS_CATALOGUE, range.span(), "range", message);
+    }
+    Some(GenericParameter {
+        parameter: known.parameter,
+        name: row.name.get_ref().clone(),
+        element: known.element,
+        quantity: known.quantity,
+        kind: known.kind,
+        access: known.access,
+        description: known.description.to_owned(),
+        range: None,
+    })
+}
+
+/// A row of an overlay that defines a parameter.
+fn of_vendor(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<GenericParameter> {
+    let name = row.name.get_ref();
+    let is_plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
+    if name.is_empty() || !name.bytes().all(is_plain) {
+        let message = format!("expected small letters, digits and _, got `{name}`");
+        resolver.error(code::UNKNOWN_NAME, row.name.span(), "name", message);
+    }
+    let element = match &row.element {
+        None => Some(FunctionalElement::ApplicationFunction),
+        Some(name) => {
+            let names = FunctionalElement::ALL.iter().map(|element| element.name());
+            resolver.name("element", name, "a functional element", FunctionalElement::parse, names)
+        }
+    };
+    let quantity = quantity(resolver, &row.quantity);
+    let kind = resolver.word("type", &row.data_type, &[("integer", ParameterType::Integer)]);
+    let accesses = Access::ALL.iter().map(|access| access.name());
+    let access = resolver.name("access", &row.access, "an access", Access::parse, accesses);
+    let range = row.range.as_ref().map(|range| (range, *range.get_ref()));
+    if let Some((at, [low, high])) = range {
+        if low > high {
+            let message = format!("expected the least value first, got [{low}, {high}]");
+            resolver.error(code::OUT_OF_RANGE, at.span(), "range", message);
+        }
+        if access == Some(Access::Read) {
+            let message = "expected no range for a parameter that is only read";
+            resolver.error(code::CONTRADICTION, at.span(), "range", message);
+        }
+    }
+    Some(GenericParameter {
+        parameter: Parameter(*row.number.as_ref()?.get_ref()),
+        name: name.clone(),
+        element: element?,
+        quantity: quantity?,
+        kind: kind?,
+        access: access?,
+        description: row.about.as_ref().map(|about| about.get_ref().clone()).unwrap_or_default(),
+        range: range.map(|(_, [low, high])| (low, high)),
+    })
+}
+
+/// Checks that a dictionary says what the program was built with.
+fn same(resolver: &mut Resolver<'_>, key: &str, name: &Name, expected: &str) {
+    resolver.same(code::CONTRADICTS_CATALOGUE, key, name, expected);
+}

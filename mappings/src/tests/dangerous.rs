@@ -1,0 +1,318 @@
+//! Tables that would send a drive the wrong way: complete, well formed, and wrong.
+
+use super::*;
+use crate::check;
+use crate::finding::registry::{self as code, Code};
+use crate::finding::{Finding, Severity};
+
+/// One of the files.
+type Table = fn(&mut TableTexts) -> &mut TableText;
+
+/// What is dangerous, in which file, from what, to what, the code and the key of the finding.
+type Case = (&'static str, Table, &'static str, &'static str, Code, &'static str);
+
+const CASES: &[Case] = &[
+    (
+        "polarity of the actual position removed",
+        |t| &mut t.generic_sercos,
+        "polarity = { idn = \"S-0-0055\", bit = 2 }, source = \"Rexroth, Metronix ARS2000, KEBA ServoOne\"",
+        "source = \"Rexroth, Metronix ARS2000, KEBA ServoOne\"",
+        code::WRONG_SIGN,
+        "signal",
+    ),
+    (
+        "bit of the actual position's polarity",
+        |t| &mut t.generic_sercos,
+        "direction = \"from_drive\", missing = \"refuse\", polarity = { idn = \"S-0-0055\", bit = 2 }",
+        "direction = \"from_drive\", missing = \"refuse\", polarity = { idn = \"S-0-0055\", bit = 0 }",
+        code::WRONG_SIGN,
+        "polarity",
+    ),
+    (
+        "direction of the axis",
+        |t| &mut t.generic_sercos,
+        "[direction]\npolarity = { idn = \"S-0-0055\", bit = 2 }",
+        "[direction]\npolarity = { idn = \"S-0-0055\", bit = 0 }",
+        code::WRONG_SIGN,
+        "polarity",
+    ),
+    (
+        "polarity of a velocity for a position",
+        |t| &mut t.generic_cia402,
+        "object = \"607A:00\", direction = \"to_drive\", polarity = \"Position polarity\"",
+        "object = \"607A:00\", direction = \"to_drive\", polarity = \"Velocity polarity\"",
+        code::WRONG_SIGN,
+        "polarity",
+    ),
+    (
+        "a limit turned round",
+        |t| &mut t.generic_sercos,
+        "idn = \"S-0-0039\", direction = \"both\", missing = \"shadow\"",
+        "idn = \"S-0-0039\", direction = \"both\", missing = \"shadow\", factor = [-1, 1]",
+        code::WRONG_SIGN,
+        "factor",
+    ),
+    (
+        "gear of the velocity turned round",
+        |t| &mut t.generic_sercos,
+        "word = \"S-0-0044\"\nload = { pattern = [0x40, 0x40], gear = [\"S-0-0121\", \"S-0-0122\"] }",
+        "word = \"S-0-0044\"\nload = { pattern = [0x40, 0x40], gear = [\"S-0-0122\", \"S-0-0121\"] }",
+        code::WRONG_SHAFT,
+        "gear",
+    ),
+    (
+        "gear ratio of CiA 402 turned round",
+        |t| &mut t.generic_cia402,
+        "times = [\"608F:02\", \"6091:02\"], over = [\"608F:01\", \"6091:01\"]",
+        "times = [\"608F:02\", \"6091:01\"], over = [\"608F:01\", \"6091:02\"]",
+        code::WRONG_SHAFT,
+        "times",
+    ),
+    (
+        "60 times too slow in a method without example",
+        |t| &mut t.generic_sercos,
+        "name = \"rotary per second, parameters\", kind = \"rotary\", quantity = \"velocity\", base = [1_000_000_000, 1]",
+        "name = \"rotary per second, parameters\", kind = \"rotary\", quantity = \"velocity\", base = [50_000_000, 3]",
+        code::WRONG_SCALE,
+        "base",
+    ),
+    (
+        "60 times too slow in a unit",
+        |t| &mut t.generic_sercos,
+        "unit = \"1/min\", quantity = \"velocity\", generic_per_unit = [50_000_000, 3]",
+        "unit = \"1/min\", quantity = \"velocity\", generic_per_unit = [1_000_000_000, 1]",
+        code::WRONG_SCALE,
+        "generic_per_unit",
+    ),
+    (
+        "60 times too slow by the code of a unit",
+        |t| &mut t.generic_cia402,
+        "when = [\"60A9:00\", 0x00B4_4700], base = [50_000_000, 3]",
+        "when = [\"60A9:00\", 0x00B4_4700], base = [2_500_000, 9]",
+        code::WRONG_SCALE,
+        "generic_per_unit",
+    ),
+    (
+        "a scaling type that is none",
+        |t| &mut t.generic_sercos,
+        "{ pattern = [0x07, 0x00], name = \"percent of continuous stall torque\"",
+        "{ pattern = [0x01, 0x00], name = \"percent of continuous stall torque\"",
+        code::WRONG_SCALE,
+        "base",
+    ),
+    (
+        "operation mode written to the display",
+        |t| &mut t.generic_cia402,
+        "mode = \"6060:00\"",
+        "mode = \"6061:00\"",
+        code::WRONG_BINDING,
+        "mode",
+    ),
+    (
+        "command in the place of the actual value",
+        |t| &mut t.generic_sercos,
+        "idn = \"S-0-0047\", direction",
+        "idn = \"S-0-0051\", direction",
+        code::WRONG_BINDING,
+        "idn",
+    ),
+    (
+        "an object that no PDO takes",
+        |t| &mut t.generic_cia402,
+        "signal = \"torque_actual\", object = \"6077:00\", direction",
+        "signal = \"torque_actual\", object = \"6072:00\", direction",
+        code::WRONG_BINDING,
+        "object",
+    ),
+    (
+        "limits exchanged",
+        |t| &mut t.generic_sercos,
+        "parameter = \"position_limit_positive\", idn = \"S-0-0049\"",
+        "parameter = \"position_limit_positive\", idn = \"S-0-0050\"",
+        code::WRONG_BINDING,
+        "idn",
+    ),
+    (
+        "running shown as stopped",
+        |t| &mut t.cip_generic,
+        "axis_state = \"Running\"",
+        "axis_state = \"Stopped\"",
+        code::WRONG_STATE,
+        "axis_state",
+    ),
+    (
+        "no main power taken for ready",
+        |t| &mut t.generic_sercos,
+        "\"Ready to operate\", is = 1 }], report = \"awaiting_power\"",
+        "\"Ready to operate\", is = 1 }], report = \"ready\"",
+        code::WRONG_STATE,
+        "report",
+    ),
+    (
+        "switched on taken for operating",
+        |t| &mut t.generic_cia402,
+        "state = \"Switched on\", report = \"ready\"",
+        "state = \"Switched on\", report = \"operating\"",
+        code::WRONG_STATE,
+        "report",
+    ),
+    (
+        "a pattern that shadows the fault",
+        |t| &mut t.generic_sercos,
+        "{ pattern = [{ field = \"Drive shut-down error\", is = 1 }], report = \"faulted\"",
+        "{ pattern = [{ field = \"Drive shut-down error\", is = 1 }, { field = \"Ready to operate\", is = 0 }], report = \"faulted\"",
+        code::WRONG_STATE,
+        "report",
+    ),
+    (
+        "enabled bit from another state",
+        |t| &mut t.generic_cia402,
+        "state = \"Operation enabled\", status = \"enabled\"",
+        "state = \"Switched on\", status = \"enabled\"",
+        code::WRONG_STATE,
+        "status",
+    ),
+    (
+        "position mode that is a torque mode",
+        |t| &mut t.generic_cia402,
+        "modes = [\"csp\"], command",
+        "modes = [\"cst\"], command",
+        code::WRONG_STATE,
+        "modes",
+    ),
+    (
+        "enable before there is power",
+        |t| &mut t.generic_cia402,
+        "when = \"Switch on disabled\", send = \"Shutdown\"",
+        "when = \"Switch on disabled\", send = \"Enable operation\"",
+        code::WRONG_ORDER,
+        "send",
+    ),
+    (
+        "disable that keeps the torque",
+        |t| &mut t.generic_cia402,
+        "action = \"disable\", when = \"Operation enabled\", send = \"Switch on\"",
+        "action = \"disable\", when = \"Operation enabled\", send = \"Enable operation\"",
+        code::WRONG_ORDER,
+        "send",
+    ),
+    (
+        "torque off that brakes",
+        |t| &mut t.generic_sercos,
+        "{ action = \"torque_off\", pattern = [\n    { field = \"Drive on\", is = \"off\" },\n    { field = \"Enable drive\", is = \"torque off\" }",
+        "{ action = \"torque_off\", pattern = [\n    { field = \"Drive on\", is = \"off\" },\n    { field = \"Enable drive\", is = \"enabled\" }",
+        code::WRONG_ORDER,
+        "action",
+    ),
+    (
+        "enable that asks for disable",
+        |t| &mut t.cip_generic,
+        "axis_control = \"Enable Request\", request",
+        "axis_control = \"Disable Request\", request",
+        code::REQUEST_LOST,
+        "mapping",
+    ),
+    (
+        "over-current as a warning",
+        |t| &mut t.generic_sercos,
+        "cause = \"over_current\", source",
+        "cause = \"motor_overload_user_limit\", reaction = \"alarm\", source",
+        code::WEAKER_REACTION,
+        "reaction",
+    ),
+];
+
+fn found(change: impl Fn(&mut TableTexts)) -> Vec<Finding> {
+    let mut texts = TableTexts::embedded();
+    change(&mut texts);
+    check::texts(Some(texts), Findings::default()).findings.list().to_vec()
+}
+
+fn replace(table: &mut TableText, from: &str, to: &str) {
+    assert!(table.text.contains(from), "{from:?} is not in {}", table.path);
+    table.text = table.text.replacen(from, to, 1);
+}
+
+#[test]
+fn what_would_send_a_drive_the_wrong_way_is_an_error_at_its_row() {
+    let mut text = String::new();
+    for (what, table, from, to, code, key) in CASES {
+        let findings = found(|texts| replace(table(texts), from, to));
+        let own: Vec<&Finding> = findings.iter().filter(|finding| finding.code == *code).collect();
+        let all: String = findings
+            .iter()
+            .filter(|found| found.severity() != Severity::Note)
+            .map(|found| format!("{found}\n"))
+            .collect();
+        assert!(own.iter().any(|finding| finding.key == *key), "{what}:\n{all}");
+        assert!(own.iter().all(|finding| !finding.help.is_empty()), "{what}:\n{all}");
+        writeln!(text, "## {what}\n{all}").unwrap();
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn states_exchanged_and_ready_exchanged_are_found_in_both_rows() {
+    let swap = |table: &mut TableText, one: &str, other: &str| {
+        assert!(table.text.contains(one) && table.text.contains(other));
+        table.text = table.text.replacen(one, "\u{1}", 1).replacen(other, one, 1).replacen('\u{1}', other, 1);
+    };
+    let states = found(|texts| swap(&mut texts.cip_generic, "\"Running\"", "\"Stopped\""));
+    assert_eq!(states.iter().filter(|found| found.code == code::WRONG_STATE).count(), 2);
+    let ready = found(|texts| {
+        let [one, other] = [1, 2].map(|is| format!("\"Ready to operate\", is = {is} }}], report"));
+        swap(&mut texts.generic_sercos, &one, &other);
+    });
+    assert_eq!(ready.iter().filter(|found| found.code == code::WRONG_STATE).count(), 2);
+}
+
+#[test]
+fn a_row_that_is_accepted_with_a_reason_is_not_reported() {
+    let from = "{ pattern = [{ field = \"Ready to operate\", is = 1 }], report = \"awaiting_power\"";
+    let wrong = "{ pattern = [{ field = \"Ready to operate\", is = 1 }], report = \"ready\"";
+    let count = |comment: &str| {
+        let findings = found(|texts| replace(&mut texts.generic_sercos, from, &format!("{comment}{wrong}")));
+        findings.iter().filter(|found| found.code == code::WRONG_STATE).count()
+    };
+    assert_eq!(count(""), 1);
+    assert_eq!(count("# accept: the drive has no contactor\n  "), 0);
+    assert_eq!(count("# accept:\n  "), 1, "a reason is needed");
+}
+
+#[test]
+fn what_is_shipped_agrees_with_the_standards() {
+    let findings = found(|_| {});
+    let bad: Vec<String> =
+        findings.iter().filter(|found| found.severity() != Severity::Note).map(ToString::to_string).collect();
+    assert!(bad.is_empty(), "{}", bad.join("\n\n"));
+}
+
+#[test]
+fn changes_are_told_by_meaning_and_acknowledged_with_a_reason() {
+    let mut texts = TableTexts::embedded();
+    let own = include_str!("../../../gateway/tests/diff/line-4.toml");
+    texts.overlays.push(Overlay::new("line-4.toml", own));
+    let new = Mapping::from_texts(&texts).unwrap();
+    let changes = check::diff::changes(shipped(), &new, &texts);
+    insta::assert_snapshot!(changes.to_string());
+    assert_eq!(changes.open(), 5, "{changes}");
+    assert!(check::diff::changes(shipped(), shipped(), &texts).list.is_empty());
+}
+
+/// The reason has to stand at the row that takes the other one away, whatever its name.
+#[test]
+fn a_row_that_is_taken_away_is_acknowledged_at_its_own_row_only() {
+    let open = |rows: &str| {
+        let mut texts = TableTexts::embedded();
+        let text = format!("format = 1\noverlay = \"own\"\n\n{rows}");
+        texts.overlays.push(Overlay::new("own.toml", &text));
+        let new = Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}"));
+        check::diff::changes(shipped(), &new, &texts).open()
+    };
+    let gone = "[[generic-cia402.status]]\nobject = \"6041:00\"\nstate = \"Switched on\"\nstatus = \"ready\"\nremove = true\n";
+    let accepted = |rows: &str| rows.replace("remove = true", "remove = true # accept: no such bit");
+    assert_eq!((open(gone), open(&accepted(gone))), (1, 0));
+    // `ready` is named in another list, with a reason of its own.
+    let elsewhere = "[[cip-generic.state]]\nstate = \"ready\" # accept: of another row\naxis_state = \"Stopped\"\nsource = \"own\"\n\n";
+    assert_eq!(open(&format!("{elsewhere}{gone}")), 1);
+}

@@ -1,0 +1,186 @@
+//! When the D-to-C updates go, and with which Update ID.
+
+use profile_generic::time::MonotonicTime;
+
+/// Timing of the answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mode {
+    Asynchronous,
+    Pending { first_update_id: u8, at: MonotonicTime },
+    Synchronous,
+}
+
+/// The schedule of the D-to-C updates.
+#[derive(Debug, Clone)]
+pub(crate) struct Schedule {
+    /// Controller Update Period, ns.
+    period: u64,
+    pub mode: Mode,
+    next: MonotonicTime,
+    /// How much before its time an update may go in synchronous operation, ns.
+    early: u64,
+    /// Sequence count of the last packet.
+    pub sequence: u16,
+    /// Head of the last update if it had nothing to say.
+    idle_header: Option<[u8; 8]>,
+    /// Update ID of the last update.
+    sent_update_id: u8,
+    /// Update ID that the next update answers, if a C-to-D update has triggered it.
+    answer: Option<u8>,
+}
+
+impl Schedule {
+    pub fn new(period: u64, early: u64, now: MonotonicTime) -> Self {
+        Self {
+            period,
+            mode: Mode::Asynchronous,
+            next: MonotonicTime(now.0.saturating_add(period)),
+            early,
+            sequence: 0,
+            idle_header: None,
+            sent_update_id: 0,
+            answer: None,
+        }
+    }
+
+    /// A C-to-D update asks for its answer. In synchronous mode the schedule goes on by itself.
+    pub fn answer(&mut self, update_id: u8, has_data: bool, now: MonotonicTime) {
+        if self.mode == Mode::Synchronous {
+            return;
+        }
+        if has_data && update_id == self.sent_update_id && self.answer.is_none() {
+            // The timer has sent this ID already: the update was late. The next one is due a period from here.
+            self.next = MonotonicTime(now.0.saturating_add(self.period));
+            return;
+        }
+        self.answer = Some(update_id);
+        self.next = now;
+    }
+
+    /// Schedules the first synchronous update for `in_ns` from now.
+    pub fn synchronize(&mut self, update_id: u8, in_ns: u64, now: MonotonicTime) {
+        self.mode = Mode::Pending {
+            // The update that starts two cycles after the one of this command.
+            first_update_id: update_id.wrapping_add(2),
+            at: MonotonicTime(now.0.saturating_add(in_ns)),
+        };
+    }
+
+    /// Aligns the schedule with a cycle that starts in `in_ns` or whole periods from it.
+    pub fn align(&mut self, in_ns: i64, now: MonotonicTime) {
+        if self.mode != Mode::Synchronous {
+            return;
+        }
+        let period = i64::try_from(self.period).unwrap_or(i64::MAX).max(1);
+        // Negative when it is overdue, as it is whenever an update and a command meet in one cycle of the device.
+        let planned = self.next.since(now).as_nanos();
+        // The multiple of the period from that start which is nearest to the plan.
+        let off = planned.saturating_sub(in_ns).rem_euclid(period);
+        let correction = if off > period / 2 { period - off } else { -off };
+        self.next = MonotonicTime(self.next.0.saturating_add_signed(correction));
+    }
+
+    /// Goes back to asynchronous operation.
+    pub fn desynchronize(&mut self) {
+        self.mode = Mode::Asynchronous;
+    }
+
+    /// An update was produced; `idle` is the head of one that has nothing to say. While there is nothing to say, the same
+    /// packet is repeated to keep the connection alive (clause 7-1.1).
+    pub fn transmitted(&mut self, idle: Option<[u8; 8]>, has_data: bool) {
+        if idle.is_none() || has_data || idle != self.idle_header {
+            self.sequence = self.sequence.wrapping_add(1);
+        }
+        self.idle_header = idle;
+    }
+
+    /// Time of the next D-to-C update.
+    pub fn next(&self) -> MonotonicTime {
+        match self.mode {
+            Mode::Pending { at, .. } => at.min(self.next),
+            _ => self.next,
+        }
+    }
+
+    /// If a D-to-C update is due: its Update ID. Schedules the one after it.
+    pub fn take(&mut self, now: MonotonicTime, has_data: bool) -> Option<u8> {
+        // This call is the nearest to what is due until then. Before the cycles are known, an update is the answer to
+        // the controller's or comes after waiting for it, so that none goes early.
+        let nearest = MonotonicTime(now.0.saturating_add(self.early));
+        let due = match self.mode {
+            Mode::Asynchronous => now >= self.next,
+            Mode::Pending { at, .. } => now >= self.next || nearest >= at,
+            Mode::Synchronous => nearest >= self.next,
+        };
+        if !due {
+            return None;
+        }
+        let period = self.period;
+        let answered = self.answer.take();
+        let id = match self.mode {
+            Mode::Pending { first_update_id, at } if nearest >= at => {
+                self.mode = Mode::Synchronous;
+                self.next = MonotonicTime(at.0.saturating_add(period));
+                first_update_id
+            }
+            _ => {
+                let next = self.next.0.saturating_add(period);
+                // A schedule that has fallen behind starts anew instead of catching up in a burst.
+                let behind = next <= now.0;
+                self.next = MonotonicTime(if behind { now.0.saturating_add(period) } else { next });
+                match answered {
+                    Some(id) => id,
+                    None if has_data => self.sent_update_id.wrapping_add(1),
+                    None => self.sent_update_id,
+                }
+            }
+        };
+        self.sent_update_id = id;
+        Some(id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: u64 = 1_000;
+
+    #[test]
+    fn answer_follows_its_update_and_the_timer_fills_in() {
+        let mut schedule = Schedule::new(PERIOD, 100, MonotonicTime(0));
+        assert_eq!(schedule.take(MonotonicTime(999), true), None);
+        schedule.answer(7, true, MonotonicTime(500));
+        assert_eq!(schedule.take(MonotonicTime(500), true), Some(7));
+        assert_eq!(schedule.next(), MonotonicTime(1_500));
+        assert_eq!(schedule.take(MonotonicTime(1_500), true), Some(8));
+        // The update with the ID that the timer has sent already is late: nothing goes twice.
+        schedule.answer(8, true, MonotonicTime(1_600));
+        assert_eq!(schedule.take(MonotonicTime(1_600), true), None);
+        assert_eq!(schedule.next(), MonotonicTime(2_600));
+    }
+
+    #[test]
+    fn first_synchronous_update_starts_the_grid() {
+        let mut schedule = Schedule::new(PERIOD, 100, MonotonicTime(0));
+        schedule.synchronize(4, 700, MonotonicTime(0));
+        assert_eq!(schedule.take(MonotonicTime(599), true), None);
+        assert_eq!(schedule.take(MonotonicTime(600), true), Some(6));
+        assert_eq!((schedule.mode, schedule.next()), (Mode::Synchronous, MonotonicTime(1_700)));
+        schedule.align(800, MonotonicTime(1_000));
+        assert_eq!(schedule.next(), MonotonicTime(1_800));
+    }
+
+    #[test]
+    fn idle_packet_is_repeated_with_its_count() {
+        let mut schedule = Schedule::new(PERIOD, 0, MonotonicTime(0));
+        let idle = Some([1; 8]);
+        let counts = [idle, idle, Some([2; 8])].map(|head| {
+            schedule.transmitted(head, false);
+            schedule.sequence
+        });
+        assert_eq!(counts, [1, 1, 2]);
+        schedule.transmitted(None, true);
+        assert_eq!(schedule.sequence, 3);
+    }
+}

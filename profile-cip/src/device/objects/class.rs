@@ -1,0 +1,8 @@
+//! Class codes of objects that other parts name.
+
+/// Class code of the Message Router object.
+pub const CLASS_MESSAGE_ROUTER: u16 = 0x02;
+/// Class code of the Connection Manager object.
+pub const CLASS_CONNECTION_MANAGER: u16 = 0x06;
+/// Class code of the Motion Device Axis Object.
+pub const CLASS_MOTION_DEVICE_AXIS: u16 = 0x42;

@@ -1,0 +1,137 @@
+//! Local control over the socket of a running gateway, with simulated drives and the clock of this host.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::process::{Running, axisbridge};
+
+/// A running gateway and the paths of its socket and its log.
+struct Gateway {
+    run: Running,
+    socket: PathBuf,
+    log: PathBuf,
+}
+
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+impl Gateway {
+    fn start(name: &str, device: &str) -> Self {
+        let example = include_str!("../../../examples/two-axes-in-process.toml");
+        let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
+        let mut text = example.replace("127.0.0.2", device);
+        text.replace_range(modbus, "");
+        let modes = "address = 1\nmodes = [\"position\", \"positioning\", \"homing\"]";
+        assert_eq!(text.matches("address = 1\n").count(), 1, "{text}");
+        let text = text.replacen("address = 1", modes, 1);
+        let config = path(&format!("{name}.toml"));
+        fs::write(&config, text).expect("the folder of the tests can be written to");
+        let (socket, log) = (path(&format!("{name}.socket")), path(&format!("{name}.log")));
+        let mut run = Command::new(axisbridge());
+        run.args(["run", "--config"]).arg(config).arg("--local").arg(&socket);
+        run.env_remove("RUST_LOG").stdout(Stdio::null()).stderr(fs::File::create(&log).expect("the log"));
+        Self { run: Running::start("run", &mut run), socket, log }
+    }
+
+    fn log(&self) -> String {
+        fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
+    fn connect(&self) -> Client {
+        let end = Instant::now() + Duration::from_secs(30);
+        loop {
+            if let Ok(stream) = UnixStream::connect(&self.socket) {
+                stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a socket");
+                return Client(BufReader::new(stream));
+            }
+            assert!(Instant::now() < end, "no socket: {}", self.log());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+struct Client(BufReader<UnixStream>);
+
+impl Client {
+    fn say(&mut self, line: &str) {
+        writeln!(self.0.get_mut(), "{line}").expect("a connection");
+    }
+
+    fn hear(&mut self) -> String {
+        let mut line = String::new();
+        self.0.read_line(&mut line).expect("a reply");
+        line
+    }
+
+    /// Sends a request and returns its reply.
+    fn ask(&mut self, line: &str) -> String {
+        self.say(line);
+        self.hear()
+    }
+
+    /// Repeats a request until its reply begins so.
+    fn until(&mut self, line: &str, beginning: &str) -> String {
+        let end = Instant::now() + Duration::from_secs(30);
+        loop {
+            let reply = self.ask(line);
+            if reply.starts_with(beginning) {
+                return reply;
+            }
+            assert!(Instant::now() < end, "{line} gives {reply}");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+/// The value of a name in a reply.
+fn value(reply: &str, name: &str) -> f64 {
+    let word = reply.split(' ').find_map(|word| word.strip_prefix(name)).unwrap_or_default();
+    word.trim_end().parse().unwrap_or_else(|_| panic!("no {name} in {reply}"))
+}
+
+#[test]
+fn people_move_an_axis_home_it_and_leave_it() {
+    let name = "people_move_an_axis_home_it_and_leave_it";
+    in_real_time(name, || {
+        let mut gateway = Gateway::start("local-people", "127.0.0.86");
+        let mut client = gateway.connect();
+        client.until("enable turntable", "ok enable turntable state=operating owner=local ");
+        let reply = client.ask("move turntable 0.75 velocity=1 acceleration=5 by=gateway");
+        assert!(reply.starts_with("ok move turntable "), "{reply}");
+        assert!((value(&reply, "position=") - 0.75).abs() < 0.002, "{reply}");
+        let reply = client.ask("move turntable -0.5 velocity=2 acceleration=5 by=drive");
+        assert!((value(&reply, "position=") + 0.5).abs() < 0.002, "{reply}");
+        let reply = client.ask("home slide");
+        assert!(reply.starts_with("error home slide not-enabled: "), "{reply}");
+        // Nothing switches the home switch of this simulated drive: it seeks until a stop replaces the order.
+        client.say("home turntable");
+        std::thread::sleep(Duration::from_millis(1_000));
+        let reply = client.ask("status turntable");
+        assert!(reply.contains(" mode=homing ") && value(&reply, "velocity=") > 0.1, "{reply}");
+        client.say("stop turntable");
+        assert_eq!(client.hear(), "error home turntable replaced: replaced by `stop`\n");
+        let reply = client.hear();
+        assert!(reply.starts_with("ok stop turntable state=operating "), "{reply}");
+        assert!(value(&reply, "velocity=").abs() < 0.15, "{reply}");
+        // The client disappears while the axis moves.
+        let reply = client.ask("jog turntable 1 acceleration=5");
+        assert!(reply.starts_with("ok jog turntable "), "{reply}");
+        drop(client);
+        let mut client = gateway.connect();
+        let reply = client.until("status turntable", "ok status turntable state=inhibited owner=nobody ");
+        assert!(value(&reply, "velocity=").abs() < 0.05, "{reply}");
+        let text = gateway.log();
+        for line in ["local control: client connected", "under local control", "released by local control"] {
+            assert!(text.contains(line), "no {line:?} in {text}");
+        }
+        let status = gateway.run.terminate(Duration::from_secs(30));
+        assert_eq!(status.code(), Some(0), "{}", gateway.log());
+        assert!(!gateway.socket.exists(), "the socket is removed");
+    });
+}

@@ -1,0 +1,138 @@
+//! A parameter that only an overlay knows, from an attribute of the controller to drives and back; and a constant.
+
+use axisbridge_tests::rig::explicit::Client;
+use axisbridge_tests::rig::motion::millis;
+use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
+use profile_cia402::node::dictionary::{self, DataType};
+use profile_cia402::wire::Mux;
+use profile_cip::controller::Step;
+use profile_cip::device::axis_state::AxisState;
+use profile_sercos::slave::parameter::Definition;
+use profile_sercos::wire::idn::Idn;
+
+const OVERLAY: &str = include_str!("../../../examples/overlays/vendor-parameter.toml");
+const GET: u8 = 0x0E;
+const SET: u8 = 0x10;
+const OK: (u8, Vec<u8>) = (0, Vec::new());
+const INVALID_VALUE: u8 = 0x09;
+const NOT_SETTABLE: u8 = 0x0E;
+const DEVICE_CONFLICT: u8 = 0x10;
+const SHORT: u8 = 0x13;
+const NOT_SUPPORTED: u8 = 0x14;
+const LONG: u8 = 0x15;
+const NOTCH: Option<u16> = Some(2001);
+const FILTERS: Option<u16> = Some(2002);
+
+/// P-0-0702 in a SERCOS drive: 2 bytes, unsigned decimal, one decimal place, with write protection as asked.
+const NOTCH_IDN: &str = "P-0-0702";
+const NOTCH_WRITABLE: u32 = 0x0111_0001;
+const NOTCH_READ_ONLY: u32 = 0x7111_0001;
+
+fn idn() -> Idn {
+    NOTCH_IDN.parse().expect("an IDN")
+}
+
+fn hertz(value: f32) -> Vec<u8> {
+    value.to_le_bytes().to_vec()
+}
+
+/// Runs until the controller has the axis, so that its attributes are served.
+fn reached(mut rig: Rig) -> (Rig, Client) {
+    rig.until_ready();
+    rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);
+    rig.run_until(millis(60_000), "a stopped axis", |rig| {
+        rig.engine.devices()[0].axis_states().next().is_some_and(|(_, state)| state == AxisState::Stopped)
+    });
+    rig.run_for(millis(100));
+    let client = Client::connect(&mut rig, CONTROLLER);
+    (rig, client)
+}
+
+/// Drive 1 has its notch filter at 120 Hz, and takes 60 to 1500 Hz.
+fn on_sercos(attribute: Option<u32>) -> (Rig, Client) {
+    let mut rig = Rig::new(Settings { overlays: vec![OVERLAY], ..Settings::default() });
+    if let Some(attribute) = attribute {
+        let notch = Definition::value(idn(), attribute, "Notch filter frequency", 1_200);
+        let store = rig.line.slaves_mut()[0].store_mut();
+        store.define(notch.unit("Hz").range(600, 15_000));
+    }
+    reached(rig)
+}
+
+#[test]
+fn a_vendors_parameter_is_read_and_set_in_a_sercos_drive() {
+    let (mut rig, client) = on_sercos(Some(NOTCH_WRITABLE));
+    let held = |rig: &Rig| rig.line.slaves()[0].store().number_of(idn());
+    let ask = |rig: &mut Rig, service, value: &[u8]| client.ask(rig, service, 1, NOTCH, value);
+    assert_eq!(ask(&mut rig, GET, &[]), (0, hertz(120.0)));
+    assert_eq!(ask(&mut rig, SET, &hertz(333.3)), OK);
+    assert_eq!(held(&rig), 3_333, "one decimal place");
+    assert_eq!(ask(&mut rig, GET, &[]), (0, hertz(333.3)));
+    // The range of the row is the gateway's, and what is within it is up to the drive.
+    for refused in [2_000.5, 49.9, f32::NAN, f32::INFINITY, 1_600.0, 55.0] {
+        assert_eq!(ask(&mut rig, SET, &hertz(refused)).0, INVALID_VALUE, "{refused}");
+    }
+    assert_eq!(ask(&mut rig, SET, &[0; 3]).0, SHORT);
+    assert_eq!(ask(&mut rig, SET, &[0; 5]).0, LONG);
+    assert_eq!(held(&rig), 3_333, "nothing of that reached the drive");
+    assert_eq!(ask(&mut rig, SET, &hertz(60.0)), OK);
+    assert_eq!(held(&rig), 600);
+}
+
+/// A drive that lacks it, or lets it only be read, never makes a set succeed.
+#[test]
+fn a_vendors_parameter_is_refused_where_the_drive_does_not_take_it() {
+    let (mut rig, client) = on_sercos(None);
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]).0, NOT_SUPPORTED);
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(100.0)).0, NOT_SUPPORTED);
+    let (mut rig, client) = on_sercos(Some(NOTCH_READ_ONLY));
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]), (0, hertz(120.0)));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(100.0)).0, NOT_SETTABLE);
+    assert_eq!(rig.line.slaves()[0].store().number_of(idn()), 1_200);
+    // The second axis has another drive, without the filter.
+    assert_eq!(client.ask(&mut rig, GET, 2, NOTCH, &[]).0, NOT_SUPPORTED);
+}
+
+#[test]
+fn a_vendors_parameter_is_not_answered_without_its_drive() {
+    let (mut rig, client) = on_sercos(Some(NOTCH_WRITABLE));
+    rig.cable = false;
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(100.0)).0, DEVICE_CONFLICT);
+    assert_eq!(rig.line.slaves()[0].store().number_of(idn()), 1_200);
+}
+
+#[test]
+fn a_vendors_parameter_is_read_and_set_in_a_canopen_drive() {
+    let configuration = include_str!("can.toml").to_owned();
+    let settings =
+        Settings { configuration, drives: Vec::new(), overlays: vec![OVERLAY], ..Settings::default() };
+    let mut rig = Rig::new(settings);
+    let mut notch = dictionary::Definition::new("Notch filter frequency", DataType::U16, 120);
+    (notch.low, notch.high) = (60, 1_500);
+    let node = rig.can[0].bus.nodes_mut().next().expect("a device");
+    node.dictionary_mut().add(Mux::new(0x2051, 0), notch);
+    let (mut rig, client) = reached(rig);
+    let held =
+        |rig: &mut Rig| rig.can[0].bus.nodes_mut().next().expect("a device").dictionary().number(0x2051, 0);
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]), (0, hertz(120.0)));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(444.0)), OK);
+    assert_eq!(held(&mut rig), 444);
+    // 1600 Hz is within the row, not within the drive.
+    for refused in [2_001.0, 49.0, 1_600.0] {
+        assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(refused)).0, INVALID_VALUE, "{refused}");
+    }
+    assert_eq!(held(&mut rig), 444);
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]), (0, hertz(444.0)));
+}
+
+#[test]
+fn a_constant_is_set_only_to_what_it_is() {
+    let (mut rig, client) = on_sercos(None);
+    assert_eq!(client.ask(&mut rig, GET, 1, FILTERS, &[]), (0, vec![3]));
+    assert_eq!(client.ask(&mut rig, SET, 1, FILTERS, &[3]), OK);
+    for other in [0, 2, 4, 255] {
+        assert_eq!(client.ask(&mut rig, SET, 1, FILTERS, &[other]).0, INVALID_VALUE, "{other}");
+    }
+    assert_eq!(client.ask(&mut rig, SET, 1, FILTERS, &[]).0, SHORT);
+    assert_eq!(client.ask(&mut rig, GET, 1, FILTERS, &[]), (0, vec![3]));
+}
