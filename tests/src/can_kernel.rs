@@ -40,6 +40,10 @@ const INSIDE: &str = "AXISBRIDGE_CAN_KERNEL";
 /// Runs a command before everything that is ordinary.
 const URGENT: [&str; 3] = ["chrt", "--fifo", "10"];
 
+/// What lets the kernel run on processors with more registers than it knows, and the flag of such a processor.
+const XSTATE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/uml/xstate.c");
+const AMX: &str = "amx_tile";
+
 /// How long the host waits beyond the guest's own limit, and for a guest that was asked to end.
 const GRACE: Duration = Duration::from_secs(20);
 const ENDING: Duration = Duration::from_secs(3);
@@ -245,7 +249,11 @@ impl Kernel {
             false => &[],
         };
         // A guest must not outlive the test that started it.
-        let mut kernel = Command::new("setpriv")
+        let mut kernel = Command::new("setpriv");
+        if let Some(library) = xstate_library(&job.folder) {
+            kernel.env("LD_PRELOAD", library);
+        }
+        let mut kernel = kernel
             .args(["--pdeathsig", "TERM"])
             .args(job.processor())
             .args(scheduling)
@@ -276,6 +284,28 @@ impl Kernel {
         let _ = kernel.kill();
         let _ = kernel.wait();
     }
+}
+
+/// The library for the processor of this host, made in a folder; `None` where the kernel needs none.
+///
+/// # Panics
+/// It cannot be made: the linker that Rust uses is the compiler that it needs.
+fn xstate_library(folder: &Path) -> Option<PathBuf> {
+    let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let flags = processors.lines().find(|line| line.starts_with("flags"))?;
+    flags.split_whitespace().find(|flag| *flag == AMX)?;
+    let library = folder.join("xstate.so");
+    let made = Command::new("cc")
+        .args(["-O2", "-shared", "-fPIC", "-o"])
+        .arg(&library)
+        .arg(XSTATE)
+        .arg("-ldl")
+        .status();
+    assert!(
+        made.is_ok_and(|status| status.success()),
+        "`cc` cannot make {XSTATE}, which this processor ({AMX}) needs"
+    );
+    Some(library)
 }
 
 /// Whether a command may be run in this way.

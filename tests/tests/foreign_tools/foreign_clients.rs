@@ -57,7 +57,7 @@ const SERIAL: &str = "40e20100";
 const NAME: &str = "13417869736272696467652074776f2061786573";
 
 /// Vendor; "attribute not supported"; Axis State Initializing.
-const PACKED: &str = "030008000e0012008e00000001008e0014008e00000000";
+const PACKED: &str = "030008000e0012008e000000ffff8e0014008e00000000";
 
 #[test]
 fn pycomm3_reads_and_writes_by_every_way_it_knows() {
