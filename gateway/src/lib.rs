@@ -20,6 +20,7 @@ pub mod settings;
 pub mod simulate;
 pub mod status;
 pub mod sys;
+pub mod time;
 pub mod translate;
 
 /// The mapping tables and what was found in them, under the names by which the parts here know them.

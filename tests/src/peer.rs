@@ -30,6 +30,17 @@ pub fn tshark_or_skip(test: &str) -> bool {
     here
 }
 
+/// Whether `ptp4l` is here; if not, `test` is skipped visibly (or fails in CI).
+#[must_use]
+pub fn ptp4l_or_skip(test: &str) -> bool {
+    // It has no `--version`.
+    let here = Command::new("ptp4l").arg("-v").output().is_ok_and(|output| output.status.success());
+    if !here {
+        skip(test, "ptp4l (Debian package linuxptp)");
+    }
+    here
+}
+
 /// Whether network namespaces can be made (root and iproute2); if not, `test` is skipped visibly (or fails in CI).
 #[must_use]
 pub fn namespaces_or_skip(test: &str) -> bool {

@@ -63,7 +63,7 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         .into());
     };
     if let Some(unknown) =
-        arguments.linear.iter().find(|address| !(arguments.address..=last).contains(address))
+        arguments.linear.iter().find(|address| !(arguments.address..=last).contains(*address))
     {
         return Err(
             format!("--linear {unknown}: expected an address of {} to {last}", arguments.address).into()

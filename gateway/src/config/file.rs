@@ -18,7 +18,7 @@ pub struct File {
     /// The gateway itself.
     #[serde(rename = "box")]
     pub the_box: BoxTable,
-    /// Time. Default: the host's clock.
+    /// System time. Default: the host's clock.
     pub time: Option<TimeTable>,
     /// Logging. Default: level `info`.
     pub log: Option<LogTable>,
@@ -53,9 +53,32 @@ pub struct BoxTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeTable {
-    /// Source of system time. Default: `"host"`, the host's clock (TAI if the kernel knows the offset from UTC).
-    #[schemars(transform = form::word(&check::TIME_SOURCES))]
+    /// Source of system time: `"ptp"` follows PTP (CIP Sync), `"daemon"` takes the time from `ptp4l` on this host, `"host"` is the host's clock while a daemon keeps it, `"shared"` is the
+    /// host's clock where controllers read the same one, `"none"` is no common time. Default: `"shared"` if every device listens on
+    /// a loopback address, else `"host"`.
+    #[schemars(transform = form::word(&check::time::SOURCES))]
     pub source: Option<Spanned<String>>,
+    /// Interface on which PTP is followed. Default: that of the first device's address.
+    #[schemars(transform = form::interface)]
+    pub interface: Option<Spanned<String>>,
+    /// PTP domain, 0 to 127. Default: 0.
+    #[schemars(range(min = 0, max = 127))]
+    pub domain: Option<Spanned<i64>>,
+    /// Largest offset of a clock that is called synchronized, 1 us to 10 ms. Default: 10 us.
+    #[schemars(transform = form::time)]
+    pub threshold: Option<Spanned<String>>,
+    /// By how much the way from the master is longer than the mean of both ways, 0 to 10 ms. Default: 0.
+    #[schemars(transform = form::time)]
+    pub asymmetry: Option<Spanned<String>>,
+    /// The way to the master is the longer one. Default: false.
+    pub asymmetry_is_upstream: Option<bool>,
+    /// Management socket of `ptp4l`. Default: `"/var/run/ptp4l"`.
+    #[schemars(transform = form::path)]
+    pub socket: Option<Spanned<String>>,
+    /// Clock of the network card that `ptp4l` keeps, such as `"/dev/ptp0"`. Default: that of the interface; without one the host's
+    /// clock.
+    #[schemars(transform = form::path)]
+    pub phc: Option<Spanned<String>>,
 }
 
 /// `[log]`

@@ -50,8 +50,8 @@ pub const FILE_LEN_MAX: u64 = 1 << 20;
 pub struct Config {
     /// Name of the box, for people.
     pub name: String,
-    /// Where system time comes from.
-    pub time: TimeSource,
+    /// System time.
+    pub time: Time,
     /// What is logged.
     pub log_level: LogLevel,
     /// The Modbus TCP server; `None` for none.
@@ -222,11 +222,60 @@ impl Written {
     }
 }
 
+/// System time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Time {
+    /// Where it comes from.
+    pub source: TimeSource,
+    /// Interface on which PTP is followed; `None` for that of the first device.
+    pub interface: Option<String>,
+    /// PTP domain, 0 to 127.
+    pub domain: u8,
+    /// Largest offset of a clock that is called synchronized.
+    pub threshold: DurationNs,
+    /// By how much the way from the master is longer than the mean of both ways.
+    pub asymmetry: DurationNs,
+    /// Management socket of `ptp4l`.
+    pub socket: PathBuf,
+    /// Clock of the network card that `ptp4l` keeps; `None` for that of the interface, or the host's clock.
+    pub phc: Option<PathBuf>,
+}
+
+impl Default for Time {
+    fn default() -> Self {
+        Self {
+            source: TimeSource::Host,
+            interface: None,
+            domain: 0,
+            threshold: DurationNs::from_micros(10),
+            asymmetry: DurationNs::ZERO,
+            socket: PathBuf::from("/var/run/ptp4l"),
+            phc: None,
+        }
+    }
+}
+
 /// Where system time comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeSource {
-    /// The host's clock: TAI where the kernel knows the offset, else UTC.
+    /// PTP, by the embedded follower.
+    Ptp,
+    /// PTP, by `ptp4l` on this host.
+    Daemon,
+    /// The host's clock, synchronized while a daemon keeps it: TAI where the kernel knows the offset, else UTC.
     Host,
+    /// The host's clock, which the controllers read too.
+    Shared,
+    /// Nowhere: there is no common time.
+    None,
+}
+
+impl TimeSource {
+    /// Its name in the configuration.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        check::time::SOURCES.iter().find(|(_, source)| *source == self).map_or("", |(name, _)| name)
+    }
 }
 
 /// How much is logged.

@@ -9,7 +9,8 @@ use crate::sys::realtime::{Outcome, Request};
 /// Area of the checks of kernel and processors, which come first.
 pub(super) const AREA: &str = "kernel";
 const REALTIME: &str = "real time";
-const CLOCK: &str = "clock";
+/// Area of the checks of the clock.
+pub(super) const CLOCK: &str = "clock";
 
 /// Clock sources that are read in tens of nanoseconds.
 const QUICK_CLOCKS: [&str; 5] =

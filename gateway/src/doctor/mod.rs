@@ -9,6 +9,7 @@ pub mod latency;
 mod kernel;
 mod network;
 mod report;
+mod time;
 
 use std::fmt;
 use std::path::Path;
@@ -118,6 +119,7 @@ pub fn examine(config: Option<&Config>, each: Duration, mut tell: impl FnMut(&st
     let request = config.map_or_else(usual_request, |config| config.realtime);
     tell("looking at kernel, clock and network");
     let mut checks = kernel::checks(root, request);
+    checks.extend(time::checks(config));
     checks.extend(network::checks(root, config));
     let mut grants = Vec::new();
     let mut results = Vec::new();

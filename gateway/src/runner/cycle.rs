@@ -11,8 +11,9 @@ use crate::engine::Engine;
 use crate::engine::axis::STOP_TIME_OUT;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::port::{NorthPort, SouthPort};
-use crate::sys::clock::{self, HostTime};
+use crate::sys::clock;
 use crate::sys::realtime;
+use crate::time::told::TimeFeed;
 
 /// What the thread is asked for: to go on, to stop the axes and end, to end without waiting for them.
 const RUN: u8 = 0;
@@ -45,6 +46,8 @@ pub struct Setup {
     pub north: Vec<UdpPort>,
     /// The port of each bus.
     pub south: Vec<OpenPort>,
+    /// Where system time comes from.
+    pub time: TimeFeed,
     /// What to ask of the kernel.
     pub realtime: realtime::Request,
 }
@@ -104,8 +107,8 @@ impl CycleThread {
 }
 
 fn run(setup: Setup, asked: &AtomicU8) -> Vec<Unrested> {
-    let Setup { mut engine, mut north, mut south, .. } = setup;
-    engine.feed_time(&HostTime.first_sample());
+    let Setup { mut engine, mut north, mut south, mut time, .. } = setup;
+    time.begin(&mut engine);
     let mut ports: Vec<&mut dyn NorthPort> =
         north.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
     let mut buses: Vec<SouthPort<'_>> = south.iter_mut().map(OpenPort::port).collect();
@@ -120,10 +123,7 @@ fn run(setup: Setup, asked: &AtomicU8) -> Vec<Unrested> {
         }
         obeyed = asked;
         let due = engine.cycle(clock::monotonic_now(), &mut ports, &mut buses);
-        // Behind the work of the cycle: a sample that is a cycle old is as good.
-        if let Some(sample) = HostTime.sample() {
-            engine.feed_time(&sample);
-        }
+        time.feed(&mut engine);
         if engine.is_stopped() || clock::sleep_until(due).is_err() {
             return engine.unrested().to_vec();
         }

@@ -20,14 +20,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime as WallClock};
 
 use profile_cip::device::adapter::Adapter;
+use profile_cip::device::config::{AdapterConfig, QosConfig};
 use profile_cip::device::event::Event;
 use profile_cip::device::identity::{Health, ModuleState};
-use profile_cip::device::motion_device::SyncState;
-use profile_cip::device::time_sync::{ClockInfo, TimeSyncState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
-use profile_generic::time_base::TimeSample;
 use tracing::{debug, info, warn};
 
 use self::can_watch::CanWatch;
@@ -53,13 +51,13 @@ use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
-use crate::simulate::setup::HOST_CLOCK;
 use crate::status::BoxStatus;
 use crate::sys::can_interface::{self, ConfigureError};
 use crate::sys::can_socket;
-use crate::sys::clock::{HostTime, TimeScale};
 use crate::sys::interface_lock::{InterfaceLock, LockError};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
+use crate::time::object::time_sync;
+use crate::time::source::{Place, SourceError, TimeService};
 
 /// How often the commissioning of drives that come later goes on.
 const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
@@ -129,6 +127,9 @@ pub enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// There is no system time.
+    #[error("{0}")]
+    Time(#[from] SourceError),
     /// A thread or runtime cannot be started.
     #[error("cannot start {what}: {source}")]
     Thread {
@@ -151,6 +152,8 @@ pub struct RunningBox {
     restart: Arc<AtomicBool>,
     /// Name and kind of each axis.
     axes: Vec<(String, AxisKind)>,
+    /// Where system time comes from.
+    _time: TimeService,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -190,10 +193,6 @@ pub fn start(
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
     let Built { mut engine, mut adapters, notices, status, commissioners } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
-    // One host clock serves the box and, by the configuration's word, everybody else's time.
-    let sync = SyncState { grandmaster: Some(HOST_CLOCK), synchronized: true, offset: 0 };
-    engine.set_sync(sync);
-
     let (recorder, mut taps) = record(config, extras.capture)?;
     let mut tap = || taps.pop();
     let mut south = Vec::with_capacity(engine.buses().len());
@@ -232,6 +231,8 @@ pub fn start(
         north.push(UdpPort::new(socket, tap()));
     }
 
+    let (time, feed) = TimeService::start(&config.time, &clock_place(&adapters, &ports))?;
+
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -250,6 +251,7 @@ pub fn start(
         adapter.hide_connection_ids(secret());
         let (source, asked) = (status.clone(), Arc::clone(&restart));
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
+        let (clock, clock_source, setter) = (time.view(), config.time.source, time.setter());
         let mut drops = DropWatch::new(Arc::clone(&gate), SocketAddrV4::new(device.listen, PORT_IO));
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
             .attend(move |adapter| {
@@ -257,7 +259,7 @@ pub fn start(
                 let of_axes = health(&source.read(), number);
                 let minor_recoverable = of_axes.minor_recoverable || kept.is_unsaved();
                 adapter.set_health(Health { minor_recoverable, ..of_axes });
-                adapter.set_time_sync(time_sync(sync));
+                adapter.set_time_sync(time_sync(clock_source, &clock.read()));
                 if let Some(port) = &port {
                     adapter.set_link(port.state());
                 }
@@ -278,8 +280,10 @@ pub fn start(
                 if let Err(error) = keeper.note(&name, event) {
                     warn!(device = name, %error, "the settings cannot be written; they last until Axisbridge ends");
                 }
-                if matches!(event, Event::Reset { .. }) {
-                    asked.store(true, Ordering::Relaxed);
+                match event {
+                    Event::Reset { .. } => asked.store(true, Ordering::Relaxed),
+                    Event::TimeSyncSet(setting) => setter.set(*setting),
+                    _ => {}
                 }
             });
         info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
@@ -308,12 +312,23 @@ pub fn start(
     runtime.spawn(can_watch::watch(watches, Arc::clone(&stop_notices)));
 
     commission(commissioners)?;
-    let setup = Setup { engine, north, south, realtime: config.realtime };
+    let setup = Setup { engine, north, south, time: feed, realtime: config.realtime };
     let cycle = CycleThread::start(setup)
         .map_err(|source| StartError::Thread { what: "the cycle thread", source })?;
     drop(_inside);
     let axes = config.axes.iter().map(|axis| (axis.name.clone(), axis.kind)).collect();
-    Ok(RunningBox { status, cycle, runtime, servers, recorder, stop_notices, restart, axes, _socket: socket })
+    Ok(RunningBox {
+        status,
+        cycle,
+        runtime,
+        servers,
+        recorder,
+        stop_notices,
+        restart,
+        axes,
+        _time: time,
+        _socket: socket,
+    })
 }
 
 /// Offers local control of all axes on a socket.
@@ -336,6 +351,16 @@ fn serve_local(
     info!(socket = %path.display(), "local control");
     runtime.spawn(server.run());
     Ok(file)
+}
+
+/// Where the clock of the box is on the network: at the address of the first device.
+fn clock_place<End>(adapters: &[(AdapterConfig, End)], ports: &[Option<HostPort>]) -> Place {
+    let adapter = adapters.first().map(|(adapter, _)| adapter);
+    Place {
+        interface: ports.first().and_then(Option::as_ref).map(|port| port.interface().to_owned()),
+        mac: adapter.map_or([0; 6], |adapter| adapter.link.mac),
+        event_dscp: adapter.map_or(QosConfig::default().ptp_event, |adapter| adapter.qos.ptp_event),
+    }
 }
 
 /// The port of a bus on CAN.
@@ -376,23 +401,6 @@ fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
         .spawn(run)
         .map(drop)
         .map_err(|source| StartError::Thread { what: "the commissioning of drives that come later", source })
-}
-
-/// The clock of the devices: that of the host, which runs no PTP of its own. Clocks that the host's daemons discipline tick
-/// at one rate, so their distance stands between two looks unless somebody sets the clock.
-fn time_sync(sync: SyncState) -> TimeSyncState {
-    let TimeSample { at: monotonic, system, .. } = HostTime.first_sample();
-    let utc_offset = match HostTime.scale() {
-        TimeScale::Tai { offset_s } => u16::try_from(offset_s).ok(),
-        TimeScale::Utc => None,
-    };
-    TimeSyncState {
-        sync,
-        system_less_monotonic: Some(system.0.cast_signed().wrapping_sub(monotonic.0.cast_signed())),
-        ptp: false,
-        measurement: None,
-        local: Some(ClockInfo { identity: HOST_CLOCK, utc_offset }),
-    }
 }
 
 /// How a device is, by its axes: what its Module Status LED shows is what its Identity object says.

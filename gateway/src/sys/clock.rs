@@ -102,20 +102,8 @@ impl HostTime {
     /// at each try. Two to nine readings of clocks, no waiting.
     #[must_use]
     pub fn sample(self) -> Option<TimeSample> {
-        let mut best: Option<(u64, TimeSample)> = None;
-        for _ in 0..READINGS {
-            let before = monotonic_now();
-            let system = SystemTime(read(ClockId::Tai));
-            let apart = monotonic_now().0.saturating_sub(before.0);
-            if best.is_none_or(|(best, _)| apart < best) {
-                let at = MonotonicTime(before.0 + apart / 2);
-                best = Some((apart, TimeSample { at, system, rate_ppb: 0 }));
-            }
-            if apart <= APART_MAX_NS / 10 {
-                break;
-            }
-        }
-        best.filter(|(apart, _)| *apart <= APART_MAX_NS).map(|(_, sample)| sample)
+        let Beside { at, time, .. } = beside(|| read(ClockId::Tai)).usable()?;
+        Some(TimeSample { at, system: SystemTime(time), rate_ppb: 0 })
     }
 
     /// The first sample, whatever interrupts it: as good as there is one.
@@ -131,11 +119,65 @@ impl HostTime {
     /// The scale that it counts now.
     #[must_use]
     pub fn scale(self) -> TimeScale {
-        match tai_offset_s() {
-            Some(offset_s) if offset_s != 0 => TimeScale::Tai { offset_s },
+        match kernel_clock() {
+            Some(KernelClock { tai_offset_s: offset_s, .. }) if offset_s != 0 => TimeScale::Tai { offset_s },
             _ => TimeScale::Utc,
         }
     }
+}
+
+/// A reading of a clock with the monotonic time of the same instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Beside {
+    /// How far the two readings of the monotonic clock around it are apart, ns.
+    pub apart: u64,
+    /// Their middle.
+    pub at: MonotonicTime,
+    /// The reading, ns.
+    pub time: u64,
+}
+
+impl Beside {
+    /// Itself, if the thread was not interrupted between the readings.
+    pub(super) fn usable(self) -> Option<Self> {
+        Some(self).filter(|reading| reading.apart <= APART_MAX_NS)
+    }
+}
+
+/// The best of some readings of a clock beside the monotonic one.
+pub(super) fn beside(read: impl Fn() -> u64) -> Beside {
+    let once = || {
+        let before = monotonic_now();
+        let time = read();
+        let apart = monotonic_now().0.saturating_sub(before.0);
+        Beside { apart, at: MonotonicTime(before.0 + apart / 2), time }
+    };
+    let mut best = once();
+    for _ in 1..READINGS {
+        if best.apart <= APART_MAX_NS / 10 {
+            break;
+        }
+        let next = once();
+        if next.apart < best.apart {
+            best = next;
+        }
+    }
+    best
+}
+
+/// The host's real-time clock beside the monotonic one; `None` when the thread was interrupted at each try.
+#[must_use]
+pub fn beside_realtime() -> Option<Beside> {
+    beside(|| read(ClockId::Realtime)).usable()
+}
+
+/// The monotonic time of a stamp of the kernel that was taken just now, to some hundred nanoseconds; `None` for one that is older
+/// than a second, as the clock may have been set since, and when the thread was interrupted at each reading.
+#[must_use]
+pub fn exactly_monotonic(stamp: KernelTime) -> Option<MonotonicTime> {
+    let Beside { at, time, .. } = beside_realtime()?;
+    let age = time.checked_sub(stamp.0).filter(|age| *age < NANOSECONDS_PER_SECOND)?;
+    at.0.checked_sub(age).map(MonotonicTime)
 }
 
 /// The monotonic time of a stamp of the kernel that was taken just now: within the last second. `None` for any other, as the clock
@@ -147,24 +189,36 @@ pub fn monotonic_of(stamp: KernelTime) -> Option<MonotonicTime> {
     now.0.checked_sub(age).map(MonotonicTime)
 }
 
-/// Whether somebody keeps the host's clock right: a daemon of PTP or NTP that has told the kernel so.
-#[must_use]
-pub fn is_disciplined() -> bool {
-    kernel_clock().is_some_and(|state| state.status & libc::STA_UNSYNC == 0)
-}
-
-/// The offset of TAI from UTC that the kernel holds, in seconds; `None` when it cannot be asked.
-fn tai_offset_s() -> Option<i32> {
-    kernel_clock().map(|state| state.tai)
+/// What the kernel knows of its clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KernelClock {
+    /// Somebody keeps it right: a daemon of PTP or NTP that has told the kernel so.
+    pub disciplined: bool,
+    /// Bound of its error, ns, as far as the daemon has told one: the smaller of its estimate and its maximum.
+    pub error_bound: u64,
+    /// Offset of TAI from UTC, s; 0 where nobody has told it.
+    pub tai_offset_s: i32,
 }
 
 /// What the kernel knows of its clock; `None` when it cannot be asked.
-fn kernel_clock() -> Option<libc::timex> {
+#[must_use]
+pub fn kernel_clock() -> Option<KernelClock> {
     let mut state = MaybeUninit::<libc::timex>::zeroed();
     // SAFETY: `state` is writable and outlives the call; `timex` is plain integers, for which all zeroes is a value, and its modes
     // of 0 only read.
     let (result, state) = unsafe { (libc::adjtimex(state.as_mut_ptr()), state.assume_init()) };
-    (result >= 0).then_some(state)
+    let micros = |value: libc::c_long| u64::try_from(value).unwrap_or(u64::MAX).saturating_mul(1_000);
+    (result >= 0).then(|| KernelClock {
+        disciplined: state.status & libc::STA_UNSYNC == 0,
+        error_bound: micros(state.esterror).min(micros(state.maxerror)),
+        tai_offset_s: state.tai,
+    })
+}
+
+/// Whether somebody keeps the host's clock right: a daemon of PTP or NTP that has told the kernel so.
+#[must_use]
+pub fn is_disciplined() -> bool {
+    kernel_clock().is_some_and(|clock| clock.disciplined)
 }
 
 fn read(clock: ClockId) -> u64 {

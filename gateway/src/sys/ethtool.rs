@@ -22,6 +22,8 @@ const DRIVER: (usize, usize) = (1, 32);
 const COALESCE: (usize, usize) = (1, 5);
 /// Places of `so_timestamping` and `rx_filters` in `struct ethtool_ts_info`.
 const STAMPS: usize = 1;
+/// Place of `phc_index` in the same: the number of the card's clock, or -1.
+const PHC_INDEX: usize = 2;
 /// Place of `eee_enabled` in `struct ethtool_eee`.
 const EEE_ENABLED: usize = 5;
 
@@ -45,6 +47,8 @@ pub struct Features {
     pub driver: Option<String>,
     /// Who stamps received frames.
     pub time_stamps: Option<TimeStamps>,
+    /// Number of the card's own clock, `/dev/ptpN`.
+    pub clock: Option<u32>,
     /// How long it may hold back the interrupt of a received and of a sent frame, us.
     pub coalescing_us: Option<(u32, u32)>,
     /// Whether Energy Efficient Ethernet is on: then the link sleeps between frames and takes time to wake.
@@ -64,6 +68,9 @@ pub fn features(name: &str) -> io::Result<Features> {
             hardware: answer[STAMPS] & RX_HARDWARE != 0,
             software: answer[STAMPS] & RX_SOFTWARE != 0,
         }),
+        clock: ask(ETHTOOL_GET_TS_INFO)
+            .map(|answer| answer[PHC_INDEX])
+            .filter(|index| index.cast_signed() >= 0),
         coalescing_us: ask(ETHTOOL_GCOALESCE).map(|answer| (answer[COALESCE.0], answer[COALESCE.1])),
         energy_efficient: ask(ETHTOOL_GEEE).map(|answer| answer[EEE_ENABLED] != 0),
     })

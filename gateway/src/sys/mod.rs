@@ -17,6 +17,8 @@ pub mod interface_lock;
 pub mod interfaces;
 pub mod link;
 pub mod packet_socket;
+pub mod phc;
+pub mod ptp_socket;
 pub mod realtime;
 pub mod udp;
 

@@ -35,14 +35,33 @@ pub(super) struct Message {
     pub own: bool,
 }
 
-/// Space for one `SCM_TIMESTAMPNS` and one `IP_TOS` or `SO_RXQ_OVFL` control message, aligned as `cmsghdr` asks.
+/// Space for the control messages of a received message: one `SCM_TIMESTAMPNS` and one `IP_TOS` or `SO_RXQ_OVFL`.
+const RECEIVED_LEN: usize = 64;
+
+/// Space for those of a sent one: `SCM_TIMESTAMPNS`, `SCM_TIMESTAMPING`, `IP_TOS` and `IP_RECVERR`.
+const SENT_LEN: usize = 192;
+
+/// Control messages, aligned as `cmsghdr` asks.
 #[repr(C, align(8))]
-struct Control([u8; 64]);
+struct Control<const LEN: usize>([u8; LEN]);
 
 /// Receives one message without waiting; `Ok(None)` when there is none.
 pub(super) fn receive(socket: BorrowedFd<'_>, buffer: &mut [u8]) -> io::Result<Option<Message>> {
+    receive_from::<RECEIVED_LEN>(socket, buffer, 0)
+}
+
+/// Takes what the kernel tells of a message that was sent (`MSG_ERRQUEUE`): when it left.
+pub(super) fn receive_sent(socket: BorrowedFd<'_>) -> io::Result<Option<Message>> {
+    receive_from::<SENT_LEN>(socket, &mut [], libc::MSG_ERRQUEUE)
+}
+
+fn receive_from<const LEN: usize>(
+    socket: BorrowedFd<'_>,
+    buffer: &mut [u8],
+    flags: libc::c_int,
+) -> io::Result<Option<Message>> {
     let mut part = libc::iovec { iov_base: buffer.as_mut_ptr().cast(), iov_len: buffer.len() };
-    let (mut from, mut control) = ([0; ADDRESS_LEN], Control([0; 64]));
+    let (mut from, mut control) = ([0; ADDRESS_LEN], Control([0; LEN]));
     // SAFETY: `msghdr` is integers and pointers, for which all zeroes is a value.
     let mut message: libc::msghdr = unsafe { std::mem::zeroed() };
     message.msg_name = from.as_mut_ptr().cast();
@@ -54,7 +73,7 @@ pub(super) fn receive(socket: BorrowedFd<'_>, buffer: &mut [u8]) -> io::Result<O
 
     // SAFETY: name, buffer and control point to writable memory of the lengths given, all alive through the
     // call.
-    let received = unsafe { libc::recvmsg(socket.as_raw_fd(), &raw mut message, libc::MSG_DONTWAIT) };
+    let received = unsafe { libc::recvmsg(socket.as_raw_fd(), &raw mut message, libc::MSG_DONTWAIT | flags) };
     let Ok(len) = usize::try_from(received) else {
         let error = io::Error::last_os_error();
         return match error.kind() {
@@ -67,6 +86,8 @@ pub(super) fn receive(socket: BorrowedFd<'_>, buffer: &mut [u8]) -> io::Result<O
     for (level, kind, data) in ControlMessages(control.0.get(..message.msg_controllen as _).unwrap_or(&[])) {
         match (level, kind) {
             (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => at = time_stamp(data),
+            // The first of three is that of the kernel; a message that has passed no driver that stamps has none.
+            (libc::SOL_SOCKET, libc::SCM_TIMESTAMPING) => at = at.or(time_stamp(data).filter(|at| at.0 > 0)),
             (libc::IPPROTO_IP, libc::IP_TOS) => tos = data.first().copied(),
             (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => {
                 dropped = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes));
@@ -123,6 +144,14 @@ pub(super) fn wait_for_input(descriptors: &[BorrowedFd<'_>], timeout: Duration) 
 /// Asks the kernel to stamp received messages; `false` when it will not.
 pub(super) fn enable_time_stamps(socket: BorrowedFd<'_>) -> bool {
     set_option(socket, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32).is_ok()
+}
+
+/// Asks the kernel to stamp messages when they leave; they are told by [`receive_sent`].
+pub(super) fn enable_sent_time_stamps(socket: BorrowedFd<'_>) -> io::Result<()> {
+    let flags = libc::SOF_TIMESTAMPING_TX_SOFTWARE
+        | libc::SOF_TIMESTAMPING_SOFTWARE
+        | libc::SOF_TIMESTAMPING_OPT_TSONLY;
+    set_option(socket, libc::SOL_SOCKET, libc::SO_TIMESTAMPING, &flags)
 }
 
 /// Asks the kernel to tell the type of service octet of received datagrams.

@@ -2,6 +2,7 @@
 
 use crate::device::config::QosConfig;
 use crate::device::motion_link::ConnectionTriad;
+use crate::device::objects::time_sync::TimeSyncSetting;
 use crate::wire::status::Service;
 use core::fmt;
 use core::net::SocketAddrV4;
@@ -101,6 +102,8 @@ pub enum Event {
         /// New value in seconds, 0 is never.
         seconds: u16,
     },
+    /// The Time Sync object was written. The application does it.
+    TimeSyncSet(TimeSyncSetting),
 }
 
 impl fmt::Display for Event {
@@ -140,6 +143,10 @@ impl fmt::Display for Event {
             Self::InactivityTimeoutChanged { seconds } => {
                 write!(f, "session inactivity time-out {seconds} s")
             }
+            Self::TimeSyncSet(TimeSyncSetting::MaxOffset) => {
+                f.write_str("Time Sync: the largest offset from the master begins anew")
+            }
+            Self::TimeSyncSet(TimeSyncSetting::Domain(domain)) => write!(f, "Time Sync: PTP domain {domain}"),
         }
     }
 }

@@ -162,6 +162,7 @@ fn configuration(name: &str) -> PathBuf {
     let listen = format!("listen = \"{GATEWAY}\"");
     for (shipped, here) in [
         ("listen = \"127.0.0.2\"", listen.as_str()),
+        ("[log]\n", "[time]\nsource = \"shared\"\n[log]\n"),
         ("priority = 0 ", "priority = 40 "),
         // The machine of the tests does not promise to keep time: two seconds without an answer.
         ("allowed_losses = 4\n", "allowed_losses = 1000\n"),

@@ -6,6 +6,7 @@ mod fixed_lists;
 mod flood;
 mod masters;
 mod misbehaviour;
+mod ptp;
 mod sercos;
 
 use std::fmt::Write as _;
@@ -70,6 +71,8 @@ fn configuration(name: &str) -> PathBuf {
     for (shipped, here) in [
         ("enp3s0", "sercos0"),
         ("192.168.1.10", "192.168.10.20"),
+        // The namespaces of a host have one clock.
+        ("source = \"ptp\"", "source = \"shared\""),
         // The machine of the tests has no processor to spare, and others on it that want to sleep.
         ("cpu = 1\n", ""),
         ("stay_awake = true", "stay_awake = false"),

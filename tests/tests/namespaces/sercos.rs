@@ -36,6 +36,7 @@ fn configuration(name: &str, axes: usize, cycle_ms: u16, ring: bool, late: usize
     let names = (1..=axes).map(|axis| format!("\"axis-{axis}\"")).collect::<Vec<_>>().join(", ");
     let mut text = format!(
         "[box]\nname = \"test\"\n[log]\nlevel = \"info\"\n\
+         [time]\nsource = \"shared\"\n\
          [[device]]\nname = \"front\"\nlisten = \"{BOX}\"\naxes = [{names}]\n\
          update_period = {{ min = \"4 ms\", max = \"32 ms\" }}\n\
          [device.identity]\nvendor_id = 1\nproduct_code = 1\nserial_number = 1\n\

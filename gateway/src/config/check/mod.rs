@@ -14,6 +14,7 @@ mod problems;
 mod realtime;
 mod references;
 pub(super) mod sercos;
+pub(super) mod time;
 mod value;
 
 use std::path::PathBuf;
@@ -25,11 +26,8 @@ pub(crate) use self::sercos::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER};
 
 use self::problems::Problems;
 use super::file::{File, RealtimeTable, SouthTable};
-use super::{AXES_MAX, Config, DEVICES_MAX, LogLevel, TimeSource};
+use super::{AXES_MAX, Config, DEVICES_MAX, LogLevel};
 use crate::finding::{Problem, Spanned};
-
-/// Where system time can come from.
-pub(super) const TIME_SOURCES: [(&str, TimeSource); 1] = [("host", TimeSource::Host)];
 
 /// What can be logged.
 pub(super) fn log_levels() -> [(&'static str, LogLevel); 5] {
@@ -45,7 +43,6 @@ pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
 
 fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
     let name = value::label(problems, "the box", &file.the_box.name);
-    let time = time(problems, file);
     let log_level = log_level(problems, file);
     let modbus = value::optional(&file.modbus, |table| modbus::check(problems, table));
     let mappings = file.mappings.as_ref();
@@ -96,6 +93,8 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         .map(|(axis, owner)| axis::check(problems, axis.get_ref(), *owner, &drives))
         .collect();
     references::instances(problems, &file.axis, &owners);
+    let listen: Vec<_> = devices.iter().flatten().map(|device| device.listen).collect();
+    let time = time::check(problems, file.time.as_ref(), &listen);
 
     Some(Config {
         name: name?,
@@ -113,11 +112,6 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         can: can?,
         devicenet: devicenet?,
     })
-}
-
-fn time(problems: &mut Problems, file: &File) -> Option<TimeSource> {
-    let source = file.time.as_ref().and_then(|table| table.source.as_ref());
-    value::word_or(problems, source, "time source", &TIME_SOURCES, TimeSource::Host)
 }
 
 fn log_level(problems: &mut Problems, file: &File) -> Option<LogLevel> {

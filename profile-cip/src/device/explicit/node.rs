@@ -249,7 +249,12 @@ impl Node {
             }
             CLASS_TIME_SYNC => {
                 let (state, config) = (&self.time_sync, &self.config);
-                serve(&mut TimeSync { state, config, now: origin.now }, service, path, data, limit)
+                let mut object = TimeSync { state, config, now: origin.now, setting: None };
+                let answer = serve(&mut object, service, path, data, limit);
+                if let Some(setting) = object.setting {
+                    self.tell(Event::TimeSyncSet(setting));
+                }
+                answer
             }
             CLASS_QOS => {
                 let before = self.config.qos;

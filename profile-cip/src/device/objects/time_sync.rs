@@ -4,8 +4,9 @@
 //! dissector and of the manuals of makers of CIP Sync devices, which agree; the class revision is from one such manual.
 //!
 //! The object reports what the device knows and refuses the rest with "attribute not supported". A device that runs no
-//! PTP itself has measured neither an offset from a master nor a path delay, and has no parent, intervals, priorities
-//! or domain; it has an opinion whether its time is everybody's time, and which clock that is.
+//! PTP itself has measured neither an offset from a master nor a path delay, and has no parent, intervals or domain; it has
+//! an opinion whether its time is everybody's time, and which clock that is. A follower of PTP serves all but the
+//! priorities of a master, which it can never be.
 //!
 //! | attribute | name | layout | served when |
 //! |---|---|---|---|
@@ -13,16 +14,22 @@
 //! | 2 | IsSynchronized | BOOL | always |
 //! | 3, 4 | SystemTimeMicroseconds, Nanoseconds | ULINT | the system time is known |
 //! | 5 | OffsetFromMaster | LINT ns | measured |
-//! | 6 | MaxOffsetFromMaster | ULINT ns | measured |
+//! | 6 | MaxOffsetFromMaster | ULINT ns | measured; set begins it anew |
 //! | 7 | MeanPathDelayToMaster | LINT ns | measured |
 //! | 8 | GrandMasterClockInfo | see [`ClockInfo`], and priorities UINT, UINT | there is one |
-//! | 9 | ParentClockInfo | no one has a parent without PTP | never |
+//! | 9 | ParentClockInfo | identity 8, port UINT, variance UINT, phase change rate UDINT | there is one |
 //! | 10 | LocalClockInfo | see [`ClockInfo`] | known |
 //! | 11 | NumberOfPorts | UINT | always: 1 |
 //! | 12 | PortStateInfo | count UINT, (port UINT, state UINT) | always: disabled without PTP |
-//! | 13 | PortEnableCfg | count UINT, (port UINT, enable UINT) | always |
-//! | 14..=20, 24 | intervals, priorities, domain, clock type, maker, profile | | never: they belong to PTP |
+//! | 13 | PortEnableCfg | count UINT, (port UINT, enable UINT) | always; set to what it is, or refused |
+//! | 14 | PortLogAnnounceIntervalCfg | count UINT, (port UINT, log2 s UINT) | with PTP |
+//! | 15 | PortLogSyncIntervalCfg | count UINT, (port UINT, log2 s INT) | with PTP |
+//! | 16, 17 | Priority1, Priority2 | | never: they belong to a master |
+//! | 18 | DomainNumber | USINT | with PTP; settable, 0 to 127 |
+//! | 19 | ClockType | WORD: bit 0 ordinary clock | with PTP |
+//! | 20 | ManufactureIdentity | 4: OUI, 0 | with PTP |
 //! | 21, 22, 23 | ProductDescription, RevisionData, UserDescription | UDINT length, text | always |
+//! | 24 | PortProfileIdentityInfo | count UINT, (port UINT, profile 8) | with PTP |
 //! | 25 | PortPhysicalAddressInfo | count UINT, (port UINT, protocol 16, length UINT, address 16) | the MAC address is known |
 //! | 26 | PortProtocolAddressInfo | count UINT, (port UINT, protocol UINT, length UINT, address 16) | always |
 //! | 27 | StepsRemoved | UINT | known |
@@ -47,7 +54,16 @@ const UDP_IPV4: u16 = 1;
 /// Longest address in the structures of the object.
 const ADDRESS_LEN: usize = 16;
 /// Priority of a clock whose priority nobody has set (IEEE 1588-2008, annex J).
-const DEFAULT_PRIORITY: u16 = 128;
+const DEFAULT_PRIORITY: u8 = 128;
+/// Identity of the profile: CIP Sync, six octets and two to fill.
+const PROFILE: [u8; 8] = [0x00, 0x21, 0x6C, 0x00, 0x01, 0x00, 0, 0];
+/// An ordinary clock.
+const ORDINARY_CLOCK: u16 = 1;
+/// What a follower has not measured of its parent, as other followers tell it.
+const PARENT_VARIANCE: u16 = 0xFFFF;
+const PARENT_PHASE_CHANGE_RATE: u32 = 0x7FFF_FFFF;
+/// Highest domain (IEEE 1588-2008, table 2).
+const DOMAIN_MAX: u8 = 127;
 
 /// What a clock says of itself.
 ///
@@ -58,36 +74,106 @@ const DEFAULT_PRIORITY: u16 = 128;
 pub struct ClockInfo {
     /// Identity, EUI-64.
     pub identity: [u8; 8],
+    /// Class (IEEE 1588-2008, table 5).
+    pub class: u8,
+    /// Accuracy (table 6).
+    pub accuracy: u8,
+    /// Offset scaled log variance (clause 7.6.3.3).
+    pub variance: u16,
     /// Seconds of TAI ahead of UTC, as far as the clock knows.
     pub utc_offset: Option<u16>,
+    /// Flags of the time properties without the validity of the UTC offset.
+    pub flags: u16,
+    /// Time source (table 7).
+    pub source: u8,
 }
 
 impl ClockInfo {
-    /// Clock class: default (IEEE 1588-2008, table 5).
-    const CLASS: u16 = 248;
-    /// Accuracy: unknown (table 6).
-    const ACCURACY: u16 = 0xFE;
-    /// Variance: not computed (clause 7.6.3.3).
-    const VARIANCE: u16 = 0xFFFF;
-    /// Time source: other (table 7).
-    const SOURCE: u16 = 0x90;
-    /// The UTC offset is valid.
+    /// Flag: the UTC offset is valid.
     const UTC_OFFSET_VALID: u16 = 1 << 2;
-    /// The time scale is that of PTP, which is TAI.
-    const PTP_TIME_SCALE: u16 = 1 << 3;
+    /// Flag: the time scale is that of PTP, which is TAI.
+    pub const PTP_TIME_SCALE: u16 = 1 << 3;
+    /// Flag: the time is traceable to a standard.
+    pub const TIME_TRACEABLE: u16 = 1 << 4;
+    /// Flag: the rate is traceable to a standard.
+    pub const FREQUENCY_TRACEABLE: u16 = 1 << 5;
+
+    /// The clock of a host: of the default class, unknown accuracy, another source.
+    #[must_use]
+    pub const fn host(identity: [u8; 8], utc_offset: Option<u16>) -> Self {
+        let flags = if utc_offset.is_some() { Self::PTP_TIME_SCALE } else { 0 };
+        Self { identity, class: 248, accuracy: 0xFE, variance: 0xFFFF, utc_offset, flags, source: 0x90 }
+    }
+
+    /// The clock of a follower: it is never a master, and has an oscillator of its own.
+    #[must_use]
+    pub const fn follower(identity: [u8; 8]) -> Self {
+        Self { class: 255, source: 0xA0, ..Self::host(identity, None) }
+    }
 
     fn write(&self, out: &mut Vec<u8>) {
-        let flags = match self.utc_offset {
-            Some(_) => Self::UTC_OFFSET_VALID | Self::PTP_TIME_SCALE,
-            None => 0,
-        };
+        let valid = if self.utc_offset.is_some() { Self::UTC_OFFSET_VALID } else { 0 };
         out.extend(self.identity);
-        for value in
-            [Self::CLASS, Self::ACCURACY, Self::VARIANCE, self.utc_offset.unwrap_or(0), flags, Self::SOURCE]
-        {
-            out.extend(value.to_le_bytes());
+        for value in [
+            self.class.into(),
+            self.accuracy.into(),
+            self.variance,
+            self.utc_offset.unwrap_or(0),
+            self.flags | valid,
+            self.source.into(),
+        ] {
+            out.extend(u16::to_le_bytes(value));
         }
     }
+}
+
+/// The master that a follower follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MasterInfo {
+    /// What the grandmaster says of itself.
+    pub grandmaster: ClockInfo,
+    /// Its first and second priority.
+    pub priorities: [u8; 2],
+    /// Identity and port number of the clock that sends the Syncs.
+    pub parent: ([u8; 8], u16),
+    /// Clocks on the way from the grandmaster.
+    pub steps_removed: u16,
+}
+
+/// State of the port of a follower (IEEE 1588-2008, table 8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PortState {
+    /// No master is heard.
+    #[default]
+    Listening = 4,
+    /// A master is followed; time is not synchronized.
+    Uncalibrated = 8,
+    /// Time is synchronized.
+    Slave = 9,
+}
+
+/// PTP of a device that follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PtpPort {
+    /// State of the port.
+    pub state: PortState,
+    /// Domain, 0 to 127.
+    pub domain: u8,
+    /// Interval of Announces that is expected, log2 s.
+    pub log_announce: u16,
+    /// Interval of Syncs that is expected, log2 s.
+    pub log_sync: i16,
+    /// Who is followed.
+    pub master: Option<MasterInfo>,
+}
+
+/// What somebody has set in the object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeSyncSetting {
+    /// The largest offset from the master begins anew.
+    MaxOffset,
+    /// Another domain is to be followed, 0 to 127.
+    Domain(u8),
 }
 
 /// What PTP has measured.
@@ -108,8 +194,8 @@ pub struct TimeSyncState {
     pub sync: SyncState,
     /// System time less monotonic time, ns; `None` without a system time.
     pub system_less_monotonic: Option<i64>,
-    /// The device runs PTP.
-    pub ptp: bool,
+    /// PTP, if the device follows it.
+    pub ptp: Option<PtpPort>,
     /// What it has measured.
     pub measurement: Option<Measurement>,
     /// The clock of the device itself.
@@ -132,6 +218,8 @@ pub(crate) struct TimeSync<'a> {
     pub state: &'a TimeSyncState,
     pub config: &'a AdapterConfig,
     pub now: MonotonicTime,
+    /// What a service has set.
+    pub setting: Option<TimeSyncSetting>,
 }
 
 impl Object for TimeSync<'_> {
@@ -144,8 +232,10 @@ impl Object for TimeSync<'_> {
         const NONE: GeneralStatus = GeneralStatus::ATTRIBUTE_NOT_SUPPORTED;
         let state = self.state;
         let measured = state.measurement.ok_or(NONE);
+        let ptp = state.ptp.ok_or(NONE);
+        let master = state.ptp.and_then(|ptp| ptp.master).ok_or(NONE);
         match attribute {
-            1 => out.push(u8::from(state.ptp)),
+            1 => out.push(u8::from(state.ptp.is_some())),
             2 => out.push(u8::from(state.sync.synchronized)),
             3 => out.extend((self.system_time()? / 1000).to_le_bytes()),
             4 => out.extend(self.system_time()?.to_le_bytes()),
@@ -153,21 +243,50 @@ impl Object for TimeSync<'_> {
             6 => out.extend(measured?.max_offset_from_master.to_le_bytes()),
             7 => out.extend(measured?.mean_path_delay.to_le_bytes()),
             8 => {
-                let local = state.local.filter(|_| state.is_grandmaster()).ok_or(NONE)?;
-                local.write(out);
-                out.extend(DEFAULT_PRIORITY.to_le_bytes());
-                out.extend(DEFAULT_PRIORITY.to_le_bytes());
+                let (clock, priorities) = match (master, state.local.filter(|_| state.is_grandmaster())) {
+                    (Ok(master), _) => (master.grandmaster, master.priorities),
+                    (Err(_), Some(local)) => (local, [DEFAULT_PRIORITY; 2]),
+                    (Err(none), None) => return Err(none),
+                };
+                clock.write(out);
+                priorities.iter().for_each(|priority| out.extend(u16::from(*priority).to_le_bytes()));
+            }
+            9 => {
+                let (identity, port) = master?.parent;
+                out.extend(identity);
+                out.extend(port.to_le_bytes());
+                out.extend(PARENT_VARIANCE.to_le_bytes());
+                out.extend(PARENT_PHASE_CHANGE_RATE.to_le_bytes());
             }
             10 => state.local.ok_or(NONE)?.write(out),
             11 => out.extend(1u16.to_le_bytes()),
-            12 if !state.ptp => port(out, &PORT_DISABLED.to_le_bytes()),
-            13 => port(out, &u16::from(state.ptp).to_le_bytes()),
+            12 => {
+                let state = state.ptp.map_or(PORT_DISABLED, |ptp| u16::from(ptp.state as u8));
+                port(out, &state.to_le_bytes());
+            }
+            13 => port(out, &u16::from(state.ptp.is_some()).to_le_bytes()),
+            14 => port(out, &ptp?.log_announce.to_le_bytes()),
+            15 => port(out, &ptp?.log_sync.to_le_bytes()),
+            18 => out.push(ptp?.domain),
+            19 => {
+                ptp?;
+                out.extend(ORDINARY_CLOCK.to_le_bytes());
+            }
+            20 => {
+                ptp?;
+                let identity = state.local.ok_or(NONE)?.identity;
+                out.extend([identity[0], identity[1], identity[2], 0]);
+            }
             21 => text(
                 &format!(";{};{:08X}", self.config.identity.product_name, self.config.identity.serial_number),
                 out,
             ),
             22 => text(&format!(";{}.{};", self.config.identity.major, self.config.identity.minor), out),
             23 => text("", out),
+            24 => {
+                ptp?;
+                port(out, &PROFILE);
+            }
             25 => {
                 let mac = self.config.link.mac;
                 if mac == [0; 6] {
@@ -182,7 +301,11 @@ impl Object for TimeSync<'_> {
                 port(out, &UDP_IPV4.to_le_bytes());
                 address(&self.config.interface.address.octets(), out);
             }
-            27 if state.is_grandmaster() => out.extend(0u16.to_le_bytes()),
+            27 => {
+                let own = state.is_grandmaster().then_some(0u16);
+                let steps = master.map(|master| master.steps_removed).ok().or(own).ok_or(NONE)?;
+                out.extend(steps.to_le_bytes());
+            }
             28 => {
                 let system_time = self.system_time()?;
                 out.extend((system_time / 1000).to_le_bytes());
@@ -196,6 +319,9 @@ impl Object for TimeSync<'_> {
     fn settable_len(&self, attribute: u16) -> Result<usize, GeneralStatus> {
         match attribute {
             1 => Ok(1),
+            6 => self.state.measurement.map(|_| 8).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+            13 => Ok(6),
+            18 => self.state.ptp.map(|_| 1).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
             _ => {
                 self.get(attribute, &mut Vec::new())?;
                 Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)
@@ -203,12 +329,24 @@ impl Object for TimeSync<'_> {
         }
     }
 
-    /// To ask for what is there is no error; a device that has no PTP cannot be made to have it.
+    /// To ask for what is there is no error; a device that has no PTP cannot be made to have it, and one that has it keeps it.
     fn set(&mut self, attribute: u16, value: &[u8]) -> Result<(), GeneralStatus> {
         match (attribute, value) {
-            (1, [0]) if !self.state.ptp => Ok(()),
-            (1, [1]) if self.state.ptp => Ok(()),
-            (1, _) => Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE),
+            (1 | 13, value) => {
+                let mut same = Vec::new();
+                self.get(attribute, &mut same)?;
+                if same == value { Ok(()) } else { Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE) }
+            }
+            // Whatever is written, the count begins anew.
+            (6, _) => {
+                self.setting = Some(TimeSyncSetting::MaxOffset);
+                Ok(())
+            }
+            (18, [domain @ 0..=DOMAIN_MAX]) => {
+                self.setting = Some(TimeSyncSetting::Domain(*domain));
+                Ok(())
+            }
+            (18, _) => Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE),
             _ => Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
         }
     }
@@ -251,7 +389,7 @@ mod tests {
         TimeSyncState {
             sync: SyncState { grandmaster: Some(HOST), synchronized: true, offset: 7000 },
             system_less_monotonic: Some(1_000_000_000_000),
-            local: Some(ClockInfo { identity: HOST, utc_offset: Some(37) }),
+            local: Some(ClockInfo::host(HOST, Some(37))),
             ..TimeSyncState::default()
         }
     }
@@ -259,7 +397,7 @@ mod tests {
     fn value(state: &TimeSyncState, attribute: u16) -> Result<Vec<u8>, GeneralStatus> {
         let mut out = Vec::new();
         let config = device();
-        let object = TimeSync { state, config: &config, now: MonotonicTime(5_000_001) };
+        let object = TimeSync { state, config: &config, now: MonotonicTime(5_000_001), setting: None };
         object.get(attribute, &mut out).map(|()| out)
     }
 
@@ -324,7 +462,7 @@ mod tests {
         }
         assert_eq!(value(&unknown, 2), Ok(vec![0]));
         // A clock on UTC says nothing of TAI.
-        let utc = TimeSyncState { local: Some(ClockInfo { identity: HOST, utc_offset: None }), ..host() };
+        let utc = TimeSyncState { local: Some(ClockInfo::host(HOST, None)), ..host() };
         assert_eq!(value(&utc, 10).map(|clock| clock[14..18].to_vec()), Ok(vec![0; 4]));
         // Somebody else's clock is not described by ours.
         let follower =
@@ -346,21 +484,116 @@ mod tests {
     #[test]
     fn ptp_can_be_asked_for_only_as_it_is() {
         let config = device();
+        let follower = Some(PtpPort::default());
         for (ptp, wanted, outcome) in [
-            (false, 0, Ok(())),
-            (false, 1, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
-            (true, 0, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
-            (true, 1, Ok(())),
-            (false, 2, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
+            (None, 0, Ok(())),
+            (None, 1, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
+            (follower, 0, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
+            (follower, 1, Ok(())),
+            (None, 2, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
         ] {
             let state = TimeSyncState { ptp, ..host() };
-            let mut object = TimeSync { state: &state, config: &config, now: MonotonicTime(0) };
+            let mut object =
+                TimeSync { state: &state, config: &config, now: MonotonicTime(0), setting: None };
             assert_eq!(object.settable_len(1), Ok(1));
-            assert_eq!(object.set(1, &[wanted]), outcome, "{ptp} {wanted}");
+            assert_eq!(object.set(1, &[wanted]), outcome, "{ptp:?} {wanted}");
+            assert_eq!(object.settable_len(13), Ok(6));
+            assert_eq!(object.set(13, &[1, 0, 1, 0, wanted, 0]), outcome, "{ptp:?} {wanted}");
+            assert_eq!(object.setting, None);
         }
         let state = host();
-        let object = TimeSync { state: &state, config: &config, now: MonotonicTime(0) };
+        let object = TimeSync { state: &state, config: &config, now: MonotonicTime(0), setting: None };
         assert_eq!(object.settable_len(2), Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE));
+        assert_eq!(object.settable_len(6), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED));
         assert_eq!(object.settable_len(9), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED));
+        assert_eq!(object.settable_len(18), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED));
+    }
+
+    /// A follower of a grandmaster behind one boundary clock.
+    fn follower() -> TimeSyncState {
+        let grandmaster = ClockInfo {
+            identity: [1; 8],
+            class: 6,
+            accuracy: 0x21,
+            variance: 0x4E5D,
+            utc_offset: Some(37),
+            flags: ClockInfo::PTP_TIME_SCALE | ClockInfo::TIME_TRACEABLE | ClockInfo::FREQUENCY_TRACEABLE,
+            source: 0x20,
+        };
+        let master =
+            MasterInfo { grandmaster, priorities: [100, 101], parent: ([2; 8], 0x0304), steps_removed: 2 };
+        TimeSyncState {
+            sync: SyncState { grandmaster: Some([1; 8]), synchronized: true, offset: 9_000 },
+            system_less_monotonic: Some(1_000_000_000_000),
+            ptp: Some(PtpPort {
+                state: PortState::Slave,
+                domain: 5,
+                log_announce: 1,
+                log_sync: 0,
+                master: Some(master),
+            }),
+            measurement: Some(Measurement {
+                offset_from_master: -12,
+                max_offset_from_master: 345,
+                mean_path_delay: 678,
+            }),
+            local: Some(ClockInfo::follower([9, 8, 7, 6, 5, 4, 3, 2])),
+        }
+    }
+
+    #[test]
+    fn a_follower_serves_everything_but_the_priorities_of_a_master() {
+        let port = |value: &[u8]| [&[1, 0, 1, 0][..], value].concat();
+        let clock = |identity: [u8; 8], rest: &[u8]| [&identity[..], rest].concat();
+        let grandmaster =
+            clock([1; 8], &[6, 0, 0x21, 0, 0x5D, 0x4E, 37, 0, 0x3C, 0, 0x20, 0, 100, 0, 101, 0]);
+        let parent = clock([2; 8], &[0x04, 0x03, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F]);
+        let local = clock([9, 8, 7, 6, 5, 4, 3, 2], &[255, 0, 0xFE, 0, 0xFF, 0xFF, 0, 0, 0, 0, 0xA0, 0]);
+        assert_eq!((grandmaster.len(), parent.len(), local.len()), (24, 16, 20));
+        for (attribute, expected) in [
+            (1, vec![1]),
+            (2, vec![1]),
+            (5, (-12_i64).to_le_bytes().to_vec()),
+            (6, 345_u64.to_le_bytes().to_vec()),
+            (7, 678_i64.to_le_bytes().to_vec()),
+            (8, grandmaster),
+            (9, parent),
+            (10, local),
+            (12, port(&[9, 0])),
+            (13, port(&[1, 0])),
+            (14, port(&[1, 0])),
+            (15, port(&[0, 0])),
+            (18, vec![5]),
+            (19, vec![1, 0]),
+            (20, vec![9, 8, 7, 0]),
+            (24, port(&[0x00, 0x21, 0x6C, 0x00, 0x01, 0x00, 0, 0])),
+            (27, vec![2, 0]),
+        ] {
+            assert_eq!(value(&follower(), attribute), Ok(expected), "{attribute}");
+        }
+        for attribute in [16, 17, 29] {
+            assert_eq!(
+                value(&follower(), attribute),
+                Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+                "{attribute}"
+            );
+        }
+        for (state, code) in [(PortState::Listening, 4), (PortState::Uncalibrated, 8)] {
+            let ptp = PtpPort { state, master: None, ..PtpPort::default() };
+            let status = TimeSyncState { ptp: Some(ptp), ..follower() };
+            assert_eq!(value(&status, 12), Ok(port(&[code, 0])));
+            assert_eq!(value(&status, 9), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED), "no parent");
+        }
+    }
+
+    #[test]
+    fn what_a_follower_can_be_told_is_told_on() {
+        let (config, state) = (device(), follower());
+        let mut object = TimeSync { state: &state, config: &config, now: MonotonicTime(0), setting: None };
+        assert_eq!((object.settable_len(6), object.settable_len(18)), (Ok(8), Ok(1)));
+        assert_eq!((object.set(6, &[0; 8]), object.setting), (Ok(()), Some(TimeSyncSetting::MaxOffset)));
+        assert_eq!((object.set(18, &[127]), object.setting), (Ok(()), Some(TimeSyncSetting::Domain(127))));
+        assert_eq!(object.set(18, &[128]), Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
+        assert_eq!(object.settable_len(16), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED));
     }
 }

@@ -19,7 +19,7 @@ fn the_time_sync_object_answers_as_the_device_was_told() {
     rig.adapter.set_time_sync(TimeSyncState {
         sync,
         system_less_monotonic: Some(0),
-        local: Some(ClockInfo { identity: [7; 8], utc_offset: None }),
+        local: Some(ClockInfo::host([7; 8], None)),
         ..TimeSyncState::default()
     });
     assert_eq!(rig.get(client, TIME_SYNC, 2).data, [1]);

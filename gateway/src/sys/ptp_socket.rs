@@ -1,0 +1,205 @@
+//! The sockets of a PTP follower: UDP 319 for event messages, with the kernel's stamps of receipt and sending, and UDP 320 for general
+//! ones.
+//!
+//! The stamps are those of the kernel, taken in the driver or just above it. `CLOCK_REALTIME` is only between them and the monotonic
+//! clock of the same moment: a step of it spoils the messages of that moment, and those are left out.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::os::fd::{AsFd as _, BorrowedFd};
+use std::time::Duration;
+
+use profile_generic::time::MonotonicTime;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockAddr, Socket, Type};
+use thiserror::Error;
+
+use super::clock::{exactly_monotonic, monotonic_now};
+use super::link;
+use super::option::set_option;
+use super::receive::{enable_sent_time_stamps, enable_time_stamps, receive, receive_sent, wait_for_input};
+
+/// Ports of event and general messages.
+const EVENT: u16 = 319;
+const GENERAL: u16 = 320;
+
+/// Where PTP messages go (IEEE 1588-2008, annex D).
+const GROUP: Ipv4Addr = Ipv4Addr::new(224, 0, 1, 129);
+
+/// How long the kernel may take to tell when a message left.
+const SENT_TIME_OUT: Duration = Duration::from_millis(20);
+
+/// Why the follower has no sockets.
+#[derive(Debug, Error)]
+pub enum OpenError {
+    /// There is no such interface.
+    #[error("there is no network interface {interface}")]
+    NoSuchInterface {
+        /// Its name.
+        interface: String,
+    },
+    /// Another program has the port.
+    #[error(
+        "UDP {port} is taken by another program: does ptp4l run here? Then source = \"daemon\" takes the time from it"
+    )]
+    InUse {
+        /// 319 or 320.
+        port: u16,
+    },
+    /// The ports below 1024 need a privilege.
+    #[error("UDP {port} needs the capability CAP_NET_BIND_SERVICE, or root")]
+    NoPrivilege {
+        /// 319 or 320.
+        port: u16,
+    },
+    /// The system refused for another reason.
+    #[error("cannot open UDP {port} for PTP: {step}: {source}")]
+    System {
+        /// 319 or 320.
+        port: u16,
+        /// What was being done.
+        step: &'static str,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+/// A message that came; its bytes are in the caller's buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arrived {
+    /// How many bytes.
+    pub len: usize,
+    /// When, for an event message (port 319); `None` for a general one (port 320).
+    pub event: Option<MonotonicTime>,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub struct PtpSockets {
+    event: Socket,
+    general: Socket,
+}
+
+impl PtpSockets {
+    /// Opens them on an interface; event messages are marked with a code point, 0 to 63.
+    ///
+    /// # Errors
+    /// [`OpenError`].
+    pub fn open(interface: &str, dscp: u8) -> Result<Self, OpenError> {
+        let index = link::index(interface)
+            .map_err(|_| OpenError::NoSuchInterface { interface: interface.to_owned() })?;
+        let index = u32::try_from(index).unwrap_or(0);
+        let event = open(EVENT, index, dscp)?;
+        let system = |step| move |source| OpenError::System { port: EVENT, step, source };
+        if !enable_time_stamps(event.as_fd()) {
+            return Err(system("SO_TIMESTAMPNS")(io::Error::last_os_error()));
+        }
+        enable_sent_time_stamps(event.as_fd()).map_err(system("SO_TIMESTAMPING"))?;
+        Ok(Self { event, general: open(GENERAL, index, dscp)? })
+    }
+
+    /// Waits for a message until an instant at most.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn wait(&self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+        if let Some(arrived) = self.take(buffer)? {
+            return Ok(Some(arrived));
+        }
+        let left = Duration::from_nanos(until.0.saturating_sub(monotonic_now().0));
+        if wait_for_input(&[self.event.as_fd(), self.general.as_fd()], left)? {
+            self.take(buffer)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// Sends an event message to all. Returns when it left, if the kernel says so in time.
+    ///
+    /// # Errors
+    /// What the system says; a message that could not be sent is no error, as a cable that was pulled comes back.
+    pub fn send_event(&self, message: &[u8]) -> io::Result<Option<MonotonicTime>> {
+        self.forget_sent()?;
+        match self.event.send_to(message, &SockAddr::from(SocketAddrV4::new(GROUP, EVENT))) {
+            Ok(_) => self.sent(),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// A stamp that came too late is that of no message, and wakes everybody who waits.
+    fn forget_sent(&self) -> io::Result<()> {
+        while receive_sent(self.event.as_fd())?.is_some() {}
+        Ok(())
+    }
+
+    /// The next message that is there.
+    fn take(&self, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+        while let Some(message) = receive(self.event.as_fd(), buffer)? {
+            // Without the time of its receipt an event message says nothing.
+            let at = message.at.and_then(exactly_monotonic);
+            if let (Some(at), false) = (at, message.truncated) {
+                return Ok(Some(Arrived { len: message.len, event: Some(at) }));
+            }
+        }
+        while let Some(message) = receive(self.general.as_fd(), buffer)? {
+            if !message.truncated {
+                return Ok(Some(Arrived { len: message.len, event: None }));
+            }
+        }
+        self.forget_sent()?;
+        Ok(None)
+    }
+
+    /// When the message sent last left.
+    fn sent(&self) -> io::Result<Option<MonotonicTime>> {
+        let end = monotonic_now().0 + u64::try_from(SENT_TIME_OUT.as_nanos()).unwrap_or(0);
+        loop {
+            if let Some(message) = receive_sent(self.event.as_fd())? {
+                return Ok(message.at.and_then(exactly_monotonic));
+            }
+            let left = end.saturating_sub(monotonic_now().0);
+            if left == 0 {
+                return Ok(None);
+            }
+            wait_for_sent(self.event.as_fd(), left)?;
+        }
+    }
+}
+
+/// Waits until something can be read from the error queue.
+fn wait_for_sent(socket: BorrowedFd<'_>, nanoseconds: u64) -> io::Result<()> {
+    let mut entry = [PollFd::from_borrowed_fd(socket, PollFlags::ERR)];
+    let timeout = Timespec { tv_sec: 0, tv_nsec: nanoseconds.min(999_999_999).try_into().unwrap_or(0) };
+    match poll(&mut entry, Some(&timeout)) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn open(port: u16, index: u32, dscp: u8) -> Result<Socket, OpenError> {
+    let system = |step: &'static str| move |source: io::Error| OpenError::System { port, step, source };
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP)).map_err(system("socket"))?;
+    socket.set_nonblocking(true).map_err(system("O_NONBLOCK"))?;
+    socket.bind(&SockAddr::from(SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, port))).map_err(|source| {
+        match source.kind() {
+            io::ErrorKind::AddrInUse => OpenError::InUse { port },
+            io::ErrorKind::PermissionDenied => OpenError::NoPrivilege { port },
+            _ => OpenError::System { port, step: "bind", source },
+        }
+    })?;
+    let interface = InterfaceIndexOrAddress::Index(index);
+    socket.join_multicast_v4_n(&GROUP, &interface).map_err(system("IP_ADD_MEMBERSHIP"))?;
+    // Messages of other interfaces, joined by other programs, are not ours.
+    socket.set_multicast_all_v4(false).map_err(system("IP_MULTICAST_ALL"))?;
+    let outgoing = libc::ip_mreqn {
+        imr_multiaddr: libc::in_addr { s_addr: 0 },
+        imr_address: libc::in_addr { s_addr: 0 },
+        imr_ifindex: index.try_into().unwrap_or(0),
+    };
+    set_option(socket.as_fd(), libc::IPPROTO_IP, libc::IP_MULTICAST_IF, &outgoing)
+        .map_err(system("IP_MULTICAST_IF"))?;
+    socket.set_multicast_ttl_v4(1).map_err(system("IP_MULTICAST_TTL"))?;
+    socket.set_multicast_loop_v4(false).map_err(system("IP_MULTICAST_LOOP"))?;
+    socket.set_tos_v4(u32::from(dscp & 0x3F) << 2).map_err(system("IP_TOS"))?;
+    Ok(socket)
+}

@@ -1,0 +1,334 @@
+//! A follower of PTP, the profile of CIP Sync: IEEE 1588-2008 over UDP and IPv4, end-to-end delay, slave only.
+//!
+//! `statime` has the protocol: parsing, best master, delay requests. Around it stand the [`guard`], which keeps from it what it
+//! cannot bear, and the [`Line`], which takes its measurements. Nothing sets a clock: the result is a line over the monotonic clock.
+//!
+//! [`follow`] runs until its [`Wire`] ends. The wire has the sockets and the time, so that a test has both in its hand.
+
+pub mod guard;
+mod measured;
+#[cfg(test)]
+mod tests;
+pub mod wire;
+
+use std::io;
+
+use profile_generic::time::MonotonicTime;
+use rand::SeedableRng as _;
+use rand::rngs::StdRng;
+use statime::config::{
+    AcceptAnyMaster, ClockIdentity, DelayMechanism, InstanceConfig, PortConfig, PtpMinorVersion, SdoId,
+    TimePropertiesDS, TimeSource,
+};
+use statime::observability::port::PortState;
+use statime::port::{PortAction, PortActionIterator, TimestampContext};
+use statime::time::{Duration, Interval, Time};
+use statime::{PtpInstance, PtpInstanceState};
+
+use self::guard::{Guard, MESSAGE_MAX};
+use self::measured::{Collector, LocalClock, Measured};
+use self::wire::{Arrived, Wire};
+use super::judge::{Event, Judge};
+use super::line::{Line, Taken};
+use super::status::{Master, TimeStatus};
+
+/// How it follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FollowerConfig {
+    /// Identity of our clock, EUI-64.
+    pub identity: [u8; 8],
+    /// Domain, 0..=127.
+    pub domain: u8,
+    /// Largest offset of a synchronized clock, ns.
+    pub threshold: u64,
+    /// By how much the way from the master is longer than the mean of both ways, ns.
+    pub asymmetry: i64,
+    /// Where the randomness of the delay requests begins.
+    pub seed: u64,
+}
+
+/// Announces come every two seconds (CIP Sync).
+const LOG_ANNOUNCE: i8 = 1;
+
+/// Syncs come every second (CIP Sync).
+const LOG_SYNC: i8 = 0;
+
+/// Delay requests go out every second in the mean.
+const LOG_DELAY_REQUEST: i8 = 0;
+
+/// Announces missed until a master is given up.
+const ANNOUNCE_TIME_OUT: u8 = 3;
+
+/// Longest wait, so that silence is noticed, ns.
+const PATROL_NS: u64 = 250_000_000;
+
+type Instance = PtpInstance<Collector, std::cell::RefCell<PtpInstanceState>>;
+
+/// Timers of the port, in the order of [`Timers::due`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Timer {
+    DelayRequest,
+    AnnounceReceipt,
+    BestMaster,
+}
+
+#[derive(Debug, Default)]
+struct Timers([Option<MonotonicTime>; 3]);
+
+impl Timers {
+    fn set(&mut self, timer: Timer, at: MonotonicTime) {
+        if let Some(place) = self.0.get_mut(timer as usize) {
+            *place = Some(at);
+        }
+    }
+
+    fn next(&self) -> Option<MonotonicTime> {
+        self.0.iter().flatten().min().copied()
+    }
+
+    /// Takes a timer that has run off.
+    fn due(&mut self, now: MonotonicTime) -> Option<Timer> {
+        [Timer::DelayRequest, Timer::AnnounceReceipt, Timer::BestMaster].into_iter().find(|timer| {
+            let place = self.0.get_mut(*timer as usize);
+            place.is_some_and(|place| place.take_if(|at| *at <= now).is_some())
+        })
+    }
+}
+
+/// A delay request that has been sent, with the time it left.
+type Sent = Option<(TimestampContext, MonotonicTime)>;
+
+/// Does what the port asks for; a delay request that left is returned.
+fn perform(
+    actions: PortActionIterator<'_>,
+    timers: &mut Timers,
+    wire: &mut impl Wire,
+    now: MonotonicTime,
+) -> io::Result<Sent> {
+    let mut sent = None;
+    let later = |duration: core::time::Duration| {
+        MonotonicTime(now.0.saturating_add(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)))
+    };
+    for action in actions {
+        match action {
+            PortAction::SendEvent { context, data, .. } => {
+                // Without the time it left there is no measurement; the next request has one.
+                sent = wire.send_event(data)?.map(|at| (context, at));
+            }
+            PortAction::ResetDelayRequestTimer { duration } => {
+                timers.set(Timer::DelayRequest, later(duration))
+            }
+            PortAction::ResetAnnounceReceiptTimer { duration } => {
+                timers.set(Timer::AnnounceReceipt, later(duration))
+            }
+            // Of a master, of filters with a time of their own, of boundary clocks.
+            PortAction::SendGeneral { .. }
+            | PortAction::ResetAnnounceTimer { .. }
+            | PortAction::ResetSyncTimer { .. }
+            | PortAction::ResetFilterUpdateTimer { .. }
+            | PortAction::ForwardTLV { .. } => {}
+        }
+    }
+    Ok(sent)
+}
+
+/// Follows the best master until the wire ends. `told` gets the status after each change.
+///
+/// # Errors
+/// What the wire says.
+pub fn follow(
+    config: &FollowerConfig,
+    wire: &mut impl Wire,
+    told: &mut dyn FnMut(&TimeStatus),
+) -> io::Result<()> {
+    let instance = Instance::new(
+        InstanceConfig {
+            clock_identity: ClockIdentity(config.identity),
+            priority_1: 255,
+            priority_2: 255,
+            domain_number: config.domain,
+            slave_only: true,
+            sdo_id: SdoId::default(),
+            path_trace: false,
+        },
+        TimePropertiesDS::new_arbitrary_time(false, false, TimeSource::InternalOscillator),
+    );
+    let collector = measured::Measurements::default();
+    let clock = LocalClock::new(wire.now());
+    let port_config = PortConfig {
+        acceptable_master_list: AcceptAnyMaster,
+        delay_mechanism: DelayMechanism::E2E { interval: Interval::from_log_2(LOG_DELAY_REQUEST) },
+        announce_interval: Interval::from_log_2(LOG_ANNOUNCE),
+        announce_receipt_timeout: ANNOUNCE_TIME_OUT,
+        sync_interval: Interval::from_log_2(LOG_SYNC),
+        master_only: false,
+        delay_asymmetry: Duration::from_nanos(config.asymmetry),
+        minor_ptp_version: PtpMinorVersion::Zero,
+    };
+    let port =
+        instance.add_port(port_config, collector.clone(), clock.clone(), StdRng::seed_from_u64(config.seed));
+    let mut timers = Timers::default();
+    let (mut port, actions) = port.end_bmca();
+    perform(actions, &mut timers, wire, wire.now())?;
+    let interval = u64::try_from(instance.bmca_interval().as_nanos()).unwrap_or(u64::MAX);
+    timers.set(Timer::BestMaster, MonotonicTime(wire.now().0.saturating_add(interval)));
+
+    let mut guard = Guard::new(config.identity, config.domain);
+    let mut follower = Follower::new(config);
+    let mut buffer = [0; MESSAGE_MAX];
+    told(follower.status(wire.now(), &guard));
+    while !wire.is_ended() {
+        let patrol = MonotonicTime(wire.now().0.saturating_add(PATROL_NS));
+        let until = timers.next().map_or(patrol, |at| at.min(patrol));
+        let arrived = wire.wait(until, &mut buffer)?;
+        let now = wire.now();
+        clock.set(now);
+        let sent = if let Some(Arrived { len, event }) = arrived {
+            match (guard.pass(buffer.get(..len).unwrap_or(&[]), now), event) {
+                (Ok(message), Some(at)) => {
+                    perform(port.handle_event_receive(message, time(at)), &mut timers, wire, now)?
+                }
+                (Ok(message), None) => perform(port.handle_general_receive(message), &mut timers, wire, now)?,
+                (Err(_), _) => None,
+            }
+        } else {
+            match timers.due(now) {
+                Some(Timer::DelayRequest) => {
+                    perform(port.handle_delay_request_timer(), &mut timers, wire, now)?
+                }
+                Some(Timer::AnnounceReceipt) => {
+                    perform(port.handle_announce_receipt_timer(), &mut timers, wire, now)?
+                }
+                Some(Timer::BestMaster) => {
+                    let mut deciding = port.start_bmca();
+                    instance.bmca(&mut [&mut deciding]);
+                    let (running, actions) = deciding.end_bmca();
+                    port = running;
+                    timers.set(Timer::BestMaster, MonotonicTime(now.0.saturating_add(interval)));
+                    perform(actions, &mut timers, wire, now)?
+                }
+                None => None,
+            }
+        };
+        if let Some((context, at)) = sent {
+            perform(port.handle_send_timestamp(context, time(at)), &mut timers, wire, now)?;
+        }
+        let parent = instance.parent_ds();
+        let is_slave = port.port_ds().port_state == PortState::Slave;
+        let master =
+            is_slave.then(|| Master::of(&parent, &instance.time_properties_ds(), &instance.current_ds(None)));
+        follower.master(master, now);
+        while let Some(measured) = collector.take() {
+            follower.measured(measured);
+        }
+        if wire.take_forget() {
+            follower.forget();
+        }
+        if follower.pass(now) {
+            told(follower.status(now, &guard));
+        }
+    }
+    Ok(())
+}
+
+fn time(at: MonotonicTime) -> Time {
+    Time::from_nanos(at.0)
+}
+
+/// What a follower makes of the measurements of its port.
+#[derive(Debug)]
+struct Follower {
+    line: Line,
+    judge: Judge,
+    status: TimeStatus,
+    /// Who has sent the Syncs of the line.
+    parent: Option<([u8; 8], u16)>,
+    changed: bool,
+}
+
+impl Follower {
+    fn new(config: &FollowerConfig) -> Self {
+        Self {
+            line: Line::default(),
+            judge: Judge::new(config.threshold),
+            status: TimeStatus::ptp(config),
+            parent: None,
+            changed: true,
+        }
+    }
+
+    fn judge(&mut self, event: Event, now: MonotonicTime) {
+        self.changed |= self.judge.handle(event, now).is_some();
+    }
+
+    /// The largest offset begins anew.
+    fn forget(&mut self) {
+        (self.status.max_offset, self.changed) = (0, true);
+    }
+
+    /// Looks whether another master is followed.
+    fn master(&mut self, master: Option<Master>, now: MonotonicTime) {
+        if master == self.status.master {
+            return;
+        }
+        self.changed = true;
+        let before = std::mem::replace(&mut self.status.master, master);
+        let Some(master) = master else {
+            self.judge(Event::NoMaster, now);
+            return;
+        };
+        let same_port = self.parent.replace(master.parent) == Some(master.parent);
+        let grandmaster = self.status.grandmaster != Some(master.grandmaster);
+        self.status.grandmaster = Some(master.grandmaster);
+        if grandmaster {
+            self.line.begin_anew();
+            self.status.max_offset = 0;
+        } else if !same_port {
+            // Another way to the same time has another delay.
+            self.line.forget_delay();
+        }
+        if grandmaster || before.is_none() {
+            self.judge(Event::Master { grandmaster }, now);
+        }
+    }
+
+    fn measured(&mut self, measured: Measured) {
+        self.changed = true;
+        let (at, phase) = match measured {
+            Measured::Sync { at, phase } => (at, phase),
+            Measured::Delay { at, phase } => return self.line.delay(at, phase),
+        };
+        let had_time = self.line.mean_path_delay().is_some();
+        let event = match self.line.sync(at, phase) {
+            Taken::Stepped { by } => {
+                self.status.steps = self.status.steps.saturating_add(1);
+                self.status.offset_from_master = Some(by.saturating_neg());
+                Event::Step
+            }
+            Taken::Near { offset } | Taken::PutAside { offset } if had_time => {
+                // Of us from the master, as everywhere in PTP.
+                self.status.offset_from_master = Some(offset.saturating_neg());
+                self.status.max_offset = self.status.max_offset.max(offset.unsigned_abs());
+                Event::Offset(offset)
+            }
+            Taken::First | Taken::Near { .. } | Taken::PutAside { .. } => Event::NoDelay,
+        };
+        self.judge(event, at);
+    }
+
+    /// Time passes. Whether there is something to tell.
+    fn pass(&mut self, now: MonotonicTime) -> bool {
+        self.judge(Event::Time, now);
+        std::mem::take(&mut self.changed)
+    }
+
+    fn status(&mut self, now: MonotonicTime, guard: &Guard) -> &TimeStatus {
+        self.status.phase = self.judge.phase();
+        self.status.error_bound = self.judge.error_bound(now);
+        self.status.sample = self.line.sample(now);
+        self.status.mean_path_delay = self.line.mean_path_delay();
+        self.status.spread = self.line.spread();
+        self.status.refused = guard::Refusal::ALL.map(|reason| guard.refused(reason));
+        &self.status
+    }
+}

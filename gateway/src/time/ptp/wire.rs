@@ -1,0 +1,84 @@
+//! Where the follower gets its messages and the time from.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+use profile_generic::time::MonotonicTime;
+
+pub use crate::sys::ptp_socket::Arrived;
+
+use crate::sys::clock::monotonic_now;
+use crate::sys::ptp_socket::PtpSockets;
+
+/// Sockets and clock of a follower.
+pub trait Wire {
+    /// The monotonic time.
+    fn now(&self) -> MonotonicTime;
+
+    /// Waits for a message until an instant at most.
+    ///
+    /// # Errors
+    /// What the sockets say.
+    fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>>;
+
+    /// Sends an event message to all. Returns when it left, if that is known.
+    ///
+    /// # Errors
+    /// What the socket says.
+    fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>>;
+
+    /// Whether the follower is to end.
+    fn is_ended(&self) -> bool;
+
+    /// Whether the largest offset is to begin anew, once.
+    fn take_forget(&mut self) -> bool {
+        false
+    }
+}
+
+/// What a follower is told while it runs.
+#[derive(Debug, Default)]
+pub struct Control {
+    /// It ends.
+    pub stop: AtomicBool,
+    /// The domain that it follows.
+    pub domain: AtomicU8,
+    /// The largest offset begins anew.
+    pub forget: AtomicBool,
+}
+
+/// The sockets of the host.
+#[derive(Debug)]
+pub struct HostWire {
+    /// They are open.
+    pub sockets: PtpSockets,
+    /// The domain that is followed.
+    pub domain: u8,
+    /// What the follower is told.
+    pub control: Arc<Control>,
+}
+
+impl Wire for HostWire {
+    fn now(&self) -> MonotonicTime {
+        monotonic_now()
+    }
+
+    fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+        self.sockets.wait(until, buffer)
+    }
+
+    fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>> {
+        self.sockets.send_event(message)
+    }
+
+    /// A follower has one domain: for another one it begins anew.
+    fn is_ended(&self) -> bool {
+        self.control.stop.load(Ordering::Relaxed)
+            || self.control.domain.load(Ordering::Relaxed) != self.domain
+    }
+
+    fn take_forget(&mut self) -> bool {
+        self.control.forget.swap(false, Ordering::Relaxed)
+    }
+}
