@@ -85,6 +85,7 @@ mod overlay;
 mod resolver;
 mod rows;
 mod sercos;
+mod twice;
 
 #[cfg(test)]
 mod tests;

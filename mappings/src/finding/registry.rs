@@ -375,6 +375,14 @@ registry! {
         "The drive has already switched itself off for this error. A row that makes a warning of it lets the controller believe that the axis still moves.",
         "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overload shut-down\", is = 1 }]\ncause = \"motor_overload_user_limit\"\nreaction = \"alarm\"",
         "Remove `reaction`.";
+    POLICY_WEAK = 66 Error "what is required may be missing in silence":
+        "`missing` and `refused` say what happens where a drive lacks a value or refuses a step. A set-point, the actual position, an operating mode of the axis and a limit of the configuration are required: without one, the drive must not come to operation as if it were there. A value that the controller reads is told as missing, and not as 0.",
+        "[[generic-sercos.signal]]\nsignal = \"velocity_command\"\nmissing = \"omit\"",
+        "Write the policy that the finding names. If the axis can really do without it, write `# accept: reason` next to the row.";
+    WRONG_FAULT = 67 Error "a fault that is reported as another one":
+        "The bit or the class of the drive, or the cause of the fault catalogue, has a name in the standard on the other side, and the row names another one. Whoever reads the fault looks for something that is not broken.",
+        "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overvoltage error\", is = 1 }]\ncause = \"under_voltage\"",
+        "Write the name that the finding shows. If this drive means something else with it, write `# accept: reason` next to the row.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",

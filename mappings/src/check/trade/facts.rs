@@ -313,3 +313,166 @@ pub(super) const SERCOS_MODES: &[(&str, bool, &str)] = &[
     ("velocity", false, "Velocity control"),
     ("torque", false, "Torque control"),
 ];
+
+/// Set-points that the controller makes, and the value that shows where the axis is: a drive that lacks one cannot be used in the mode.
+/// What is added inside the drive (offsets) and the deceleration of a profile, for which drives take the acceleration, may be missing.
+pub(super) const REQUIRED: &[&str] = &[
+    "position_command",
+    "velocity_command",
+    "torque_command",
+    "target_position",
+    "profile_velocity",
+    "profile_acceleration",
+    "position_actual",
+];
+
+/// The mode of a frequency converter, which may have no encoder: its velocity is what shows that it turns.
+pub(super) const WITHOUT_ENCODER: (&str, &str) = ("vl", "velocity_actual");
+
+/// Steps of commissioning after which the axis is another one when the drive refuses: the mode of operation, and what the
+/// configuration limits.
+pub(super) const MODE_STEPS: &[&str] = &["write_modes", "write_mode"];
+pub(super) const LIMITS: &[&str] = &[
+    "position_limit_positive",
+    "position_limit_negative",
+    "velocity_limit_positive",
+    "velocity_limit_negative",
+    "acceleration_limit",
+    "deceleration_limit",
+    "torque_limit_positive",
+    "torque_limit_negative",
+    "position_error_tolerance",
+];
+
+/// The one element of the Actual Data Set that is there with every drive (Table 6-2.21): of one that is gone, the last position.
+pub(super) const ALWAYS_THERE: &str = "Actual Position";
+
+/// How a Stopping Action of CIP Motion stops (Table 5-2.54): the method, whether the axis is held then, and the strongest
+/// stop that an Abort request may make of it.
+pub(super) const STOPPINGS: &[(&str, &str, bool, &str)] = &[
+    ("Disable & Coast", "coast", false, "coast_and_disable"),
+    ("Current Decel & Disable", "decelerate", false, "decelerate_and_disable"),
+    ("Ramped Decel & Disable", "ramp", false, "decelerate_and_disable"),
+    ("Current Decel & Hold", "decelerate", true, "hold_position"),
+    ("Ramped Decel & Hold", "ramp", true, "hold_position"),
+];
+
+/// The fault of CIP Motion that stands for a cause, by the texts of Tables 5-2.65 (exceptions), 5-2.6 (node faults), 5-2.72
+/// (initialization faults) and 5-2.76 (APR faults): the key of the row, and the name. Other causes have no name in the standard.
+pub(super) const CIP_FAULTS: &[(&str, &str, &str)] = &[
+    ("motor_over_current", "exception", "Motor Overcurrent"),
+    ("motor_short_circuit", "exception", "Motor Overcurrent"),
+    ("commutation", "exception", "Motor Commutation"),
+    ("motor_over_speed", "exception", "Motor Overspeed FL"),
+    ("motor_over_speed_user_limit", "exception", "Motor Overspeed UL"),
+    ("motor_over_temperature", "exception", "Motor Overtemperature FL"),
+    ("motor_over_temperature_user_limit", "exception", "Motor Overtemperature UL"),
+    ("motor_overload", "exception", "Motor Thermal Overload FL"),
+    ("motor_overload_user_limit", "exception", "Motor Thermal Overload UL"),
+    ("motor_phase_loss", "exception", "Motor Phase Loss"),
+    ("over_torque", "exception", "Overtorque Limit"),
+    ("under_torque", "exception", "Undertorque Limit"),
+    ("over_current", "exception", "Inverter Overcurrent"),
+    ("drive_over_temperature", "exception", "Inverter Overtemperature FL"),
+    ("drive_over_temperature_user_limit", "exception", "Inverter Overtemperature UL"),
+    ("drive_overload", "exception", "Inverter Thermal Overload FL"),
+    ("drive_overload_user_limit", "exception", "Inverter Thermal Overload UL"),
+    ("ground_current", "exception", "Converter Ground Current FL"),
+    ("over_voltage", "exception", "Bus Overvoltage FL"),
+    ("over_voltage_user_limit", "exception", "Bus Overvoltage UL"),
+    ("under_voltage", "exception", "Bus Undervoltage FL"),
+    ("under_voltage_user_limit", "exception", "Bus Undervoltage UL"),
+    ("power_loss", "exception", "Bus Power Loss"),
+    ("mains_loss", "exception", "Converter AC Power Loss"),
+    ("mains_phase_loss", "exception", "Converter AC Single Phase Loss"),
+    ("mains_short_circuit", "exception", "Converter AC Phase Short"),
+    ("pre_charge", "exception", "Converter Pre-Charge Failure"),
+    ("bus_regulator", "exception", "Bus Regulator Failure"),
+    ("bus_regulator_overload", "exception", "Bus Regulator Thermal Overload FL"),
+    ("bus_fuse", "exception", "Bus Power Blown Fuse"),
+    ("bus_sharing", "exception", "Bus Power Sharing"),
+    ("bus_leakage", "exception", "Bus Power Leakage"),
+    ("converter_over_current", "exception", "Converter Overcurrent"),
+    ("converter_over_temperature", "exception", "Converter Overtemperature FL"),
+    ("converter_overload", "exception", "Converter Thermal Overload FL"),
+    ("feedback_loss", "exception", "Feedback Signal Loss FL"),
+    ("feedback_noise", "exception", "Feedback Signal Noise FL"),
+    ("feedback_data_loss", "exception", "Feedback Data Loss FL"),
+    ("feedback_device", "exception", "Feedback Device Failure"),
+    ("excessive_position_error", "exception", "Excessive Position Error"),
+    ("excessive_velocity_error", "exception", "Excessive Velocity Error"),
+    ("hardware_overtravel_positive", "exception", "Hardware Overtravel Positive"),
+    ("hardware_overtravel_negative", "exception", "Hardware Overtravel Negative"),
+    ("software_overtravel_positive", "exception", "Position Overtravel Positive"),
+    ("software_overtravel_negative", "exception", "Position Overtravel Negative"),
+    ("brake_slip", "exception", "Brake Slip"),
+    ("enable_input_lost", "exception", "Enable Input Deactivated"),
+    ("external_input", "exception", "External Exception Input"),
+    ("controller_abort", "exception", "Controller Initiated Exception"),
+    ("illegal_mode", "exception", "Illegal Control Mode"),
+    ("command_lost", "node_fault", "Control Connection Update Fault"),
+    ("synchronization_loss", "node_fault", "Clock Sync Fault"),
+    ("time_stamp", "node_fault", "Clock Skew Fault"),
+    ("data_format", "node_fault", "Data Format Error"),
+    ("connection_closed", "node_fault", "Control Connection Loss Fault"),
+    ("duplicate_address", "node_fault", "Duplicate Address"),
+    ("processor_watchdog", "node_fault", "Processor Watchdog Fault"),
+    ("node_hardware", "node_fault", "Hardware Fault"),
+    ("memory", "initialization", "Nonvolatile Memory Checksum Fault"),
+    ("self_test", "initialization", "Main Block Checksum Fault"),
+    ("absolute_position_lost", "apr", "Feedback Integrity Loss"),
+];
+
+/// Bits of S-0-0011 and S-0-0012, and what they say is wrong.
+pub(super) const SERCOS_FAULTS: &[(&str, &str)] = &[
+    ("Overload shut-down", "motor_overload"),
+    ("Amplifier overtemperature shut-down", "drive_over_temperature"),
+    ("Motor overtemperature shut-down", "motor_over_temperature"),
+    ("Cooling error shut-down", "cooling"),
+    ("Control voltage error", "control_voltage"),
+    ("Feedback error", "feedback_loss"),
+    ("Commutation error", "commutation"),
+    ("Overcurrent error", "over_current"),
+    ("Overvoltage error", "over_voltage"),
+    ("Undervoltage error", "under_voltage"),
+    ("Power supply phase error", "mains_phase_loss"),
+    ("Excessive position deviation", "excessive_position_error"),
+    ("Communication error", "communication_loss"),
+    ("Overtravel limit exceeded", "software_overtravel_positive"),
+    ("Manufacturer specific error", "drive_specific"),
+    ("Overload warning", "motor_overload_user_limit"),
+    ("Amplifier overtemperature warning", "drive_over_temperature_user_limit"),
+    ("Motor overtemperature warning", "motor_over_temperature_user_limit"),
+    ("Cooling error warning", "cooling_warning"),
+    ("Positioning velocity above limit", "velocity_command_warning"),
+    ("Undervoltage warning", "under_voltage_user_limit"),
+    ("Target position outside of travel range", "position_command_warning"),
+    ("Manufacturer specific warning", "drive_warning"),
+];
+
+/// Classes of the error codes of 603Fh, and what is wrong by them where the code says no more.
+pub(super) const CLASSES: &[(&str, &str)] = &[
+    ("Current", "over_current"),
+    ("Current, input side", "over_current"),
+    ("Current, inside the device", "over_current"),
+    ("Current, output side", "over_current"),
+    ("Mains voltage", "mains_loss"),
+    ("DC link voltage", "over_voltage"),
+    ("Temperature", "drive_over_temperature"),
+    ("Ambient temperature", "drive_over_temperature"),
+    ("Device temperature", "drive_over_temperature"),
+    ("Drive temperature", "drive_over_temperature"),
+    ("Device hardware", "internal"),
+    ("Device software", "internal"),
+    ("Internal software", "internal"),
+    ("User software", "internal"),
+    ("Data set", "parameter"),
+    ("Communication", "communication_loss"),
+    ("Protocol", "communication_loss"),
+    ("Velocity control", "excessive_velocity_error"),
+    ("Position control", "excessive_position_error"),
+    ("Positioning", "excessive_position_error"),
+    ("External error", "external_input"),
+    ("Generic error", "drive_specific"),
+    ("Device specific", "drive_specific"),
+];

@@ -8,9 +8,11 @@
 
 mod access;
 mod bindings;
+mod causes;
 mod cia402_words;
 mod cip_words;
 mod facts;
+mod policies;
 mod scales;
 mod sercos_words;
 mod signs;
@@ -31,6 +33,10 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     scales::sercos(mapping, findings);
     scales::cip(mapping, findings);
     sercos_words::check(mapping, findings);
+    causes::sercos(mapping, findings);
+    causes::cip(mapping, findings);
+    policies::sercos(mapping, findings);
+    policies::cip(mapping, findings);
     cip_words::check(mapping, findings);
 }
 
@@ -41,6 +47,8 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     access::cia402(mapping, findings);
     scales::cia402(mapping, findings);
     cia402_words::check(mapping, findings);
+    causes::cia402(mapping, findings);
+    policies::cia402(mapping, findings);
 }
 
 /// The place of a key that may be missing: its own, else that of what names the row.
