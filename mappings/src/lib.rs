@@ -79,6 +79,7 @@ mod generic_names;
 mod groups;
 mod item;
 mod load;
+mod meaning;
 mod numbers;
 mod origin;
 mod overlay;

@@ -63,7 +63,9 @@ fn problem(section: &Section, row: &DeTable<'_>, place: Range<usize>, first: Ran
     let problem = Problem::new(code::TWICE, place).key(key);
     let problem = problem.title(format!("the [[{}]] row of {key} = {which} is there twice", section.name));
     let problem = problem.expected("the first one counts, this one is never reached");
-    problem.related(first, "the row is here first").help("remove one of the two, or correct the keys that identify it")
+    problem
+        .related(first, "the row is here first")
+        .help("remove one of the two, or correct the keys that identify it")
 }
 
 /// Where a row is shown: at the first of the keys by which it is known, or as a whole where a group says that key.

@@ -1,11 +1,13 @@
 //! A fault of a drive is reported as what it is.
 
-use super::facts::{CIP_FAULTS, CLASSES, SERCOS_FAULTS};
+use super::facts::{
+    CIP_FAULTS, CLASSES, INHIBITS, OWN_EVENT_STATUS, OWN_FAULTS, OWN_INHIBITS, SERCOS_FAULTS,
+};
 use super::{Reporter, place_of};
 use crate::Mapping;
-use crate::finding::Findings;
 use crate::finding::registry::{WEAKER_REACTION, WRONG_FAULT};
-use crate::format::{CipFaultRow, FieldIs, Name};
+use crate::finding::{Findings, Spanned};
+use crate::format::{CipFaultRow, FieldIs, FieldValueRow, Name};
 
 /// The faults of CIP Motion that causes stand for.
 pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
@@ -45,6 +47,47 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
         };
         reporter.report(WRONG_FAULT, (key, place), what);
     }
+    for row in &file.rows.fault {
+        own(&mut reporter, &row.cause, row.manufacturer.as_ref(), OWN_FAULTS);
+    }
+    for row in &file.rows.inhibit {
+        own(&mut reporter, &row.inhibit, row.manufacturer.as_ref(), OWN_INHIBITS);
+        let name = row.inhibit.get_ref();
+        let right = INHIBITS.iter().find(|(known, _)| known == name).map(|(_, right)| *right);
+        let given = row.start_inhibit.as_ref();
+        if let Some(given) = given.filter(|given| right.is_some_and(|right| given.get_ref() != right)) {
+            let right = right.unwrap_or_default();
+            let what = [
+                format!("`{name}` would be reported as `{}`", given.get_ref()),
+                format!("expected `{right}`"),
+                format!("write `start_inhibit = \"{right}\"`"),
+            ];
+            reporter.report(WRONG_FAULT, ("start_inhibit", given.span()), what);
+        }
+    }
+    for row in &file.rows.capture_status {
+        let fact = OWN_EVENT_STATUS.iter().find(|(known, _)| known == row.status.get_ref());
+        if let Some((status, right)) = fact.filter(|(_, right)| row.event_status != *right) {
+            let what = [
+                format!("`{status}` would be reported as Event Status {}", row.event_status),
+                format!("expected {right}: programs of controllers rely on it"),
+                format!("write `event_status = {right}`"),
+            ];
+            reporter.report(WRONG_FAULT, ("status", row.status.span()), what);
+        }
+    }
+}
+
+/// A bit of the manufacturer.
+fn own(reporter: &mut Reporter<'_>, name: &Name, bit: Option<&Spanned<u32>>, facts: &[(&str, u32)]) {
+    let Some((_, right)) = facts.iter().find(|(known, _)| known == name.get_ref()) else { return };
+    let Some(bit) = bit.filter(|bit| bit.get_ref() != right) else { return };
+    let what = [
+        format!("`{}` would be reported by bit {} of the manufacturer", name.get_ref(), bit.get_ref()),
+        format!("expected bit {right}: programs of controllers rely on it"),
+        format!("write `manufacturer = {right}`"),
+    ];
+    reporter.report(WRONG_FAULT, ("manufacturer", bit.span()), what);
 }
 
 /// The name that a row has for its cause; `None` for a bit of the manufacturer.
@@ -65,13 +108,30 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     let mut reporter = Reporter { source: &file.text, findings };
     for row in &file.rows.fault {
         silent(&mut reporter, &row.cause, row.reaction.as_ref());
+        let of_class = |field: &FieldValueRow| {
+            field.field.get_ref() == "Class" && matches!(field.is.get_ref(), FieldIs::Number(0xF))
+        };
+        if row.word.get_ref() == "Diagnostic number" && !row.pattern.iter().any(of_class) {
+            let what = [
+                format!("`{}` would be reported for a diagnosis that is no error", row.cause.get_ref()),
+                "the class of S-0-0390 is F for a class 1 diagnostic".to_owned(),
+                "write `{ field = \"Class\", is = 0xF }` into `pattern`".to_owned(),
+            ];
+            reporter.report(WRONG_FAULT, ("cause", row.cause.span()), what);
+        }
         // Several bits together, and values of fields, are what a vendor says with them.
         let [field] = row.pattern.as_slice() else { continue };
-        if !matches!(field.is.get_ref(), FieldIs::Number(1)) {
-            continue;
-        }
         let name = field.field.get_ref().as_str();
         let fact = SERCOS_FAULTS.iter().find(|(known, _)| *known == name);
+        if fact.is_some() && matches!(field.is.get_ref(), FieldIs::Number(0)) {
+            let what = [
+                format!("`{}` would be reported while `{name}` is 0", row.cause.get_ref()),
+                "the drive sets the bit when something is wrong".to_owned(),
+                format!("write `pattern = [{{ field = \"{name}\", is = 1 }}]`"),
+            ];
+            reporter.report(WRONG_FAULT, ("cause", row.cause.span()), what);
+            continue;
+        }
         wrong(&mut reporter, &row.cause, name, fact);
     }
 }

@@ -78,7 +78,10 @@ fn stoppings(mapping: &Mapping, reporter: &mut Reporter<'_>) {
         }
         if row.holds != *holds {
             let what = [
-                format!("`{name}` would {} the axis with torque at rest", if row.holds { "hold" } else { "not hold" }),
+                format!(
+                    "`{name}` would {} the axis with torque at rest",
+                    if row.holds { "hold" } else { "not hold" }
+                ),
                 format!("expected `holds = {holds}`, as its name says"),
                 format!("write `holds = {holds}`"),
             ];

@@ -3,7 +3,7 @@
 //! A policy says what happens where a drive lacks a value or refuses a step. The weaker one of the two lets the axis come to
 //! operation without it: good for what is only read, and not for a set-point, a mode or a limit.
 
-use super::facts::{ALWAYS_THERE, LIMITS, MODE_STEPS, REQUIRED, WITHOUT_ENCODER};
+use super::facts::{ALWAYS_THERE, LIMITS, MODE_STEPS, REQUIRED, REQUIRED_OF_SERCOS, WITHOUT_ENCODER};
 use super::{Reporter, is_standard};
 use crate::Mapping;
 use crate::dictionary::Access;
@@ -18,6 +18,18 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
         if is_standard(row.idn.get_ref()) {
             signal(&mut reporter, &row.signal, &row.missing, &[]);
         }
+        if row.signal.get_ref() == REQUIRED_OF_SERCOS {
+            required(&mut reporter, &row.signal, &row.missing);
+        }
+    }
+    for row in file.rows.scaling.iter().filter(|row| row.scaling.get_ref() == "position" && !row.exact) {
+        let what = [
+            "positions may be rounded in silence".to_owned(),
+            "a position that does not come back exactly drifts: a drive whose scaling does not fit is refused"
+                .to_owned(),
+            "write `exact = true`".to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("scaling", row.scaling.span()), what);
     }
     for row in &file.rows.mode {
         mode(&mut reporter, &row.mode, row.interpolation.as_ref(), &row.missing);
@@ -53,7 +65,14 @@ fn signal(reporter: &mut Reporter<'_>, name: &Name, missing: &Name, modes: &[Nam
     } else {
         REQUIRED.contains(&name.get_ref().as_str())
     };
-    if required && missing.get_ref() != "refuse" {
+    if required {
+        self::required(reporter, name, missing);
+    }
+}
+
+/// A value that no axis can do without.
+fn required(reporter: &mut Reporter<'_>, name: &Name, missing: &Name) {
+    if missing.get_ref() != "refuse" {
         let what = [
             format!("`{}` may be missing in silence", name.get_ref()),
             "a drive that lacks it would come to operation, and the mode needs it".to_owned(),
@@ -70,7 +89,8 @@ fn mode(reporter: &mut Reporter<'_>, name: &Name, interpolation: Option<&Name>, 
         let what = [
             format!("the operating mode `{}` may be missing in silence", name.get_ref()),
             "a drive that lacks a mode of its axis would come to operation without it".to_owned(),
-            "write `missing = \"refuse\"`; an axis that does without the mode has `modes` of its own".to_owned(),
+            "write `missing = \"refuse\"`; an axis that does without the mode has `modes` of its own"
+                .to_owned(),
         ];
         reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
     }
@@ -118,10 +138,13 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
         let Some(attribute) = mapping.dictionaries.cip.attribute(row.attribute.get_ref()) else { continue };
         // What a controller only reads cannot be what it has set.
         let read_only = attribute.access == Access::Get;
-        if let Some(missing) = row.missing.as_ref().filter(|missing| read_only && missing.get_ref() == "shadow") {
+        if let Some(missing) =
+            row.missing.as_ref().filter(|missing| read_only && missing.get_ref() == "shadow")
+        {
             let what = [
                 format!("`{}` is not told as missing", attribute.name),
-                "of a drive without the parameter the controller would read a value that nobody has".to_owned(),
+                "of a drive without the parameter the controller would read a value that nobody has"
+                    .to_owned(),
                 "write `missing = \"reject\"`".to_owned(),
             ];
             reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
