@@ -9,6 +9,9 @@ use crate::finding::registry::{WEAKER_REACTION, WRONG_FAULT};
 use crate::finding::{Findings, Spanned};
 use crate::format::{CipFaultRow, FieldIs, FieldValueRow, Name};
 
+/// Causes without a name of their own: they say less than a bit or class, and nothing that is wrong.
+const NAMELESS: [&str; 2] = ["drive_specific", "drive_warning"];
+
 /// The faults of CIP Motion that causes stand for.
 pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().cip_generic;
@@ -156,7 +159,9 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
 
 /// A row whose cause is not what its bit or class says.
 fn wrong(reporter: &mut Reporter<'_>, cause: &Name, says: &str, fact: Option<&(&str, &str)>) {
-    let Some((_, right)) = fact.filter(|(_, right)| cause.get_ref() != right) else { return };
+    let given = cause.get_ref().as_str();
+    let says_less = NAMELESS.contains(&given);
+    let Some((_, right)) = fact.filter(|(_, right)| given != *right && !says_less) else { return };
     let what = [
         format!("`{says}` would be reported as `{}`", cause.get_ref()),
         format!("expected `{right}`"),
